@@ -1,0 +1,31 @@
+"""Errors that reach the user: one plain sentence each, and the exit code that goes with it."""
+
+
+class PlannerError(Exception):
+    """Base of every error whose message is meant for the engineer's eyes."""
+
+    exit_code = 2
+
+
+class InputError(PlannerError):
+    """Bad usage or bad input; the message names file, row (where there is one) and remedy."""
+
+    exit_code = 2
+
+
+class RefusedError(PlannerError):
+    """A recording was read but cannot be used as a measurement."""
+
+    exit_code = 3
+
+
+class NoPoseLeftError(PlannerError):
+    """No reachable pose is left to propose."""
+
+    exit_code = 4
+
+
+class JournalError(PlannerError):
+    """The campaign's log is damaged beyond the tail that can be repaired."""
+
+    exit_code = 5

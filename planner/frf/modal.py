@@ -1,0 +1,30 @@
+"""Modal synthesis: poles and residues to FRFs, the one formula that every stage shares."""
+
+import numpy as np
+
+
+def pole(frequency_hz: np.ndarray, damping_ratio: np.ndarray) -> np.ndarray:
+    """Complex poles (rad/s) of natural frequencies (Hz) and damping ratios; shapes broadcast."""
+    omega = 2 * np.pi * np.asarray(frequency_hz)
+    zeta = np.asarray(damping_ratio)
+    return -zeta * omega + 1j * omega * np.sqrt(np.maximum(0.0, 1 - zeta**2))
+
+
+def accelerance(
+    frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray
+) -> np.ndarray:
+    """Accelerance (m/s²/N) of modes.
+
+    frequency_hz (F,); poles (..., m) in rad/s; residues (..., m, *out) in m/(N·s).
+    Returns (..., *out, F) = −ω² Σ_m [R/(iω−λ) + R*/(iω−λ*)] (seed 000, eq. 9).
+    """
+    iw = 2j * np.pi * np.asarray(frequency_hz)
+    poles = np.asarray(poles)
+    residues = np.asarray(residues)
+    out = residues.shape[poles.ndim :]
+    flat = residues.reshape(*poles.shape, -1)
+    basis = 1 / (iw - poles[..., None])
+    basis_conj = 1 / (iw - poles.conj()[..., None])
+    receptance = np.einsum("...mk,...mf->...kf", flat, basis)
+    receptance = receptance + np.einsum("...mk,...mf->...kf", flat.conj(), basis_conj)
+    return (iw**2 * receptance).reshape(*poles.shape[:-1], *out, iw.size)

@@ -1,0 +1,32 @@
+"""The frequency response matrix of one pose."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Frf:
+    """Accelerance matrix of one pose, estimated from its hits.
+
+    `accelerance[i, j]` (m/s²/N) is the response along axis i of the sensor frame to a force along
+    axis j of the tcp frame (i, j = x, y, z; parallel frames). Columns that were never hit are NaN
+    and False in `measured`. `variance` is E|δH|² of each complex line (the variance of the
+    estimate, not of one hit), NaN where unknown. `exponential_rate_1_s` is the decay rate of the
+    exponential window that the records carry (0: none); poles fitted to this FRF are shifted left
+    by exactly that rate and have to be shifted back.
+    """
+
+    frequency_hz: np.ndarray  # (F,) uniform, increasing
+    accelerance: np.ndarray  # (3, 3, F) complex
+    variance: np.ndarray  # (3, 3, F)
+    coherence: np.ndarray  # (3, 3, F) in [0, 1], NaN with a single hit
+    hits: tuple[int, int, int]  # hits averaged per column
+    usable_band_hz: tuple[float, float]  # where pulse, anti-alias and signal-to-noise allow use
+    exponential_rate_1_s: float = 0.0
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def measured(self) -> np.ndarray:
+        """(3,) bool: which columns (hit axes) were measured."""
+        return np.array(self.hits) > 0

@@ -1,0 +1,119 @@
+"""What a recording holds, before anything is computed from it."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One time history as stored in a file, converted to SI where its unit is stated.
+
+    `quantity` is "force", "acceleration", "velocity", "displacement", "pressure", "voltage" or
+    "unknown"; `unit` the SI unit of `samples` ("N", "m/s^2", …, "V", "" when the file states none).
+    `direction` is ±1, ±2, ±3 for ±x, ±y, ±z, 0 when the file states none.
+    """
+
+    name: str
+    quantity: str
+    unit: str
+    direction: int
+    samples: np.ndarray  # (n,)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeRecord:
+    """Simultaneously sampled channels of one file."""
+
+    source: Path
+    sampling_rate_hz: float
+    channels: tuple[Channel, ...]
+    remarks: tuple[str, ...] = ()  # what the reader noticed and the user should know
+    simulated: bool = False  # the file says that it holds simulated, not measured, data
+
+
+@dataclass(frozen=True, eq=False)
+class FrfRecord:
+    """FRFs exported by an analyser (UFF function type 4 and the like).
+
+    `values[k]` is the response `response_direction[k]` (±1, ±2, ±3; 0 unknown) per unit force in
+    `reference_direction[k]`; `quantity` is "accelerance" (m/s²/N), "mobility", "receptance" or
+    "unknown"; `unit` the unit of the values. `coherence` is NaN where the file has none.
+    """
+
+    source: Path
+    frequency_hz: np.ndarray  # (F,)
+    values: np.ndarray  # (k, F) complex
+    response_direction: tuple[int, ...]
+    reference_direction: tuple[int, ...]
+    quantity: str
+    unit: str
+    coherence: np.ndarray  # (k, F)
+    remarks: tuple[str, ...] = ()
+    simulated: bool = False
+
+
+Record = TimeRecord | FrfRecord
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """One hammer hit: force and the three accelerations of the sensor, as recorded.
+
+    `axis` is the hit direction as a signed axis of the tcp frame ("+x" … "-z"): the force acts on
+    the structure along that signed axis, so that H_xx of a "-x" hit is −a_x/F. `acceleration_m_s2`
+    is already turned into +x, +y, +z of the sensor frame (parallel to the tcp frame).
+    """
+
+    source: Path
+    axis: str
+    sampling_rate_hz: float
+    force_n: np.ndarray  # (n,)
+    acceleration_m_s2: np.ndarray  # (3, n)
+    repeat: int = 1
+    remarks: tuple[str, ...] = ()
+    simulated: bool = False
+
+    @property
+    def axis_index(self) -> int:
+        """0, 1, 2 for x, y, z."""
+        return AXES.index(self.axis[1])
+
+    @property
+    def sign(self) -> float:
+        """+1 or −1: sense of the hit along its axis."""
+        return -1.0 if self.axis[0] == "-" else 1.0
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Why a hit was refused (`refuse` true) or is only remarked upon."""
+
+    kind: str  # "clipped", "double_hit", "too_weak", "too_soft", "wrong_axis", "incoherent", …
+    text: str  # one sentence: what is wrong, with figures, and what to do
+    refuse: bool = True
+
+
+@dataclass(frozen=True)
+class PoseRow:
+    """One row of recordings.csv (`file` is absolute) or of predict.csv (`hit`, `file` None)."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    row: int  # line in the CSV file, the header being line 1
+    hit: str | None = None
+    repeat: int | None = None
+    file: Path | None = None
+    peak_force_n: float | None = None
+
+
+@dataclass(frozen=True)
+class RecordingsFolder:
+    """A folder of recordings as recordings.csv lists it, in recording order."""
+
+    path: Path
+    joint_names: tuple[str, ...]
+    rows: tuple[PoseRow, ...] = field(default=())

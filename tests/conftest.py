@@ -1,0 +1,20 @@
+"""What every test shares: one BLAS thread, real recordings where they are present."""
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+from pathlib import Path
+
+import pytest
+
+SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of real recordings; the test is skipped where it is missing."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip("real recordings (shared/data beside the project) are not on this machine")
+    return SHARED_DATA
