@@ -1,0 +1,111 @@
+"""What can happen in a campaign: one immutable record per line of the log."""
+
+import msgspec
+
+
+class Event(msgspec.Struct, frozen=True, tag_field="kind"):
+    """Base of every entry of the log."""
+
+
+class Configured(Event, tag="configured"):
+    """The campaign was started, or its campaign.toml or robot folder was changed by hand.
+
+    `config` is campaign.toml; `robot` maps each file of the robot folder to its sha256.
+    """
+
+    config: dict
+    robot: dict[str, str]
+    planner: str
+
+
+class Proposal(msgspec.Struct, frozen=True):
+    """A pose to measure: joint setpoint, tcp position, score of the acquisition, why."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    position_m: tuple[float, float, float]
+    score: float
+    reason: str
+
+
+class Proposed(Event, tag="proposed"):
+    """`count` poses were asked for; these replace the poses proposed before and not yet hit."""
+
+    acquisition: str
+    count: int
+    proposals: tuple[Proposal, ...]
+
+
+class HitRecord(msgspec.Struct, frozen=True):
+    """One file as it was imported; the file itself is kept under its sha256.
+
+    `reason` says why it was refused; empty for an accepted hit.
+    """
+
+    file: str
+    sha256: str
+    suffix: str
+    hit: str | None = None
+    repeat: int | None = None
+    accepted: bool = True
+    reason: str = ""
+    simulated: bool = False
+
+
+class MeasuredMode(msgspec.Struct, frozen=True):
+    """One experimental mode; residues in m/(N·s), row by row (NaN as null), [re, im, sd]."""
+
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: tuple[tuple[float, float], ...]
+    residue: tuple[tuple[float | None, float | None, float | None], ...]
+    probability: float = 1.0
+
+
+class Imported(Event, tag="imported"):
+    """Hits at one pose were imported; `modes` are those of all its accepted hits so far."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    hits: tuple[HitRecord, ...]
+    modes: tuple[MeasuredMode, ...]
+    remarks: tuple[str, ...] = ()
+
+
+class Withdrawn(Event, tag="withdrawn"):
+    """A measured pose was set aside; its recordings stay."""
+
+    pose: str
+    reason: str = ""
+
+
+class Skipped(Event, tag="skipped"):
+    """A proposed pose cannot or shall not be measured; it is not offered again."""
+
+    pose: str
+    reason: str = ""
+
+
+class Starred(Event, tag="starred"):
+    """The engineer marked a pose as worth a second look."""
+
+    pose: str
+
+
+class Undone(Event, tag="undone"):
+    """The act with sequence number `act` was taken back."""
+
+    act: int
+
+
+AnyEvent = Configured | Proposed | Imported | Withdrawn | Skipped | Starred | Undone
+
+
+class Entry(msgspec.Struct, frozen=True):
+    """An event with its place in the log (`seq` from 1) and the time (UTC, ISO 8601)."""
+
+    seq: int
+    time: str
+    event: AnyEvent

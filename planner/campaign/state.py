@@ -1,0 +1,137 @@
+"""The state of a campaign: a pure fold over its events."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+from planner.campaign.events import (
+    AnyEvent,
+    Configured,
+    Entry,
+    HitRecord,
+    Imported,
+    MeasuredMode,
+    Proposal,
+    Proposed,
+    Skipped,
+    Starred,
+    Undone,
+    Withdrawn,
+)
+
+ACTS = (Proposed, Imported, Withdrawn, Skipped, Starred)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One measured pose: readback angles, all its hits, modes of the accepted ones."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    hits: tuple[HitRecord, ...]
+    modes: tuple[MeasuredMode, ...]
+    remarks: tuple[str, ...] = ()
+    withdrawn: bool = False
+    time: str = ""
+
+    @property
+    def accepted(self) -> tuple[HitRecord, ...]:
+        """Hits in use."""
+        return tuple(hit for hit in self.hits if hit.accepted)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any hit is labelled as simulated."""
+        return any(hit.simulated for hit in self.hits)
+
+
+@dataclass(frozen=True)
+class CampaignState:
+    """Everything the log says; a value."""
+
+    configured: Configured | None = None
+    proposals: dict[str, Proposal] = field(default_factory=dict)  # every one ever made, by pose
+    open: tuple[str, ...] = ()  # proposed and not yet measured, skipped or superseded
+    proposed_by: str = ""  # acquisition that made the open proposals
+    stale: bool = True  # the model changed since the open proposals were made
+    measurements: dict[str, Measurement] = field(default_factory=dict)
+    skipped: dict[str, str] = field(default_factory=dict)
+    starred: frozenset[str] = frozenset()
+    proposals_made: int = 0  # counts undone ones too: a name is never given twice
+    events: int = 0
+    model_version: int = 0  # sequence number of the last event that changed the model
+
+    @property
+    def used(self) -> tuple[Measurement, ...]:
+        """Measurements that the model uses, in the order of their first import."""
+        return tuple(m for m in self.measurements.values() if m.modes and not m.withdrawn)
+
+
+def fold(entries: Iterable[Entry]) -> CampaignState:
+    """The state after the given entries (seq 1, 2, …)."""
+    entries = tuple(entries)
+    undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
+    state = CampaignState()
+    for entry in entries:
+        if isinstance(entry.event, Proposed):
+            made = state.proposals_made + len(entry.event.proposals)
+            state = replace(state, proposals_made=made)
+        if isinstance(entry.event, Undone):
+            state = replace(state, stale=True, model_version=entry.seq)
+        elif entry.seq not in undone:
+            state = _apply(state, entry.event, entry)
+        state = replace(state, events=entry.seq)
+    return state
+
+
+def last_act(entries: Iterable[Entry]) -> Entry | None:
+    """The act that `undo` would take back."""
+    entries = tuple(entries)
+    undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
+    acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
+    return acts[-1] if acts else None
+
+
+def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
+    changed = replace(state, stale=True, model_version=entry.seq)
+    match event:
+        case Configured():
+            return replace(changed, configured=event)
+        case Proposed():
+            return replace(
+                state,
+                proposals={**state.proposals, **{p.pose: p for p in event.proposals}},
+                open=tuple(p.pose for p in event.proposals),
+                proposed_by=event.acquisition,
+                stale=False,
+            )
+        case Imported():
+            return _imported(changed, event, entry)
+        case Withdrawn():
+            measurement = replace(state.measurements[event.pose], withdrawn=True)
+            return replace(
+                changed, measurements={**state.measurements, event.pose: measurement}
+            )
+        case Skipped():
+            left = tuple(pose for pose in state.open if pose != event.pose)
+            return replace(changed, open=left, skipped={**state.skipped, event.pose: event.reason})
+        case Starred():
+            return replace(state, starred=state.starred | {event.pose})
+    return state
+
+
+def _imported(state: CampaignState, event: Imported, entry: Entry) -> CampaignState:
+    before = state.measurements.get(event.pose)
+    measurement = Measurement(
+        pose=event.pose,
+        joints_deg=event.joints_deg,
+        hits=(*(before.hits if before else ()), *event.hits),
+        modes=event.modes,
+        remarks=event.remarks,
+        time=before.time if before else entry.time,
+    )
+    left = state.open
+    if measurement.modes:
+        left = tuple(pose for pose in state.open if pose != event.pose)
+    return replace(
+        state, open=left, measurements={**state.measurements, event.pose: measurement}
+    )

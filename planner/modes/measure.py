@@ -1,0 +1,136 @@
+"""From the files of one pose to its modes: read, screen, average, identify."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from planner.errors import InputError, PlannerError, RefusedError
+from planner.frf.types import Frf
+from planner.modes.types import ModalModel
+from planner.recording.types import FrfRecord, Hit, Record
+
+
+@dataclass(frozen=True)
+class Source:
+    """One file and what the table of recordings says about it (None: nothing)."""
+
+    path: Path
+    name: str
+    hit: str | None = None
+    repeat: int | None = None
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one file: accepted, or refused for a stated reason."""
+
+    source: Source
+    accepted: bool
+    reason: str = ""
+    axis: str | None = None
+    simulated: bool = False
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPose:
+    """All that one pose's files gave; `frf` and `modal` are None where nothing could be used."""
+
+    verdicts: tuple[Verdict, ...]
+    hits: tuple[Hit, ...]
+    frf: Frf | None
+    modal: ModalModel | None
+    remarks: tuple[str, ...] = ()
+
+
+def measure(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> MeasuredPose:
+    """Read and screen every file, estimate the FRF from the good hits and the modes from it.
+
+    A file that cannot be used is refused with its reason, never dropped in silence.
+    """
+    verdicts: list[Verdict] = []
+    hits: list[tuple[int, Hit]] = []
+    frfs: list[FrfRecord] = []
+    for source in sources:
+        verdict, found, records = _read_one(source, band_hz)
+        hits += [(len(verdicts), hit) for hit in found]
+        frfs += records
+        verdicts.append(verdict)
+    hits = _drop_inconsistent(hits, verdicts, band_hz)
+    frf, modal, remarks = _identify(tuple(hit for _, hit in hits), frfs, band_hz)
+    return MeasuredPose(tuple(verdicts), tuple(h for _, h in hits), frf, modal, remarks)
+
+
+def _read_one(
+    source: Source, band_hz: tuple[float, float]
+) -> tuple[Verdict, list[Hit], list[FrfRecord]]:
+    from planner.recording.hits import hits_from
+    from planner.recording.read import read
+    from planner.recording.screening import ScreeningLimits, screen
+
+    try:
+        records: tuple[Record, ...] = read(source.path)
+        frfs = [record for record in records if isinstance(record, FrfRecord)]
+        if frfs:
+            simulated = any(record.simulated for record in frfs)
+            return Verdict(source, True, "", source.hit, simulated), [], frfs
+        found = hits_from(records, axis=source.hit)
+    except PlannerError as error:
+        return Verdict(source, False, _rename(str(error), source)), [], []
+    limits = replace(ScreeningLimits(), band_hz=band_hz)
+    faults = [fault for hit in found for fault in screen(hit, limits)]
+    remarks = tuple(f.text for f in faults if not f.refuse)
+    simulated = any(hit.simulated for hit in found)
+    axis = found[0].axis
+    refusing = [fault for fault in faults if fault.refuse]
+    if refusing:
+        text = " ".join(fault.text for fault in refusing)
+        return Verdict(source, False, text, axis, simulated, remarks), [], []
+    hits = [replace(hit, repeat=source.repeat or hit.repeat) for hit in found]
+    return Verdict(source, True, "", axis, simulated, remarks), hits, []
+
+
+def _rename(text: str, source: Source) -> str:
+    """Say the name that the user gave, not that of the stored copy."""
+    return text.replace(str(source.path), source.name)
+
+
+def _drop_inconsistent(
+    hits: list[tuple[int, Hit]], verdicts: list[Verdict], band_hz: tuple[float, float]
+) -> list[tuple[int, Hit]]:
+    from planner.recording.screening import screen_repeats
+
+    if not hits:
+        return hits
+    kept = []
+    faults = screen_repeats(tuple(hit for _, hit in hits), band_hz)
+    for (index, hit), found in zip(hits, faults, strict=True):
+        refusing = [fault for fault in found if fault.refuse]
+        if refusing:
+            text = " ".join(fault.text for fault in refusing)
+            verdicts[index] = replace(verdicts[index], accepted=False, reason=text)
+        else:
+            kept.append((index, hit))
+    return kept
+
+
+def _identify(
+    hits: tuple[Hit, ...], frfs: list[FrfRecord], band_hz: tuple[float, float]
+) -> tuple[Frf | None, ModalModel | None, tuple[str, ...]]:
+    from planner.frf.estimate import estimate, from_records
+    from planner.modes.estimate import estimate_modes
+
+    if not hits and not frfs:
+        return None, None, ("No usable hit: nothing was estimated.",)
+    if hits and frfs:
+        raise InputError(
+            "The files of this pose mix time histories and exported FRFs; import one kind only."
+        )
+    try:
+        frf = estimate(hits, band_hz) if hits else from_records(tuple(frfs))
+    except RefusedError as error:
+        return None, None, (str(error),)
+    try:
+        modal = estimate_modes(frf, band_hz)
+    except RefusedError as error:
+        return frf, None, (*frf.remarks, str(error))
+    return frf, modal, (*frf.remarks, *modal.remarks)
