@@ -1,0 +1,141 @@
+"""What a campaign folder holds besides its log: the robot folder and the raw recordings."""
+
+import hashlib
+import os
+import shutil
+from pathlib import Path
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from planner.campaign.config import CampaignConfig, load_campaign_config
+from planner.campaign.journal import sync_folder, write_synced
+from planner.errors import InputError
+
+LOG = "log.jsonl"
+CONFIG = "campaign.toml"
+ROBOT = "robot"
+RECORDINGS = "recordings"
+MAX_FILE_BYTES = 512 * 1024 * 1024
+
+
+def sha256(data: bytes) -> str:
+    """Content hash under which a file is kept."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def store_recording(folder: Path, path: Path) -> tuple[str, str]:
+    """Keep a recording under its content hash; returns (sha256, suffix). Idempotent."""
+    data = read_bytes(path)
+    digest, suffix = sha256(data), "".join(path.suffixes[-2:]).lower()
+    suffix = suffix if suffix.endswith(".gz") else path.suffix.lower()
+    kept = recording_path(folder, digest, suffix)
+    if not kept.exists():
+        kept.parent.mkdir(exist_ok=True)
+        write_synced(kept, data)
+    return digest, suffix
+
+
+def recording_path(folder: Path, digest: str, suffix: str) -> Path:
+    """Where the recording with this content hash is kept."""
+    return folder / RECORDINGS / f"{digest}{suffix}"
+
+
+def read_bytes(path: Path) -> bytes:
+    """A file's bytes, or InputError saying why not."""
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise InputError(
+                f"{path} is larger than {MAX_FILE_BYTES >> 20} MiB, no single hit is; split it."
+            )
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; check the path.") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); check the file.") from None
+
+
+def robot_hashes(folder: Path) -> dict[str, str]:
+    """sha256 of each file of the campaign's robot folder, by relative path."""
+    root = folder / ROBOT
+    files = sorted(path for path in root.rglob("*") if path.is_file())
+    return {path.relative_to(root).as_posix(): sha256(path.read_bytes()) for path in files}
+
+
+def keep_robot_files(folder: Path, hashes: dict[str, str]) -> None:
+    """Keep each version of each robot file by content, so that replay can go back to it."""
+    for name, digest in hashes.items():
+        kept = folder / RECORDINGS / f"{digest}.robot"
+        if not kept.exists():
+            kept.parent.mkdir(exist_ok=True)
+            write_synced(kept, (folder / ROBOT / name).read_bytes())
+
+
+def restore_robot(folder: Path, hashes: dict[str, str], target: Path) -> None:
+    """Lay out in `target` the robot folder as it was when `hashes` were logged."""
+    for name, digest in hashes.items():
+        kept = folder / RECORDINGS / f"{digest}.robot"
+        path = target / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(read_bytes(kept))
+
+
+def create_folder(directory: Path, robot_toml: Path, campaign_toml: Path | None) -> CampaignConfig:
+    """Make the campaign folder: robot folder copied in, campaign.toml taken over.
+
+    The folder appears under its name only once it is whole.
+    """
+    if (directory / LOG).exists():
+        raise InputError(f"{directory} already holds a campaign; choose another folder.")
+    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
+        raise InputError(f"{directory} exists and is not empty; choose another folder.")
+    partial = directory.with_name(f".{directory.name}.{os.getpid()}.part")
+    try:
+        directory.parent.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir()
+        _copy_robot(robot_toml, partial / ROBOT)
+        text = _campaign_text(campaign_toml, f"{ROBOT}/{robot_toml.name}")
+        (partial / CONFIG).write_text(text, encoding="utf-8")
+        config = load_campaign_config(campaign_toml or partial / CONFIG)
+        if directory.exists():
+            directory.rmdir()
+        os.replace(partial, directory)
+        sync_folder(directory.parent)
+    except OSError as error:
+        raise InputError(
+            f"{directory} cannot be made ({error.strerror}); choose another folder."
+        ) from None
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+    return config
+
+
+def _copy_robot(robot_toml: Path, target: Path) -> None:
+    from planner.robot.config import load_config
+
+    source = robot_toml.parent.resolve()
+    urdf = (source / load_config(robot_toml).urdf).resolve()
+    if not urdf.is_relative_to(source):
+        raise InputError(
+            f"{robot_toml}: its URDF {urdf} lies outside the robot folder, which is copied whole; "
+            f"move it next to robot.toml."
+        )
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*"))
+
+
+def _campaign_text(campaign_toml: Path | None, robot: str) -> str:
+    if campaign_toml is None:
+        raise InputError(
+            "No workspace is stated; give --campaign CAMPAIGN_TOML with a [workspace] table."
+        )
+    try:
+        document = tomlkit.parse(campaign_toml.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{campaign_toml} does not exist; name a campaign.toml.") from None
+    except (OSError, UnicodeDecodeError, TOMLKitError) as error:
+        raise InputError(
+            f"{campaign_toml} is not a valid campaign.toml ({error}); correct it."
+        ) from None
+    document["robot"] = robot
+    return tomlkit.dumps(document)
