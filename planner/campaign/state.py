@@ -108,9 +108,7 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             return _imported(changed, event, entry)
         case Withdrawn():
             measurement = replace(state.measurements[event.pose], withdrawn=True)
-            return replace(
-                changed, measurements={**state.measurements, event.pose: measurement}
-            )
+            return replace(changed, measurements={**state.measurements, event.pose: measurement})
         case Skipped():
             left = tuple(pose for pose in state.open if pose != event.pose)
             return replace(changed, open=left, skipped={**state.skipped, event.pose: event.reason})
@@ -132,6 +130,4 @@ def _imported(state: CampaignState, event: Imported, entry: Entry) -> CampaignSt
     left = state.open
     if measurement.modes:
         left = tuple(pose for pose in state.open if pose != event.pose)
-    return replace(
-        state, open=left, measurements={**state.measurements, event.pose: measurement}
-    )
+    return replace(state, open=left, measurements={**state.measurements, event.pose: measurement})

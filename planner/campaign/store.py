@@ -3,12 +3,14 @@
 import hashlib
 import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
-from planner.campaign.config import CampaignConfig, load_campaign_config
+from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import sync_folder, write_synced
 from planner.errors import InputError
 
@@ -80,11 +82,17 @@ def restore_robot(folder: Path, hashes: dict[str, str], target: Path) -> None:
         path.write_bytes(read_bytes(kept))
 
 
-def create_folder(directory: Path, robot_toml: Path, campaign_toml: Path | None) -> CampaignConfig:
-    """Make the campaign folder: robot folder copied in, campaign.toml taken over.
+def create_folder(
+    directory: Path,
+    robot_toml: Path,
+    campaign_toml: Path | None,
+    first_line: Callable[[Path], bytes],
+) -> None:
+    """Make the campaign folder: robot folder copied in, campaign.toml taken over, log begun.
 
     The folder appears under its name only once it is whole.
     """
+    directory = directory.absolute()
     if (directory / LOG).exists():
         raise InputError(f"{directory} already holds a campaign; choose another folder.")
     if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
@@ -95,9 +103,11 @@ def create_folder(directory: Path, robot_toml: Path, campaign_toml: Path | None)
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir()
         _copy_robot(robot_toml, partial / ROBOT)
-        text = _campaign_text(campaign_toml, f"{ROBOT}/{robot_toml.name}")
+        robot = f"{ROBOT}/{robot_toml.name}"
+        text = _taken_over(campaign_toml, robot) if campaign_toml else _default(partial, robot)
         (partial / CONFIG).write_text(text, encoding="utf-8")
-        config = load_campaign_config(campaign_toml or partial / CONFIG)
+        load_campaign_config(campaign_toml or partial / CONFIG)
+        write_synced(partial / LOG, first_line(partial))
         if directory.exists():
             directory.rmdir()
         os.replace(partial, directory)
@@ -108,7 +118,6 @@ def create_folder(directory: Path, robot_toml: Path, campaign_toml: Path | None)
         ) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
-    return config
 
 
 def _copy_robot(robot_toml: Path, target: Path) -> None:
@@ -124,11 +133,8 @@ def _copy_robot(robot_toml: Path, target: Path) -> None:
     shutil.copytree(source, target, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*"))
 
 
-def _campaign_text(campaign_toml: Path | None, robot: str) -> str:
-    if campaign_toml is None:
-        raise InputError(
-            "No workspace is stated; give --campaign CAMPAIGN_TOML with a [workspace] table."
-        )
+def _taken_over(campaign_toml: Path, robot: str) -> str:
+    """The user's campaign.toml, comments and all, with the robot's new place."""
     try:
         document = tomlkit.parse(campaign_toml.read_text(encoding="utf-8"))
     except FileNotFoundError:
@@ -137,5 +143,26 @@ def _campaign_text(campaign_toml: Path | None, robot: str) -> str:
         raise InputError(
             f"{campaign_toml} is not a valid campaign.toml ({error}); correct it."
         ) from None
-    document["robot"] = robot
+    kept = document.body
+    fresh = tomlkit.document()
+    fresh.add("robot", tomlkit.item(robot))
+    for key, item in kept:
+        if key is None:
+            fresh.add(item)
+        elif key.key != "robot":
+            fresh.add(key, item)
+    return tomlkit.dumps(fresh)
+
+
+def _default(directory: Path, robot_file: str) -> str:
+    """A campaign.toml over the whole joint range, to be narrowed by the engineer."""
+    from planner.robot.robot import Robot
+
+    robot = Robot.load(directory / robot_file)
+    limits = np.rad2deg(np.stack([robot.lower_rad, robot.upper_rad], axis=1)).round(3)
+    document = tomlkit.document()
+    document.add(tomlkit.comment("Whole range of every joint: narrow it to where the tool works."))
+    document.add("robot", tomlkit.item(robot_file))
+    document.add("workspace", tomlkit.item({"joints_deg": limits.tolist()}))
+    document.add("modes", tomlkit.item({"band_hz": list(robot.config.band_hz)}))
     return tomlkit.dumps(document)

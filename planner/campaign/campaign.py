@@ -1,0 +1,360 @@
+"""The campaign: the only thing with state, and its state is a fold over its log."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from planner import __version__
+from planner.campaign import store
+from planner.campaign.cell import Cell
+from planner.campaign.config import config_from_builtins, load_campaign_config
+from planner.campaign.events import (
+    AnyEvent,
+    Configured,
+    Entry,
+    HitRecord,
+    Imported,
+    Proposal,
+    Proposed,
+    Skipped,
+    Starred,
+    Undone,
+    Withdrawn,
+)
+from planner.campaign.intake import Delivery, sort_paths
+from planner.campaign.journal import Journal
+from planner.campaign.labels import from_mode
+from planner.campaign.model import Model, build, propose
+from planner.campaign.state import CampaignState, Measurement, fold, last_act
+from planner.errors import InputError
+from planner.modes.measure import MeasuredPose, Source, measure
+
+SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
+
+
+@dataclass(frozen=True, eq=False)
+class ImportReport:
+    """What one import did to one pose: files, modes, and the model before and after."""
+
+    pose: str
+    accepted: tuple[HitRecord, ...]
+    refused: tuple[HitRecord, ...]
+    already: tuple[str, ...]  # files that were imported before
+    measurement: Measurement | None
+    measured: MeasuredPose | None
+    model_before: Model
+    model: Model
+    refit_seconds: float
+    remarks: tuple[str, ...] = ()
+
+
+class Campaign:
+    """A campaign folder, opened. Reads never write; every act is on the disk when it returns."""
+
+    def __init__(self, directory: Path):
+        self.directory = directory.resolve()
+        self._journal = Journal(self.directory / store.LOG)
+        self._cells: dict[str, Cell] = {}
+        self._models: dict[tuple[str, int], Model] = {}
+
+    @classmethod
+    def new(cls, directory: Path, robot_toml: Path, campaign_toml: Path | None) -> "Campaign":
+        """Start a campaign: copy robot folder and decisions in, write the first event.
+
+        Raises InputError if the folder is in use or any input is wrong.
+        """
+        store.create_folder(directory, robot_toml, campaign_toml, _first_entry)
+        return cls(directory)
+
+    # -- what is known -------------------------------------------------------------------------
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """The log."""
+        return self._journal.entries
+
+    @property
+    def torn_bytes(self) -> int:
+        """Length of a torn last line, which the next act sets aside."""
+        return self._journal.torn_bytes
+
+    @property
+    def state(self) -> CampaignState:
+        """The fold over the log, with changes made by hand to the configuration."""
+        state = fold(self.entries)
+        if state.configured is None:
+            raise InputError(
+                f"{self.directory} holds an empty log; start the campaign again with planner new."
+            )
+        return state
+
+    @property
+    def cell(self) -> Cell:
+        """Robot, simulation and workspace as configured now."""
+        configured = self._configured()
+        key = msgspec.json.encode(configured).decode()
+        if key not in self._cells:
+            config = config_from_builtins(configured.config)
+            self._cells[key] = Cell.load(self.directory / config.robot, config)
+        return self._cells[key]
+
+    @property
+    def model(self) -> Model:
+        """The model after all measurements; fitted once per state."""
+        state = self.state
+        key = (msgspec.json.encode(self._configured()).decode(), state.model_version)
+        if key not in self._models:
+            self._models = {key: build(self.cell, state)}
+        return self._models[key]
+
+    def _configured(self) -> Configured:
+        """What campaign.toml and the robot folder say now (the log follows with the next act)."""
+        config = load_campaign_config(self.directory / store.CONFIG)
+        hashes = store.robot_hashes(self.directory)
+        return Configured(msgspec.to_builtins(config), hashes, __version__)
+
+    # -- acts ----------------------------------------------------------------------------------
+
+    def next(self, count: int = 1, acquisition: str | None = None) -> tuple[Proposal, ...]:
+        """The next poses to measure; the same ones until something changes.
+
+        Raises NoPoseLeftError when no reachable pose is left.
+        """
+        with self._acting():
+            state = self.state
+            name = acquisition or self.cell.config.acquisition.name
+            same = not state.stale and state.proposed_by == name
+            if same and len(state.open) >= count:
+                return tuple(state.proposals[pose] for pose in state.open[:count])
+            proposals = propose(self.model, state, count, name)
+            self._append(Proposed(name, count, proposals))
+            return proposals
+
+    def import_paths(
+        self,
+        paths: tuple[Path, ...],
+        pose: str | None = None,
+        progress: Callable[[str], None] | None = None,
+    ) -> tuple[ImportReport, ...]:
+        """Import hits, one report per pose, in recording order.
+
+        Raises InputError, before anything is stored, if it is not clear what or where they are.
+        """
+        with self._acting():
+            open_poses = self.state.open
+            default = open_poses[0] if len(open_poses) == 1 else None
+            deliveries = sort_paths(paths, self.cell.robot.joint_names, pose, default)
+            placed = [(delivery, self._place(delivery)) for delivery in deliveries]
+            reports = []
+            for delivery, joints_deg in placed:
+                if progress:
+                    progress(delivery.pose)
+                reports.append(self._import_pose(delivery, joints_deg))
+            return tuple(reports)
+
+    def withdraw(self, pose: str, reason: str = "") -> None:
+        """Set a measured pose aside; its recordings stay."""
+        with self._acting():
+            measurement = self.state.measurements.get(pose)
+            if measurement is None or measurement.withdrawn:
+                raise InputError(f"Pose {pose} is not among the measured ones; see planner status.")
+            self._append(Withdrawn(pose, reason))
+
+    def skip(self, pose: str, reason: str = "") -> None:
+        """A proposed pose cannot or shall not be measured; it is not offered again."""
+        with self._acting():
+            if pose not in self.state.open:
+                raise InputError(f"Pose {pose} is not an open proposal; see planner status.")
+            self._append(Skipped(pose, reason))
+
+    def star(self, pose: str) -> None:
+        """Mark a pose as worth a second look."""
+        with self._acting():
+            if pose not in self.state.measurements and pose not in self.state.proposals:
+                raise InputError(f"Pose {pose} is not known; see planner status.")
+            self._append(Starred(pose))
+
+    def undo(self) -> Entry:
+        """Take back the last act (proposal, import, withdrawal, skip, star)."""
+        with self._acting():
+            entry = last_act(self.entries)
+            if entry is None:
+                raise InputError(f"{self.directory} holds no act that could be taken back.")
+            self._append(Undone(entry.seq))
+            return entry
+
+    # -- inside --------------------------------------------------------------------------------
+
+    def _acting(self):
+        return _Acting(self)
+
+    def _append(self, event: AnyEvent) -> Entry:
+        return self._journal.append(event)
+
+    def _log_configuration(self) -> None:
+        """Follow changes made by hand to campaign.toml or the robot folder."""
+        configured, logged = self._configured(), self.state.configured
+        assert logged is not None
+        if (configured.config, configured.robot) != (logged.config, logged.robot):
+            _ = self.cell  # must load before it is believed
+            store.keep_robot_files(self.directory, configured.robot)
+            self._append(configured)
+
+    def _place(self, delivery: Delivery) -> tuple[float, ...]:
+        """Readback angles of a delivery, checked against robot, proposal and earlier hits."""
+        state = self.state
+        known = state.measurements.get(delivery.pose)
+        proposal = state.proposals.get(delivery.pose)
+        if delivery.joints_deg is None:
+            stated = known or proposal
+            if stated is None:
+                raise InputError(
+                    f"No joint angles are known for pose {delivery.pose}; import a folder with "
+                    f"recordings.csv, or name a proposed pose."
+                )
+            return stated.joints_deg
+        self.cell.check_pose(delivery.joints_deg, delivery.row)
+        if known is not None:
+            off = np.max(np.abs(np.subtract(known.joints_deg, delivery.joints_deg)))
+            if off > SAME_POSE_DEG:
+                raise InputError(
+                    f"{delivery.row}: pose {delivery.pose} was imported before at joint angles "
+                    f"that differ by {off:.2f}°; give the new measurement another name."
+                )
+        return delivery.joints_deg
+
+    def _import_pose(self, delivery: Delivery, joints_deg: tuple[float, ...]) -> ImportReport:
+        before, state = self.model, self.state
+        fresh, already = self._store_new(delivery, state)
+        if not fresh:
+            return ImportReport(
+                delivery.pose, (), (), already, state.measurements.get(delivery.pose), None,
+                before, before, 0.0,
+            )  # fmt: skip
+        known = state.measurements.get(delivery.pose)
+        started = time.perf_counter()
+        hits, measured = self._measure(fresh, known)
+        event = Imported(
+            pose=delivery.pose,
+            joints_deg=known.joints_deg if known else joints_deg,
+            hits=hits,
+            modes=tuple(from_mode(m) for m in measured.modal.modes) if measured.modal else (),
+            remarks=measured.remarks,
+        )
+        self._append(event)
+        model = self.model
+        return ImportReport(
+            pose=delivery.pose,
+            accepted=tuple(hit for hit in hits if hit.accepted),
+            refused=tuple(hit for hit in hits if not hit.accepted),
+            already=already,
+            measurement=self.state.measurements[delivery.pose],
+            measured=measured,
+            model_before=before,
+            model=model,
+            refit_seconds=time.perf_counter() - started,
+            remarks=(*measured.remarks, *self._displacement(delivery, joints_deg)),
+        )
+
+    def _store_new(
+        self, delivery: Delivery, state: CampaignState
+    ) -> tuple[tuple[tuple[Source, str, str], ...], tuple[str, ...]]:
+        """Keep the raw files; those imported before at this pose are only named."""
+        owner = {h.sha256: m.pose for m in state.measurements.values() for h in m.hits}
+        fresh: dict[str, tuple[Source, str, str]] = {}
+        already = []
+        for source in delivery.sources:
+            digest, suffix = store.store_recording(self.directory, source.path)
+            if owner.get(digest, delivery.pose) != delivery.pose:
+                raise InputError(
+                    f"{source.path} was imported before as a recording of pose {owner[digest]}; "
+                    f"it cannot belong to {delivery.pose} too."
+                )
+            if digest in owner or digest in fresh:
+                already.append(source.name)
+            else:
+                fresh[digest] = (source, digest, suffix)
+        return tuple(fresh.values()), tuple(already)
+
+    def _measure(
+        self, fresh: tuple[tuple[Source, str, str], ...], known: Measurement | None
+    ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
+        """Verdicts on the new files and the modes of all good hits of the pose, old and new."""
+        old = known.accepted if known else ()
+        sources = [self.source_of(hit) for hit in old]
+        sources += [
+            Source(store.recording_path(self.directory, digest, suffix), s.name, s.hit, s.repeat)
+            for s, digest, suffix in fresh
+        ]
+        measured = measure(tuple(sources), self.cell.config.modes.band_hz)
+        records = tuple(
+            HitRecord(
+                file=source.name,
+                sha256=digest,
+                suffix=suffix,
+                hit=verdict.axis,
+                repeat=source.repeat,
+                accepted=verdict.accepted,
+                reason=verdict.reason,
+                simulated=verdict.simulated,
+            )
+            for verdict, (source, digest, suffix) in zip(
+                measured.verdicts[len(old) :], fresh, strict=True
+            )
+        )
+        return records, measured
+
+    def source_of(self, hit: HitRecord) -> Source:
+        """The kept copy of a recording."""
+        path = store.recording_path(self.directory, hit.sha256, hit.suffix)
+        return Source(path, hit.file, hit.hit, hit.repeat)
+
+    def _displacement(self, delivery: Delivery, joints_deg: tuple[float, ...]) -> tuple[str, ...]:
+        proposal = self.state.proposals.get(delivery.pose)
+        if proposal is None:
+            return ()
+        off = float(np.max(np.abs(np.subtract(proposal.joints_deg, joints_deg))))
+        if off <= SAME_POSE_DEG:
+            return ()
+        return (
+            f"The readback of {delivery.pose} is up to {off:.2f}° from its setpoint; the readback "
+            f"is used.",
+        )
+
+
+class _Acting:
+    """The campaign's lock, its log read afresh and its configuration followed."""
+
+    def __init__(self, campaign: Campaign):
+        self._campaign = campaign
+        self._lock = campaign._journal.writing()
+
+    def __enter__(self) -> None:
+        self._lock.__enter__()
+        try:
+            self._campaign._log_configuration()
+        except BaseException:
+            self._lock.__exit__(None, None, None)
+            raise
+
+    def __exit__(self, *error: object) -> None:
+        self._lock.__exit__(None, None, None)
+
+
+def _first_entry(directory: Path) -> bytes:
+    """The log of a new campaign, once robot and workspace have been held against each other."""
+    from datetime import UTC, datetime
+
+    from planner.campaign.journal import encode_line
+
+    config = load_campaign_config(directory / store.CONFIG)
+    Cell.load(directory / config.robot, config)
+    hashes = store.robot_hashes(directory)
+    store.keep_robot_files(directory, hashes)
+    now = datetime.now(UTC).isoformat(timespec="milliseconds")
+    event = Configured(msgspec.to_builtins(config), hashes, __version__)
+    return encode_line("", Entry(1, now, event))[0]

@@ -1,0 +1,79 @@
+"""What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.config import CampaignConfig
+from planner.errors import InputError
+from planner.fusion.surrogate import SimulatedModal
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.robot.workspace import Candidates, Workspace
+
+CANDIDATE_SEED = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """Robot, simulation (None when the campaign uses none) and workspace of one campaign."""
+
+    config: CampaignConfig
+    robot: Robot
+    simulation: Simulation | None
+    workspace: Workspace
+
+    @classmethod
+    def load(cls, robot_toml: Path, config: CampaignConfig) -> "Cell":
+        """Load the robot and hold the workspace against it; InputError where they disagree."""
+        robot = Robot.load(robot_toml)
+        simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
+        workspace = Workspace.from_table(config.workspace, robot)
+        return cls(config, robot, simulation, workspace)
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """Reachable poses of the workspace, the same for the same configuration."""
+        return self.workspace.candidates(
+            self.robot, self.config.acquisition.candidates, CANDIDATE_SEED
+        )
+
+    @cached_property
+    def simulated_candidates(self) -> SimulatedModal:
+        """What the simulation says at the candidates."""
+        return self.simulate(self.candidates.q)
+
+    def features(self, q: np.ndarray) -> np.ndarray:
+        """Coordinates (n, d) of poses q (n, dof) in rad that the model uses."""
+        return self.workspace.features(self.robot, q)
+
+    def simulate(self, q: np.ndarray) -> SimulatedModal:
+        """Simulated modes of poses q (n, dof) in rad; NaN without a simulation."""
+        count = self.config.modes.count
+        if self.simulation is None:
+            empty = np.full((len(q), count), np.nan)
+            residue = np.full((len(q), count, 3, 3), np.nan + 0j)
+            return SimulatedModal(empty, empty, residue)
+        modes = self.simulation.modes(q, count)
+        return SimulatedModal(modes.frequency_hz, modes.damping_ratio, modes.residue)
+
+    def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
+        """The pose in rad; InputError if the robot cannot stand there."""
+        if len(joints_deg) != len(self.robot.joint_names):
+            raise InputError(
+                f"{where}: {len(joints_deg)} joint angles are given, the robot has "
+                f"{len(self.robot.joint_names)} joints; correct the columns."
+            )
+        q = np.deg2rad(np.asarray(joints_deg, dtype=float))
+        tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
+        over = np.maximum(self.robot.lower_rad - q, q - self.robot.upper_rad)
+        worst = int(np.argmax(over))
+        if over[worst] > tolerance:
+            low, high = np.rad2deg([self.robot.lower_rad[worst], self.robot.upper_rad[worst]])
+            raise InputError(
+                f"{where}: {self.robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
+                f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
+            )
+        return q

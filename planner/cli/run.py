@@ -1,0 +1,53 @@
+"""Running a command so that every failure is one sentence and an exit code."""
+
+import os
+import sys
+import traceback
+
+from typer._click.exceptions import Abort, ClickException, Exit, NoArgsIsHelpError
+
+from planner.errors import PlannerError
+
+
+def run(arguments: list[str]) -> int:
+    """Run the command line; returns the exit code, never raises on bad usage or input."""
+    from planner.cli.app import app
+
+    try:
+        code = app(arguments, standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except PlannerError as error:
+        return _say(str(error), error.exit_code)
+    except NoArgsIsHelpError as error:
+        print(error.format_message())
+        return 2
+    except Exit as error:
+        return error.exit_code
+    except (Abort, KeyboardInterrupt):
+        return _say("Stopped; everything imported so far is kept.", 130)
+    except ClickException as error:
+        return _say(f"{error.format_message().rstrip('.')}; see planner --help.", 2)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except MemoryError:
+        return _say("The input needs more memory than this machine has; give a smaller one.", 2)
+    except Exception as error:
+        return _internal(error)
+
+
+def _say(sentence: str, code: int) -> int:
+    # A sentence is one line, whatever the file names or library texts inside it hold.
+    print(" ".join(sentence.split()), file=sys.stderr)
+    return code
+
+
+def _internal(error: Exception) -> int:
+    if os.environ.get("PLANNER_DEBUG"):
+        traceback.print_exc()
+    where = traceback.extract_tb(error.__traceback__)[-1]
+    return _say(
+        f"planner failed inside ({type(error).__name__}: {error}, at {where.name}); nothing "
+        f"imported is lost; set PLANNER_DEBUG=1 to see where and report it.",
+        1,
+    )
