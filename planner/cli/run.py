@@ -4,7 +4,8 @@ import os
 import sys
 import traceback
 
-from typer._click.exceptions import Abort, ClickException, Exit, NoArgsIsHelpError
+import typer
+from typer.exceptions import TyperException
 
 from planner.errors import PlannerError
 
@@ -18,15 +19,12 @@ def run(arguments: list[str]) -> int:
         return code if isinstance(code, int) else 0
     except PlannerError as error:
         return _say(str(error), error.exit_code)
-    except NoArgsIsHelpError as error:
-        print(error.format_message())
-        return 2
-    except Exit as error:
+    except typer.Exit as error:
         return error.exit_code
-    except (Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         return _say("Stopped; everything imported so far is kept.", 130)
-    except ClickException as error:
-        return _say(f"{error.format_message().rstrip('.')}; see planner --help.", 2)
+    except TyperException as error:
+        return _usage(error)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -40,6 +38,13 @@ def _say(sentence: str, code: int) -> int:
     # A sentence is one line, whatever the file names or library texts inside it hold.
     print(" ".join(sentence.split()), file=sys.stderr)
     return code
+
+
+def _usage(error: TyperException) -> int:
+    text = error.format_message() if hasattr(error, "format_message") else str(error)
+    if not text:  # no command was given: the help has been printed
+        return 2
+    return _say(f"{text.rstrip('.')}; see planner --help.", 2)
 
 
 def _internal(error: Exception) -> int:

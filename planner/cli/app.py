@@ -1,0 +1,238 @@
+"""The command line: one function per command; heavy imports inside them (see contract section 4)."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planner.cli.answer import AsJson, respond, warn
+
+app = typer.Typer(
+    name="planner",
+    help="Plans hammer tests of a milling robot, fuses them with its simulation, explains both.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Campaign folder.")]
+PoseArgument = Annotated[str, typer.Argument(metavar="POSE", help="Name of the pose.")]
+Rrd = Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")]
+Viewer = Annotated[bool, typer.Option("--viewer", help="Show progress in a live Rerun viewer.")]
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+) -> None:
+    if version:
+        from planner import __version__
+
+        print(f"planner {__version__}")
+
+
+@app.command()
+def new(
+    directory: Directory,
+    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    campaign: Annotated[
+        Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Start a campaign."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+
+    made = Campaign.new(directory, robot, campaign)
+    return respond(answers.created(made), as_json, render.created)
+
+
+@app.command(name="next")
+def next_(
+    directory: Directory,
+    count: Annotated[int, typer.Option(min=1, max=100, help="How many poses.")] = 1,
+    acquisition: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Instead of campaign.toml's.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Propose the next pose or poses to measure."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+
+    opened = Campaign(directory)
+    proposals = opened.next(count, acquisition)
+    return respond(answers.proposals(opened, proposals), as_json, render.proposals)
+
+
+@app.command(name="import")
+def import_(
+    directory: Directory,
+    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Hits, or a folder.")],
+    pose: Annotated[str | None, typer.Option(metavar="ID", help="Pose of these hits.")] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Import hits, refit, and say what changed."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+    from planner.cli.progress import reporting
+
+    with reporting("importing", quiet=as_json) as progress:
+        reports = Campaign(directory).import_paths(tuple(paths), pose, progress)
+    refused = [hit for report in reports for hit in report.refused]
+    for hit in refused:
+        warn(f"Refused {hit.file}: {hit.reason}")
+    return respond(answers.imported(reports), as_json, render.imported, 3 if refused else 0)
+
+
+@app.command()
+def status(directory: Directory, as_json: AsJson = False) -> int:
+    """What has been measured, what is open, and how sure the model is."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+
+    return respond(answers.status(Campaign(directory)), as_json, render.status)
+
+
+@app.command()
+def undo(directory: Directory, as_json: AsJson = False) -> int:
+    """Take back the last act."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+
+    entry = Campaign(directory).undo()
+    return respond(answers.undone(entry), as_json, render.undone)
+
+
+@app.command()
+def withdraw(
+    directory: Directory,
+    pose: PoseArgument,
+    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
+    as_json: AsJson = False,
+) -> int:
+    """Set a measured pose aside; its recordings stay."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import render
+
+    Campaign(directory).withdraw(pose, reason)
+    return respond({"withdrawn": pose, "reason": reason}, as_json, render.withdrawn)
+
+
+@app.command()
+def skip(
+    directory: Directory,
+    pose: PoseArgument,
+    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
+    as_json: AsJson = False,
+) -> int:
+    """Say that a proposed pose cannot be measured; it is not offered again."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import render
+
+    Campaign(directory).skip(pose, reason)
+    return respond({"skipped": pose, "reason": reason}, as_json, render.skipped)
+
+
+@app.command()
+def watch(
+    directory: Directory,
+    folder: Annotated[Path, typer.Argument(help="Folder into which the analyser exports.")],
+    auto: Annotated[bool, typer.Option("--auto", help="Import without asking.")] = False,
+    hits_per_pose: Annotated[int, typer.Option(min=1, help="Hits that make a pose.")] = 12,
+    rrd: Rrd = None,
+    viewer: Viewer = False,
+    as_json: AsJson = False,
+) -> int:
+    """Interactive session: propose, wait for the analyser's export, import, refit."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+    from planner.cli.progress import console
+    from planner.session import watch as run
+
+    summary = run(
+        Campaign(directory),
+        folder,
+        console=console(quiet=False, stderr=as_json),
+        auto=auto,
+        hits_per_pose=hits_per_pose,
+        rrd=rrd,
+        viewer=viewer,
+    )
+    return respond(answers.session(summary), as_json, render.session)
+
+
+@app.command()
+def predict(
+    directory: Directory,
+    poses: Annotated[Path, typer.Argument(metavar="POSES_CSV", help="pose, joint_…_deg")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="Where FRFs go.")] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Modes and FRFs, with uncertainty, at given poses."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+
+    return respond(answers.predicted(Campaign(directory), poses, out), as_json, render.predicted)
+
+
+@app.command()
+def replay(
+    directory: Directory,
+    until: Annotated[int | None, typer.Option(metavar="N", help="Stop after entry N.")] = None,
+    rrd: Rrd = None,
+    viewer: Viewer = False,
+    as_json: AsJson = False,
+) -> int:
+    """Rebuild the campaign from its log, step by step, and check each step."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+    from planner.cli.progress import reporting
+
+    with reporting("replaying", quiet=as_json) as progress:
+        answer = answers.replayed(Campaign(directory), until, rrd, viewer, progress)
+    if not answer["reproduced"]:
+        warn("The log was not reproduced; see the steps that differ.")
+    return respond(answer, as_json, render.replayed, 0 if answer["reproduced"] else 1)
+
+
+@app.command()
+def modes(
+    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Hits of one pose.")],
+    band_hz: Annotated[
+        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Band in Hz.")
+    ] = None,
+    force: Annotated[
+        str | None, typer.Option(metavar="CHANNEL", help="Force channel, if not labelled.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Experimental modal analysis of one pose's hits."""
+    from planner.cli import modal, render
+
+    answer = modal.analyse(tuple(paths), band_hz, force)
+    refused = answer["refused"]
+    for entry in refused:
+        warn(f"Refused {entry['file']}: {entry['reason']}")
+    return respond(answer, as_json, render.modes, 3 if refused else 0)
+
+
+@app.command()
+def demo(
+    directory: Annotated[
+        Path | None, typer.Option("--dir", help="Where the campaign goes (default: temporary).")
+    ] = None,
+    measurements: Annotated[int, typer.Option(min=1, max=35, help="At most so many.")] = 10,
+    viewer: Viewer = False,
+    as_json: AsJson = False,
+) -> int:
+    """Play a whole campaign on recordings shipped with the project (simulated)."""
+    from planner.cli import render
+    from planner.cli.progress import reporting
+    from planner.demo import play
+
+    with reporting("playing", quiet=as_json) as progress:
+        answer = play(directory, measurements, viewer, progress)
+    return respond(answer, as_json, render.demo)

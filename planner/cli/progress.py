@@ -1,0 +1,23 @@
+"""Progress on stderr, where somebody is looking; nothing otherwise."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+
+def console(quiet: bool, stderr: bool = True):
+    """A rich console on stderr (or stdout), silent if `quiet`."""
+    from rich.console import Console
+
+    return Console(stderr=stderr, quiet=quiet)
+
+
+@contextmanager
+def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
+    """A function that shows what is being done, with the time it has taken so far."""
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    screen = console(quiet)
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task(verb, total=None)
+        yield lambda text: bar.update(task, description=f"{verb}: {text}")

@@ -1,0 +1,124 @@
+"""Rebuilding a campaign from its log, step by step, and checking each step."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from planner.campaign import store
+from planner.campaign.campaign import Campaign
+from planner.campaign.cell import Cell
+from planner.campaign.config import config_from_builtins
+from planner.campaign.events import Configured, Entry, Imported, MeasuredMode, Proposed
+from planner.campaign.labels import from_mode
+from planner.campaign.model import Model, build, propose
+from planner.campaign.state import CampaignState, fold
+from planner.errors import InputError, PlannerError
+from planner.modes.measure import MeasuredPose, measure
+
+CLOSE = 1e-6  # relative; another processor rounds differently, another program errs by more
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One entry of the log, computed again: "identical", "close" (rounding), "differs", "kept"."""
+
+    entry: Entry
+    check: str
+    detail: str
+    state: CampaignState  # after the entry
+    model: Model
+    measured: MeasuredPose | None = None
+
+
+class _Cells:
+    """Cells by configuration; earlier versions of the robot folder are laid out again."""
+
+    def __init__(self, campaign: Campaign, stack: ExitStack):
+        self._campaign, self._stack = campaign, stack
+        self._cells: dict[bytes, Cell] = {}
+
+    def of(self, configured: Configured) -> Cell:
+        key = msgspec.json.encode((configured.config, configured.robot))
+        if key not in self._cells:
+            config = config_from_builtins(configured.config)
+            root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
+            store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
+            self._cells[key] = Cell.load(root / config.robot, config)
+        return self._cells[key]
+
+
+def replay(campaign: Campaign, until: int | None = None) -> Iterator[Step]:
+    """Each entry of the log up to number `until`, with what computing it again gives.
+
+    Raises InputError if a recording that the log names is missing or changed.
+    """
+    entries = campaign.entries
+    if until is not None and not 1 <= until <= len(entries):
+        raise InputError(f"The log has entries 1 to {len(entries)}; {until} is not among them.")
+    with ExitStack() as stack:
+        cells = _Cells(campaign, stack)
+        model, model_key = None, None
+        for entry in entries[:until]:
+            before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
+            check, detail, measured = _check(campaign, entry, before, model)
+            assert after.configured is not None
+            key = (after.model_version, id(cells.of(after.configured)))
+            if model is None or key != model_key:
+                model, model_key = build(cells.of(after.configured), after), key
+            yield Step(entry, check, detail, after, model, measured)
+
+
+def _check(
+    campaign: Campaign, entry: Entry, before: CampaignState, model: Model | None
+) -> tuple[str, str, MeasuredPose | None]:
+    event = entry.event
+    if isinstance(event, Proposed) and model is not None:
+        try:
+            again = propose(model, before, event.count, event.acquisition)
+        except PlannerError as error:
+            return "differs", str(error), None
+        numbers = [[(*p.joints_deg, p.score) for p in ps] for ps in (event.proposals, again)]
+        names = ", ".join(p.pose for p in event.proposals)
+        return (*_compare(numbers[0], numbers[1], names), None)
+    if isinstance(event, Imported) and model is not None:
+        return _check_import(campaign, event, before, model)
+    return "kept", type(event).__name__.lower(), None
+
+
+def _check_import(
+    campaign: Campaign, event: Imported, before: CampaignState, model: Model
+) -> tuple[str, str, MeasuredPose]:
+    known = before.measurements.get(event.pose)
+    hits = (*(known.accepted if known else ()), *event.hits)
+    sources = tuple(campaign.source_of(hit) for hit in hits)
+    for hit, source in zip(hits, sources, strict=True):
+        if store.sha256(store.read_bytes(source.path)) != hit.sha256:
+            raise InputError(
+                f"{source.path} is not what was imported as {hit.file}; restore it from a copy."
+            )
+    measured = measure(sources, model.cell.config.modes.band_hz)
+    modes = [from_mode(mode) for mode in measured.modal.modes] if measured.modal else []
+    accepted = [v.accepted for v in measured.verdicts[len(hits) - len(event.hits) :]]
+    if accepted != [hit.accepted for hit in event.hits]:
+        return "differs", f"{event.pose}: other hits are refused than before", measured
+    detail = f"{event.pose}: {sum(accepted)} hits, {len(modes)} modes"
+    check, detail = _compare(_numbers(event.modes), _numbers(tuple(modes)), detail)
+    return check, detail, measured
+
+
+def _numbers(modes: tuple[MeasuredMode, ...]) -> list[list[float]]:
+    return [[m.frequency_hz, m.damping_ratio, m.frequency_sd_hz, m.damping_sd] for m in modes]
+
+
+def _compare(logged: list, again: list, detail: str) -> tuple[str, str]:
+    if [list(row) for row in logged] == [list(row) for row in again]:
+        return "identical", detail
+    a, b = np.array(logged, dtype=float), np.array(again, dtype=float)
+    if a.shape == b.shape and np.allclose(a, b, rtol=CLOSE, atol=CLOSE):
+        return "close", detail
+    return "differs", detail
