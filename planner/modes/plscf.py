@@ -1,0 +1,147 @@
+"""Poly-reference least-squares complex frequency-domain estimator (pLSCF).
+
+Right matrix fraction H(ω) = B(ω) A(ω)⁻¹ in the z-domain basis e^{iωΔt·r}, all hit directions at
+once (Guillaume et al., ISMA 2003; Peeters et al., Shock and Vibration 11, 2004). With one
+reference it is the common-denominator LSCF. A₀ = I is fixed: noise poles then come out unstable
+and drop out (Cauberghe, PhD thesis, VUB 2004, ch. 3).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve, solve_triangular
+
+# Relative ridge on the normal matrices: a band that leaves part of the circle empty makes them
+# singular to rounding, and only to rounding.
+RIDGE = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class PoleSet:
+    """Poles with positive frequency and damping that one model order gives."""
+
+    order: int
+    poles: np.ndarray  # (k,) rad/s
+    participation: np.ndarray  # (k, inputs), unit length
+
+
+@dataclass(frozen=True)
+class _Circle:
+    """Map of the band onto the upper half of the unit circle: angle = (ω − base)·step."""
+
+    base: float  # rad/s
+    step: float  # s
+
+    def to_poles(self, z: np.ndarray) -> np.ndarray:
+        return np.log(z) / self.step + 1j * self.base
+
+
+def plscf(
+    frequency_hz: np.ndarray,
+    frf: np.ndarray,
+    orders: tuple[int, ...],
+    weight: np.ndarray | None = None,
+) -> tuple[PoleSet, ...]:
+    """Poles of every model order.
+
+    frequency_hz (F,) increasing, > 0; frf (outputs, inputs, F) complex, finite, of any kind
+    (receptance, mobility, accelerance: the poles are the same and the numerator takes the
+    rest); weight (outputs, F), ≥ 0, multiplies the squared equation error of one output's row,
+    usually 1/variance. An order n gives n·inputs poles, of which those with positive frequency
+    and damping are returned.
+    """
+    omega = 2 * np.pi * np.asarray(frequency_hz)
+    circle = _circle(omega)
+    scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
+    scale = np.where(scale > 0, scale, 1.0)
+    scaled = frf / scale[:, None]
+    normal, coupling = _normal(
+        np.exp(1j * (omega - circle.base) * circle.step), scaled, weight, max(orders)
+    )
+    return tuple(_solve(order, normal, coupling, scale, circle) for order in orders)
+
+
+def _circle(omega: np.ndarray) -> _Circle:
+    low, high = omega[0], omega[-1]
+    # A band far above zero is moved down, or most of the circle would hold no data.
+    base = low if low > 0.5 * high else 0.0
+    return _Circle(base, np.pi / (high - base))
+
+
+def _normal(
+    z: np.ndarray, frf: np.ndarray, weight: np.ndarray | None, order: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Denominator block of the normal equations and its coupling to the numerators.
+
+    Returns T (n+1, i, n+1, i), the sum over outputs, and V = L⁻¹S (outputs, n+1, n+1, i) with
+    R = LLᵀ: the reduced matrix of any order m is T − Σ VᵀV over the leading m + 1 blocks.
+    Everything is (block) Toeplitz because the basis is a power of z, so sums per lag suffice.
+    """
+    outputs, inputs, lines = frf.shape
+    w = np.ones((outputs, lines)) if weight is None else weight / np.mean(weight)
+    lags = z[None, :] ** np.arange(order + 1)[:, None]
+    index = np.arange(order + 1)
+    lag = index[None, :] - index[:, None]  # column power minus row power
+    total = np.zeros((order + 1, inputs, order + 1, inputs))
+    reduced = np.empty((outputs, order + 1, order + 1, inputs))
+    for o in range(outputs):
+        h = frf[o]
+        r = (lags @ w[o]).real
+        s = _two_sided(lags, (w[o] * h).T).real  # (2n+1, i) for lags −n…n
+        products = (w[o] * h.conj()[:, None] * h[None]).reshape(inputs * inputs, lines)
+        t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
+        gram = r[np.abs(lag)]
+        gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
+        factor = cholesky(gram + RIDGE * r[0] * np.eye(order + 1), lower=True)
+        coupled = -s[lag + order].reshape(order + 1, -1)
+        reduced[o] = solve_triangular(factor, coupled, lower=True).reshape(
+            order + 1, order + 1, inputs
+        )
+        total += t[lag + order].transpose(0, 2, 1, 3)
+    return total, reduced
+
+
+def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Σ_f z^l data_f for l = −n…n."""
+    return np.concatenate([(lags[:0:-1].conj()) @ data, lags @ data])
+
+
+def _solve(
+    order: int, normal: np.ndarray, coupling: np.ndarray, scale: np.ndarray, circle: _Circle
+) -> PoleSet:
+    inputs = normal.shape[1]
+    size = (order + 1) * inputs
+    block = normal[: order + 1, :, : order + 1].reshape(size, size)
+    v = coupling[:, : order + 1, : order + 1].reshape(-1, size)
+    block = block - v.T @ v
+    ridge = RIDGE * np.trace(block) / size
+    inner = block[inputs:, inputs:] + ridge * np.eye(size - inputs)
+    a = -solve(inner, block[inputs:, :inputs], assume_a="sym", check_finite=False)
+    coefficients = np.concatenate([np.eye(inputs)[None], a.reshape(order, inputs, inputs)])
+    z = 1 / _reciprocal_roots(coefficients)
+    poles = circle.to_poles(z)
+    keep = (np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)
+    poles, z = poles[keep], z[keep]
+    participation = _participation(coefficients, z) * scale
+    participation /= np.linalg.norm(participation, axis=1, keepdims=True)
+    by_frequency = np.argsort(poles.imag)
+    return PoleSet(order, poles[by_frequency], participation[by_frequency])
+
+
+def _reciprocal_roots(coefficients: np.ndarray) -> np.ndarray:
+    """1/z for det Σ A_r z^r = 0 with A₀ = I: eigenvalues of the block companion matrix."""
+    order, inputs = coefficients.shape[0] - 1, coefficients.shape[1]
+    companion = np.eye(order * inputs, k=-inputs)
+    companion[:inputs] = -coefficients[1:].transpose(1, 0, 2).reshape(inputs, -1)
+    roots = np.linalg.eigvals(companion)
+    return roots[np.abs(roots) > 1e-12]
+
+
+def _participation(coefficients: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Left null vectors u of A(z): the residue is ψuᵀ, so u weighs the hit directions."""
+    if coefficients.shape[1] == 1 or z.size == 0:
+        return np.ones((z.size, coefficients.shape[1]), complex)
+    powers = z[:, None] ** np.arange(coefficients.shape[0])
+    values = np.einsum("kr,rij->kij", powers, coefficients)
+    left = np.linalg.svd(values)[0]
+    return left[:, :, -1].conj()

@@ -1,0 +1,183 @@
+"""Maximum-likelihood refinement of poles and residues in the frequency domain.
+
+The residues enter linearly and are eliminated (variable projection, Golub and Pereyra 1973, in
+Kaufman's form), so that Gauss–Newton with Levenberg–Marquardt damping runs over the poles only.
+The noise of a line is circular complex normal with the stated variance E|δH|²; at the solution
+the linearised equations give the covariance of poles and residues (Pintelon and Schoukens,
+System Identification, 2012, ch. 9).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.modes.residues import Residues, basis, basis_slope, unpack
+
+MAX_ITERATIONS = 30
+# Poles further than this from zero, relative to |λ|, are not modes of a structure.
+MAX_DAMPING = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance."""
+
+    poles: np.ndarray  # (m,) rad/s
+    residues: Residues  # (outputs, inputs, m)
+    chi2: float
+    degrees: int  # degrees of freedom left
+    pole_covariance: np.ndarray  # (2m, 2m) of Re λ (all modes), then Im λ
+    residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """The problem at one set of poles: χ², step equations and what they rest on."""
+
+    chi2: float
+    coefficients: np.ndarray  # (entries, columns)
+    gradient: np.ndarray  # (2m,)
+    hessian: np.ndarray  # (2m, 2m)
+    inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
+    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+
+
+def refine(
+    frequency_hz: np.ndarray,
+    accelerance: np.ndarray,
+    variance: np.ndarray,
+    poles: np.ndarray,
+    residual_terms: bool = True,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Refined:
+    """Minimise the weighted error over poles and residues, starting from `poles`.
+
+    frequency_hz (F,); accelerance and variance (outputs, inputs, F), finite, variance > 0;
+    poles (m,) in rad/s, m ≥ 1.
+    """
+    outputs, inputs, lines = accelerance.shape
+    omega = 2 * np.pi * np.asarray(frequency_hz)
+    data = accelerance.reshape(-1, lines)
+    weight = 2 / variance.reshape(-1, lines)
+    poles = np.asarray(poles, complex)
+    m = poles.size
+    damping = 1e-3
+    point = _evaluate(omega, data, weight, poles, residual_terms)
+    converged = False
+    for _ in range(max_iterations):
+        scale = np.sqrt(np.diag(point.hessian)) + 1e-300
+        hessian = point.hessian / scale[:, None] / scale
+        step = np.linalg.solve(hessian + damping * np.eye(2 * m), point.gradient / scale)
+        step = step / scale
+        candidate = poles + step[:m] + 1j * step[m:]
+        trial = None
+        if _allowed(candidate, omega):
+            trial = _evaluate(omega, data, weight, candidate, residual_terms)
+        if trial is None or not trial.chi2 <= point.chi2:
+            damping *= 10
+            if damping > 1e8:
+                break
+            continue
+        gain = point.chi2 - trial.chi2
+        small = np.max(np.abs(step) * scale) < 1e-3 or gain < 1e-9 * point.chi2
+        poles, point, damping = candidate, trial, damping / 10
+        if small and damping < 1e-4:
+            converged = True
+            break
+    return _finish(omega, poles, point, (outputs, inputs), lines, converged)
+
+
+def _allowed(poles: np.ndarray, omega: np.ndarray) -> bool:
+    span = omega[-1] - omega[0]
+    inside = (poles.imag > max(0.0, omega[0] - span)) & (poles.imag < omega[-1] + span)
+    damped = (poles.real < 0) & (-poles.real < MAX_DAMPING * np.abs(poles))
+    return bool(np.all(inside & damped))
+
+
+def _evaluate(
+    omega: np.ndarray, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
+) -> _Point:
+    m = poles.size
+    linear, slope = basis(omega, poles, rest), basis_slope(omega, poles)
+    p = linear.shape[0]
+    columns = np.concatenate([linear, slope])
+    norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
+    columns /= norm[:, None]
+    gram, cross, square = _products(columns, data, weight)
+    size = np.sqrt(np.einsum("ekk->ek", gram))[:, :p]
+    scaled = gram[:, :p, :p] / size[:, :, None] / size[:, None, :]
+    inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
+    inverse /= size[:, :, None] * size[:, None, :]
+    coefficients = np.einsum("ekl,el->ek", inverse, cross[:, :p])
+    chi2 = float(np.sum(square) - np.einsum("ek,ek->", coefficients, cross[:, :p]))
+    # Jacobian columns as combinations of the slope basis: J = slope · turn.
+    turn = _turn(coefficients / norm[:p], m) * norm[p:, None]
+    mixed = gram[:, :p, p:] @ turn
+    sensitivity = -inverse @ mixed
+    gradient = np.einsum("eka,ek->a", turn, cross[:, p:])
+    gradient -= np.einsum("eka,ek->a", mixed, coefficients)
+    jtj = turn.transpose(0, 2, 1) @ gram[:, p:, p:] @ turn
+    hessian = np.sum(jtj + mixed.transpose(0, 2, 1) @ sensitivity, axis=0)
+    return _Point(
+        max(chi2, 0.0),
+        coefficients / norm[:p],
+        gradient,
+        hessian,
+        inverse / norm[:p, None] / norm[:p],
+        sensitivity / norm[:p, None],
+    )
+
+
+def _products(
+    columns: np.ndarray, data: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gram matrix of the columns, their products with the data, ‖data‖², per entry."""
+    square = np.sum(weight * np.abs(data) ** 2, axis=1)
+    both = np.concatenate([columns.real, columns.imag], axis=1)
+    wide = np.concatenate([weight, weight], axis=1)
+    values = np.concatenate([data.real, data.imag], axis=1)
+    cross = (wide * values) @ both.T
+    common = np.all(weight == weight[:, :1])
+    if common:
+        gram = weight[:, 0, None, None] * (both @ both.T)
+    else:
+        gram = np.stack([(both * row) @ both.T for row in wide])
+    return gram, cross, square
+
+
+def _turn(coefficients: np.ndarray, m: int) -> np.ndarray:
+    """(entries, 2m, 2m): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
+    real, imag = coefficients[:, :m], coefficients[:, m : 2 * m]
+    turn = np.zeros((coefficients.shape[0], 2 * m, 2 * m))
+    index = np.arange(m)
+    turn[:, index, index] = real
+    turn[:, m + index, index] = imag
+    turn[:, index, m + index] = -imag
+    turn[:, m + index, m + index] = real
+    return turn
+
+
+def _finish(
+    omega: np.ndarray,
+    poles: np.ndarray,
+    point: _Point,
+    shape: tuple[int, int],
+    lines: int,
+    converged: bool,
+) -> Refined:
+    m = poles.size
+    entries, p = point.coefficients.shape
+    covariance = np.linalg.pinv(point.hessian, hermitian=True)
+    spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
+    variance = np.einsum("ekk->ek", point.inverse) + spread
+    residues = unpack(point.coefficients.reshape(*shape, p), m, omega[-1])
+    return Refined(
+        poles,
+        residues,
+        point.chi2,
+        2 * lines * entries - entries * p - 2 * m,
+        covariance,
+        variance[:, : 2 * m].reshape(*shape, 2, m),
+        converged,
+    )
