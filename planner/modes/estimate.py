@@ -1,30 +1,18 @@
 """From the FRF matrix of one pose to its modes, without an expert."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from planner.errors import RefusedError
 from planner.frf.types import Frf
+from planner.modes.fit import Data, Fit, fit, scales
 from planner.modes.plscf import plscf
-from planner.modes.refine import Refined, refine
 from planner.modes.residues import rank_one, synthesize
-from planner.modes.stabilisation import Line, diagram, stable
+from planner.modes.stabilisation import diagram, stable
 from planner.modes.types import ModalModel, Mode
 
 MAX_ORDER = 40
 # Lines beyond the band that are fitted too, so that modes at its edges are met from both sides.
 MARGIN = 0.15
-
-
-@dataclass(frozen=True, eq=False)
-class _Data:
-    """What is fitted: measured columns on the lines used."""
-
-    frequency_hz: np.ndarray
-    accelerance: np.ndarray  # (3, columns, F)
-    variance: np.ndarray | None  # (3, columns, F), None where unknown
-    columns: np.ndarray
 
 
 def estimate_modes(
@@ -42,12 +30,14 @@ def estimate_modes(
     lines = stable(diagram(sets, reach))
     if not lines:
         raise RefusedError(_nothing(band_hz))
-    fit, scale = _fit(data, lines)
-    modes = _modes(data, fit, scale, frf.exponential_rate_1_s)
+    found = fit(data, np.array([line.pole for line in lines]) + data.rate_1_s)
+    modes = _modes(data, found)
     modes = [m for m in modes if band_hz[0] <= m.frequency_hz <= band_hz[1]]
     if not modes:
         raise RefusedError(_nothing(band_hz))
-    error = data.accelerance - synthesize(data.frequency_hz, fit.poles, fit.residues)
+    error = data.accelerance - synthesize(
+        data.frequency_hz, found.refined.poles, found.refined.residues, data.rate_1_s
+    )
     relative = float(np.linalg.norm(error) / np.linalg.norm(data.accelerance))
     return ModalModel(tuple(modes), band_hz, relative, max(orders))
 
@@ -59,7 +49,7 @@ def _nothing(band_hz: tuple[float, float]) -> str:
     )
 
 
-def _select_lines(frf: Frf, band_hz: tuple[float, float]) -> _Data:
+def _select_lines(frf: Frf, band_hz: tuple[float, float]) -> Data:
     usable = frf.usable_band_hz
     low = max(band_hz[0] / (1 + MARGIN), usable[0], 1e-9)
     high = min(band_hz[1] * (1 + MARGIN), usable[1])
@@ -74,47 +64,31 @@ def _select_lines(frf: Frf, band_hz: tuple[float, float]) -> _Data:
         )
     variance = frf.variance[:, columns][..., chosen]
     known = np.all(np.isfinite(variance) & (variance > 0))
-    return _Data(frf.frequency_hz[chosen], h[..., chosen], variance if known else None, columns)
+    return Data(frf.frequency_hz[chosen], h[..., chosen], variance if known else None, columns)
 
 
-def _order_limit(data: _Data, max_order: int) -> int:
+def _order_limit(data: Data, max_order: int) -> int:
     # Twice as many real equations per column as unknowns, at least.
     return max(2, min(max_order, data.frequency_hz.size // 3))
 
 
-def _fit(data: _Data, lines: tuple[Line, ...]) -> tuple[Refined, float]:
-    """Refined fit and the factor on its covariance (1 where the stated variance explains it)."""
-    poles = np.array([line.pole for line in lines])
-    flat = np.mean(np.abs(data.accelerance) ** 2, axis=-1, keepdims=True)
-    variance = data.variance
-    if variance is None:
-        variance = np.broadcast_to(flat, data.accelerance.shape)
-        first = refine(data.frequency_hz, data.accelerance, variance, poles)
-        error = data.accelerance - synthesize(data.frequency_hz, first.poles, first.residues)
-        flat = np.mean(np.abs(error) ** 2, axis=-1, keepdims=True) + 1e-24 * flat
-        variance = np.broadcast_to(flat, data.accelerance.shape)
-        poles = first.poles
-    fit = refine(data.frequency_hz, data.accelerance, variance, poles)
-    return fit, max(1.0, fit.chi2 / max(1, fit.degrees))
-
-
-def _modes(data: _Data, fit: Refined, scale: float, rate_1_s: float) -> list[Mode]:
-    """Modes in increasing frequency, poles shifted back by the rate of the window."""
-    m = fit.poles.size
+def _modes(data: Data, found: Fit) -> list[Mode]:
+    """Modes in increasing frequency."""
+    refined = found.refined
+    m = refined.poles.size
+    scale = scales(data, found)
     modes = []
     for k in range(m):
-        pole = fit.poles[k] + rate_1_s
-        if pole.real >= 0:
-            continue
-        covariance = scale * fit.pole_covariance[np.ix_([k, m + k], [k, m + k])]
-        frequency, damping, sd = _natural(pole, covariance)
+        index = [k, m + k]
+        covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        frequency, damping, sd = _natural(complex(refined.poles[k]), covariance)
         residue = np.full((3, 3), np.nan + 1j * np.nan)
         residue_sd = np.full((3, 3), np.nan)
-        found = fit.residues.residue[..., k]
-        residue[:, data.columns] = found
-        variance = scale * fit.residue_variance[..., k]
+        value = refined.residues.residue[..., k]
+        residue[:, data.columns] = value
+        variance = scale[k] * refined.residue_variance[..., k]
         residue_sd[:, data.columns] = np.sqrt(np.mean(variance, axis=-1))
-        shape = rank_one(found)[0]
+        shape = rank_one(value)[0]
         modes.append(Mode(frequency, sd[0], damping, sd[1], residue, residue_sd, shape))
     return sorted(modes, key=lambda mode: mode.frequency_hz)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modes.residues import Residues, basis, basis_slope, unpack
+from planner.modes.residues import Residues, basis, basis_slope, laplace, unpack
 
 MAX_ITERATIONS = 30
 # Poles further than this from zero, relative to |λ|, are not modes of a structure.
@@ -28,6 +28,7 @@ class Refined:
     degrees: int  # degrees of freedom left
     pole_covariance: np.ndarray  # (2m, 2m) of Re λ (all modes), then Im λ
     residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
+    significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
     converged: bool
 
 
@@ -48,22 +49,24 @@ def refine(
     accelerance: np.ndarray,
     variance: np.ndarray,
     poles: np.ndarray,
+    rate_1_s: float = 0.0,
     residual_terms: bool = True,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Refined:
     """Minimise the weighted error over poles and residues, starting from `poles`.
 
     frequency_hz (F,); accelerance and variance (outputs, inputs, F), finite, variance > 0;
-    poles (m,) in rad/s, m ≥ 1.
+    poles (m,) in rad/s, m ≥ 1; rate_1_s that of the exponential window of the records, whose
+    effect is part of the model: `poles` are those of the structure.
     """
     outputs, inputs, lines = accelerance.shape
-    omega = 2 * np.pi * np.asarray(frequency_hz)
+    s = laplace(frequency_hz, rate_1_s)
     data = accelerance.reshape(-1, lines)
     weight = 2 / variance.reshape(-1, lines)
     poles = np.asarray(poles, complex)
     m = poles.size
     damping = 1e-3
-    point = _evaluate(omega, data, weight, poles, residual_terms)
+    point = _evaluate(s, data, weight, poles, residual_terms)
     converged = False
     for _ in range(max_iterations):
         scale = np.sqrt(np.diag(point.hessian)) + 1e-300
@@ -72,8 +75,8 @@ def refine(
         step = step / scale
         candidate = poles + step[:m] + 1j * step[m:]
         trial = None
-        if _allowed(candidate, omega):
-            trial = _evaluate(omega, data, weight, candidate, residual_terms)
+        if _allowed(candidate, s):
+            trial = _evaluate(s, data, weight, candidate, residual_terms)
         if trial is None or not trial.chi2 <= point.chi2:
             damping *= 10
             if damping > 1e8:
@@ -85,21 +88,23 @@ def refine(
         if small and damping < 1e-4:
             converged = True
             break
-    return _finish(omega, poles, point, (outputs, inputs), lines, converged)
+    return _finish(s, poles, point, (outputs, inputs), lines, converged)
 
 
-def _allowed(poles: np.ndarray, omega: np.ndarray) -> bool:
+def _allowed(poles: np.ndarray, s: np.ndarray) -> bool:
+    """Near the band, and decaying as recorded (under the window)."""
+    omega, rate = s.imag, s.real[0]
     span = omega[-1] - omega[0]
     inside = (poles.imag > max(0.0, omega[0] - span)) & (poles.imag < omega[-1] + span)
-    damped = (poles.real < 0) & (-poles.real < MAX_DAMPING * np.abs(poles))
+    damped = (poles.real < rate) & (-poles.real < MAX_DAMPING * np.abs(poles))
     return bool(np.all(inside & damped))
 
 
 def _evaluate(
-    omega: np.ndarray, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
+    s: np.ndarray, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
 ) -> _Point:
     m = poles.size
-    linear, slope = basis(omega, poles, rest), basis_slope(omega, poles)
+    linear, slope = basis(s, poles, rest), basis_slope(s, poles)
     p = linear.shape[0]
     columns = np.concatenate([linear, slope])
     norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
@@ -159,7 +164,7 @@ def _turn(coefficients: np.ndarray, m: int) -> np.ndarray:
 
 
 def _finish(
-    omega: np.ndarray,
+    s: np.ndarray,
     poles: np.ndarray,
     point: _Point,
     shape: tuple[int, int],
@@ -171,7 +176,7 @@ def _finish(
     covariance = np.linalg.pinv(point.hessian, hermitian=True)
     spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
     variance = np.einsum("ekk->ek", point.inverse) + spread
-    residues = unpack(point.coefficients.reshape(*shape, p), m, omega[-1])
+    residues = unpack(point.coefficients.reshape(*shape, p), m, float(np.max(np.abs(s))))
     return Refined(
         poles,
         residues,
@@ -179,5 +184,14 @@ def _finish(
         2 * lines * entries - entries * p - 2 * m,
         covariance,
         variance[:, : 2 * m].reshape(*shape, 2, m),
+        _significance(point, m),
         converged,
     )
+
+
+def _significance(point: _Point, m: int) -> np.ndarray:
+    """Wald statistic of each mode's residues: 2 · entries degrees of freedom without a mode."""
+    index = np.stack([np.arange(m), m + np.arange(m)], axis=1)
+    value = point.coefficients[:, index]
+    block = point.inverse[:, index[:, :, None], index[:, None, :]]
+    return np.einsum("emk,emkl,eml->m", value, np.linalg.pinv(block, hermitian=True), value)

@@ -1,8 +1,10 @@
 """Residues by least squares in the frequency domain (LSFD), with out-of-band terms.
 
-Accelerance of one entry: −ω² [Σ R/(iω−λ) + R*/(iω−λ*)] + L − ω² U, L and U standing for the
+Accelerance of one entry: s² [Σ R/(s−λ) + R*/(s−λ*)] + L + s² U, L and U standing for the
 modes below and above the band (Heylen, Lammens, Sas, Modal Analysis Theory and Testing, 1997,
-A.3); both may be complex, because the modes outside are damped.
+A.3); both may be complex, because the modes outside are damped. s = iω, or iω + rate where the
+records carry an exponential window e^{−rate·t}: the transform of the windowed record is that of
+the record itself at iω + rate, so poles and residues need no correction afterwards.
 """
 
 from dataclasses import dataclass
@@ -19,41 +21,47 @@ class Residues:
     upper: np.ndarray  # m/N
 
 
-def basis(omega: np.ndarray, poles: np.ndarray, residual_terms: bool = True) -> np.ndarray:
+def basis(s: np.ndarray, poles: np.ndarray, residual_terms: bool = True) -> np.ndarray:
     """Accelerance of unit real and imaginary parts of every coefficient, (columns, F) complex.
 
-    omega (F,) and poles (m,) in rad/s. Columns: Re R of each mode, Im R of each mode, then
-    Re L, Im L, Re U, Im U (scaled by ω_max² to be of the size of L).
+    s (F,) and poles (m,) in rad/s. Columns: Re R of each mode, Im R of each mode, then Re L,
+    Im L, Re U, Im U (U scaled by |s|²_max to be of the size of L).
     """
-    iw = 1j * omega
-    up, down = 1 / (iw - poles[:, None]), 1 / (iw - poles.conj()[:, None])
-    columns = [iw**2 * (up + down), 1j * iw**2 * (up - down)]
+    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
+    columns = [s**2 * (up + down), 1j * s**2 * (up - down)]
     if residual_terms:
-        scaled = -((omega / omega[-1]) ** 2)
-        one = np.ones_like(iw)
+        scaled = s**2 / np.max(np.abs(s)) ** 2
+        one = np.ones_like(s)
         columns.append(np.stack([one, 1j * one, scaled, 1j * scaled]))
     return np.concatenate(columns)
 
 
-def basis_slope(omega: np.ndarray, poles: np.ndarray) -> np.ndarray:
+def basis_slope(s: np.ndarray, poles: np.ndarray) -> np.ndarray:
     """Basis (2m, F) of the derivative by the poles, for unit Re R and Im R.
 
     ∂H/∂Re λ = Re R·first + Im R·second and ∂H/∂Im λ = Re R·second − Im R·first.
     """
-    iw = 1j * omega
-    up, down = 1 / (iw - poles[:, None]) ** 2, 1 / (iw - poles.conj()[:, None]) ** 2
-    return np.concatenate([iw**2 * (up + down), 1j * iw**2 * (up - down)])
+    up, down = 1 / (s - poles[:, None]) ** 2, 1 / (s - poles.conj()[:, None]) ** 2
+    return np.concatenate([s**2 * (up + down), 1j * s**2 * (up - down)])
 
 
-def unpack(coefficients: np.ndarray, modes: int, omega_max: float) -> Residues:
-    """Coefficients of `basis` (outputs, inputs, columns) as residues and out-of-band terms."""
+def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0) -> np.ndarray:
+    """s (rad/s) of frequency lines (Hz) of records windowed by e^{−rate·t}."""
+    return 2j * np.pi * np.asarray(frequency_hz) + rate_1_s
+
+
+def unpack(coefficients: np.ndarray, modes: int, largest: float) -> Residues:
+    """Coefficients of `basis` (outputs, inputs, columns) as residues and out-of-band terms.
+
+    `largest` is |s|_max, by which the basis of U was scaled.
+    """
     residue = coefficients[..., :modes] + 1j * coefficients[..., modes : 2 * modes]
     rest = coefficients[..., 2 * modes :]
     if rest.shape[-1] == 0:
         zero = np.zeros(residue.shape[:2], complex)
         return Residues(residue, zero, zero)
     lower = rest[..., 0] + 1j * rest[..., 1]
-    upper = (rest[..., 2] + 1j * rest[..., 3]) / omega_max**2
+    upper = (rest[..., 2] + 1j * rest[..., 3]) / largest**2
     return Residues(residue, lower, upper)
 
 
@@ -64,6 +72,7 @@ def lsfd(
     weight: np.ndarray | None = None,
     residual_terms: bool = True,
     real_modes: bool = False,
+    rate_1_s: float = 0.0,
 ) -> Residues:
     """Residues of given poles.
 
@@ -71,8 +80,8 @@ def lsfd(
     like accelerance, usually 1/variance. With `real_modes` the residues are purely imaginary,
     as those of a proportionally damped structure are.
     """
-    omega = 2 * np.pi * np.asarray(frequency_hz)
-    columns = basis(omega, np.asarray(poles), residual_terms)
+    s = laplace(frequency_hz, rate_1_s)
+    columns = basis(s, np.asarray(poles), residual_terms)
     m = len(poles)
     free = np.arange(m, columns.shape[0]) if real_modes else np.arange(columns.shape[0])
     root = np.ones(accelerance.shape) if weight is None else np.sqrt(weight)
@@ -82,7 +91,7 @@ def lsfd(
         norm = np.linalg.norm(a, axis=0)
         b = stack(accelerance[o, i] * root[o, i])
         coefficients[o, i, free] = np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm
-    return unpack(coefficients, m, omega[-1])
+    return unpack(coefficients, m, float(np.max(np.abs(s))))
 
 
 def stack(values: np.ndarray) -> np.ndarray:
@@ -90,14 +99,14 @@ def stack(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
-def synthesize(frequency_hz: np.ndarray, poles: np.ndarray, residues: Residues) -> np.ndarray:
+def synthesize(
+    frequency_hz: np.ndarray, poles: np.ndarray, residues: Residues, rate_1_s: float = 0.0
+) -> np.ndarray:
     """Accelerance (outputs, inputs, F) of poles, residues and out-of-band terms."""
-    omega = 2 * np.pi * np.asarray(frequency_hz)
-    iw = 1j * omega
-    up, down = 1 / (iw - poles[:, None]), 1 / (iw - poles.conj()[:, None])
+    s = laplace(frequency_hz, rate_1_s)
+    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
     receptance = residues.residue @ up + residues.residue.conj() @ down
-    rest = residues.lower[..., None] + residues.upper[..., None] * iw**2
-    return iw**2 * receptance + rest
+    return s**2 * (receptance + residues.upper[..., None]) + residues.lower[..., None]
 
 
 def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -1,0 +1,187 @@
+"""Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.modes.refine import Refined, refine
+from planner.modes.residues import laplace, synthesize
+
+# Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
+QUANTILE = 5.0
+MAX_ROUNDS = 12
+MAX_DAMPING = 0.3
+# Damping ratios of the atoms with which the remaining error is searched.
+TRIAL_DAMPING = (0.003, 0.01, 0.03, 0.08)
+# Least noise relative to the FRF: below it rounding rules.
+FLOOR = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """What is fitted: measured columns on the lines used."""
+
+    frequency_hz: np.ndarray  # (F,)
+    accelerance: np.ndarray  # (3, columns, F)
+    variance: np.ndarray | None  # like accelerance, None where unknown
+    columns: np.ndarray  # indices of the measured columns
+    rate_1_s: float = 0.0
+
+    @property
+    def entries(self) -> int:
+        return self.accelerance.shape[0] * self.accelerance.shape[1]
+
+    @property
+    def threshold(self) -> float:
+        """Fall of χ² that a mode (pole and residues) reaches by chance with negligible odds."""
+        k = 2 * self.entries + 2
+        return k * (1 - 2 / (9 * k) + QUANTILE * np.sqrt(2 / (9 * k))) ** 3
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Refined poles, the variance that weighted them, and the excess of χ² per line."""
+
+    refined: Refined
+    variance: np.ndarray
+    excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom around each line
+
+    def scale_at(self, frequency_hz: float, lines_hz: np.ndarray) -> float:
+        """Factor by which the error around a frequency exceeds its stated variance."""
+        return float(np.interp(frequency_hz, lines_hz, self.excess))
+
+
+def fit(data: Data, start: np.ndarray) -> Fit:
+    """Fit from starting poles (m,), leaving out and adding modes until neither helps."""
+    current = _refine(data, start, None)
+    current = _prune(data, current)
+    tried: list[complex] = []
+    for _ in range(MAX_ROUNDS):
+        candidate = _missing(data, current, tried)
+        if candidate is None:
+            break
+        tried.append(candidate)
+        poles = np.append(current.refined.poles, candidate)
+        grown = _refine(data, poles, current)
+        if _worth(data, current, grown):
+            current = _prune(data, grown)
+    return current
+
+
+def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
+    """Refined fit; an unknown variance is taken from the error, flat over the lines."""
+    power = np.mean(np.abs(data.accelerance) ** 2, axis=-1, keepdims=True)
+    variance = data.variance
+    if variance is None and before is not None:
+        variance = before.variance
+    rounds = 1 if data.variance is not None else 2
+    if variance is None:
+        variance, rounds = np.broadcast_to(power, data.accelerance.shape), 3
+    refined = None
+    for k in range(rounds):
+        start = poles if refined is None else refined.poles
+        refined = refine(data.frequency_hz, data.accelerance, variance, start, data.rate_1_s)
+        if data.variance is None and k < rounds - 1:
+            square = np.abs(_error(data, refined)) ** 2
+            lines = data.frequency_hz.size
+            lost = 1 - (2 * refined.poles.size + 4) / (2 * lines)
+            flat = np.mean(square, axis=-1, keepdims=True) / max(lost, 0.1)
+            variance = np.broadcast_to(flat + FLOOR**2 * power, data.accelerance.shape)
+    assert refined is not None
+    return Fit(refined, variance, _excess(data, refined, variance))
+
+
+def _error(data: Data, refined: Refined) -> np.ndarray:
+    model = synthesize(data.frequency_hz, refined.poles, refined.residues, data.rate_1_s)
+    return data.accelerance - model
+
+
+def _excess(data: Data, refined: Refined, variance: np.ndarray) -> np.ndarray:
+    """χ² per degree of freedom in a window of lines, at least 1 and at least the overall one."""
+    error = np.mean(np.abs(_error(data, refined)) ** 2 / variance, axis=(0, 1))
+    lines = error.size
+    freedom = refined.degrees / (2 * lines * data.entries)
+    half = max(5, lines // 40)
+    total = np.concatenate([[0.0], np.cumsum(error)])
+    low = np.clip(np.arange(lines) - half, 0, None)
+    high = np.clip(np.arange(lines) + half + 1, None, lines)
+    local = (total[high] - total[low]) / (high - low) / max(freedom, 0.1)
+    # A window of few lines scatters by itself; only what exceeds that is excess.
+    noise = 1 + 2 / np.sqrt((high - low) * data.entries)
+    return np.maximum(1.0, np.maximum(local / noise, np.mean(error) / max(freedom, 0.1)))
+
+
+def _prune(data: Data, current: Fit) -> Fit:
+    """Leave out, one at a time, modes that the data do not carry."""
+    while current.refined.poles.size > 1:
+        weakness = _weakness(data, current)
+        worst = int(np.argmax(weakness))
+        if weakness[worst] <= 1:
+            break
+        poles = np.delete(current.refined.poles, worst)
+        current = _refine(data, poles, current)
+    return current
+
+
+def _weakness(data: Data, current: Fit) -> np.ndarray:
+    """(m,) above 1 where a mode is not established."""
+    refined = current.refined
+    m = refined.poles.size
+    sd = np.sqrt(np.maximum(0.0, np.diag(refined.pole_covariance)))
+    scale = scales(data, current)
+    decay = np.maximum(data.rate_1_s - refined.poles.real, 1e-12 * np.abs(refined.poles))
+    found = data.threshold * scale / np.maximum(refined.significance, 1e-300)
+    blurred = 2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay
+    damped = -refined.poles.real / (MAX_DAMPING * np.abs(refined.poles))
+    return np.max([found, blurred, damped], axis=0)
+
+
+def scales(data: Data, current: Fit) -> np.ndarray:
+    """(m,) factor on the covariance of each mode, from the error around it."""
+    frequency = np.abs(current.refined.poles) / (2 * np.pi)
+    return np.array([current.scale_at(f, data.frequency_hz) for f in frequency])
+
+
+def _worth(data: Data, before: Fit, after: Fit) -> bool:
+    weight = 2 / before.variance
+    rise = np.sum(weight * np.abs(_error(data, before.refined)) ** 2)
+    rise -= np.sum(weight * np.abs(_error(data, after.refined)) ** 2)
+    new = int(np.argmax(_weakness(data, after)))
+    scale = scales(data, after)[new]
+    if data.variance is None:
+        scale *= float(np.mean(after.variance / before.variance))
+    return bool(rise > data.threshold * scale)
+
+
+def _missing(data: Data, current: Fit, tried: list[complex]) -> complex | None:
+    """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
+    s = laplace(data.frequency_hz, data.rate_1_s)
+    poles = _atoms(data)
+    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
+    first, second = s**2 * (up + down), 1j * s**2 * (up - down)
+    weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
+    error = weight * _error(data, current.refined).reshape(data.entries, -1)
+    aa = (np.abs(first) ** 2) @ weight.T
+    bb = (np.abs(second) ** 2) @ weight.T
+    ab = (first.conj() * second).real @ weight.T
+    a = (first.conj() @ error.T).real
+    b = (second.conj() @ error.T).real
+    fall = np.sum((bb * a**2 - 2 * ab * a * b + aa * b**2) / (aa * bb - ab**2), axis=1)
+    for pole in tried:
+        fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
+    best = int(np.argmax(fall))
+    return complex(poles[best]) if fall[best] > data.threshold else None
+
+
+def _atoms(data: Data) -> np.ndarray:
+    low, high = data.frequency_hz[0], data.frequency_hz[-1]
+    step = data.frequency_hz[1] - data.frequency_hz[0]
+    atoms = []
+    for zeta in TRIAL_DAMPING:
+        frequency, grid = low, []
+        while frequency <= high:
+            grid.append(frequency)
+            frequency += max(step, 0.7 * zeta * frequency)
+        omega = 2 * np.pi * np.array(grid)
+        atoms.append(omega * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+    return np.concatenate(atoms)

@@ -1,0 +1,96 @@
+"""Random modal systems with known poles: the truth that the mode tests are judged by."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.frf.modal import accelerance, pole
+from planner.frf.types import Frf
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    frequency_hz: np.ndarray  # (m,) increasing
+    damping_ratio: np.ndarray  # (m,)
+    residues: np.ndarray  # (m, 3, 3)
+
+    @property
+    def poles(self) -> np.ndarray:
+        return pole(self.frequency_hz, self.damping_ratio)
+
+
+def random_system(
+    rng: np.random.Generator,
+    modes: int,
+    band_hz: tuple[float, float] = (4.0, 60.0),
+    damping: tuple[float, float] = (0.002, 0.1),
+    pair: float | None = None,
+    complexity: float = 0.0,
+    spacing: float = 0.06,
+) -> System:
+    """Modes of comparable receptance at resonance, spaced by `spacing` in log frequency at least.
+
+    `pair` puts two of them that far apart (0.01: 1 %), with differing shapes as the x and y
+    modes of a robot have. `complexity` is the sd of the shapes' phases in rad.
+    """
+    low, high = np.log(band_hz[0] * 1.1), np.log(band_hz[1] / 1.1)
+    free = modes - (pair is not None)
+    while True:
+        logs = np.sort(rng.uniform(low, high, free))
+        if free < 2 or np.min(np.diff(logs)) > spacing:
+            break
+    frequency = np.exp(logs)
+    if pair is not None:
+        frequency = np.append(frequency, frequency[rng.integers(free)] * (1 + pair))
+    shape = rng.normal(size=(modes, 3))
+    shape /= np.linalg.norm(shape, axis=1, keepdims=True)
+    if pair is not None:
+        twin = np.argmin(np.abs(frequency[:-1] * (1 + pair) - frequency[-1]))
+        shape[-1] -= 0.9 * (shape[-1] @ shape[twin]) * shape[twin]
+        shape[-1] /= np.linalg.norm(shape[-1])
+    shape = shape * np.exp(1j * complexity * rng.normal(size=shape.shape))
+    by_frequency = np.argsort(frequency)
+    frequency, shape = frequency[by_frequency], shape[by_frequency]
+    zeta = np.exp(rng.uniform(*np.log(damping), modes))
+    poles = pole(frequency, zeta)
+    # Equal peaks of the accelerance within a factor of three each way.
+    size = 2 * zeta / 50.0 * np.exp(rng.uniform(-1, 1, modes))
+    residues = np.einsum("mi,mj->mij", shape, shape) * (size / (2j * poles.imag))[:, None, None]
+    return System(frequency, zeta, residues)
+
+
+def exact_frf(system: System, frequency_hz: np.ndarray, rate_1_s: float = 0.0) -> np.ndarray:
+    """Accelerance (3, 3, F); with `rate_1_s`, as from records under an exponential window.
+
+    The window moves every pole by the rate; the accelerance is then s² at s = iω + rate.
+    """
+    if rate_1_s == 0.0:
+        return accelerance(frequency_hz, system.poles, system.residues)
+    s = 2j * np.pi * frequency_hz + rate_1_s
+    up = 1 / (s - system.poles[:, None])
+    down = 1 / (s - system.poles.conj()[:, None])
+    r = np.moveaxis(system.residues, 0, -1)
+    return s**2 * (r @ up + r.conj() @ down)
+
+
+def noisy(h: np.ndarray, share: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """FRF with circular noise of `share` times the rms of each entry, and its variance."""
+    variance = np.mean(np.abs(h) ** 2, axis=-1, keepdims=True) * share**2 * np.ones(h.shape)
+    noise = rng.normal(size=h.shape) + 1j * rng.normal(size=h.shape)
+    return h + noise * np.sqrt(variance / 2), variance
+
+
+def as_frf(
+    frequency_hz: np.ndarray,
+    h: np.ndarray,
+    variance: np.ndarray | None = None,
+    columns: tuple[int, ...] = (0, 1, 2),
+    rate_1_s: float = 0.0,
+) -> Frf:
+    """Frf of the given columns; NaN elsewhere."""
+    value = np.full(h.shape, np.nan + 1j * np.nan)
+    value[:, list(columns)] = h[:, list(columns)]
+    spread = np.full(h.shape, np.nan) if variance is None else variance.copy()
+    hits = tuple(4 if c in columns else 0 for c in range(3))
+    band = (float(frequency_hz[0]), float(frequency_hz[-1]))
+    return Frf(frequency_hz, value, spread, np.full(h.shape, np.nan), hits, band, rate_1_s)
