@@ -1,11 +1,12 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from planner.modes.refine import Refined, refine
-from planner.modes.residues import laplace, synthesize
+from planner.modes.residues import Lines, basis, laplace, synthesize
 
 # Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
 QUANTILE = 5.0
@@ -19,17 +20,50 @@ FLOOR = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """What is fitted: measured columns on the lines used."""
+    """What is fitted: responses on frequency lines, and the plane in which their poles lie.
+
+    Accelerance (`step_s` None): the s-plane. Transforms of free decays sampled every `step_s`,
+    taken at the lines of the DFT without padding: the z-plane, where they are exactly rational
+    (the end of the record only scales the residues). `rate_1_s` is that of the exponential
+    window which the records carry; poles are those of the structure, without it.
+    """
 
     frequency_hz: np.ndarray  # (F,)
-    accelerance: np.ndarray  # (3, columns, F)
-    variance: np.ndarray | None  # like accelerance, None where unknown
-    columns: np.ndarray  # indices of the measured columns
+    response: np.ndarray  # (outputs, inputs, F)
+    variance: np.ndarray | None  # like response, None where unknown
     rate_1_s: float = 0.0
+    step_s: float | None = None
+
+    @cached_property
+    def lines(self) -> Lines:
+        if self.step_s is None:
+            return laplace(self.frequency_hz, self.rate_1_s)
+        s = 2j * np.pi * self.frequency_hz + self.rate_1_s
+        x = np.exp(s * self.step_s)
+        return Lines(x, x)
+
+    def to_plane(self, poles: np.ndarray) -> np.ndarray:
+        """From rad/s to the plane of the lines."""
+        return poles if self.step_s is None else np.exp(poles * self.step_s)
+
+    def to_poles(self, values: np.ndarray) -> np.ndarray:
+        """From the plane of the lines to rad/s."""
+        return values if self.step_s is None else np.log(values) / self.step_s
+
+    def allowed(self, values: np.ndarray) -> bool:
+        """Near the band, and decaying as recorded (under the window)."""
+        if np.any(values == 0):
+            return False
+        poles = self.to_poles(values)
+        low, high = 2 * np.pi * self.frequency_hz[[0, -1]]
+        span = high - low
+        inside = (poles.imag > max(0.0, low - span)) & (poles.imag < high + span)
+        damped = (poles.real < self.rate_1_s) & (-poles.real < 0.5 * np.abs(poles))
+        return bool(np.all(inside & damped))
 
     @property
     def entries(self) -> int:
-        return self.accelerance.shape[0] * self.accelerance.shape[1]
+        return self.response.shape[0] * self.response.shape[1]
 
     @property
     def threshold(self) -> float:
@@ -70,30 +104,47 @@ def fit(data: Data, start: np.ndarray) -> Fit:
 
 def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
     """Refined fit; an unknown variance is taken from the error, flat over the lines."""
-    power = np.mean(np.abs(data.accelerance) ** 2, axis=-1, keepdims=True)
+    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = data.variance
     if variance is None and before is not None:
         variance = before.variance
     rounds = 1 if data.variance is not None else 2
     if variance is None:
-        variance, rounds = np.broadcast_to(power, data.accelerance.shape), 3
+        variance, rounds = np.broadcast_to(power, data.response.shape), 3
     refined = None
     for k in range(rounds):
         start = poles if refined is None else refined.poles
-        refined = refine(data.frequency_hz, data.accelerance, variance, start, data.rate_1_s)
+        plane = data.to_plane(start)
+        refined = refine(data.lines, data.response, variance, plane, data.allowed)
+        refined = _in_rad_s(data, refined)
         if data.variance is None and k < rounds - 1:
             square = np.abs(_error(data, refined)) ** 2
             lines = data.frequency_hz.size
             lost = 1 - (2 * refined.poles.size + 4) / (2 * lines)
             flat = np.mean(square, axis=-1, keepdims=True) / max(lost, 0.1)
-            variance = np.broadcast_to(flat + FLOOR**2 * power, data.accelerance.shape)
+            variance = np.broadcast_to(flat + FLOOR**2 * power, data.response.shape)
     assert refined is not None
     return Fit(refined, variance, _excess(data, refined, variance))
 
 
 def _error(data: Data, refined: Refined) -> np.ndarray:
-    model = synthesize(data.frequency_hz, refined.poles, refined.residues, data.rate_1_s)
-    return data.accelerance - model
+    return data.response - model(data, refined)
+
+
+def model(data: Data, refined: Refined) -> np.ndarray:
+    """Fitted responses (outputs, inputs, F)."""
+    return synthesize(data.lines, data.to_plane(refined.poles), refined.residues)
+
+
+def _in_rad_s(data: Data, refined: Refined) -> Refined:
+    """Poles and their covariance carried from the plane of the lines to the s-plane."""
+    if data.step_s is None:
+        return refined
+    slope = 1 / (refined.poles * data.step_s)
+    real, imag = np.diag(slope.real), np.diag(slope.imag)
+    turn = np.block([[real, -imag], [imag, real]])
+    covariance = turn @ refined.pole_covariance @ turn.T
+    return replace(refined, poles=data.to_poles(refined.poles), pole_covariance=covariance)
 
 
 def _excess(data: Data, refined: Refined, variance: np.ndarray) -> np.ndarray:
@@ -114,17 +165,17 @@ def _excess(data: Data, refined: Refined, variance: np.ndarray) -> np.ndarray:
 def _prune(data: Data, current: Fit) -> Fit:
     """Leave out, one at a time, modes that the data do not carry."""
     while current.refined.poles.size > 1:
-        weakness = _weakness(data, current)
-        worst = int(np.argmax(weakness))
-        if weakness[worst] <= 1:
+        weak = weakness(data, current)
+        worst = int(np.argmax(weak))
+        if weak[worst] <= 1:
             break
         poles = np.delete(current.refined.poles, worst)
         current = _refine(data, poles, current)
     return current
 
 
-def _weakness(data: Data, current: Fit) -> np.ndarray:
-    """(m,) above 1 where a mode is not established."""
+def weakness(data: Data, current: Fit) -> np.ndarray:
+    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
     refined = current.refined
     m = refined.poles.size
     sd = np.sqrt(np.maximum(0.0, np.diag(refined.pole_covariance)))
@@ -146,7 +197,7 @@ def _worth(data: Data, before: Fit, after: Fit) -> bool:
     weight = 2 / before.variance
     rise = np.sum(weight * np.abs(_error(data, before.refined)) ** 2)
     rise -= np.sum(weight * np.abs(_error(data, after.refined)) ** 2)
-    new = int(np.argmax(_weakness(data, after)))
+    new = int(np.argmax(weakness(data, after)))
     scale = scales(data, after)[new]
     if data.variance is None:
         scale *= float(np.mean(after.variance / before.variance))
@@ -155,22 +206,36 @@ def _worth(data: Data, before: Fit, after: Fit) -> bool:
 
 def _missing(data: Data, current: Fit, tried: list[complex]) -> complex | None:
     """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
-    s = laplace(data.frequency_hz, data.rate_1_s)
-    poles = _atoms(data)
-    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
-    first, second = s**2 * (up + down), 1j * s**2 * (up - down)
     weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
     error = weight * _error(data, current.refined).reshape(data.entries, -1)
+    poles, fall = _falls(data, weight, error)
+    for pole in tried:
+        fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
+    best = int(np.argmax(fall))
+    return complex(poles[best]) if fall[best] > data.threshold else None
+
+
+def strongest(data: Data) -> np.ndarray:
+    """(0 or 1,) pole of the atom that explains most of the responses, alone."""
+    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
+    variance = np.broadcast_to(power, data.response.shape)
+    if data.variance is not None:
+        variance = data.variance
+    weight = (2 / variance).reshape(data.entries, -1)
+    poles, fall = _falls(data, weight, weight * data.response.reshape(data.entries, -1))
+    return poles[[int(np.argmax(fall))]] if np.max(fall) > data.threshold else poles[:0]
+
+
+def _falls(data: Data, weight: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Trial poles and the fall of χ² that each brings alone; error (entries, F) is weighted."""
+    poles = _atoms(data)
+    first, second = basis(data.lines, data.to_plane(poles), False).reshape(2, len(poles), -1)
     aa = (np.abs(first) ** 2) @ weight.T
     bb = (np.abs(second) ** 2) @ weight.T
     ab = (first.conj() * second).real @ weight.T
     a = (first.conj() @ error.T).real
     b = (second.conj() @ error.T).real
-    fall = np.sum((bb * a**2 - 2 * ab * a * b + aa * b**2) / (aa * bb - ab**2), axis=1)
-    for pole in tried:
-        fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
-    best = int(np.argmax(fall))
-    return complex(poles[best]) if fall[best] > data.threshold else None
+    return poles, np.sum((bb * a**2 - 2 * ab * a * b + aa * b**2) / (aa * bb - ab**2), axis=1)
 
 
 def _atoms(data: Data) -> np.ndarray:

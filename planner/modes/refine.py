@@ -7,26 +7,25 @@ the linearised equations give the covariance of poles and residues (Pintelon and
 System Identification, 2012, ch. 9).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modes.residues import Residues, basis, basis_slope, laplace, unpack
+from planner.modes.residues import Lines, Residues, basis, basis_slope, unpack
 
 MAX_ITERATIONS = 30
-# Poles further than this from zero, relative to |λ|, are not modes of a structure.
-MAX_DAMPING = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Refined:
     """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance."""
 
-    poles: np.ndarray  # (m,) rad/s
+    poles: np.ndarray  # (m,) in the plane of the lines
     residues: Residues  # (outputs, inputs, m)
     chi2: float
     degrees: int  # degrees of freedom left
-    pole_covariance: np.ndarray  # (2m, 2m) of Re λ (all modes), then Im λ
+    pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
     residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
     significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
     converged: bool
@@ -45,28 +44,26 @@ class _Point:
 
 
 def refine(
-    frequency_hz: np.ndarray,
-    accelerance: np.ndarray,
+    lines: Lines,
+    response: np.ndarray,
     variance: np.ndarray,
     poles: np.ndarray,
-    rate_1_s: float = 0.0,
+    allowed: Callable[[np.ndarray], bool],
     residual_terms: bool = True,
     max_iterations: int = MAX_ITERATIONS,
 ) -> Refined:
     """Minimise the weighted error over poles and residues, starting from `poles`.
 
-    frequency_hz (F,); accelerance and variance (outputs, inputs, F), finite, variance > 0;
-    poles (m,) in rad/s, m ≥ 1; rate_1_s that of the exponential window of the records, whose
-    effect is part of the model: `poles` are those of the structure.
+    response and variance (outputs, inputs, F), finite, variance > 0, at `lines`; poles (m,),
+    m ≥ 1, in the plane of `lines`; a step to poles that are not `allowed` is shortened.
     """
-    outputs, inputs, lines = accelerance.shape
-    s = laplace(frequency_hz, rate_1_s)
-    data = accelerance.reshape(-1, lines)
-    weight = 2 / variance.reshape(-1, lines)
+    outputs, inputs, count = response.shape
+    data = response.reshape(-1, count)
+    weight = 2 / variance.reshape(-1, count)
     poles = np.asarray(poles, complex)
     m = poles.size
     damping = 1e-3
-    point = _evaluate(s, data, weight, poles, residual_terms)
+    point = _evaluate(lines, data, weight, poles, residual_terms)
     converged = False
     for _ in range(max_iterations):
         scale = np.sqrt(np.diag(point.hessian)) + 1e-300
@@ -75,8 +72,8 @@ def refine(
         step = step / scale
         candidate = poles + step[:m] + 1j * step[m:]
         trial = None
-        if _allowed(candidate, s):
-            trial = _evaluate(s, data, weight, candidate, residual_terms)
+        if allowed(candidate):
+            trial = _evaluate(lines, data, weight, candidate, residual_terms)
         if trial is None or not trial.chi2 <= point.chi2:
             damping *= 10
             if damping > 1e8:
@@ -88,23 +85,14 @@ def refine(
         if small and damping < 1e-4:
             converged = True
             break
-    return _finish(s, poles, point, (outputs, inputs), lines, converged)
-
-
-def _allowed(poles: np.ndarray, s: np.ndarray) -> bool:
-    """Near the band, and decaying as recorded (under the window)."""
-    omega, rate = s.imag, s.real[0]
-    span = omega[-1] - omega[0]
-    inside = (poles.imag > max(0.0, omega[0] - span)) & (poles.imag < omega[-1] + span)
-    damped = (poles.real < rate) & (-poles.real < MAX_DAMPING * np.abs(poles))
-    return bool(np.all(inside & damped))
+    return _finish(lines, poles, point, (outputs, inputs), count, converged)
 
 
 def _evaluate(
-    s: np.ndarray, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
+    lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
 ) -> _Point:
     m = poles.size
-    linear, slope = basis(s, poles, rest), basis_slope(s, poles)
+    linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
     p = linear.shape[0]
     columns = np.concatenate([linear, slope])
     norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
@@ -164,11 +152,11 @@ def _turn(coefficients: np.ndarray, m: int) -> np.ndarray:
 
 
 def _finish(
-    s: np.ndarray,
+    lines: Lines,
     poles: np.ndarray,
     point: _Point,
     shape: tuple[int, int],
-    lines: int,
+    count: int,
     converged: bool,
 ) -> Refined:
     m = poles.size
@@ -176,12 +164,12 @@ def _finish(
     covariance = np.linalg.pinv(point.hessian, hermitian=True)
     spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
     variance = np.einsum("ekk->ek", point.inverse) + spread
-    residues = unpack(point.coefficients.reshape(*shape, p), m, float(np.max(np.abs(s))))
+    residues = unpack(point.coefficients.reshape(*shape, p), m, lines.largest)
     return Refined(
         poles,
         residues,
         point.chi2,
-        2 * lines * entries - entries * p - 2 * m,
+        2 * count * entries - entries * p - 2 * m,
         covariance,
         variance[:, : 2 * m].reshape(*shape, 2, m),
         _significance(point, m),

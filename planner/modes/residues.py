@@ -21,39 +21,55 @@ class Residues:
     upper: np.ndarray  # m/N
 
 
-def basis(s: np.ndarray, poles: np.ndarray, residual_terms: bool = True) -> np.ndarray:
-    """Accelerance of unit real and imaginary parts of every coefficient, (columns, F) complex.
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Where a model of poles is evaluated: factor · [R/(x−p) + R*/(x−p*)] + L + factor·U.
 
-    s (F,) and poles (m,) in rad/s. Columns: Re R of each mode, Im R of each mode, then Re L,
-    Im L, Re U, Im U (U scaled by |s|²_max to be of the size of L).
+    Accelerance: x = s, factor = s². A sampled free decay: x = e^{s·step}, factor = x.
     """
-    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
-    columns = [s**2 * (up + down), 1j * s**2 * (up - down)]
+
+    x: np.ndarray  # (F,) complex
+    factor: np.ndarray  # (F,) complex
+
+    @property
+    def largest(self) -> float:
+        return float(np.max(np.abs(self.factor)))
+
+
+def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0) -> Lines:
+    """Accelerance lines (Hz) of records windowed by e^{−rate·t}: s = iω + rate."""
+    s = 2j * np.pi * np.asarray(frequency_hz) + rate_1_s
+    return Lines(s, s**2)
+
+
+def basis(lines: Lines, poles: np.ndarray, residual_terms: bool = True) -> np.ndarray:
+    """Response to unit real and imaginary parts of every coefficient, (columns, F) complex.
+
+    poles (m,) in the plane of `lines`. Columns: Re R of each mode, Im R of each mode, then
+    Re L, Im L, Re U, Im U (U scaled to be of the size of L).
+    """
+    up, down = 1 / (lines.x - poles[:, None]), 1 / (lines.x - poles.conj()[:, None])
+    columns = [lines.factor * (up + down), 1j * lines.factor * (up - down)]
     if residual_terms:
-        scaled = s**2 / np.max(np.abs(s)) ** 2
-        one = np.ones_like(s)
+        scaled = lines.factor / lines.largest
+        one = np.ones_like(scaled)
         columns.append(np.stack([one, 1j * one, scaled, 1j * scaled]))
     return np.concatenate(columns)
 
 
-def basis_slope(s: np.ndarray, poles: np.ndarray) -> np.ndarray:
+def basis_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
     """Basis (2m, F) of the derivative by the poles, for unit Re R and Im R.
 
-    ∂H/∂Re λ = Re R·first + Im R·second and ∂H/∂Im λ = Re R·second − Im R·first.
+    ∂H/∂Re p = Re R·first + Im R·second and ∂H/∂Im p = Re R·second − Im R·first.
     """
-    up, down = 1 / (s - poles[:, None]) ** 2, 1 / (s - poles.conj()[:, None]) ** 2
-    return np.concatenate([s**2 * (up + down), 1j * s**2 * (up - down)])
-
-
-def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0) -> np.ndarray:
-    """s (rad/s) of frequency lines (Hz) of records windowed by e^{−rate·t}."""
-    return 2j * np.pi * np.asarray(frequency_hz) + rate_1_s
+    up, down = 1 / (lines.x - poles[:, None]) ** 2, 1 / (lines.x - poles.conj()[:, None]) ** 2
+    return np.concatenate([lines.factor * (up + down), 1j * lines.factor * (up - down)])
 
 
 def unpack(coefficients: np.ndarray, modes: int, largest: float) -> Residues:
     """Coefficients of `basis` (outputs, inputs, columns) as residues and out-of-band terms.
 
-    `largest` is |s|_max, by which the basis of U was scaled.
+    `largest` is |factor|_max, by which the basis of U was scaled.
     """
     residue = coefficients[..., :modes] + 1j * coefficients[..., modes : 2 * modes]
     rest = coefficients[..., 2 * modes :]
@@ -61,7 +77,7 @@ def unpack(coefficients: np.ndarray, modes: int, largest: float) -> Residues:
         zero = np.zeros(residue.shape[:2], complex)
         return Residues(residue, zero, zero)
     lower = rest[..., 0] + 1j * rest[..., 1]
-    upper = (rest[..., 2] + 1j * rest[..., 3]) / largest**2
+    upper = (rest[..., 2] + 1j * rest[..., 3]) / largest
     return Residues(residue, lower, upper)
 
 
@@ -80,8 +96,8 @@ def lsfd(
     like accelerance, usually 1/variance. With `real_modes` the residues are purely imaginary,
     as those of a proportionally damped structure are.
     """
-    s = laplace(frequency_hz, rate_1_s)
-    columns = basis(s, np.asarray(poles), residual_terms)
+    lines = laplace(frequency_hz, rate_1_s)
+    columns = basis(lines, np.asarray(poles), residual_terms)
     m = len(poles)
     free = np.arange(m, columns.shape[0]) if real_modes else np.arange(columns.shape[0])
     root = np.ones(accelerance.shape) if weight is None else np.sqrt(weight)
@@ -91,7 +107,7 @@ def lsfd(
         norm = np.linalg.norm(a, axis=0)
         b = stack(accelerance[o, i] * root[o, i])
         coefficients[o, i, free] = np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm
-    return unpack(coefficients, m, float(np.max(np.abs(s))))
+    return unpack(coefficients, m, lines.largest)
 
 
 def stack(values: np.ndarray) -> np.ndarray:
@@ -99,14 +115,11 @@ def stack(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
-def synthesize(
-    frequency_hz: np.ndarray, poles: np.ndarray, residues: Residues, rate_1_s: float = 0.0
-) -> np.ndarray:
-    """Accelerance (outputs, inputs, F) of poles, residues and out-of-band terms."""
-    s = laplace(frequency_hz, rate_1_s)
-    up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
-    receptance = residues.residue @ up + residues.residue.conj() @ down
-    return s**2 * (receptance + residues.upper[..., None]) + residues.lower[..., None]
+def synthesize(lines: Lines, poles: np.ndarray, residues: Residues) -> np.ndarray:
+    """Response (outputs, inputs, F) of poles, residues and out-of-band terms."""
+    up, down = 1 / (lines.x - poles[:, None]), 1 / (lines.x - poles.conj()[:, None])
+    modal = residues.residue @ up + residues.residue.conj() @ down
+    return lines.factor * (modal + residues.upper[..., None]) + residues.lower[..., None]
 
 
 def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

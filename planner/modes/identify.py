@@ -1,0 +1,120 @@
+"""The one chain from responses to modes: poles of all orders, stable lines, fit, probability."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.modes.fit import Data, Fit, fit, model, scales, strongest, weakness
+from planner.modes.plscf import PoleSet, plscf
+from planner.modes.stabilisation import Diagram, diagram, stable
+
+MAX_ORDER = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """One mode in rad/s and the units of the data."""
+
+    pole: complex
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    residue: np.ndarray  # (outputs, inputs)
+    residue_sd: np.ndarray  # (outputs, inputs) of real and imaginary part each
+    support: float  # share of the higher model orders that have this pole
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Modes in increasing frequency, and what they came from."""
+
+    modes: tuple[Identified, ...]
+    data: Data
+    diagram: Diagram
+    fit: Fit
+    fit_error: float  # ‖H − fit‖/‖H‖
+    order: int
+
+
+def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
+    """All modes that the lines of `data` carry, None where there is none."""
+    # At least as many lines as half the unknowns of one column need, and once that to spare.
+    top = max(2, min(max_order, data.frequency_hz.size // 3))
+    orders = tuple(range(2, top + 1))
+    weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
+    sets = plscf(data.frequency_hz, data.response, orders, weight)
+    reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
+    found = diagram(sets, reach)
+    start = np.array([line.pole for line in stable(found)]) + data.rate_1_s
+    if start.size == 0:
+        start = strongest(data)
+    if start.size == 0:
+        return None
+    fitted = fit(data, start)
+    modes = _modes(data, fitted, sets)
+    error = np.linalg.norm(data.response - model(data, fitted.refined))
+    relative = float(error / np.linalg.norm(data.response))
+    return Identification(modes, data, found, fitted, relative, top) if modes else None
+
+
+def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+    refined = fitted.refined
+    m = refined.poles.size
+    scale = scales(data, fitted)
+    weak = weakness(data, fitted)
+    modes = []
+    for k in range(m):
+        if weak[k] > 1:
+            continue
+        index = [k, m + k]
+        covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        pole = complex(refined.poles[k])
+        frequency, damping, sd = natural(pole, covariance)
+        variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        support = _support(pole - data.rate_1_s, sets)
+        modes.append(
+            Identified(
+                pole,
+                frequency,
+                float(sd[0]),
+                damping,
+                float(sd[1]),
+                refined.residues.residue[..., k],
+                np.sqrt(variance),
+                support,
+                _probability(support, float(weak[k])),
+            )
+        )
+    return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
+
+
+def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
+    """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
+    size = abs(pole)
+    slope = np.array(
+        [
+            [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)],
+            [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3],
+        ]
+    )
+    spread = slope @ covariance @ slope.T
+    return size / (2 * np.pi), -pole.real / size, np.sqrt(np.maximum(0.0, np.diag(spread)))
+
+
+def _support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
+    """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""
+    upper = sets[len(sets) // 2 :]
+    reach = max(abs(pole.real), 0.005 * abs(pole))
+    near = [np.any(np.abs(entry.poles.imag - pole.imag) < reach) for entry in upper]
+    return float(np.mean(near))
+
+
+def _probability(support: float, weak: float) -> float:
+    """Logistic in what separates modes from artefacts: support and distance from the limits.
+
+    Coefficients from simulated FRFs with and without errors that no modal model explains.
+    """
+    score = -2.0 + 4.0 * support - 1.5 * np.log(max(weak, 1e-6))
+    return float(1 / (1 + np.exp(-score)))
