@@ -87,7 +87,7 @@ def _check(config: CampaignConfig, path: Path) -> None:
         )
     if w.position_m is not None and (len(w.position_m) != 3 or w.tool_axis is None):
         raise InputError(
-            f"{path}: [workspace] position_m needs three ranges (x, y, z) and a tool_axis; add them."
+            f"{path}: [workspace] position_m needs ranges of x, y, z and a tool_axis; add them."
         )
     low_high += w.joints_deg or w.position_m or []
     low_high += [w.rotation_deg] if w.rotation_deg else []

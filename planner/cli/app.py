@@ -1,4 +1,4 @@
-"""The command line: one function per command; heavy imports inside them (see contract section 4)."""
+"""The command line: one function per command, heavy imports inside them."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,0 +1,179 @@
+"""The main job, start to end, on the shipped campaign: propose, import, refit, propose again."""
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.campaign.campaign import Campaign, ImportReport
+from planner.campaign.cell import Cell
+from planner.campaign.events import Proposal
+from planner.campaign.labels import from_mode, label
+from planner.campaign.model import Model
+from planner.campaign.state import Measurement
+from planner.errors import InputError, NoPoseLeftError
+from planner.modes.measure import Source, measure
+from planner.recording.folder import read_recordings
+from planner.recording.types import PoseRow
+from planner.show.story import Story
+
+NAME = "kr240_plane"
+Z_95 = 1.959964  # two-sided 95 % of a normal distribution
+
+
+def shipped(name: str) -> Path:
+    """Folder of a campaign shipped with the project (installed, or in a checkout)."""
+    package = Path(__file__).parent
+    for root in (package / "campaigns", package.parent / "campaigns"):
+        if (root / name / "campaign.toml").is_file():
+            return root / name
+    raise InputError(f"The shipped campaign {name} is missing; install the package again.")
+
+
+@dataclass(frozen=True, eq=False)
+class Pool:
+    """Recorded poses that the demonstration may draw on."""
+
+    folder: Path
+    rows: dict[str, tuple[PoseRow, ...]]
+
+    @classmethod
+    def load(cls, folder: Path, joint_names: tuple[str, ...]) -> "Pool":
+        """Read a recordings folder."""
+        rows: dict[str, list[PoseRow]] = {}
+        for row in read_recordings(folder, joint_names).rows:
+            rows.setdefault(row.pose, []).append(row)
+        return cls(folder, {pose: tuple(group) for pose, group in rows.items()})
+
+    def q(self, poses: list[str]) -> np.ndarray:
+        """Readback angles (n, dof) in rad."""
+        return np.deg2rad(np.array([self.rows[pose][0].joints_deg for pose in poses]))
+
+    def nearest(self, cell: Cell, proposal: Proposal, used: list[str]) -> str:
+        """The unused recorded pose that is nearest to a proposal, in model coordinates."""
+        left = [pose for pose in self.rows if pose not in used]
+        target = cell.features(np.deg2rad([proposal.joints_deg]))
+        distance = np.linalg.norm(cell.features(self.q(left)) - target, axis=1)
+        return left[int(np.argmin(distance))]
+
+
+def play(
+    directory: Path | None, measurements: int, viewer: bool, progress: Callable[[str], None]
+) -> dict[str, Any]:
+    """Play a campaign until its target, `measurements`, or the pool's end; returns the summary."""
+    source = shipped(NAME)
+    directory = directory or Path(tempfile.mkdtemp(prefix="planner-demo-")) / NAME
+    campaign = Campaign.new(directory, source / "robot" / "robot.toml", source / "campaign.toml")
+    pool = Pool.load(source / "recordings", campaign.cell.robot.joint_names)
+    rrd = campaign.directory / "demo.rrd"
+    used: list[str] = []
+    steps: list[dict[str, Any]] = []
+    with Story(campaign.cell, rrd, viewer, simulated=True) as story:
+        story.tell(campaign.entries[0], campaign.state, campaign.model)
+        started = time.perf_counter()
+        proposal = campaign.next()[0]
+        story.tell(campaign.entries[-1], campaign.state, campaign.model)
+        while len(used) < min(measurements, len(pool.rows)) and not _done(campaign):
+            pose = pool.nearest(campaign.cell, proposal, used)
+            progress(f"measurement {len(used) + 1}: pose {pose}")
+            if used:
+                started = time.perf_counter()
+            report = campaign.import_paths((pool.folder,), pose)[0]
+            imported = campaign.entries[-1], campaign.state, campaign.model
+            used.append(pose)
+            try:
+                proposal = campaign.next()[0]
+            except NoPoseLeftError:
+                break
+            finally:
+                steps.append(_step(report, proposal, time.perf_counter() - started))
+                story.tell(*imported, report.measured)
+            story.tell(campaign.entries[-1], campaign.state, campaign.model)
+    return _summary(campaign, pool, used, steps, rrd, progress)
+
+
+def _done(campaign: Campaign) -> bool:
+    stop, model = campaign.cell.config.stop, campaign.model
+    overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
+    return len(model.labelled) >= stop.measurements_min and overall <= stop.frequency_sd_percent
+
+
+def _step(report: ImportReport, proposal: Proposal, seconds: float) -> dict[str, Any]:
+    return {
+        "pose": report.pose,
+        "proposed": proposal.pose,
+        "frequency_hz": [m.frequency_hz for m in report.measurement.modes]
+        if report.measurement
+        else [],
+        "refused": len(report.refused),
+        "frequency_sd_percent": report.model.frequency_sd_percent,
+        "refit_seconds": report.refit_seconds,
+        "seconds": seconds,
+    }
+
+
+def _summary(
+    campaign: Campaign,
+    pool: Pool,
+    used: list[str],
+    steps: list[dict[str, Any]],
+    rrd: Path,
+    progress: Callable[[str], None],
+) -> dict[str, Any]:
+    cell = campaign.cell
+    unused = [pose for pose in pool.rows if pose not in used]
+    truth = _measured_hz(cell, pool, unused, progress)
+    prediction = campaign.model.predict(pool.q(unused))
+    simulated = cell.simulate(pool.q(unused)).frequency_hz
+    inside = np.abs(truth - prediction.frequency_hz) <= Z_95 * prediction.frequency_sd_hz
+    known = np.isfinite(truth)
+    return {
+        "campaign": str(campaign.directory),
+        "robot": cell.robot.name,
+        "simulated": True,
+        "pool": len(pool.rows),
+        "measurements": len(used),
+        "used": used,
+        "unused": len(unused),
+        "modes_compared": int(known.sum()),
+        "frequency_rmse_percent": rmse_percent(prediction.frequency_hz, truth),
+        "simulation_rmse_percent": rmse_percent(simulated, truth),
+        "frequency_rmse_percent_per_mode": _per_mode(prediction.frequency_hz, truth),
+        "simulation_rmse_percent_per_mode": _per_mode(simulated, truth),
+        "coverage95": float(np.mean(inside[known])) if known.any() else float("nan"),
+        "coverage95_per_mode": [
+            float(np.mean(inside[known[:, k], k])) if known[:, k].any() else float("nan")
+            for k in range(truth.shape[1])
+        ],
+        "step_seconds": [step["seconds"] for step in steps],
+        "steps": steps,
+        "rrd": str(rrd),
+    }
+
+
+def _measured_hz(
+    cell: Cell, pool: Pool, poses: list[str], progress: Callable[[str], None]
+) -> np.ndarray:
+    """Frequencies (n, count) in Hz that the recordings of poses give; NaN where none was found."""
+    found = []
+    for i, pose in enumerate(poses):
+        progress(f"checking on unused pose {i + 1} of {len(poses)}")
+        sources = tuple(Source(r.file, str(r.file), r.hit) for r in pool.rows[pose] if r.file)
+        measured = measure(sources, cell.config.modes.band_hz)
+        modes = tuple(from_mode(m) for m in measured.modal.modes) if measured.modal else ()
+        found.append(Measurement(pose, pool.rows[pose][0].joints_deg, (), modes))
+    labelled = label(cell, tuple(found))
+    return np.array([[m.frequency_hz if m else np.nan for m in p.modes] for p in labelled])
+
+
+def rmse_percent(predicted: np.ndarray, truth: np.ndarray) -> float:
+    """Root mean square relative error in %, over entries (any shape) known in `truth`."""
+    return float(100 * np.sqrt(np.nanmean((predicted / truth - 1) ** 2)))
+
+
+def _per_mode(predicted: np.ndarray, truth: np.ndarray) -> list[float]:
+    return [rmse_percent(predicted[:, k], truth[:, k]) for k in range(truth.shape[1])]

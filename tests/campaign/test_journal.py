@@ -1,0 +1,127 @@
+"""The log: nothing whole is lost, nothing half is believed, damage is found."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.campaign.events import Entry, Skipped, Starred, Undone, Withdrawn
+from planner.campaign.journal import Journal, encode_line, parse
+from planner.errors import InputError, JournalError
+
+EVENTS = [
+    Starred("P001"),
+    Skipped("P002", "the table is in the way, 3 mm — near"),
+    Withdrawn("P001", ""),
+    Undone(3),
+]
+
+
+def log_of(events) -> bytes:
+    data, check = b"", ""
+    for i, event in enumerate(events):
+        line, check = encode_line(check, Entry(i + 1, "2026-01-01T00:00:00.000+00:00", event))
+        data += line
+    return data
+
+
+def test_a_log_reads_back_as_written():
+    assert [entry.event for entry in parse(log_of(EVENTS)).entries] == EVENTS
+
+
+def test_every_truncation_keeps_every_whole_line_and_no_half_one():
+    data = log_of(EVENTS)
+    ends = [i + 1 for i, byte in enumerate(data) if byte == 10]
+    for cut in range(len(data) + 1):
+        content = parse(data[:cut])
+        # A line that lacks nothing but its newline is whole: its check proves it.
+        whole = sum(1 for end in ends if end - 1 <= cut)
+        assert len(content.entries) == whole
+        assert len(content.torn) == cut - content.whole_bytes
+
+
+@settings(deadline=None)
+@given(st.data())
+def test_a_changed_byte_is_found(data):
+    log = log_of(EVENTS)
+    at = data.draw(st.integers(0, len(log) - 1))
+    byte = data.draw(st.integers(0, 255).filter(lambda b: b != log[at]))
+    changed = log[:at] + bytes([byte]) + log[at + 1 :]
+    last = log[:-1].rfind(b"\n") + 1
+    if at < last:
+        with pytest.raises(JournalError, match="damaged"):
+            parse(changed)
+    else:
+        content = parse(changed)
+        assert [e.event for e in content.entries] == EVENTS[: len(content.entries)]
+        if at < len(log) - 1:
+            assert len(content.entries) == len(EVENTS) - 1
+
+
+@settings(deadline=None)
+@given(st.permutations(range(len(EVENTS))))
+def test_reordered_lines_are_found(order):
+    lines = log_of(EVENTS).splitlines(keepends=True)
+    if list(order) == list(range(len(EVENTS))):
+        return
+    try:
+        content = parse(b"".join(lines[i] for i in order))
+    except JournalError:
+        return
+    assert len(content.entries) < len(EVENTS)  # only the last line can be set aside
+
+
+def test_torn_tail_is_set_aside_before_appending(tmp_path):
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(log_of(EVENTS[:2]) + b'{"check":"00","ent')
+    journal = Journal(path)
+    assert journal.torn_bytes == 18
+    with journal.writing():
+        journal.append(EVENTS[2])
+    assert [e.event for e in Journal(path).entries] == EVENTS[:3]
+    (aside,) = tmp_path.glob("log.jsonl.torn-*")
+    assert aside.read_bytes() == b'{"check":"00","ent'
+
+
+def test_reading_never_writes(tmp_path):
+    path = tmp_path / "log.jsonl"
+    data = log_of(EVENTS) + b"half"
+    path.write_bytes(data)
+    assert len(Journal(path).entries) == 4
+    assert path.read_bytes() == data
+    assert os.listdir(tmp_path) == ["log.jsonl"]
+
+
+def test_missing_log_names_the_remedy(tmp_path):
+    with pytest.raises(InputError, match="planner new"):
+        Journal(tmp_path / "log.jsonl")
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from planner.campaign.journal import Journal
+with Journal(Path(sys.argv[1])).writing():
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_one_writer_at_a_time_and_no_stale_lock(tmp_path):
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(log_of(EVENTS))
+    holder = subprocess.Popen([sys.executable, "-c", HOLD, str(path)], stdout=subprocess.PIPE)
+    try:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == b"held\n"
+        with pytest.raises(InputError, match="in use"), Journal(path).writing(wait_s=0.1):
+            pass
+    finally:
+        holder.kill()
+        holder.communicate()
+    with Journal(path).writing(wait_s=5.0) as journal:  # the lock died with its holder
+        journal.append(Starred("P003"))
+    assert len(Journal(path).entries) == 5
