@@ -1,0 +1,214 @@
+"""The workspace: where the model has to be good, its coordinates, and reachable candidates."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import qmc
+
+from planner.errors import InputError, NoPoseLeftError
+from planner.robot.collision import Collisions
+from planner.robot.inverse import solve
+from planner.robot.robot import Robot
+
+TRIES = 4  # points tried per candidate wanted, before a sparse workspace is accepted as such
+
+
+class WorkspaceTable(Protocol):
+    """The [workspace] table of campaign.toml (contract section 3)."""
+
+    joints_deg: list[tuple[float, float]] | None
+    position_m: list[tuple[float, float]] | None
+    tool_axis: tuple[float, float, float] | None
+    rotation_deg: tuple[float, float] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Reachable poses: angles (n, dof) in rad, model coordinates (n, d), tcp positions (n, 3)."""
+
+    q: np.ndarray
+    features: np.ndarray
+    position_m: np.ndarray
+    rejected: dict[str, int]  # why points of the workspace were left out
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """A box in joint angles (rad), or in tcp position (m) and rotation about the tool axis (rad).
+
+    Model coordinates are the box's own, scaled to [0, 1], without those that do not vary.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    names: tuple[str, ...]
+    tool_axis: np.ndarray | None = None  # None: joint box
+
+    @classmethod
+    def from_table(cls, table: WorkspaceTable, robot: Robot) -> "Workspace":
+        """From campaign.toml; InputError where the table does not suit the robot."""
+        if table.joints_deg is not None:
+            return _joint_box(cls, table.joints_deg, robot)
+        assert table.position_m is not None
+        assert table.tool_axis is not None
+        axis = np.array(table.tool_axis, dtype=float)
+        if not abs(np.linalg.norm(axis) - 1) < 1e-3:
+            raise InputError("[workspace] tool_axis is no unit vector; give a direction.")
+        rotation = np.deg2rad(table.rotation_deg or (0.0, 0.0))
+        box = np.array([*table.position_m, rotation], dtype=float)
+        names = ("x_m", "y_m", "z_m", "rotation_deg")
+        return cls(box[:, 0], box[:, 1], names, axis / np.linalg.norm(axis))
+
+    @property
+    def varying(self) -> np.ndarray:
+        """Which coordinates of the box vary."""
+        return self.upper > self.lower
+
+    @property
+    def feature_names(self) -> tuple[str, ...]:
+        """Names of the model coordinates."""
+        return tuple(n for n, v in zip(self.names, self.varying, strict=True) if v)
+
+    def coordinates(self, robot: Robot, q: np.ndarray) -> np.ndarray:
+        """Coordinates (n, box) of poses (n, dof), unscaled."""
+        q = np.atleast_2d(q)
+        if self.tool_axis is None:
+            return q
+        rotation, position = robot.forward_batch(q)
+        reference, normal = self._directions()
+        x = rotation[:, :, 0]
+        angle = np.arctan2(x @ normal, x @ reference)
+        return np.column_stack([position, angle])
+
+    def features(self, robot: Robot, q: np.ndarray) -> np.ndarray:
+        """Model coordinates (n, d) of poses q (n, dof) in rad; in [0, 1] inside the workspace."""
+        varying = self.varying
+        scaled = self.coordinates(robot, q)[:, varying] - self.lower[varying]
+        return scaled / (self.upper - self.lower)[varying]
+
+    def contains(self, robot: Robot, q: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
+        """(n,) bool: whether poses q (n, dof) lie in the workspace."""
+        c = self.coordinates(robot, q)
+        inside = (c >= self.lower - tolerance) & (c <= self.upper + tolerance)
+        return np.all(inside, axis=1)
+
+    def candidates(self, robot: Robot, n: int, seed: int) -> Candidates:
+        """Up to n reachable poses spread evenly (Sobol); the same for the same seed.
+
+        Raises NoPoseLeftError, saying what stands in the way, if there is none.
+        """
+        collisions, rejected = Collisions(robot), Counter()
+        dimensions = int(self.varying.sum())
+        points = np.tile(self.lower, (1 if dimensions == 0 else TRIES * n, 1))
+        if dimensions:
+            sampler = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
+            exponent = int(np.ceil(np.log2(TRIES * n)))
+            unit = sampler.random_base2(exponent)[: TRIES * n]
+            span = (self.upper - self.lower)[self.varying]
+            points[:, self.varying] = self.lower[self.varying] + unit * span
+        found = self._reachable(robot, points, n, collisions, rejected)
+        if not len(found):
+            reason, _ = rejected.most_common(1)[0]
+            raise NoPoseLeftError(
+                f"No pose of the workspace can be reached ({reason}); change [workspace]."
+            )
+        q = np.array(found)
+        return Candidates(q, self.features(robot, q), robot.forward_batch(q)[1], dict(rejected))
+
+    def _reachable(
+        self, robot: Robot, points: np.ndarray, n: int, collisions: Collisions, rejected: Counter
+    ) -> list[np.ndarray]:
+        found: list[np.ndarray] = []
+        places: list[np.ndarray] = []
+        for point in points:
+            if len(found) == n:
+                break
+            if self.tool_axis is None:
+                q, reason = point, _first(collisions, point)
+            else:
+                q, reason = self._solve(robot, point, collisions, found, places)
+            if q is None or reason:
+                rejected[reason] += 1
+            else:
+                found.append(q)
+                places.append(point)
+        return found
+
+    def _solve(
+        self,
+        robot: Robot,
+        point: np.ndarray,
+        collisions: Collisions,
+        found: list[np.ndarray],
+        places: list[np.ndarray],
+    ) -> tuple[np.ndarray | None, str]:
+        """IK from the nearest solved neighbour, so that one branch of solutions is kept."""
+        if not found:
+            return self._first_branch(robot, point, collisions)
+        distance = np.linalg.norm((np.array(places) - point), axis=1)
+        near = found[int(np.argmin(distance))]
+        rotation = self.rotation(point[3])
+        result = solve(robot, rotation, point[:3], near, collisions, restarts=0)
+        return result.q, result.reason
+
+    def _first_branch(
+        self, robot: Robot, point: np.ndarray, collisions: Collisions
+    ) -> tuple[np.ndarray | None, str]:
+        """Of several solutions, the one farthest from the joint limits."""
+        best, margin, reason = None, -1.0, ""
+        for seed in range(8):
+            rng = np.random.default_rng(seed)
+            start = rng.uniform(robot.lower_rad, robot.upper_rad)
+            result = solve(robot, self.rotation(point[3]), point[:3], start, collisions, 4, seed)
+            if result.q is None:
+                reason = reason or result.reason
+                continue
+            room = np.minimum(result.q - robot.lower_rad, robot.upper_rad - result.q)
+            share = float(np.min(room / (robot.upper_rad - robot.lower_rad)))
+            if share > margin + 1e-6:
+                best, margin = result.q, share
+        return (best, "") if best is not None else (None, reason)
+
+    def rotation(self, angle_rad: float) -> np.ndarray:
+        """Rotation (3, 3) of the tcp for a rotation about the tool axis."""
+        assert self.tool_axis is not None
+        reference, normal = self._directions()
+        x = np.cos(angle_rad) * reference + np.sin(angle_rad) * normal
+        return np.column_stack([x, np.cross(self.tool_axis, x), self.tool_axis])
+
+    def _directions(self) -> tuple[np.ndarray, np.ndarray]:
+        """The tcp's x axis at rotation 0 (world x, or y, across the tool axis), and at 90°."""
+        assert self.tool_axis is not None
+        world = np.array([1.0, 0, 0]) if abs(self.tool_axis[0]) < 0.999 else np.array([0, 1.0, 0])
+        reference = world - (world @ self.tool_axis) * self.tool_axis
+        reference /= np.linalg.norm(reference)
+        return reference, np.cross(self.tool_axis, reference)
+
+
+def _first(collisions: Collisions, q: np.ndarray) -> str:
+    if collisions.free(q):
+        return ""
+    return collisions.violations(q)[0]
+
+
+def _joint_box(cls, ranges: list[tuple[float, float]], robot: Robot) -> Workspace:
+    names = robot.joint_names
+    if len(ranges) != len(names):
+        raise InputError(
+            f"[workspace] joints_deg has {len(ranges)} ranges, the robot {len(names)} joints; "
+            f"give one range a joint."
+        )
+    box = np.deg2rad(np.array(ranges, dtype=float))
+    slack = 1e-6
+    for i, name in enumerate(names):
+        if box[i, 0] < robot.lower_rad[i] - slack or box[i, 1] > robot.upper_rad[i] + slack:
+            low, high = np.rad2deg([robot.lower_rad[i], robot.upper_rad[i]])
+            raise InputError(
+                f"[workspace] joints_deg of {name} is {list(ranges[i])}, its limits are "
+                f"{low:.1f}° to {high:.1f}°; narrow the range."
+            )
+    lower = np.maximum(box[:, 0], robot.lower_rad)
+    upper = np.minimum(box[:, 1], robot.upper_rad)
+    return cls(lower, upper, tuple(f"{name}_deg" for name in names))
