@@ -119,24 +119,22 @@ def _chances(cost: np.ndarray, spurious: np.ndarray) -> np.ndarray:
     back = _log_sums(cost[::-1, ::-1], spurious[::-1])[::-1, ::-1]
     chance = np.zeros((k, n + 1))
     chance[:, :n] = np.exp(ahead[:-1, :-1] + back[1:, 1:] - cost / 2 - ahead[-1, -1])
-    chance[:, n] = np.clip(1 - chance[:, :n].sum(axis=1), 0.0, 1.0)
+    chance[:, n] = 1 - chance[:, :n].sum(axis=1)
     return np.clip(chance, 0.0, 1.0)
 
 
 def _log_sums(cost: np.ndarray, spurious: np.ndarray) -> np.ndarray:
-    """Log of the summed weights exp(−cost/2) of all alignments of leading parts."""
+    """Log of the summed weights exp(−cost/2) of all alignments of leading parts.
+
+    An alignment is its set of matches: each trades a missing and an unexpected mode for its own
+    cost. Sets are counted once, by inclusion and exclusion.
+    """
     k, n = cost.shape
-    total = np.full((k + 1, n + 1), -np.inf)
-    total[0, 0] = 0.0
-    for i in range(k + 1):
-        for j in range(n + 1):
-            ways = [total[i, j]]
-            if i and j:
-                ways.append(total[i - 1, j - 1] - cost[i - 1, j - 1] / 2)
-            # Gaps in one canonical order (missing after unexpected) count an alignment once.
-            if i:
-                ways.append(total[i - 1, j] - MISSING_COST / 2)
-            if j:
-                ways.append(total[i, j - 1] - spurious[j - 1] / 2)
-            total[i, j] = np.logaddexp.reduce(ways)
-    return total
+    gain = np.exp(-(cost - MISSING_COST - spurious) / 2)
+    total = np.ones((k + 1, n + 1))
+    for i in range(1, k + 1):
+        for j in range(1, n + 1):
+            total[i, j] = total[i - 1, j] + total[i, j - 1] - total[i - 1, j - 1]
+            total[i, j] += total[i - 1, j - 1] * gain[i - 1, j - 1]
+    missing = MISSING_COST * np.arange(k + 1)[:, None]
+    return np.log(total) - (missing + np.concatenate([[0.0], np.cumsum(spurious)])) / 2

@@ -119,9 +119,8 @@ def _solve(
     a = -solve(inner, block[inputs:, :inputs], assume_a="sym", check_finite=False)
     coefficients = np.concatenate([np.eye(inputs)[None], a.reshape(order, inputs, inputs)])
     z = 1 / _reciprocal_roots(coefficients)
+    z = z[(np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)].astype(complex)
     poles = circle.to_poles(z)
-    keep = (np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)
-    poles, z = poles[keep], z[keep]
     participation = _participation(coefficients, z) * scale
     participation /= np.linalg.norm(participation, axis=1, keepdims=True)
     by_frequency = np.argsort(poles.imag)
