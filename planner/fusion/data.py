@@ -1,0 +1,58 @@
+"""Training data of many outputs over one set of poses, padded so that growth compiles nothing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+CAPACITIES = (16, 32, 64, 128, 256, 512)
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingData:
+    """n poses, m outputs. x (n, d) in model coordinates; y, sd, low (n, m), NaN where missing.
+
+    `low` is the simulation's value of the same output; a column without any number has none.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    sd: np.ndarray
+    low: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Padded:
+    """The same, output first, with `mask` (m, c) saying which entries count."""
+
+    x: np.ndarray  # (c, d)
+    y: np.ndarray  # (m, c)
+    variance: np.ndarray  # (m, c)
+    low: np.ndarray  # (m, c)
+    mask: np.ndarray  # (m, c)
+
+
+def capacity(n: int) -> int:
+    """Smallest padded size that holds n poses."""
+    return next((c for c in CAPACITIES if c >= n), -(-n // CAPACITIES[-1]) * CAPACITIES[-1])
+
+
+def query_size(n: int) -> int:
+    """Padded number of query points: a power of two, 64 at least."""
+    return max(64, 1 << max(0, int(n) - 1).bit_length())
+
+
+def pad(data: TrainingData, uses_low: np.ndarray) -> Padded:
+    """Pad to capacity. A value counts if it and its sd, and its low fidelity if used, are known."""
+    n, d = data.x.shape
+    m = data.y.shape[1]
+    c = capacity(n)
+    known = np.isfinite(data.y) & np.isfinite(data.sd) & (np.isfinite(data.low) | ~uses_low)
+    out = Padded(
+        np.zeros((c, d)), np.zeros((m, c)), np.ones((m, c)), np.zeros((m, c)), np.zeros((m, c))
+    )
+    out.x[:n] = data.x
+    out.mask[:, :n] = known.T
+    out.y[:, :n] = np.where(known, data.y, 0.0).T
+    out.variance[:, :n] = np.where(known, data.sd, 1.0).T ** 2
+    out.low[:, :n] = np.where(known & uses_low, data.low, 0.0).T
+    return out

@@ -1,0 +1,28 @@
+"""JAX as every module here wants it: float64, strict shapes, compiled code kept between runs."""
+
+import os
+from pathlib import Path
+
+# Nested small products on the thread pool of a 2-core machine wait for each other for ever.
+_FLAG = "--xla_cpu_multi_thread_eigen=false"
+if _FLAG not in os.environ.get("XLA_FLAGS", ""):
+    os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_FLAG}".strip()
+
+import jax  # noqa: E402  (reads XLA_FLAGS when it starts)
+
+jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_numpy_rank_promotion", "raise")
+
+
+def _cache_folder() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
+    return Path(base) / "planner" if base else Path.home() / ".cache" / "planner"
+
+
+try:
+    _cache_folder().mkdir(parents=True, exist_ok=True)
+    jax.config.update("jax_compilation_cache_dir", str(_cache_folder() / "jax"))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+except OSError:
+    pass  # a cache that cannot be kept costs seconds, nothing else
