@@ -1,0 +1,218 @@
+"""recordings.csv and predict.csv (contract section 2)."""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+from planner.errors import InputError
+from planner.recording.tables import hit_direction
+from planner.recording.types import PoseRow, RecordingsFolder
+
+MAX_BYTES = 32 * 1024 * 1024
+MAX_ROWS = 200_000
+SAME_POSE_DEG = 0.5  # readback of one pose may scatter by less
+
+
+def read_recordings(folder: Path, joint_names: tuple[str, ...]) -> RecordingsFolder:
+    """The table of a recordings folder. Raises InputError naming file, row and remedy."""
+    path = folder / "recordings.csv"
+    header, lines = _table(path)
+    joints = _joint_columns(path, header, joint_names, {"pose", "hit", "repeat", "file"})
+    for name in ("pose", "hit", "file"):
+        if name not in header:
+            raise InputError(f"{path} has no column {name}; add it (see its first row).")
+    rows: list[PoseRow] = []
+    seen: dict[tuple[str, str, int], int] = {}
+    for number, cells in lines:
+        row = _recording_row(path, folder, number, dict(zip(header, cells, strict=True)), joints)
+        key = (row.pose, str(row.hit), row.repeat or 0)
+        if row.repeat is not None and key in seen:
+            raise InputError(
+                f"{path}, row {number}: pose {row.pose}, hit {row.hit}, repeat {row.repeat} is "
+                f"listed in row {seen[key]} already; number the repeats."
+            )
+        seen[key] = number
+        rows.append(row)
+    _same_angles(path, rows)
+    _distinct_files(path, rows)
+    return RecordingsFolder(folder, joint_names, tuple(rows))
+
+
+def read_poses(path: Path, joint_names: tuple[str, ...]) -> tuple[PoseRow, ...]:
+    """Poses at which a prediction is wanted. Raises InputError naming file, row and remedy."""
+    header, lines = _table(path)
+    joints = _joint_columns(path, header, joint_names, {"pose", "peak_force_n"})
+    if "pose" not in header:
+        raise InputError(f"{path} has no column pose; add one that names each row.")
+    rows: list[PoseRow] = []
+    seen: dict[str, int] = {}
+    for number, values in lines:
+        cells = dict(zip(header, values, strict=True))
+        pose = _pose(path, number, cells)
+        if pose in seen:
+            raise InputError(
+                f"{path}, row {number}: pose {pose} stands in row {seen[pose]} already; "
+                f"rename one of them."
+            )
+        seen[pose] = number
+        force = None
+        if cells.get("peak_force_n", "").strip():
+            force = _number(path, number, "peak_force_n", cells["peak_force_n"])
+        angles = tuple(_number(path, number, name, cells[name]) for name in joints)
+        rows.append(PoseRow(pose, angles, number, peak_force_n=force))
+    return tuple(rows)
+
+
+def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header and rows with their line numbers."""
+    text = _text(path)
+    first = text.split("\n", 1)[0]
+    delimiter = next((d for d in (",", ";", "\t") if d in first), ",")
+    try:
+        table = list(csv.reader(io.StringIO(text, newline=""), delimiter=delimiter))
+    except csv.Error as error:
+        raise InputError(f"{path} is no readable CSV table ({error}); export it again.") from None
+    numbered = [(i, row) for i, row in enumerate(table, 1) if any(c.strip() for c in row)]
+    if not numbered:
+        raise InputError(f"{path} is empty; it needs a header and a row per hit or pose.")
+    header = [name.strip() for name in numbered[0][1]]
+    twice = next((name for name in header if header.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{path}: column {twice or 'without a name'} stands twice; remove one.")
+    if len(numbered) == 1:
+        raise InputError(f"{path} has a header and no rows; add the rows.")
+    if len(numbered) > MAX_ROWS:
+        raise InputError(f"{path} has more than {MAX_ROWS} rows; split it.")
+    for number, row in numbered[1:]:
+        if len(row) != len(header):
+            raise InputError(
+                f"{path}, row {number}: {len(row)} cells, the header has {len(header)}; "
+                f"correct the row."
+            )
+    return header, numbered[1:]
+
+
+def _text(path: Path) -> str:
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; check the path.") from None
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); check the file.") from None
+    if b"\x00" in data:
+        raise InputError(f"{path} is binary, not a CSV table; check which file it is.")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path} is not UTF-8 text; save the table as CSV in UTF-8.") from None
+
+
+def _joint_columns(
+    path: Path, header: list[str], joint_names: tuple[str, ...], others: set[str]
+) -> list[str]:
+    """Names of the joints' columns in the robot's order."""
+    wanted = [f"{name}_deg" for name in joint_names]
+    missing = [name for name in wanted if name not in header]
+    if missing:
+        raise InputError(
+            f"{path} has no column {missing[0]}; the robot's joints are "
+            f"{', '.join(wanted)}: add what is missing."
+        )
+    extra = [n for n in header if n.endswith(("_deg", "_rad")) and n not in wanted]
+    if extra:
+        raise InputError(
+            f"{path} has a column {extra[0]} that is no joint of the robot; remove or rename it."
+        )
+    return wanted
+
+
+def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
+    pose = cells["pose"].strip()
+    if not pose or len(pose) > 100 or any(ord(c) < 32 for c in pose):
+        raise InputError(f"{path}, row {number}: the pose has no usable name; give it one.")
+    return pose
+
+
+def _number(path: Path, number: int, column: str, cell: str) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or abs(value) > 1e5:
+        raise InputError(
+            f'{path}, row {number}: {column} is "{cell.strip()}", not a number; correct it '
+            f"(decimal point, degrees)."
+        )
+    return value
+
+
+def _recording_row(
+    path: Path, folder: Path, number: int, cells: dict[str, str], joints: list[str]
+) -> PoseRow:
+    angles = tuple(_number(path, number, name, cells[name]) for name in joints)
+    hit = cells["hit"].strip().lower()
+    if not hit_direction(hit):
+        raise InputError(
+            f'{path}, row {number}: hit is "{cells["hit"].strip()}"; give a signed axis of the '
+            f"tcp frame such as +x."
+        )
+    hit = hit if hit[0] in "+-" else f"+{hit}"
+    repeat = None
+    if cells.get("repeat", "").strip():
+        value = _number(path, number, "repeat", cells["repeat"])
+        if value != int(value) or value < 0:
+            raise InputError(f"{path}, row {number}: repeat is {value:g}; give a whole number.")
+        repeat = int(value)
+    return PoseRow(
+        _pose(path, number, cells),
+        angles,
+        number,
+        hit,
+        repeat,
+        _file(path, folder, number, cells["file"].strip()),
+    )
+
+
+def _file(path: Path, folder: Path, number: int, name: str) -> Path:
+    if not name:
+        raise InputError(f"{path}, row {number}: no file is named; add it.")
+    try:
+        file = (folder / name).resolve()
+        inside = file.is_relative_to(folder.resolve())
+        found = inside and file.is_file()
+    except (OSError, ValueError):
+        raise InputError(f"{path}, row {number}: {name!r} is no file name; correct it.") from None
+    if not inside:
+        raise InputError(
+            f"{path}, row {number}: {name} lies outside the recordings folder; move it inside."
+        )
+    if not found:
+        raise InputError(f"{path}, row {number}: {name} does not exist; correct the file name.")
+    return file
+
+
+def _same_angles(path: Path, rows: list[PoseRow]) -> None:
+    first: dict[str, PoseRow] = {}
+    for row in rows:
+        known = first.setdefault(row.pose, row)
+        off = max(abs(a - b) for a, b in zip(known.joints_deg, row.joints_deg, strict=True))
+        if off > SAME_POSE_DEG:
+            raise InputError(
+                f"{path}, row {row.row}: pose {row.pose} has joint angles {off:.2f}° away from "
+                f"those in row {known.row}; give another pose another name."
+            )
+
+
+def _distinct_files(path: Path, rows: list[PoseRow]) -> None:
+    seen: dict[Path, int] = {}
+    for row in rows:
+        assert row.file is not None
+        if row.file in seen:
+            raise InputError(
+                f"{path}, row {row.row}: {row.file.name} is listed in row {seen[row.file]} "
+                f"already; each hit has a file of its own."
+            )
+        seen[row.file] = row.row

@@ -1,0 +1,142 @@
+"""Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.recording.tables import Named, to_records
+from planner.recording.text import read_text
+from planner.recording.types import Record
+from planner.recording.uff import read_uff
+
+MAX_BYTES = 512 * 1024 * 1024
+
+
+def _columns(path: Path, entries: dict[str, object]) -> Named:
+    """Vectors among the entries are columns; single values are attributes."""
+    columns: dict[str, np.ndarray] = {}
+    attributes: dict[str, str] = {}
+    for name, entry in entries.items():
+        value = np.squeeze(np.asarray(entry))
+        if value.ndim == 1 and value.dtype.kind in "fiuc" and value.size > 1:
+            columns[name] = value if value.dtype.kind == "c" else value.astype(float)
+        elif value.ndim == 0:
+            item = value.item()
+            attributes[name] = item.decode() if isinstance(item, bytes) else str(item)
+    if not columns:
+        shapes = ", ".join(f"{n} {np.shape(e)}" for n, e in list(entries.items())[:5])
+        raise InputError(
+            f"{path} holds no named vectors ({shapes or 'nothing'}); name them time_s, force_n, "
+            f"acceleration_x_m_s2 and so on."
+        )
+    return Named(columns, {}, attributes)
+
+
+def read_mat(path: Path) -> tuple[Record, ...]:
+    """MATLAB files up to v7; v7.3 is HDF5."""
+    import scipy.io
+
+    try:
+        entries = scipy.io.loadmat(str(path), squeeze_me=True)
+    except NotImplementedError:
+        return read_hdf5(path)
+    except Exception as error:
+        raise InputError(
+            f"{path} is not a readable MAT file ({type(error).__name__}); export it again."
+        ) from None
+    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
+    return to_records(path, _columns(path, visible))
+
+
+def read_hdf5(path: Path) -> tuple[Record, ...]:
+    """HDF5 files with one dataset per channel; attributes of the file and its root count too."""
+    import h5py
+
+    entries: dict[str, object] = {}
+    units: dict[str, str] = {}
+    try:
+        with h5py.File(path, "r") as file:
+            entries.update(file.attrs.items())
+
+            def visit(name: str, item: object) -> None:
+                if isinstance(item, h5py.Dataset):
+                    entries[name.rsplit("/", maxsplit=1)[-1]] = item[()]
+                    if "unit" in item.attrs:
+                        units[name.rsplit("/", maxsplit=1)[-1]] = str(item.attrs["unit"])
+
+            file.visititems(visit)
+    except Exception as error:
+        raise InputError(
+            f"{path} is not a readable HDF5 file ({type(error).__name__}); export it again."
+        ) from None
+    named = _columns(path, entries)
+    return to_records(path, Named(named.columns, units, named.attributes))
+
+
+def read_tdms(path: Path) -> tuple[Record, ...]:
+    """TDMS files; unit and increment as LabVIEW writes them (unit_string, wf_increment)."""
+    from nptdms import TdmsFile
+
+    columns: dict[str, np.ndarray] = {}
+    units: dict[str, str] = {}
+    try:
+        file = TdmsFile.read(path)
+        attributes = {str(k): str(v) for k, v in file.properties.items()}
+        for group in file.groups():
+            attributes |= {str(k): str(v) for k, v in group.properties.items()}
+            for channel in group.channels():
+                columns[channel.name] = np.asarray(channel[:], dtype=float)
+                if channel.properties.get("unit_string"):
+                    units[channel.name] = str(channel.properties["unit_string"])
+                if channel.properties.get("wf_increment"):
+                    rate = 1 / float(channel.properties["wf_increment"])
+                    attributes.setdefault("sampling_rate_hz", repr(rate))
+    except Exception as error:
+        raise InputError(
+            f"{path} is not a readable TDMS file ({type(error).__name__}); export it again."
+        ) from None
+    return to_records(path, Named(columns, units, attributes))
+
+
+def _read_txt(path: Path) -> tuple[Record, ...]:
+    """Universal files are often named .txt."""
+    with open(path, "rb") as file:
+        head = file.read(200)
+    lines = [line.strip() for line in head.splitlines()[:2]]
+    is_uff = len(lines) == 2 and lines[0] == b"-1" and lines[1][:2] in (b"58", b"15", b"16")
+    return read_uff(path) if is_uff else read_text(path)
+
+
+READERS: dict[str, Callable[[Path], tuple[Record, ...]]] = {
+    ".uff": read_uff,
+    ".unv": read_uff,
+    ".uf58": read_uff,
+    ".mat": read_mat,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".tdms": read_tdms,
+    ".csv": read_text,
+    ".tsv": read_text,
+    ".txt": _read_txt,
+    ".gz": read_text,
+}
+
+
+def read(path: Path) -> tuple[Record, ...]:
+    """All records of a file. Raises InputError with one sentence if it cannot be read right."""
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError(
+            f"{path} has no known format; recordings are {', '.join(READERS)}: export one of these."
+        )
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise InputError(f"{path} cannot be read ({error.strerror}); check the path.") from None
+    if size == 0:
+        raise InputError(f"{path} is empty; export it again.")
+    if size > MAX_BYTES:
+        raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
+    return reader(path)

@@ -1,0 +1,245 @@
+"""Screening of hits: what a careful engineer would refuse while standing at the robot."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.recording.types import AXES, Fault, Hit
+
+
+@dataclass(frozen=True)
+class ScreeningLimits:
+    """When a hit is refused. Ratios are of the pulse's peak unless stated."""
+
+    band_hz: tuple[float, float] = (4.0, 60.0)
+    clipped_samples: int = 4  # equal to the last digit, at the very top
+    second_peak: float = 0.12
+    least_snr: float = 8.0  # peak force over noise
+    least_response_snr: float = 4.0
+    roll_off_db: float = 20.0  # force spectrum at the band's end, below its top in the band
+    least_pretrigger: int = 2  # samples before the pulse
+
+
+def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]:
+    """Faults of one hit by itself; those with `refuse` make it unusable."""
+    limits = limits or ScreeningLimits()
+    force = hit.force_n
+    peak, noise = _peak(force), _noise(force)
+    where = int(np.argmax(np.abs(force)))
+    if peak == 0 or not np.any(hit.acceleration_m_s2):
+        return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
+    faults = [
+        *_weak(hit, peak, noise, limits),
+        *_clipping(hit, limits),
+    ]
+    if any(f.kind == "too_weak" for f in faults):
+        return tuple(faults)
+    faults += _polarity(force, where, peak)
+    faults += _pulse_whole(force, where, peak, noise, limits)
+    faults += _double(hit, where, peak, noise, limits)
+    faults += _soft(hit, limits)
+    return tuple(faults)
+
+
+def _peak(force: np.ndarray) -> float:
+    return float(np.max(np.abs(force - np.median(force))))
+
+
+def _noise(force: np.ndarray) -> float:
+    """Robust sd of what is not the pulse (which is short)."""
+    centred = np.abs(force - np.median(force))
+    return float(1.4826 * np.median(centred))
+
+
+def _weak(hit: Hit, peak: float, noise: float, limits: ScreeningLimits) -> list[Fault]:
+    faults = []
+    if peak < limits.least_snr * noise:
+        faults.append(
+            Fault(
+                "too_weak",
+                f"The force peak of {peak:.3g} N is only {peak / noise:.1f} times the noise; "
+                f"hit harder.",
+            )
+        )
+    for i, samples in enumerate(hit.acceleration_m_s2):
+        if not np.any(samples - samples[0]):
+            faults.append(
+                Fault("dead", f"The acceleration along {AXES[i]} is constant; check its cable.")
+            )
+    return faults
+
+
+def _clipping(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+    """Overload leaves the top flat: several neighbouring samples equal to the last digit."""
+    faults = []
+    channels = [("force", hit.force_n)]
+    channels += [(f"acceleration {a}", s) for a, s in zip(AXES, hit.acceleration_m_s2, strict=True)]
+    for name, samples in channels:
+        for sense in (1.0, -1.0):
+            top = float(np.max(sense * samples))
+            if top <= 0:
+                continue
+            flat = _longest_run(sense * samples >= top * (1 - 1e-6))
+            if flat >= limits.clipped_samples:
+                faults.append(
+                    Fault(
+                        "clipped",
+                        f"The {name} is clipped at {sense * top:.4g} ({flat} samples); raise the "
+                        f"channel's range or hit more softly.",
+                    )
+                )
+                break
+    return faults
+
+
+def _longest_run(mask: np.ndarray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
+
+
+def _polarity(force: np.ndarray, where: int, peak: float) -> list[Fault]:
+    if force[where] - np.median(force) > 0:
+        return []
+    return [
+        Fault(
+            "polarity",
+            f"The force pulse of {peak:.3g} N is negative: a hammer only pushes; check the "
+            f"polarity of the force channel.",
+        )
+    ]
+
+
+def _pulse_span(force: np.ndarray, where: int, peak: float, noise: float) -> tuple[int, int]:
+    """First and last sample of the main pulse, where the force is above a share of its peak."""
+    level = max(0.05 * peak, 4 * noise)
+    above = np.abs(force - np.median(force)) > level
+    start = end = where
+    while start > 0 and above[start - 1]:
+        start -= 1
+    while end < len(force) - 1 and above[end + 1]:
+        end += 1
+    return start, end
+
+
+def _pulse_whole(
+    force: np.ndarray, where: int, peak: float, noise: float, limits: ScreeningLimits
+) -> list[Fault]:
+    start, end = _pulse_span(force, where, peak, noise)
+    if start < limits.least_pretrigger:
+        return [Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")]
+    if end >= len(force) - 8 or where > 0.8 * len(force):
+        return [Fault("truncated", "The record ends right after the pulse; check the trigger.")]
+    return []
+
+
+def _double(
+    hit: Hit, where: int, peak: float, noise: float, limits: ScreeningLimits
+) -> list[Fault]:
+    """A second pulse: force that rises again after it had fallen."""
+    force = hit.force_n - np.median(hit.force_n)
+    start, end = _pulse_span(hit.force_n, where, peak, noise)
+    # The anti-alias filter rings around a pulse for a few samples; that is no second hit.
+    margin = max(3, end - start + 1)
+    rest = np.concatenate([force[: max(0, start - margin)], force[end + 1 + margin :]])
+    if not rest.size:
+        return []
+    second = float(np.max(rest))
+    valley = _valley(force[start : end + 1], peak)
+    if second > max(limits.second_peak * peak, 6 * noise) or valley > limits.second_peak * peak:
+        return [
+            Fault(
+                "double_hit",
+                f"A second pulse of {max(second, valley):.3g} N follows the first of "
+                f"{peak:.3g} N; hit once and let it bounce off.",
+            )
+        ]
+    return []
+
+
+def _valley(pulse: np.ndarray, peak: float) -> float:
+    """How far the force rises again inside one pulse, above the lowest point between two tops."""
+    top = int(np.argmax(pulse))
+    rise = 0.0
+    for side in (pulse[top:], pulse[top::-1]):
+        lowest = np.minimum.accumulate(side)
+        rise = max(rise, float(np.max(side - lowest)))
+    return rise
+
+
+def _soft(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+    force = hit.force_n - np.median(hit.force_n)
+    size = 1 << int(np.ceil(np.log2(4 * len(force))))
+    spectrum = np.abs(np.fft.rfft(force, size))
+    frequency = np.fft.rfftfreq(size, 1 / hit.sampling_rate_hz)
+    low, high = limits.band_hz
+    if high > 0.45 * hit.sampling_rate_hz:
+        return [
+            Fault(
+                "too_slow",
+                f"Sampled at {hit.sampling_rate_hz:g} Hz, the record cannot reach {high:g} Hz; "
+                f"sample at {2.56 * high:.0f} Hz or faster.",
+            )
+        ]
+    inside = spectrum[(frequency >= low) & (frequency <= high)]
+    end = spectrum[(frequency >= 0.9 * high) & (frequency <= high)]
+    if not inside.size or not end.size:
+        return []
+    drop = 20 * np.log10(np.max(inside) / max(float(np.mean(end)), 1e-30))
+    if drop > limits.roll_off_db:
+        return [
+            Fault(
+                "too_soft",
+                f"The pulse is too soft: its spectrum has fallen by {drop:.0f} dB at "
+                f"{high:g} Hz; use a harder tip.",
+            )
+        ]
+    return []
+
+
+def screen_repeats(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[Fault, ...], ...]:
+    """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
+
+    Judged only where three hits or more of an axis agree; a robust vote needs a majority.
+    """
+    faults: list[tuple[Fault, ...]] = [() for _ in hits]
+    for axis in range(3):
+        group = [i for i, hit in enumerate(hits) if hit.axis_index == axis]
+        if len(group) < 3 or len({len(hits[i].force_n) for i in group}) > 1:
+            continue
+        frfs = np.array([_frf(hits[i], band_hz) for i in group])
+        centre = np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
+        alike = [_likeness(frf, centre) for frf in frfs]
+        typical = float(np.median(alike))
+        for i, frf, share in zip(group, frfs, alike, strict=True):
+            if share > 0.5 or share > typical - 0.3:
+                continue
+            if _likeness(-frf, centre) > 0.8:
+                text, kind = "has the opposite sign of the others", "wrong_axis"
+            else:
+                text, kind = "does not agree with the others of its axis", "incoherent"
+            faults[i] = (
+                Fault(
+                    kind,
+                    f"Its FRF {text} (likeness {share:.2f}, others {typical:.2f}); check axis and "
+                    f"hit point, and hit again.",
+                ),
+            )
+    return tuple(faults)
+
+
+def _frf(hit: Hit, band_hz: tuple[float, float]) -> np.ndarray:
+    frequency = np.fft.rfftfreq(len(hit.force_n), 1 / hit.sampling_rate_hz)
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    force = np.fft.rfft(hit.sign * (hit.force_n - np.median(hit.force_n)))[inside]
+    mean = np.median(hit.acceleration_m_s2, axis=1, keepdims=True)
+    response = np.fft.rfft(hit.acceleration_m_s2 - mean, axis=1)[:, inside]
+    floor = 1e-3 * np.max(np.abs(force))
+    return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
+
+
+def _likeness(frf: np.ndarray, centre: np.ndarray) -> float:
+    """1 where two FRFs are the same in size, sign and phase; 0 or less where unrelated."""
+    scale = np.linalg.norm(frf) * np.linalg.norm(centre)
+    return float(np.real(np.vdot(centre, frf)) / scale) if scale > 0 else 0.0

@@ -1,0 +1,189 @@
+"""Universal files, dataset 58 (ASCII) and 58b (binary): time histories and FRFs."""
+
+import io
+import warnings
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.recording.tables import sampling_rate
+from planner.recording.types import Channel, FrfRecord, Record, TimeRecord
+from planner.recording.units import lookup
+
+# UFF 58, record 8 and 9: specific data types.
+_QUANTITY = {8: "displacement", 11: "velocity", 12: "acceleration", 13: "force", 9: "force",
+             15: "pressure", 21: "pressure"}  # fmt: skip
+_SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force": "N",
+       "pressure": "Pa"}  # fmt: skip
+_FUNCTIONS = {0: "general data", 1: "time histories", 2: "auto-spectra", 3: "cross-spectra",
+              4: "FRFs", 5: "transmissibilities", 6: "coherences", 9: "power spectral densities",
+              12: "spectra"}  # fmt: skip
+_RATIO = {"acceleration": "accelerance", "velocity": "mobility", "displacement": "receptance"}
+
+
+def read_uff(path: Path) -> tuple[Record, ...]:
+    """Records of a universal file. Raises InputError saying what it holds instead."""
+    sets = [s for s in _sets(path) if s.get("type") == 58]
+    if not sets:
+        raise InputError(f"{path} holds no dataset 58; export time histories as UFF 58 or 58b.")
+    kinds = {int(s["func_type"]) for s in sets}
+    times = [s for s in sets if s["func_type"] == 1]
+    frfs = [s for s in sets if s["func_type"] == 4]
+    if not times and not frfs:
+        names = ", ".join(_FUNCTIONS.get(k, f"function type {k}") for k in sorted(kinds))
+        raise InputError(
+            f"{path} holds {names}, neither time histories nor FRFs; export one of these."
+        )
+    _check_numbers(path, times + frfs)
+    records: list[Record] = []
+    if times:
+        records.append(_time_record(path, times))
+    if frfs:
+        coherences = [s for s in sets if s["func_type"] == 6]
+        records.append(_frf_record(path, frfs, coherences))
+    return tuple(records)
+
+
+def _sets(path: Path) -> list[dict[str, Any]]:
+    import pyuff
+
+    try:
+        with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+            warnings.simplefilter("ignore")
+            file = pyuff.UFF(str(path))
+            count = len(file.get_set_types())
+            if not count:
+                raise InputError(f"{path} is no universal file (no dataset in it); export again.")
+            return [file.read_sets(i) for i in range(count)]
+    except InputError:
+        raise
+    except Exception as error:  # the parser raises whatever the junk makes it raise
+        raise InputError(
+            f"{path} cannot be read as a universal file ({type(error).__name__}); export it again."
+        ) from None
+
+
+def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:
+    for number, s in enumerate(sets, 1):
+        data = np.asarray(s["data"])
+        if len(data) != int(s["num_pts"]) or len(data) < 2:
+            raise InputError(
+                f"{path}: dataset {number} states {s['num_pts']} points and holds {len(data)}; "
+                f"the file is cut off, export it again."
+            )
+        bad = np.flatnonzero(~np.isfinite(data))
+        if bad.size:
+            raise InputError(
+                f"{path}: dataset {number}, sample {bad[0] + 1} is not a finite number; "
+                f"export it again."
+            )
+
+
+def _simulated(sets: list[dict[str, Any]]) -> bool:
+    texts = (str(s.get(f"id{i}", "")) for s in sets for i in range(1, 6))
+    return any("simulated" in text.lower() for text in texts)
+
+
+def _unit(path: Path, s: dict[str, Any]) -> tuple[str, str, float]:
+    """Quantity, SI unit and factor; without a label UFF's default, SI, holds."""
+    stated = _QUANTITY.get(int(s["ordinate_spec_data_type"]))
+    label = str(s["ordinate_axis_units_lab"]).strip()
+    if label.upper() in ("", "NONE", "NULL"):
+        return (stated, _SI[stated], 1.0) if stated else ("unknown", "", 1.0)
+    known = lookup(label)
+    if known is None:
+        return stated or "unknown", "", 1.0
+    if stated and known[0] != stated:
+        raise InputError(
+            f"{path} labels a record of {stated} with the unit {label}; correct the export."
+        )
+    return known
+
+
+def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
+    grids = {(round(float(s["abscissa_min"]), 9), _rate(path, s), len(s["data"])) for s in sets}
+    rates = {round(g[1], 6) for g in grids}
+    if len(rates) > 1 or len({g[2] for g in grids}) > 1:
+        raise InputError(
+            f"{path} mixes records of different sampling or length; export one hit with one rate."
+        )
+    common = {int(s["ref_dir"]) for s in sets if int(s["ref_dir"])}
+    channels, remarks = [], []
+    for s in sets:
+        quantity, unit, factor = _unit(path, s)
+        direction = int(s["rsp_dir"])
+        if quantity == "force":
+            direction = int(s["ref_dir"]) or (common.pop() if len(common) == 1 else direction)
+        if not unit:
+            label = str(s["ordinate_axis_units_lab"]).strip()
+            remarks.append(f"The unit {label or 'of a record'} is not known.")
+        name = str(s["rsp_ent_name"]).strip()
+        name = name if name.upper() != "NONE" else f"{quantity} {direction:+d}"
+        samples = np.asarray(s["data"], dtype=float) * factor
+        channels.append(Channel(name, quantity, unit, direction, samples))
+    rate = next(iter(grids))[1]
+    return TimeRecord(path, rate, tuple(channels), tuple(remarks), _simulated(sets))
+
+
+def _rate(path: Path, s: dict[str, Any]) -> float:
+    if int(s["abscissa_spacing"]) == 1:
+        step = float(s["abscissa_inc"])
+        if not 1e-9 < step < 1e6:
+            raise InputError(f"{path} states a sampling step of {step} s; correct the export.")
+        return 1 / step
+    return sampling_rate(path, np.asarray(s["x"], dtype=float))
+
+
+def _frf_record(
+    path: Path, sets: list[dict[str, Any]], coherences: list[dict[str, Any]]
+) -> FrfRecord:
+    frequency = np.asarray(sets[0]["x"], dtype=float)
+    values, coherence, kinds = [], [], set()
+    found = {(int(c["rsp_dir"]), int(c["ref_dir"])): c for c in coherences}
+    for s in sets:
+        if len(s["x"]) != len(frequency) or not np.allclose(s["x"], frequency):
+            raise InputError(f"{path} mixes FRFs over different frequency lines; export one grid.")
+        quantity, unit, factor = _unit_of_ratio(s)
+        kinds.add((quantity, unit))
+        values.append(np.asarray(s["data"], dtype=complex) * factor)
+        match = found.get((int(s["rsp_dir"]), int(s["ref_dir"])))
+        same = match is not None and len(match["data"]) == len(frequency)
+        coherence.append(
+            np.real(match["data"]) if match and same else np.full(len(frequency), np.nan)
+        )
+    if len(kinds) != 1:
+        raise InputError(f"{path} mixes FRFs of different kinds; export accelerance only.")
+    quantity, unit = kinds.pop()
+    remarks = () if unit else ("The FRFs' unit is not stated.",)
+    return FrfRecord(
+        path,
+        frequency,
+        np.array(values),
+        tuple(int(s["rsp_dir"]) for s in sets),
+        tuple(int(s["ref_dir"]) for s in sets),
+        quantity,
+        unit,
+        np.array(coherence),
+        remarks,
+        _simulated(sets),
+    )
+
+
+def _unit_of_ratio(s: dict[str, Any]) -> tuple[str, str, float]:
+    """Kind and unit of an FRF from its numerator and denominator, where both are stated."""
+    top = _QUANTITY.get(int(s["ordinate_spec_data_type"]))
+    bottom = _QUANTITY.get(int(s["orddenom_spec_data_type"]))
+    if top not in _RATIO or bottom != "force":
+        return "unknown", "", 1.0
+    factor = 1.0
+    for key, sign in (("ordinate_axis_units_lab", 1), ("orddenom_axis_units_lab", -1)):
+        label = str(s[key]).strip().split("/N")[0]
+        if label.upper() not in ("", "NONE"):
+            known = lookup(label)
+            if known is None:
+                return _RATIO[top], "", 1.0
+            factor *= known[2] ** sign
+    return _RATIO[top], f"{_SI[top]}/N", factor
