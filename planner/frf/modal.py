@@ -10,9 +10,7 @@ def pole(frequency_hz: np.ndarray, damping_ratio: np.ndarray) -> np.ndarray:
     return -zeta * omega + 1j * omega * np.sqrt(np.maximum(0.0, 1 - zeta**2))
 
 
-def accelerance(
-    frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray
-) -> np.ndarray:
+def accelerance(frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarray) -> np.ndarray:
     """Accelerance (m/s²/N) of modes.
 
     frequency_hz (F,); poles (..., m) in rad/s; residues (..., m, *out) in m/(N·s).

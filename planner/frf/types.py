@@ -14,7 +14,10 @@ class Frf:
     and False in `measured`. `variance` is E|δH|² of each complex line (the variance of the
     estimate, not of one hit), NaN where unknown. `exponential_rate_1_s` is the decay rate of the
     exponential window that the records carry (0: none); poles fitted to this FRF are shifted left
-    by exactly that rate and have to be shifted back.
+    by exactly that rate and have to be shifted back. `tail_s` is the time from the pulse (its
+    centroid) to the end of the transformed records, where no window but the exponential one was
+    applied to them: decays cut off at the end are then part of the fitted model. ∞ where records
+    last until all is quiet, or where it is not known.
     """
 
     frequency_hz: np.ndarray  # (F,) uniform, increasing
@@ -25,6 +28,7 @@ class Frf:
     usable_band_hz: tuple[float, float]  # where pulse, anti-alias and signal-to-noise allow use
     exponential_rate_1_s: float = 0.0
     remarks: tuple[str, ...] = ()
+    tail_s: float = float("inf")
 
     @property
     def measured(self) -> np.ndarray:

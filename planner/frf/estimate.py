@@ -1,0 +1,235 @@
+"""From hits to the FRF matrix of a pose: H1, H2 or Hv with coherence and variance per line.
+
+No window is laid over the responses: what a record lacks because it ends before the decay is
+known exactly (`Frf.tail_s`) and is part of the model that is fitted later. The force is taken
+from the pulse alone (force window), because between pulses it holds only noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import RefusedError
+from planner.frf.types import Frf
+from planner.recording.types import AXES, FrfRecord, Hit
+
+MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
+NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
+DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
+ALIVE = 0.005  # response left at the record's end, over its peak, that counts as cut off
+SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
+LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectra:
+    """Transforms of one hit: force (F,), responses (3, F), noise power of the responses (3,)."""
+
+    axis: int
+    force: np.ndarray
+    response: np.ndarray
+    noise_power: np.ndarray
+
+
+def estimate(hits: tuple[Hit, ...], band_hz: tuple[float, float], estimator: str = "h1") -> Frf:
+    """FRF matrix of one pose from its hits (any order and number per axis).
+
+    `estimator` is "h1" (noise on the responses), "h2" (noise on the force) or "hv" (both).
+    Raises RefusedError if the hits do not fit together.
+    """
+    if estimator not in ("h1", "h2", "hv"):
+        raise ValueError(f"unknown estimator {estimator}")
+    if not hits:
+        raise RefusedError("No usable hit is left at this pose; hit again.")
+    rate = hits[0].sampling_rate_hz
+    if any(abs(hit.sampling_rate_hz / rate - 1) > 1e-6 for hit in hits):
+        raise RefusedError("The hits of this pose have different sampling rates; use one.")
+    cuts, remarks = _alignment(hits)
+    length = cuts[0][1] - cuts[0][0]
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
+    frequency = frequency[chosen]
+    spectra = [_spectra(hit, *cut, chosen) for hit, cut in zip(hits, cuts, strict=True)]
+    shape = (3, 3, frequency.size)
+    h, variance, coherence = (
+        np.full(shape, np.nan + 0j),
+        np.full(shape, np.nan),
+        np.full(shape, np.nan),
+    )
+    counts = [0, 0, 0]
+    for axis in range(3):
+        group = [s for s in spectra if s.axis == axis]
+        counts[axis] = len(group)
+        if group:
+            h[:, axis], variance[:, axis], coherence[:, axis] = _column(group, estimator)
+    return Frf(
+        frequency,
+        h,
+        variance,
+        coherence,
+        (counts[0], counts[1], counts[2]),
+        _usable(spectra, frequency, band_hz),
+        0.0,
+        tuple(remarks),
+        _tail(hits, cuts),
+    )
+
+
+def _onset(hit: Hit) -> int:
+    return int(np.argmax(np.abs(hit.force_n - np.median(hit.force_n))))
+
+
+def _alignment(hits: tuple[Hit, ...]) -> tuple[list[tuple[int, int]], list[str]]:
+    """Sample ranges in which every hit has its pulse at the same place and the same length."""
+    onsets = [_onset(hit) for hit in hits]
+    before = min(onsets)
+    after = min(len(hit.force_n) - onset for hit, onset in zip(hits, onsets, strict=True))
+    if after < 64:
+        raise RefusedError("A record ends right after its pulse; record longer.")
+    longest = max(len(hit.force_n) for hit in hits)
+    remarks = []
+    if before + after < 0.9 * longest:
+        remarks.append("Records of different length were cut to the shortest.")
+    return [(onset - before, onset + after) for onset in onsets], remarks
+
+
+def _spectra(hit: Hit, start: int, stop: int, chosen: np.ndarray) -> _Spectra:
+    force = np.array(hit.force_n[start:stop])
+    response = np.array(hit.acceleration_m_s2[:, start:stop])
+    peak = int(np.argmax(np.abs(force - np.median(force))))
+    first, last = _pulse(force, peak)
+    quiet = max(0, first - 2)
+    noise = np.full(3, np.nan)
+    if quiet >= LEAST_QUIET:
+        force = force - np.mean(force[:quiet])
+        response = response - np.mean(response[:, :quiet], axis=1, keepdims=True)
+        noise = np.var(response[:, :quiet], axis=1, ddof=1) * force.size
+    else:
+        force = force - np.median(force)
+    window = np.zeros(force.size)
+    window[first:last] = 1.0
+    sign = hit.sign
+    return _Spectra(
+        hit.axis_index,
+        np.fft.rfft(sign * force * window)[chosen],
+        np.fft.rfft(response, axis=1)[:, chosen],
+        noise,
+    )
+
+
+def _pulse(force: np.ndarray, peak: int) -> tuple[int, int]:
+    """Range of samples that holds the pulse and the anti-alias filter's ringing around it."""
+    centred = np.abs(force - np.median(force))
+    above = np.flatnonzero(centred > 0.1 * centred[peak])
+    first = last = peak
+    while first - 1 in above:
+        first -= 1
+    while last + 1 in above:
+        last += 1
+    margin = 8 + 3 * (last - first + 1)
+    return max(0, first - margin), min(force.size, last + 1 + margin)
+
+
+def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """FRF, variance and coherence (3, F) of one hit axis."""
+    force = np.array([s.force for s in group])  # (n, F)
+    response = np.array([s.response for s in group])  # (n, 3, F)
+    sff = np.sum(np.abs(force) ** 2, axis=0)
+    sxx = np.sum(np.abs(response) ** 2, axis=0)
+    sxf = np.sum(response * force.conj()[:, None], axis=0)
+    h1 = sxf / sff
+    if estimator == "h1":
+        h = h1
+    else:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            h2 = np.where(np.abs(sxf) > 0, sxx / sxf.conj(), h1)
+        # The geometric mean of H1 and H2 (they share the phase) is Hv for equal relative noise.
+        h = h2 if estimator == "h2" else h1 * np.sqrt(np.abs(h2) / np.maximum(np.abs(h1), 1e-300))
+    n = len(group)
+    if n == 1:
+        noise = group[0].noise_power
+        return h, noise[:, None] / sff[None, :], np.full(h.shape, np.nan)
+    error = np.sum(np.abs(response - h[None] * force[:, None]) ** 2, axis=0) / (n - 1)
+    coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
+    return h, _smooth(error) / sff, coherence
+
+
+def _smooth(values: np.ndarray) -> np.ndarray:
+    """Running mean over SMOOTH lines, shorter at the ends; (k, F)."""
+    width = min(SMOOTH, values.shape[1])
+    kernel = np.ones(width)
+    count = np.convolve(np.ones(values.shape[1]), kernel, mode="same")
+    return np.array([np.convolve(row, kernel, mode="same") for row in values]) / count
+
+
+def _usable(
+    spectra: list[_Spectra], frequency: np.ndarray, band_hz: tuple[float, float]
+) -> tuple[float, float]:
+    """From the first line to where the weakest pulse has lost DROP_DB, or the lines end."""
+    high = float(frequency[-1])
+    for s in spectra:
+        size = np.abs(s.force)
+        weak = (size < np.max(size) * 10 ** (-DROP_DB / 20)) & (frequency > band_hz[0])
+        if weak.any():
+            high = min(high, float(frequency[np.argmax(weak)]))
+    return float(frequency[0]), high
+
+
+def _tail(hits: tuple[Hit, ...], cuts: list[tuple[int, int]]) -> float:
+    """Time from pulse to the end of the records, ∞ if everything has decayed by then."""
+    alive, times = False, []
+    for hit, (start, stop) in zip(hits, cuts, strict=True):
+        response = hit.acceleration_m_s2[:, start:stop]
+        response = response - np.median(response, axis=1, keepdims=True)
+        end = np.sqrt(np.mean(response[:, -response.shape[1] // 12 :] ** 2, axis=1))
+        alive |= bool(np.any(end > ALIVE * np.max(np.abs(response))))
+        force = hit.force_n[start:stop] - np.median(hit.force_n)
+        first, last = _pulse(force, int(np.argmax(np.abs(force))))
+        pulse = np.clip(force[first:last], 0.0, None)
+        centroid = first + float(np.sum(np.arange(pulse.size) * pulse) / np.sum(pulse))
+        times.append((stop - start - centroid) / hit.sampling_rate_hz)
+    return float(np.mean(times)) if alive else float("inf")
+
+
+def from_records(records: tuple[FrfRecord, ...]) -> Frf:
+    """FRF matrix from exported FRFs. Raises RefusedError where they do not make one."""
+    first = records[0]
+    frequency = np.asarray(first.frequency_hz, dtype=float)
+    keep = frequency > 0
+    shape = (3, 3, int(keep.sum()))
+    h, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
+    for record in records:
+        if record.quantity == "unknown" or not record.unit:
+            raise RefusedError(
+                f"{record.source}: it is not stated whether these FRFs are accelerance, mobility "
+                f"or receptance, and in which unit; label them."
+            )
+        if len(record.frequency_hz) != len(frequency) or not np.allclose(
+            record.frequency_hz, frequency
+        ):
+            raise RefusedError(f"{record.source} has other frequency lines; export one grid.")
+        power = {"accelerance": 0, "mobility": 1, "receptance": 2}[record.quantity]
+        values = record.values * (2j * np.pi * frequency) ** power
+        for k, (i, j) in enumerate(
+            zip(record.response_direction, record.reference_direction, strict=True)
+        ):
+            if not (1 <= abs(i) <= 3 and 1 <= abs(j) <= 3):
+                raise RefusedError(
+                    f"{record.source}: FRF {k + 1} does not state its directions; label them."
+                )
+            at = abs(i) - 1, abs(j) - 1
+            h[at] = np.sign(i) * np.sign(j) * values[k][keep]
+            coherence[at] = record.coherence[k][keep]
+    measured = [bool(np.all(np.isfinite(h[:, j]))) for j in range(3)]
+    if not any(measured):
+        raise RefusedError(
+            f"{first.source}: no hit axis has all three responses "
+            f"({', '.join(AXES)}); export them together."
+        )
+    for j in range(3):
+        if not measured[j]:
+            h[:, j] = np.nan
+    counts = tuple(int(m) for m in measured)
+    unknown = np.full(shape, np.nan)
+    band = float(frequency[keep][0]), float(frequency[keep][-1])
+    return Frf(frequency[keep], h, unknown, coherence, (counts[0], counts[1], counts[2]), band)
