@@ -68,6 +68,7 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
         h[..., chosen],
         variance if known else None,
         frf.exponential_rate_1_s,
+        tail_s=frf.tail_s,
     )
 
 

@@ -28,7 +28,8 @@ class Data:
     Accelerance (`step_s` None): the s-plane. Transforms of free decays sampled every `step_s`,
     taken at the lines of the DFT without padding: the z-plane, where they are exactly rational
     (the end of the record only scales the residues). `rate_1_s` is that of the exponential
-    window which the records carry; poles are those of the structure, without it.
+    window which the records carry; poles are those of the structure, without it. `tail_s` is the
+    time from the pulse to the end of the record (see `residues`).
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -36,14 +37,15 @@ class Data:
     variance: np.ndarray | None  # like response, None where unknown
     rate_1_s: float = 0.0
     step_s: float | None = None
+    tail_s: float = np.inf
 
     @cached_property
     def lines(self) -> Lines:
         if self.step_s is None:
-            return laplace(self.frequency_hz, self.rate_1_s)
+            return laplace(self.frequency_hz, self.rate_1_s, self.tail_s)
         s = 2j * np.pi * self.frequency_hz + self.rate_1_s
         x = np.exp(s * self.step_s)
-        return Lines(x, x)
+        return Lines(x, x, np.stack([np.ones_like(x), x]))
 
     def to_plane(self, poles: np.ndarray) -> np.ndarray:
         """From rad/s to the plane of the lines."""
@@ -65,6 +67,16 @@ class Data:
         return bool(np.all(inside & damped))
 
     @property
+    def correlated(self) -> float:
+        """Lines that carry one line's worth of information: the window smears noise over them.
+
+        The noise of neighbours k lines apart correlates as 1/(1 + iπk·Δf/rate); the sum of the
+        real parts, over all k, is what the variance of anything wider than that grows by.
+        """
+        lines = self.rate_1_s / (self.frequency_hz[1] - self.frequency_hz[0])
+        return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
+
+    @property
     def entries(self) -> int:
         return self.response.shape[0] * self.response.shape[1]
 
@@ -81,7 +93,7 @@ class Fit:
 
     refined: Refined
     variance: np.ndarray
-    excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom around each line
+    excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom (and of information) around a line
 
     def scale_at(self, frequency_hz: float, lines_hz: np.ndarray) -> float:
         """Factor by which the error around a frequency exceeds its stated variance."""
@@ -106,7 +118,7 @@ def fit(data: Data, start: np.ndarray) -> Fit:
 
 
 def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
-    """Refined fit; an unknown variance is taken from the error, flat over the lines."""
+    """Refined fit; an unknown variance is taken from the error itself."""
     power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = data.variance
     if variance is None and before is not None:
@@ -121,13 +133,28 @@ def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
         refined = refine(data.lines, data.response, variance, plane, data.allowed)
         refined = _in_rad_s(data, refined)
         if data.variance is None and k < rounds - 1:
-            square = np.abs(_error(data, refined)) ** 2
-            lines = data.frequency_hz.size
-            lost = 1 - (2 * refined.poles.size + 4) / (2 * lines)
-            flat = np.mean(square, axis=-1, keepdims=True) / max(lost, 0.1)
-            variance = np.broadcast_to(flat + FLOOR**2 * power, data.response.shape)
+            variance = _scatter(data, refined, power)
     assert refined is not None
     return Fit(refined, variance, _excess(data, refined, variance))
+
+
+def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
+    """Variance from the error of the fit, a running mean over a tenth of the lines."""
+    square = np.abs(_error(data, refined)) ** 2
+    lines = data.frequency_hz.size
+    lost = 1 - (2 * refined.poles.size + 2 * len(data.lines.rest)) / (2 * lines)
+    low, high = _windows(lines, max(10, lines // 20))
+    total = np.concatenate([np.zeros((*square.shape[:2], 1)), np.cumsum(square, axis=-1)], axis=-1)
+    local = (total[..., high] - total[..., low]) / (high - low)
+    flat = np.mean(square, axis=-1, keepdims=True)
+    # A little of the overall level keeps quiet stretches from being trusted without limit.
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + FLOOR**2 * power
+
+
+def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:
+    """First and one past the last line of a window around every line, clipped at the ends."""
+    index = np.arange(lines)
+    return np.clip(index - half, 0, None), np.clip(index + half + 1, None, lines)
 
 
 def _error(data: Data, refined: Refined) -> np.ndarray:
@@ -155,25 +182,29 @@ def _excess(data: Data, refined: Refined, variance: np.ndarray) -> np.ndarray:
     error = np.mean(np.abs(_error(data, refined)) ** 2 / variance, axis=(0, 1))
     lines = error.size
     freedom = refined.degrees / (2 * lines * data.entries)
-    half = max(5, lines // 40)
+    low, high = _windows(lines, max(5, lines // 40))
     total = np.concatenate([[0.0], np.cumsum(error)])
-    low = np.clip(np.arange(lines) - half, 0, None)
-    high = np.clip(np.arange(lines) + half + 1, None, lines)
     local = (total[high] - total[low]) / (high - low) / max(freedom, 0.1)
     # A window of few lines scatters by itself; only what exceeds that is excess.
-    noise = 1 + 2 / np.sqrt((high - low) * data.entries)
-    return np.maximum(1.0, np.maximum(local / noise, np.mean(error) / max(freedom, 0.1)))
+    noise = 1 + 2 / np.sqrt((high - low) * data.entries / data.correlated)
+    local = np.maximum(local / noise, np.mean(error) / max(freedom, 0.1))
+    return data.correlated * np.maximum(1.0, local)
 
 
 def _prune(data: Data, current: Fit) -> Fit:
-    """Leave out, one at a time, modes that the data do not carry."""
+    """Leave out modes that the data do not carry, the weakest of each neighbourhood first."""
     while current.refined.poles.size > 1:
         weak = weakness(data, current)
-        worst = int(np.argmax(weak))
-        if weak[worst] <= 1:
+        poles = current.refined.poles
+        dropped: list[int] = []
+        for k in np.argsort(-weak):
+            apart = [abs(poles[k] - poles[d]) > 3 * abs(poles[[k, d]].real).max() for d in dropped]
+            # What looks weak may be strong once its twin is gone.
+            if weak[k] > 1 and all(apart) and len(dropped) < poles.size - 1:
+                dropped.append(int(k))
+        if not dropped:
             break
-        poles = np.delete(current.refined.poles, worst)
-        current = _refine(data, poles, current)
+        current = _refine(data, np.delete(poles, dropped), current)
     return current
 
 
@@ -246,8 +277,7 @@ def _falls_of(data: Data, poles: np.ndarray, weight: np.ndarray, error: np.ndarr
         low = np.searchsorted(data.frequency_hz, frequency[block][0] - reach[block][0])
         high = np.searchsorted(data.frequency_hz, frequency[block][-1] + reach[block][-1])
         near = slice(max(0, min(low, data.frequency_hz.size - LEAST)), max(high, LEAST))
-        lines = Lines(data.lines.x[near], data.lines.factor[near])
-        atoms = basis(lines, data.to_plane(poles[block]), False)
+        atoms = basis(data.lines.part(near), data.to_plane(poles[block]), False)
         first, second = atoms.reshape(2, atoms.shape[0] // 2, -1)
         aa = (np.abs(first) ** 2) @ weight[:, near].T
         bb = (np.abs(second) ** 2) @ weight[:, near].T

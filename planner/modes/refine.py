@@ -164,7 +164,7 @@ def _finish(
     covariance = np.linalg.pinv(point.hessian, hermitian=True)
     spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
     variance = np.einsum("ekk->ek", point.inverse) + spread
-    residues = unpack(point.coefficients.reshape(*shape, p), m, lines.largest)
+    residues = unpack(point.coefficients.reshape(*shape, p), m)
     return Refined(
         poles,
         residues,

@@ -1,10 +1,14 @@
 """Residues by least squares in the frequency domain (LSFD), with out-of-band terms.
 
-Accelerance of one entry: s² [Σ R/(s−λ) + R*/(s−λ*)] + L + s² U, L and U standing for the
+Accelerance of one entry: Σ s²[R/(s−λ) + R*/(s−λ*)] + L + s V + s² U, L and U standing for the
 modes below and above the band (Heylen, Lammens, Sas, Modal Analysis Theory and Testing, 1997,
-A.3); both may be complex, because the modes outside are damped. s = iω, or iω + rate where the
+A.3); all may be complex, because the modes outside are damped. s = iω, or iω + rate where the
 records carry an exponential window e^{−rate·t}: the transform of the windowed record is that of
 the record itself at iω + rate, so poles and residues need no correction afterwards.
+
+A record that ends before its decay lacks the tail that starts at its end. With the end a time τ
+after the pulse, s² becomes s² − λ² e^{(λ−s)τ}: exact for an impulse, and it is not leakage that
+a window would have to hide, for the tail has the same poles.
 """
 
 from dataclasses import dataclass
@@ -14,46 +18,77 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Residues:
-    """Residues (outputs, inputs, m) in m/(N·s) and the out-of-band terms (outputs, inputs)."""
+    """Residues (outputs, inputs, m) in m/(N·s), out-of-band terms (outputs, inputs, terms)."""
 
     residue: np.ndarray
-    lower: np.ndarray  # m/s²/N
-    upper: np.ndarray  # m/N
+    rest: np.ndarray  # coefficients of `Lines.rest`; none: last axis 0
+
+    @property
+    def lower(self) -> np.ndarray:
+        """(outputs, inputs) constant term of the accelerance: the modes below the band."""
+        return self.rest[..., 0]
+
+    @property
+    def upper(self) -> np.ndarray:
+        """(outputs, inputs) receptance (m/N) of the modes above the band."""
+        return self.rest[..., -1]
 
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Where a model of poles is evaluated: factor · [R/(x−p) + R*/(x−p*)] + L + factor·U.
+    """Where a model of poles is evaluated: factor · [R/(x−p) + R*/(x−p*)] + rest.
 
-    Accelerance: x = s, factor = s². A sampled free decay: x = e^{s·step}, factor = x.
+    Accelerance: x = s, factor = s², rest 1, s, s². A sampled free decay: x = e^{s·step},
+    factor = x, rest 1, x. `tail_s` is the time from pulse to end of record (accelerance only).
     """
 
     x: np.ndarray  # (F,) complex
     factor: np.ndarray  # (F,) complex
+    rest: np.ndarray  # (terms, F) complex
+    tail_s: float = np.inf
 
-    @property
-    def largest(self) -> float:
-        return float(np.max(np.abs(self.factor)))
+    def part(self, chosen: slice) -> "Lines":
+        """Some of the lines."""
+        return Lines(self.x[chosen], self.factor[chosen], self.rest[:, chosen], self.tail_s)
 
 
-def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0) -> Lines:
+def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0, tail_s: float = np.inf) -> Lines:
     """Accelerance lines (Hz) of records windowed by e^{−rate·t}: s = iω + rate."""
     s = 2j * np.pi * np.asarray(frequency_hz) + rate_1_s
-    return Lines(s, s**2)
+    return Lines(s, s**2, np.stack([np.ones_like(s), s, s**2]), tail_s)
+
+
+def unit(lines: Lines, poles: np.ndarray) -> np.ndarray:
+    """Response (m, F) to a unit residue of each pole, its conjugate's left out."""
+    apart = lines.x - poles[:, None]
+    if not np.isfinite(lines.tail_s):
+        return lines.factor / apart
+    # A pole that grows would blow the tail up; only those that decay as recorded come this far.
+    tail = poles[:, None] ** 2 * np.exp(-apart * lines.tail_s)
+    return (lines.factor - tail) / apart
+
+
+def unit_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
+    """Derivative of `unit` by the poles (complex-analytic)."""
+    apart = lines.x - poles[:, None]
+    if not np.isfinite(lines.tail_s):
+        return lines.factor / apart**2
+    p = poles[:, None]
+    end = np.exp(-apart * lines.tail_s)
+    change = (2 * p + p**2 * lines.tail_s) * end
+    return (lines.factor - p**2 * end) / apart**2 - change / apart
 
 
 def basis(lines: Lines, poles: np.ndarray, residual_terms: bool = True) -> np.ndarray:
     """Response to unit real and imaginary parts of every coefficient, (columns, F) complex.
 
     poles (m,) in the plane of `lines`. Columns: Re R of each mode, Im R of each mode, then
-    Re L, Im L, Re U, Im U (U scaled to be of the size of L).
+    the real parts of the out-of-band coefficients, then the imaginary ones.
     """
-    up, down = 1 / (lines.x - poles[:, None]), 1 / (lines.x - poles.conj()[:, None])
-    columns = [lines.factor * (up + down), 1j * lines.factor * (up - down)]
+    up, down = unit(lines, poles), unit(lines, poles.conj())
+    columns = [up + down, 1j * (up - down)]
     if residual_terms:
-        scaled = lines.factor / lines.largest
-        one = np.ones_like(scaled)
-        columns.append(np.stack([one, 1j * one, scaled, 1j * scaled]))
+        columns += [lines.rest, 1j * lines.rest]
     return np.concatenate(columns)
 
 
@@ -62,23 +97,15 @@ def basis_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
 
     ∂H/∂Re p = Re R·first + Im R·second and ∂H/∂Im p = Re R·second − Im R·first.
     """
-    up, down = 1 / (lines.x - poles[:, None]) ** 2, 1 / (lines.x - poles.conj()[:, None]) ** 2
-    return np.concatenate([lines.factor * (up + down), 1j * lines.factor * (up - down)])
+    up, down = unit_slope(lines, poles), unit_slope(lines, poles.conj())
+    return np.concatenate([up + down, 1j * (up - down)])
 
 
-def unpack(coefficients: np.ndarray, modes: int, largest: float) -> Residues:
-    """Coefficients of `basis` (outputs, inputs, columns) as residues and out-of-band terms.
-
-    `largest` is |factor|_max, by which the basis of U was scaled.
-    """
+def unpack(coefficients: np.ndarray, modes: int) -> Residues:
+    """Coefficients of `basis` (outputs, inputs, columns) as residues and out-of-band terms."""
     residue = coefficients[..., :modes] + 1j * coefficients[..., modes : 2 * modes]
-    rest = coefficients[..., 2 * modes :]
-    if rest.shape[-1] == 0:
-        zero = np.zeros(residue.shape[:2], complex)
-        return Residues(residue, zero, zero)
-    lower = rest[..., 0] + 1j * rest[..., 1]
-    upper = (rest[..., 2] + 1j * rest[..., 3]) / largest
-    return Residues(residue, lower, upper)
+    real, imag = np.split(coefficients[..., 2 * modes :], 2, axis=-1)
+    return Residues(residue, real + 1j * imag)
 
 
 def lsfd(
@@ -107,7 +134,7 @@ def lsfd(
         norm = np.linalg.norm(a, axis=0)
         b = stack(accelerance[o, i] * root[o, i])
         coefficients[o, i, free] = np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm
-    return unpack(coefficients, m, lines.largest)
+    return unpack(coefficients, m)
 
 
 def stack(values: np.ndarray) -> np.ndarray:
@@ -117,9 +144,10 @@ def stack(values: np.ndarray) -> np.ndarray:
 
 def synthesize(lines: Lines, poles: np.ndarray, residues: Residues) -> np.ndarray:
     """Response (outputs, inputs, F) of poles, residues and out-of-band terms."""
-    up, down = 1 / (lines.x - poles[:, None]), 1 / (lines.x - poles.conj()[:, None])
+    up, down = unit(lines, poles), unit(lines, poles.conj())
     modal = residues.residue @ up + residues.residue.conj() @ down
-    return lines.factor * (modal + residues.upper[..., None]) + residues.lower[..., None]
+    rest = residues.rest @ lines.rest if residues.rest.shape[-1] else 0.0
+    return modal + rest
 
 
 def rank_one(residue: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -24,7 +24,7 @@ LINES = np.arange(4.0, 60.0, 0.2)
 
 def test_synthesis_is_that_of_the_shared_formula():
     system = random_system(np.random.default_rng(0), 4, complexity=0.7)
-    residues = Residues(np.moveaxis(system.residues, 0, -1), np.zeros((3, 3)), np.zeros((3, 3)))
+    residues = Residues(np.moveaxis(system.residues, 0, -1), np.zeros((3, 3, 0)))
     mine = synthesize(laplace(LINES), system.poles, residues)
     np.testing.assert_allclose(mine, accelerance(LINES, system.poles, system.residues), rtol=1e-12)
 
