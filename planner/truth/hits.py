@@ -1,0 +1,167 @@
+"""Simulated hammer hits: exact response to a pulse, the analyser's filter, noise, one UFF a hit."""
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+from planner.truth.model import Truth
+
+OVERSAMPLING = 16
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Hammer:
+    """What the person, the hammer and the analyser are like.
+
+    Noise is relative: of the responses to the hit's largest response (rms), of the force to its
+    peak. Readback angles scatter by `readback_deg` around the setpoint.
+    """
+
+    peak_n: float = 1200.0
+    duration_s: float = 0.008
+    sampling_rate_hz: float = 400.0
+    record_s: float = 2.56
+    pretrigger_s: float = 0.06
+    noise: float = 0.02
+    force_noise: float = 5e-4
+    readback_deg: float = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedHit:
+    """force_n (n,) ≥ 0 along `axis`, acceleration_m_s2 (3, n)."""
+
+    axis: str
+    force_n: np.ndarray
+    acceleration_m_s2: np.ndarray
+
+
+def simulate_hit(
+    truth: Truth, q: np.ndarray, axis: str, hammer: Hammer, rng: np.random.Generator
+) -> SimulatedHit:
+    """One hit at pose q (rad) along a signed axis of the tcp frame ("+x")."""
+    fine = hammer.sampling_rate_hz * OVERSAMPLING
+    n = round(hammer.record_s * fine)
+    force = _pulse(n, fine, hammer, rng)
+    sense, index = (-1.0 if axis[0] == "-" else 1.0), AXES.index(axis[1])
+    response = _response(truth, q, sense * force, index, 1 / fine)
+    # The analyser's anti-alias filter, the same on all channels.
+    filtered = signal.sosfilt(
+        signal.butter(6, 0.4 * hammer.sampling_rate_hz, fs=fine, output="sos"),
+        np.vstack([force, response]),
+    )[:, ::OVERSAMPLING]
+    f, a = filtered[0], filtered[1:]
+    largest = np.max(np.sqrt(np.mean(a**2, axis=1)))
+    f = f + hammer.force_noise * np.max(f) * rng.standard_normal(f.size)
+    a = a + hammer.noise * largest * rng.standard_normal(a.shape)
+    return SimulatedHit(axis, f, a)
+
+
+def _pulse(n: int, rate_hz: float, hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
+    """A hammer's pulse, sin^1.5 over its duration; no two hits are alike."""
+    t = np.arange(n) / rate_hz
+    start = hammer.pretrigger_s + rng.uniform(0, 2 / hammer.sampling_rate_hz)
+    duration = hammer.duration_s * rng.uniform(0.85, 1.15)
+    phase = np.clip((t - start) / duration, 0.0, 1.0)
+    return hammer.peak_n * rng.uniform(0.75, 1.25) * np.sin(np.pi * phase) ** 1.5
+
+
+def _response(
+    truth: Truth, q: np.ndarray, force: np.ndarray, index: int, step_s: float
+) -> np.ndarray:
+    """Accelerations (3, n), exact for a force that is linear between samples.
+
+    Each pole obeys x' = λx + f; a = Σ R(λ²x + λf) + D f with D = Js M⁻¹ Jhᵀ, for Σ R = 0.
+    """
+    poles, residues, direct = truth.poles(q)
+    out = np.outer(direct[:, index], force).astype(complex)
+    for pole, residue in zip(poles, residues[:, :, index], strict=True):
+        z = pole * step_s
+        grow = np.exp(z)
+        b1 = (grow - 1 - z) / (z * pole)  # weight of the newer force sample
+        b0 = (grow - 1) / pole - b1
+        x = signal.lfilter([b1, b0], [1.0, -grow], force.astype(complex))
+        # Σ Rλ is the direct part: it is in `direct` already, so only λ²x is added here.
+        out += np.outer(residue, pole**2 * x)
+    return out.real
+
+
+def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, text: str) -> None:
+    """One hit as UFF 58b, labelled as simulated."""
+    import pyuff
+
+    path.unlink(missing_ok=True)
+    file = pyuff.UFF(str(path))
+    direction = (AXES.index(hit.axis[1]) + 1) * (-1 if hit.axis[0] == "-" else 1)
+    channels = [(hit.force_n, 13, "N", direction, "hammer")]
+    channels += [
+        (samples, 12, "m/s^2", i + 1, f"sensor {AXES[i]}")
+        for i, samples in enumerate(hit.acceleration_m_s2)
+    ]
+    for samples, kind, unit, response, name in channels:
+        entry = {
+            "type": 58,
+            "binary": 1,
+            "func_type": 1,
+            "id1": "SIMULATED, not measured",
+            "id2": text[:80],
+            "rsp_node": 1,
+            "rsp_dir": response,
+            "rsp_ent_name": name.replace(" ", "_"),
+            "ref_node": 1,
+            "ref_dir": direction,
+            "ord_data_type": 4,
+            "num_pts": samples.size,
+            "abscissa_spacing": 1,
+            "abscissa_min": 0.0,
+            "abscissa_inc": 1 / hammer.sampling_rate_hz,
+            "abscissa_spec_data_type": 17,
+            "abscissa_axis_units_lab": "s",
+            "ordinate_spec_data_type": kind,
+            "ordinate_axis_units_lab": unit,
+            "orddenom_spec_data_type": 0,
+            "z_axis_spec_data_type": 0,
+            "data": np.asarray(samples, dtype=float),
+            "x": np.arange(samples.size) / hammer.sampling_rate_hz,
+        }
+        file.write_sets(entry, "add")
+
+
+def record_poses(
+    truth: Truth,
+    poses: Sequence[tuple[str, np.ndarray]],
+    folder: Path,
+    hits: Sequence[str] = ("+x", "+y", "+z"),
+    repeats: int = 4,
+    hammer: Hammer | None = None,
+    seed: int = 0,
+) -> Path:
+    """A recordings folder (contract section 2) of poses (name, q in rad); returns its path.
+
+    Angles in recordings.csv are the readback, and it is there that the truth is evaluated.
+    """
+    hammer = hammer or Hammer()
+    (folder / "data").mkdir(parents=True, exist_ok=True)
+    rows = []
+    for number, (pose, q) in enumerate(poses):
+        rng = np.random.default_rng([seed, number])
+        readback = np.rad2deg(q) + hammer.readback_deg * rng.uniform(-1, 1, len(q))
+        readback = np.round(readback, 4)
+        for axis in hits:
+            for repeat in range(1, repeats + 1):
+                hit = simulate_hit(truth, np.deg2rad(readback), axis, hammer, rng)
+                sign = "m" if axis[0] == "-" else "p"
+                name = f"data/{pose}_{sign}{axis[1]}_{repeat}.uff"
+                write_uff(folder / name, hit, hammer, truth.description)
+                rows.append([pose, *(f"{v:.4f}" for v in readback), axis, repeat, name])
+    with open(folder / "recordings.csv", "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        joints = [f"{name}_deg" for name in truth.joint_names]
+        writer.writerow(["pose", *joints, "hit", "repeat", "file"])
+        writer.writerows(rows)
+    return folder
