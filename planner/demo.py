@@ -13,7 +13,6 @@ from planner.campaign.campaign import Campaign, ImportReport
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.labels import from_mode, label
-from planner.campaign.model import Model
 from planner.campaign.state import Measurement
 from planner.errors import InputError, NoPoseLeftError
 from planner.modes.measure import Source, measure

@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-import jax.numpy as jnp
 import numpy as np
 
-from planner.fusion.data import query_size
-from planner.fusion.gp import Posterior, cross_covariance
+from planner.fusion.gp import Posterior
 from planner.fusion.surrogate import Surrogate
 
 MEASUREMENT_SD = 1e-3  # relative sd that EMA gives a frequency
@@ -76,18 +74,4 @@ class FrequencyOutputs:
     def _measured(
         self, k: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        p, na, nb = self.posterior, len(xa), len(xb)
-        pxa, pla = _padded(xa, la[:, k])
-        pxb, plb = _padded(xb, lb[:, k])
-        cov, va, vb = cross_covariance(
-            p.kernel, p.x, p.low[k], p.mask[k], p.theta[k], p.factor[k],
-            jnp.asarray(p.prior.bias_sd[k]), jnp.asarray(p.prior.slope_sd[k]), pxa, pla, pxb, plb,
-        )  # fmt: skip
-        return np.array(cov)[:, :na, :nb], np.array(va)[:, :na], np.array(vb)[:, :nb]
-
-
-def _padded(x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    size = query_size(len(x))
-    px, pl = np.zeros((size, x.shape[1])), np.zeros(size)
-    px[: len(x)], pl[: len(x)] = x, low
-    return px, pl
+        return self.posterior.covariance(k, xa, la[:, k], xb, lb[:, k])

@@ -111,6 +111,17 @@ class Campaign:
             self._models = {key: build(self.cell, state)}
         return self._models[key]
 
+    def orphans(self) -> list[str]:
+        """Recordings stored without an import: the program was stopped in between."""
+        known = {
+            hit.sha256
+            for e in self.entries
+            if isinstance(e.event, Imported)
+            for hit in e.event.hits
+        }
+        kept = (self.directory / store.RECORDINGS).glob("[0-9a-f]*")
+        return sorted(p.name for p in kept if p.suffix != ".robot" and p.name[:64] not in known)
+
     def _configured(self) -> Configured:
         """What campaign.toml and the robot folder say now (the log follows with the next act)."""
         config = load_campaign_config(self.directory / store.CONFIG)

@@ -36,11 +36,6 @@ def capacity(n: int) -> int:
     return next((c for c in CAPACITIES if c >= n), -(-n // CAPACITIES[-1]) * CAPACITIES[-1])
 
 
-def query_size(n: int) -> int:
-    """Padded number of query points: a power of two, 64 at least."""
-    return max(64, 1 << max(0, int(n) - 1).bit_length())
-
-
 def pad(data: TrainingData, uses_low: np.ndarray) -> Padded:
     """Pad to capacity. A value counts if it and its sd, and its low fidelity if used, are known."""
     n, d = data.x.shape

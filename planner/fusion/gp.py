@@ -19,7 +19,7 @@ from jax.scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import norm, qmc
 
 from planner.fusion import jaxsetup  # noqa: F401
-from planner.fusion.data import Padded, query_size
+from planner.fusion.data import Padded
 from planner.fusion.kernels import KERNELS
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
@@ -39,35 +39,76 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """m outputs, k hyperparameter samples of equal weight, c padded training points."""
+    """m outputs, k hyperparameter samples of equal weight, c padded training points.
 
-    x: Array  # (c, d)
-    low: Array  # (m, c) centred
-    mask: Array  # (m, c)
-    theta: Array  # (m, k, 2 + d)
-    factor: Array  # (m, k, c, c) lower Cholesky factor
-    weights: Array  # (m, k, c) K⁻¹(y − mean)
+    Everything after the fit is plain NumPy on few, small matrices.
+    """
+
+    x: np.ndarray  # (c, d)
+    low: np.ndarray  # (m, c) centred
+    mask: np.ndarray  # (m, c)
+    theta: np.ndarray  # (m, k, 2 + d)
+    whiten: np.ndarray  # (m, k, c, c) inverse of the Cholesky factor
+    weights: np.ndarray  # (m, k, c) K⁻¹(y − mean)
     prior: Prior
     kernel: str
     remarks: tuple[str, ...] = ()
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m)."""
-        n = len(x)
-        size = query_size(n)
-        xq = np.zeros((size, x.shape[1]))
-        lq = np.zeros((self.mask.shape[0], size))
-        xq[:n], lq[:, :n] = x, low.T
-        mean, variance = _predict(
-            self.kernel, self.x, self.low, self.mask, self.theta, self.factor, self.weights,
-            self.prior.bias_sd, self.prior.slope_sd, xq, lq,
-        )  # fmt: skip
-        centre = self.prior.mean[None, :]
-        return np.array(mean).T[:n] + centre, np.sqrt(np.array(variance).T[:n])
+        m = self.mask.shape[0]
+        mean, variance = np.empty((len(x), m)), np.empty((len(x), m))
+        for j in range(m):
+            cross, white = self._cross(j, x, low[:, j])
+            means = (self.weights[j][:, None, :] @ cross)[:, 0]
+            own = self._own(j, x, low[:, j]) - np.sum(white**2, axis=1)
+            mean[:, j] = self.prior.mean[j] + np.mean(means, axis=0)
+            variance[:, j] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
+        return mean, np.sqrt(variance)
+
+    def covariance(
+        self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Posterior covariance (k, a, b), variances (k, a), (k, b) of output j, per sample."""
+        _, wa = self._cross(j, xa, la)
+        _, wb = self._cross(j, xb, lb)
+        prior = self._prior(j, xa, la, xb, lb)
+        va = self._own(j, xa, la) - np.sum(wa**2, axis=1)
+        vb = self._own(j, xb, lb) - np.sum(wb**2, axis=1)
+        covariance = prior - np.swapaxes(wa, 1, 2) @ wb
+        return covariance, np.maximum(va, 0.0), np.maximum(vb, 0.0)
 
     def nugget_variance(self) -> np.ndarray:
         """Mean nugget variance (m,)."""
-        return np.array(jnp.mean(jnp.exp(2 * self.theta[:, :, 1]), axis=1))
+        return np.mean(np.exp(2 * self.theta[:, :, 1]), axis=1)
+
+    def _prior(
+        self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
+    ) -> np.ndarray:
+        theta, prior = self.theta[j], self.prior
+        scale = np.exp(theta[:, None, 2:])
+        delta = KERNELS[self.kernel](np, xa[None] / scale, xb[None] / scale)
+        linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * np.outer(la, lb)
+        return np.exp(2 * theta[:, 0])[:, None, None] * delta + linear
+
+    def _own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
+        """Prior variances (k, q)."""
+        theta, prior = self.theta[j], self.prior
+        scaled = (x[None] / np.exp(theta[:, None, 2:]))[:, :, None, :]
+        delta = KERNELS[self.kernel](np, scaled, scaled)[..., 0, 0]
+        linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * low**2
+        return np.exp(2 * theta[:, :1]) * delta + linear
+
+    def _cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Prior covariance (k, n, q) with the training points, and L⁻¹ times it.
+
+        Padding is left out here: n counts the points that hold a value.
+        """
+        known = np.flatnonzero(self.mask[j])
+        cross = self._prior(j, self.x[known], self.low[j][known], x, low)
+        full = np.zeros((len(cross), self.mask.shape[1], len(x)))
+        full[:, known] = cross
+        return full, self.whiten[j][:, known[:, None], known[None, :]] @ cross
 
 
 def fit(
@@ -79,7 +120,7 @@ def fit(
     y = (padded.y - prior.mean[:, None]) * padded.mask
     remarks: tuple[str, ...] = ()
     for jitter in JITTERS:
-        theta, factor, weights = _fit(
+        theta, whiten, weights = _fit(
             kernel, kept, padded.x, padded.low, padded.mask, y, padded.variance,
             prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, second, jitter,
         )  # fmt: skip
@@ -87,8 +128,8 @@ def fit(
             break
         remarks = (f"The covariance was singular; a jitter above {jitter:g} was needed.",)
     return Posterior(
-        jnp.asarray(padded.x), jnp.asarray(padded.low), jnp.asarray(padded.mask), theta, factor,
-        weights, prior, kernel, remarks,
+        padded.x, padded.low, padded.mask, np.array(theta), np.array(whiten), np.array(weights),
+        prior, kernel, remarks,
     )  # fmt: skip
 
 
@@ -106,17 +147,9 @@ def _covariance(
     kernel: str, xa: Array, la: Array, xb: Array, lb: Array, theta: Array, bias: Array, slope: Array
 ) -> Array:
     """Prior covariance (a, b) of one output at one θ."""
-    delta = jnp.exp(2 * theta[0]) * KERNELS[kernel](xa, xb, jnp.exp(theta[2:]))
+    scale = jnp.exp(theta[2:])[None, :]
+    delta = jnp.exp(2 * theta[0]) * KERNELS[kernel](jnp, xa / scale, xb / scale)
     return delta + bias**2 + slope**2 * la[:, None] * lb[None, :]
-
-
-def _own_variance(
-    kernel: str, x: Array, low: Array, theta: Array, bias: Array, slope: Array
-) -> Array:
-    """Diagonal (a,) of the prior covariance."""
-    scale = jnp.exp(theta[2:])
-    delta = jax.vmap(lambda p: KERNELS[kernel](p[None, :], p[None, :], scale)[0, 0])(x)
-    return jnp.exp(2 * theta[0]) * delta + bias**2 + slope**2 * low**2
 
 
 def _factor(
@@ -156,8 +189,10 @@ def _fit(
         factors = jax.vmap(
             lambda t: _factor(kernel, x, low, mask, variance, t, bias, slope, jitter)
         )(theta)
+        one = jnp.eye(y.shape[0])
+        whiten = jax.vmap(lambda f: solve_triangular(f, one, lower=True))(factors)
         weights = jax.vmap(lambda f: cho_solve((f, True), y))(factors)
-        return theta, factors, weights
+        return theta, whiten, weights
 
     return jax.vmap(one)(low, mask, y, variance, bias, slope, mean, sd)
 
@@ -185,45 +220,3 @@ def _sample(score, first: Array, second: Array, kept: int) -> Array:
     edges = jnp.cumsum(weight)
     picks = jnp.searchsorted(edges, (jnp.arange(kept) + 0.5) / kept * edges[-1])
     return points[jnp.clip(picks, 0, points.shape[0] - 1)]
-
-
-@partial(jax.jit, static_argnums=(0,))
-def _predict(
-    kernel: str, x: Array, low: Array, mask: Array, theta: Array, factor: Array, weights: Array,
-    bias: Array, slope: Array, xq: Array, lq: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    def sample(theta, factor, weights, low, mask, lq, bias, slope):
-        cross = _covariance(kernel, x, low, xq, lq, theta, bias, slope) * mask[:, None]
-        white = solve_triangular(factor, cross, lower=True)
-        own = _own_variance(kernel, xq, lq, theta, bias, slope)
-        return weights @ cross, jnp.maximum(own - jnp.sum(white**2, axis=0), 0.0)
-
-    def one(theta, factor, weights, low, mask, lq, bias, slope):
-        means, variances = jax.vmap(sample, in_axes=(0, 0, 0, None, None, None, None, None))(
-            theta, factor, weights, low, mask, lq, bias, slope
-        )
-        mean = jnp.mean(means, axis=0)
-        return mean, jnp.mean(variances, axis=0) + jnp.var(means, axis=0)
-
-    return jax.vmap(one)(theta, factor, weights, low, mask, lq, bias, slope)
-
-
-@partial(jax.jit, static_argnums=(0,))
-def cross_covariance(
-    kernel: str, x: Array, low: Array, mask: Array, theta: Array, factor: Array, bias: Array,
-    slope: Array, xa: Array, la: Array, xb: Array, lb: Array,
-) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Posterior covariance (k, a, b), variances (k, a) and (k, b) of one output, per sample."""
-
-    def sample(theta, factor):
-        def white(xq, lq):
-            cross = _covariance(kernel, x, low, xq, lq, theta, bias, slope) * mask[:, None]
-            return solve_triangular(factor, cross, lower=True)
-
-        wa, wb = white(xa, la), white(xb, lb)
-        prior = _covariance(kernel, xa, la, xb, lb, theta, bias, slope)
-        va = _own_variance(kernel, xa, la, theta, bias, slope) - jnp.sum(wa**2, axis=0)
-        vb = _own_variance(kernel, xb, lb, theta, bias, slope) - jnp.sum(wb**2, axis=0)
-        return prior - wa.T @ wb, jnp.maximum(va, 0.0), jnp.maximum(vb, 0.0)
-
-    return jax.vmap(sample)(theta, factor)

@@ -3,7 +3,9 @@
 import os
 from pathlib import Path
 
-# Nested small products on the thread pool of a 2-core machine wait for each other for ever.
+# Matrices here are small: threads gain nothing, and on few cores nested parallel LAPACK calls
+# wait for each other for ever. NPROC is how XLA learns the size of its thread pool.
+os.environ.setdefault("NPROC", "1")
 _FLAG = "--xla_cpu_multi_thread_eigen=false"
 if _FLAG not in os.environ.get("XLA_FLAGS", ""):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_FLAG}".strip()
