@@ -1,90 +1,21 @@
 """Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
+from planner.modes.data import Data
 from planner.modes.refine import Refined, refine
-from planner.modes.residues import Lines, basis, laplace, synthesize
+from planner.modes.residues import rank_one, synthesize
+from planner.modes.search import falls
 
-# Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
-QUANTILE = 5.0
 MAX_ROUNDS = 12
 MAX_DAMPING = 0.3
-# Damping ratios of the atoms with which the remaining error is searched.
-TRIAL_DAMPING = (0.003, 0.01, 0.03, 0.08)
-# They are compared with the error over so many bandwidths around them (at least so many lines),
-# so many atoms at once.
-REACH, LEAST, BLOCK = 20.0, 8, 64
+# Neighbours closer than this (half bandwidths, share of frequency) and alike by MAC are one mode.
+TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
 # Least noise relative to the FRF: below it rounding rules.
 FLOOR = 1e-10
-
-
-@dataclass(frozen=True, eq=False)
-class Data:
-    """What is fitted: responses on frequency lines, and the plane in which their poles lie.
-
-    Accelerance (`step_s` None): the s-plane. Transforms of free decays sampled every `step_s`,
-    taken at the lines of the DFT without padding: the z-plane, where they are exactly rational
-    (the end of the record only scales the residues). `rate_1_s` is that of the exponential
-    window which the records carry; poles are those of the structure, without it. `tail_s` is the
-    time from the pulse to the end of the record (see `residues`).
-    """
-
-    frequency_hz: np.ndarray  # (F,)
-    response: np.ndarray  # (outputs, inputs, F)
-    variance: np.ndarray | None  # like response, None where unknown
-    rate_1_s: float = 0.0
-    step_s: float | None = None
-    tail_s: float = np.inf
-
-    @cached_property
-    def lines(self) -> Lines:
-        if self.step_s is None:
-            return laplace(self.frequency_hz, self.rate_1_s, self.tail_s)
-        s = 2j * np.pi * self.frequency_hz + self.rate_1_s
-        x = np.exp(s * self.step_s)
-        return Lines(x, x, np.stack([np.ones_like(x), x]))
-
-    def to_plane(self, poles: np.ndarray) -> np.ndarray:
-        """From rad/s to the plane of the lines."""
-        return poles if self.step_s is None else np.exp(poles * self.step_s)
-
-    def to_poles(self, values: np.ndarray) -> np.ndarray:
-        """From the plane of the lines to rad/s."""
-        return values if self.step_s is None else np.log(values) / self.step_s
-
-    def allowed(self, values: np.ndarray) -> bool:
-        """Near the band, and decaying as recorded (under the window)."""
-        if np.any(values == 0):
-            return False
-        poles = self.to_poles(values)
-        low, high = 2 * np.pi * self.frequency_hz[[0, -1]]
-        span = high - low
-        inside = (poles.imag > max(0.0, low - span)) & (poles.imag < high + span)
-        damped = (poles.real < self.rate_1_s) & (-poles.real < 0.5 * np.abs(poles))
-        return bool(np.all(inside & damped))
-
-    @property
-    def correlated(self) -> float:
-        """Lines that carry one line's worth of information: the window smears noise over them.
-
-        The noise of neighbours k lines apart correlates as 1/(1 + iπk·Δf/rate); the sum of the
-        real parts, over all k, is what the variance of anything wider than that grows by.
-        """
-        lines = self.rate_1_s / (self.frequency_hz[1] - self.frequency_hz[0])
-        return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
-
-    @property
-    def entries(self) -> int:
-        return self.response.shape[0] * self.response.shape[1]
-
-    @property
-    def threshold(self) -> float:
-        """Fall of χ² that a mode (pole and residues) reaches by chance with negligible odds."""
-        k = 2 * self.entries + 2
-        return k * (1 - 2 / (9 * k) + QUANTILE * np.sqrt(2 / (9 * k))) ** 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +45,7 @@ def fit(data: Data, start: np.ndarray) -> Fit:
         grown = _refine(data, poles, current)
         if _worth(data, current, grown):
             current = _prune(data, grown)
-    return current
+    return _unsplit(data, current)
 
 
 def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
@@ -208,6 +139,36 @@ def _prune(data: Data, current: Fit) -> Fit:
     return current
 
 
+def _unsplit(data: Data, current: Fit) -> Fit:
+    """One pole for twins of one shape: hit directions that disagree split a mode in two.
+
+    Between two hits a mode moves a little (warmth, amplitude, a clamp that settles); its second
+    pole then has the same shape. Two modes of a structure within a bandwidth differ in shape.
+    """
+    while (pair := _twins(data, current)) is not None:
+        refined = current.refined
+        weight = refined.significance[list(pair)]
+        middle = np.sum(weight * refined.poles[list(pair)]) / np.sum(weight)
+        poles = np.append(np.delete(refined.poles, pair), middle)
+        current = _refine(data, poles, current)
+    return current
+
+
+def _twins(data: Data, current: Fit) -> tuple[int, int] | None:
+    if data.response.shape[0] < 2:
+        return None
+    refined = current.refined
+    order = np.argsort(refined.poles.imag)
+    shapes = [rank_one(refined.residues.residue[..., k])[0] for k in range(order.size)]
+    for a, b in pairwise(order):
+        apart = abs(refined.poles[a] - refined.poles[b])
+        width = np.max(data.rate_1_s - refined.poles[[a, b]].real)
+        near = apart < min(TWIN_WIDTHS * width, TWIN_SHARE * abs(refined.poles[a]))
+        if near and abs(np.vdot(shapes[a], shapes[b])) ** 2 > TWIN_MAC:
+            return int(a), int(b)
+    return None
+
+
 def weakness(data: Data, current: Fit) -> np.ndarray:
     """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
     refined = current.refined
@@ -242,7 +203,7 @@ def _missing(data: Data, current: Fit, tried: list[complex]) -> complex | None:
     """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
     weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
     error = weight * _error(data, current.refined).reshape(data.entries, -1)
-    poles, fall = _falls(data, weight, error)
+    poles, fall = falls(data, weight, error)
     for pole in tried:
         fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
     best = int(np.argmax(fall))
@@ -256,49 +217,5 @@ def strongest(data: Data) -> np.ndarray:
     if data.variance is not None:
         variance = data.variance
     weight = (2 / variance).reshape(data.entries, -1)
-    poles, fall = _falls(data, weight, weight * data.response.reshape(data.entries, -1))
+    poles, fall = falls(data, weight, weight * data.response.reshape(data.entries, -1))
     return poles[[int(np.argmax(fall))]] if np.max(fall) > data.threshold else poles[:0]
-
-
-def _falls(data: Data, weight: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Trial poles and the fall of χ² that each brings alone; error (entries, F) is weighted."""
-    grids = _atoms(data)
-    fall = [_falls_of(data, poles, weight, error) for poles in grids]
-    return np.concatenate(grids), np.concatenate(fall)
-
-
-def _falls_of(data: Data, poles: np.ndarray, weight: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Falls of atoms of one damping ratio, increasing in frequency, over the lines near each."""
-    frequency = np.abs(poles) / (2 * np.pi)
-    reach = REACH * (data.rate_1_s - poles.real) / (2 * np.pi)
-    out = np.zeros(poles.size)
-    for start in range(0, poles.size, BLOCK):
-        block = slice(start, min(start + BLOCK, poles.size))
-        low = np.searchsorted(data.frequency_hz, frequency[block][0] - reach[block][0])
-        high = np.searchsorted(data.frequency_hz, frequency[block][-1] + reach[block][-1])
-        near = slice(max(0, min(low, data.frequency_hz.size - LEAST)), max(high, LEAST))
-        atoms = basis(data.lines.part(near), data.to_plane(poles[block]), False)
-        first, second = atoms.reshape(2, atoms.shape[0] // 2, -1)
-        aa = (np.abs(first) ** 2) @ weight[:, near].T
-        bb = (np.abs(second) ** 2) @ weight[:, near].T
-        ab = (first.conj() * second).real @ weight[:, near].T
-        a = (first.conj() @ error[:, near].T).real
-        b = (second.conj() @ error[:, near].T).real
-        gain = (bb * a**2 - 2 * ab * a * b + aa * b**2) / (aa * bb - ab**2)
-        out[block] = np.sum(gain, axis=1)
-    return out
-
-
-def _atoms(data: Data) -> list[np.ndarray]:
-    """Trial poles, one array per damping ratio."""
-    low, high = data.frequency_hz[0], data.frequency_hz[-1]
-    step = data.frequency_hz[1] - data.frequency_hz[0]
-    atoms = []
-    for zeta in TRIAL_DAMPING:
-        frequency, grid = low, []
-        while frequency <= high:
-            grid.append(frequency)
-            frequency += max(step, 0.7 * zeta * frequency)
-        omega = 2 * np.pi * np.array(grid)
-        atoms.append(omega * (-zeta + 1j * np.sqrt(1 - zeta**2)))
-    return atoms

@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modes.fit import Data, Fit, fit, model, scales, strongest, weakness
+from planner.modes.data import Data
+from planner.modes.fit import Fit, fit, model, scales, strongest, weakness
 from planner.modes.plscf import PoleSet, plscf
+from planner.modes.refine import Refined
+from planner.modes.residues import unit
 from planner.modes.stabilisation import Diagram, diagram, stable
 
 MAX_ORDER = 40
@@ -22,6 +25,7 @@ class Identified:
     damping_sd: float
     residue: np.ndarray  # (outputs, inputs)
     residue_sd: np.ndarray  # (outputs, inputs) of real and imaginary part each
+    presence: float  # share of the response at its frequency that is this mode's, roughly
     support: float  # share of the higher model orders that have this pole
     probability: float
 
@@ -73,6 +77,7 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
         pole = complex(refined.poles[k])
         frequency, damping, sd = natural(pole, covariance)
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        presence = _presence(data, refined, k)
         support = _support(pole - data.rate_1_s, sets)
         modes.append(
             Identified(
@@ -83,8 +88,9 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
                 float(sd[1]),
                 refined.residues.residue[..., k],
                 np.sqrt(variance),
+                presence,
                 support,
-                _probability(support, float(weak[k])),
+                _probability(presence, support, float(weak[k])),
             )
         )
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
@@ -111,10 +117,23 @@ def _support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
     return float(np.mean(near))
 
 
-def _probability(support: float, weak: float) -> float:
-    """Logistic in what separates modes from artefacts: support and distance from the limits.
+def _presence(data: Data, refined: Refined, k: int) -> float:
+    """‖response of mode k‖/‖response‖ at the line nearest its frequency."""
+    frequency = refined.poles[k].imag / (2 * np.pi)
+    line = int(np.argmin(np.abs(data.frequency_hz - frequency)))
+    lines = data.lines.part(slice(line, line + 1))
+    one = unit(lines, data.to_plane(refined.poles[k : k + 1]))[0, 0]
+    whole = np.linalg.norm(data.response[..., line])
+    return float(np.linalg.norm(refined.residues.residue[..., k] * one) / max(whole, 1e-300))
 
-    Coefficients from simulated FRFs with and without errors that no modal model explains.
+
+def _probability(presence: float, support: float, weak: float) -> float:
+    """Logistic in what separates modes from artefacts.
+
+    That is: the share of the response that is the mode's, its support in the diagram, and how
+    far it is from the limits of `weakness`. Coefficients from 200 simulated poses (2-s records,
+    hits that disagree by 0.3 %, a 3 % ripple, short records, weak modes; 1,100 poles).
     """
-    score = -2.0 + 4.0 * support - 1.5 * np.log(max(weak, 1e-6))
+    size = np.log(np.clip(presence, 1e-3, 1.0))
+    score = -0.3 + 1.2 * support - 3.1 * np.log(max(weak, 1e-6)) + 2.1 * size
     return float(1 / (1 + np.exp(-score)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modes.fit import Data
+from planner.modes.data import Data
 from planner.modes.identify import Identification, identify
 
 # Poles of higher orders than this do not help with a handful of channels.

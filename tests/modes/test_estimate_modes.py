@@ -1,6 +1,7 @@
 """Modes of random systems with known poles, found without being told anything."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -153,6 +154,62 @@ def test_probability_is_high_for_modes_with_support():
     assert len(found.diagram.sets) == 39
 
 
+def truncated(system: System, tail_s: float) -> np.ndarray:
+    """Accelerance from records of an impulse that end `tail_s` after it, mode by mode."""
+    s = 2j * np.pi * LINES
+    out = np.zeros((3, 3, LINES.size), complex)
+    for pole, r in zip(system.poles, system.residues, strict=True):
+        for p, c in ((pole, r), (pole.conj(), r.conj())):
+            # Decay p²c·e^{pt} cut off at tail_s; the impulse part s + p is not affected.
+            part = p**2 * (1 - np.exp((p - s) * tail_s)) / (s - p) + s + p
+            out += c[..., None] * part
+    return out
+
+
+@pytest.mark.parametrize("tail_s", [0.9, 2.0])
+def test_records_that_end_early_are_exact(tail_s):
+    system = random_system(np.random.default_rng(9), 4, damping=(0.003, 0.02), complexity=0.2)
+    frf = replace(as_frf(LINES, truncated(system, tail_s)), tail_s=tail_s)
+    model = estimate_modes(frf, BAND)
+    np.testing.assert_allclose(frequencies(model), system.frequency_hz, rtol=1e-7)
+    np.testing.assert_allclose(dampings(model), system.damping_ratio, rtol=1e-6)
+    for mode, residue in zip(model.modes, system.residues, strict=True):
+        np.testing.assert_allclose(mode.residue, residue, atol=1e-6 * np.max(np.abs(residue)))
+
+
+def test_hit_directions_that_disagree_do_not_split_a_mode():
+    """Frequencies 0.3 % higher in the z column: as many modes as there are, each in between."""
+    lost = extra = 0
+    for seed in range(10):
+        rng = np.random.default_rng(50 + seed)
+        system = random_system(rng, 4, damping=(0.005, 0.03), complexity=0.1)
+        moved = System(system.frequency_hz * 1.003, system.damping_ratio, system.residues)
+        h = exact_frf(system, LINES)
+        h[:, 2] = exact_frf(moved, LINES)[:, 2]
+        h, variance = noisy(h, 0.005, rng)
+        model = estimate_modes(as_frf(LINES, h, variance), BAND)
+        found = hits(model, system)
+        lost += found.count(None)
+        extra += len(model.modes) - sum(k is not None for k in found)
+    assert lost <= 1
+    assert extra <= 1
+
+
+def test_ripple_makes_no_likely_modes():
+    """A 3 % ripple over the FRFs (cable, double hit) that no modal model explains."""
+    likely = 0
+    for seed in range(10):
+        rng = np.random.default_rng(80 + seed)
+        system = random_system(rng, 4, damping=(0.005, 0.03))
+        h, variance = noisy(exact_frf(system, LINES), 0.005, rng)
+        ripple = 1 + 0.03 * np.sin(LINES * rng.uniform(0.3, 2.0) + rng.uniform(0, 6))
+        model = estimate_modes(as_frf(LINES, h * ripple, variance), BAND)
+        found = hits(model, system)
+        assert None not in found
+        likely += sum(m.probability > 0.5 for m in model.modes) - 4
+    assert likely <= 2
+
+
 def test_noise_alone_is_refused():
     for seed in range(6):
         rng = np.random.default_rng(seed)
@@ -172,7 +229,7 @@ def test_too_few_lines_are_refused():
         estimate_modes(as_frf(LINES, 0 * h), BAND)
 
 
-def test_a_pose_takes_a_third_of_a_second_at_most():
+def test_a_pose_takes_a_fraction_of_a_second():
     rng = np.random.default_rng(8)
     system = random_system(rng, 7, pair=0.02)
     lines = np.linspace(3.0, 70.0, 420)
@@ -181,8 +238,8 @@ def test_a_pose_takes_a_third_of_a_second_at_most():
     estimate_modes(frf, BAND)
     times = []
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         estimate_modes(frf, BAND)
-        times.append(time.perf_counter() - start)
-    # 0.1-0.2 s on one core; the bound leaves room for a busy machine.
-    assert min(times) < 0.3
+        times.append(time.process_time() - start)
+    # 0.1-0.2 s on an idle core; the bound leaves room for a busy machine.
+    assert min(times) < 0.6

@@ -5,7 +5,7 @@ import pytest
 from modal_systems import exact_frf, random_system
 
 from planner.frf.modal import accelerance
-from planner.modes.fit import Data
+from planner.modes.data import Data
 from planner.modes.refine import refine
 from planner.modes.residues import (
     Residues,
