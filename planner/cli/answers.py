@@ -1,5 +1,6 @@
 """The answers of the campaign commands as plain values (contract section 5)."""
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -149,7 +150,7 @@ def undone(entry: Entry) -> dict[str, Any]:
 
 def session(summary) -> dict[str, Any]:
     """Answer of `watch`."""
-    return msgspec.to_builtins(summary)
+    return dataclasses.asdict(summary)
 
 
 def predicted(campaign: Campaign, poses_csv: Path, out: Path | None) -> dict[str, Any]:

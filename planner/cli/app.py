@@ -150,7 +150,7 @@ def watch(
     from planner.campaign.campaign import Campaign
     from planner.cli import answers, render
     from planner.cli.progress import console
-    from planner.session import watch as run
+    from planner.session.watch import watch as run
 
     summary = run(
         Campaign(directory),

@@ -1,0 +1,226 @@
+"""The session's loop. All state is the campaign's: quit or kill it anywhere, and start it again."""
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.text import Text
+
+from planner.campaign.campaign import Campaign, ImportReport
+from planner.campaign.events import Imported, Proposal
+from planner.errors import InputError, NoPoseLeftError, PlannerError
+from planner.session.inbox import TABLE, Inbox
+from planner.session.keys import Keys, NoKeys, terminal_keys
+from planner.show import terminal
+from planner.show.story import Story
+
+POLL_S = 0.2
+
+
+@dataclass(frozen=True)
+class SessionSummary:
+    """How a session ended."""
+
+    measured: tuple[str, ...]
+    stopped: str
+    frequency_sd_percent: tuple[float, ...]
+    seconds: float
+
+
+def watch(
+    campaign: Campaign,
+    folder: Path,
+    *,
+    console: Console,
+    auto: bool = False,
+    hits_per_pose: int = 12,
+    rrd: Path | None = None,
+    viewer: bool = False,
+    keys: Keys | None = None,
+    quiet_s: float = 1.0,
+    limit_s: float | None = None,
+) -> SessionSummary:
+    """Run a session until quit, target, no pose left, or `limit_s`.
+
+    `auto` imports without asking, as does a session without a keyboard.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; name the one the analyser exports into.")
+    with ExitStack() as stack:
+        source = keys or stack.enter_context(terminal_keys())
+        story = stack.enter_context(Story(campaign.cell, rrd, viewer))
+        session = _Session(
+            campaign, Inbox(folder, quiet_s), console, source, story,
+            auto or isinstance(source, NoKeys), hits_per_pose, limit_s,
+        )  # fmt: skip
+        return session.run()
+
+
+class _Session:
+    def __init__(
+        self, campaign: Campaign, inbox: Inbox, console: Console, keys: Keys, story: Story,
+        auto: bool, hits_per_pose: int, limit_s: float | None,
+    ):  # fmt: skip
+        self.campaign, self.inbox, self.console, self.keys = campaign, inbox, console, keys
+        self.story, self.auto, self.hits_per_pose = story, auto, hits_per_pose
+        self.started = time.monotonic()
+        self.deadline = None if limit_s is None else self.started + limit_s
+        self.aside: set[str] = set()  # refused by the engineer, by content
+        self.measured: list[str] = []
+        self.history: list[float] = []
+        self.stop = ""
+        self.told = 0
+        self.announced = False
+
+    def run(self) -> SessionSummary:
+        try:
+            while not self.stop:
+                proposal = self._propose()
+                if proposal is not None:
+                    self._at_pose(proposal)
+        except KeyboardInterrupt:
+            self.stop = "quit"
+        self.console.print(Text(f"Session ended: {self.stop}. Go on with the same command."))
+        return SessionSummary(
+            tuple(self.measured),
+            self.stop,
+            tuple(self.campaign.model.frequency_sd_percent.tolist()),
+            time.monotonic() - self.started,
+        )
+
+    def _propose(self) -> Proposal | None:
+        try:
+            with self.console.status("choosing the next pose"):
+                proposal = self.campaign.next()[0]
+        except NoPoseLeftError as error:
+            self.console.print(Text(str(error)))
+            self.stop = "no pose left"
+            return None
+        self._tell()
+        number = len(self.campaign.model.labelled) + 1
+        self.console.print(terminal.proposal_panel(proposal, self.campaign.model, number))
+        return proposal
+
+    def _tell(self, report: ImportReport | None = None) -> None:
+        """Show what the log gained, in Rerun."""
+        for entry in self.campaign.entries[self.told :]:
+            measured = None
+            if report is not None and isinstance(entry.event, Imported):
+                measured = report.measured
+            self.story.tell(entry, self.campaign.state, self.campaign.model, measured)
+        self.told = len(self.campaign.entries)
+
+    def _at_pose(self, proposal: Proposal) -> None:
+        """Wait at one pose for hits and keys, until it is measured, skipped or superseded."""
+        shown: tuple = ()
+        since = time.monotonic()
+        if not self.auto:
+            self.console.print(Text(terminal.KEYS, style="dim"))
+        while not self.stop:
+            whole, waiting = self.inbox.scan(self._done())
+            now = (tuple(whole), tuple(p for p, _ in waiting))
+            if now != shown:
+                self._arrived(whole, waiting)
+                shown, since = now, time.monotonic()
+            quiet = time.monotonic() - since > 3 * self.inbox.quiet_s
+            if self.auto and whole and (len(whole) >= self.hits_per_pose or quiet):
+                if self._import(proposal, whole):
+                    return
+                continue
+            if self._key(self.keys.get(POLL_S), proposal, whole):
+                return
+            if self.deadline is not None and time.monotonic() > self.deadline:
+                self.stop = "time limit"
+
+    def _done(self) -> set[str]:
+        measurements = self.campaign.state.measurements.values()
+        return self.aside | {hit.sha256 for m in measurements for hit in m.hits}
+
+    def _arrived(self, whole: list[Path], waiting: list[tuple[Path, str]]) -> None:
+        if whole:
+            names = ", ".join(p.name for p in whole[-4:])
+            text = f"{len(whole)} of {self.hits_per_pose} hits wait ({names})"
+            self.console.print(Text(text, style="green"))
+        for path, why in waiting:
+            if why != "is being written":
+                self.console.print(Text(f"not whole yet: {why}", style="dim"))
+            else:
+                self.console.print(Text(f"{path.name} {why}", style="dim"))
+
+    def _key(self, key: str | None, proposal: Proposal, whole: list[Path]) -> bool:
+        """Act on a key; True when the pose is over."""
+        try:
+            match key:
+                case "a" | "\n" | "\r":
+                    return self._import(proposal, whole)
+                case "r":
+                    self.aside |= {self.inbox.digest(path) for path in whole}
+                    self.console.print(Text(f"{len(whole)} hits set aside; hit again."))
+                case "s":
+                    self.campaign.star(proposal.pose)
+                    self.console.print(Text(f"★ {proposal.pose}"))
+                case "k":
+                    self.campaign.skip(proposal.pose, "skipped in the session")
+                    self.console.print(Text(f"{proposal.pose} will not be offered again."))
+                    return True
+                case "u":
+                    entry = self.campaign.undo()
+                    kind = type(entry.event).__name__.lower()
+                    self.console.print(Text(f"Took back entry {entry.seq} ({kind})."))
+                    return True
+                case "n":
+                    self.campaign.skip(proposal.pose, "another was asked for")
+                    return True
+                case "q":
+                    self.stop = "quit"
+                case "?":
+                    self.console.print(Text(terminal.HELP))
+        except PlannerError as error:
+            self.console.print(Text(str(error), style="red"))
+        return False
+
+    def _import(self, proposal: Proposal, whole: list[Path]) -> bool:
+        """Import the waiting hits; True when the pose gave modes."""
+        if not whole:
+            self.console.print(Text("No whole new file waits yet.", style="yellow"))
+            return False
+        table = self.inbox.folder / TABLE
+        paths = (self.inbox.folder,) if table.is_file() else tuple(whole)
+        try:
+            with self.console.status("importing and refitting"):
+                reports = self.campaign.import_paths(
+                    paths, None if table.is_file() else proposal.pose
+                )
+        except PlannerError as error:
+            self.console.print(Text(str(error), style="red"))
+            self.aside |= {self.inbox.digest(path) for path in whole} if self.auto else set()
+            return False
+        for report in reports:
+            if report.accepted or report.refused:
+                self._after(report)
+        return any(report.measurement and report.measurement.modes for report in reports)
+
+    def _after(self, report: ImportReport) -> None:
+        self._tell(report)
+        state, stop = self.campaign.state, self.campaign.cell.config.stop
+        simulated = bool(report.measurement and report.measurement.simulated)
+        self.console.print(terminal.import_panel(report, simulated))
+        self.measured.append(report.pose)
+        overall = float(np.sqrt(np.mean(report.model.frequency_sd_percent**2)))
+        self.history.append(overall)
+        per_pose = (time.monotonic() - self.started) / len(self.measured)
+        self.console.print(
+            terminal.progress_line(
+                self.history, stop.frequency_sd_percent, per_pose, stop.measurements_min
+            )
+        )
+        enough = len(state.used) >= stop.measurements_min
+        if enough and overall <= stop.frequency_sd_percent and not self.announced:
+            self.announced = True
+            self.console.print(Text("The target of campaign.toml is reached.", style="bold green"))
+            self.stop = "target reached" if self.auto else ""
+        if len(state.used) >= stop.measurements_max:
+            self.stop = "as many measurements as campaign.toml allows"

@@ -1,0 +1,116 @@
+"""What the session shows, as rich renderables; units in every column."""
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from planner.campaign.campaign import ImportReport
+from planner.campaign.events import Proposal
+from planner.campaign.model import Model
+
+KEYS = "[a] accept  [r] refuse  [s] star  [k] skip  [n] propose anew  [u] undo  [q] quit  [?] help"
+HELP = """\
+a, Enter  import the hits that wait          r  set the waiting hits aside, do not import them
+k         skip this pose, do not offer it    n  propose anew
+s         star this pose                     u  take back the last act
+q         quit; everything is on disk, and planner watch goes on from here"""
+SIMULATED = "SIMULATED RECORDINGS: nothing here was measured on a real robot"
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right")
+    return table
+
+
+def proposal_panel(proposal: Proposal, model: Model, number: int) -> RenderableType:
+    """Where to go, and what to expect there."""
+    angles = _table("joint", "angle (°)")
+    for name, value in zip(model.cell.robot.joint_names, proposal.joints_deg, strict=True):
+        angles.add_row(name, f"{value:.3f}")
+    expected = _table("mode", "expected (Hz)", "damping (%)")
+    p = model.predict(np.deg2rad([proposal.joints_deg]))
+    for k in range(p.frequency_hz.shape[1]):
+        expected.add_row(
+            str(k + 1),
+            f"{p.frequency_hz[0, k]:.2f} ± {p.frequency_sd_hz[0, k]:.2f}",
+            f"{100 * p.damping_ratio[0, k]:.1f} ± {100 * p.damping_sd[0, k]:.1f}",
+        )
+    both = Table.grid(padding=(0, 4))
+    both.add_row(angles, expected)
+    x, y, z = proposal.position_m
+    place = Text(f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m\n{proposal.reason}")
+    title = f"Measurement {number}: go to pose {proposal.pose}"
+    return Panel(Group(both, Text(""), place), title=title, title_align="left", expand=False)
+
+
+def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
+    """What came out against what was expected."""
+    table = _table("mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)")
+    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    if labelled is not None:
+        before = report.model_before.predict(np.deg2rad([labelled.joints_deg]))
+        for k, mode in enumerate(labelled.modes):
+            expected, sd = before.frequency_hz[0, k], before.frequency_sd_hz[0, k]
+            if mode is None:
+                table.add_row(str(k + 1), "not found", f"{expected:.2f} ± {sd:.2f}", "–", "–")
+                continue
+            off = (mode.frequency_hz - expected) / np.hypot(sd, mode.frequency_sd_hz)
+            table.add_row(
+                str(k + 1),
+                f"{mode.frequency_hz:.3f} ± {mode.frequency_sd_hz:.3f}",
+                f"{expected:.2f} ± {sd:.2f}",
+                Text(f"{off:+.1f}", style="bold yellow" if abs(off) > 3 else ""),
+                f"{100 * mode.damping_ratio:.2f} ± {100 * mode.damping_sd:.2f}",
+            )
+    parts: list[RenderableType] = [table]
+    for hit in report.refused:
+        parts.append(Text(f"refused {hit.file}: {hit.reason}", style="red"))
+    parts += [Text(remark, style="yellow") for remark in report.remarks]
+    parts.append(uncertainty_line(report.model))
+    if simulated:
+        parts.append(Text(SIMULATED, style="bold magenta"))
+    title = f"Pose {report.pose}: {len(report.accepted)} hits in, {len(report.refused)} refused"
+    return Panel(Group(*parts), title=title, title_align="left", expand=False)
+
+
+def uncertainty_line(model: Model) -> Text:
+    """What the model does not know yet."""
+    sd = model.frequency_sd_percent
+    each = ", ".join(f"mode {k + 1} {v:.2f} %" for k, v in enumerate(sd))
+    target = model.cell.config.stop.frequency_sd_percent
+    return Text(f"sd of frequencies over the workspace: {each} (target {target:g} %)")
+
+
+def progress_line(
+    history: list[float], target: float, seconds_per_pose: float | None, minimum: int
+) -> Text:
+    """Time per pose, and about how long until the target, judging by the trend so far.
+
+    `history` is the overall sd (%) after each measurement; it falls about geometrically.
+    """
+    parts = []
+    if seconds_per_pose is not None:
+        parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
+    left = poses_to_go(history, target, minimum)
+    if left == 0:
+        parts.append("target reached")
+    elif left is not None:
+        parts.append(f"about {left} more pose{'s' if left > 1 else ''}")
+        if seconds_per_pose is not None:
+            parts.append(f"about {left * seconds_per_pose / 60:.0f} min to go")
+    return Text("; ".join(parts))
+
+
+def poses_to_go(history: list[float], target: float, minimum: int) -> int | None:
+    """Poses until `history` falls to `target`; None while there is no trend to judge by."""
+    missing = max(0, minimum - len(history))
+    if history and history[-1] <= target:
+        return missing
+    if len(history) < 2 or history[-1] >= history[0]:
+        return None
+    rate = np.log(history[-1] / history[0]) / (len(history) - 1)
+    return max(missing, int(np.ceil(np.log(target / history[-1]) / rate)))

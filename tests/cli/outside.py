@@ -1,0 +1,49 @@
+"""Driving the program from outside, as the contract says: commands, files and JSON only."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from robots import campaign_text, make_arm
+
+from planner.truth.hits import Hammer, record_poses
+from planner.truth.model import Deviation, Truth, load_truth
+
+PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
+HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
+
+
+def planner(*arguments: object, check: bool = True) -> subprocess.CompletedProcess[str]:
+    """Run `planner …` in a process of its own."""
+    command = [*PLANNER, *(str(a) for a in arguments)]
+    env = {**os.environ, "PLANNER_DEBUG": "1"}
+    done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=240)
+    if check:
+        assert done.returncode == 0, f"{arguments}: {done.returncode}\n{done.stderr}"
+    return done
+
+
+def answer(*arguments: object) -> dict:
+    """The JSON answer of a command that must succeed."""
+    return json.loads(planner(*arguments, "--json").stdout)
+
+
+def make_cell(root: Path) -> tuple[Path, Path, Truth]:
+    """A robot folder, a campaign.toml and a truth that deviates from the simulation."""
+    robot = make_arm(root / "robot")
+    campaign = root / "plan" / "campaign.toml"
+    campaign.parent.mkdir()
+    campaign.write_text(campaign_text())
+    truth = load_truth(
+        robot, Deviation(seed=3, stiffness=0.12, damping=0.1, inertia=0.04, com_m=0.003)
+    )
+    return robot, campaign, truth
+
+
+def record(truth: Truth, folder: Path, pose: str, joints_deg: list[float], seed: int = 0) -> Path:
+    """What the analyser would export for a pose."""
+    q = np.deg2rad(joints_deg)
+    return record_poses(truth, [(pose, q)], folder, repeats=3, hammer=HAMMER, seed=seed)

@@ -1,0 +1,64 @@
+"""A whole session by the contract on a robot that is not the shipped one."""
+
+import csv
+
+import numpy as np
+from outside import answer, make_cell, planner, record
+
+MEASUREMENTS = 8
+
+
+def test_eight_measurements_and_a_prediction(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    cell = tmp_path / "cell"
+    made = answer("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    assert made["modes"] == 4
+    for number in range(MEASUREMENTS):
+        (proposal,) = answer("next", cell)["proposals"]
+        assert set(proposal) >= {"pose", "joints_deg", "position_m", "score", "reason"}
+        folder = record(truth, tmp_path / f"export{number}", proposal["pose"],
+                        proposal["joints_deg"], seed=number)  # fmt: skip
+        report = answer("import", cell, folder)
+        assert report["pose"] == proposal["pose"]
+        assert len(report["accepted"]) == 9
+        assert report["refused"] == []
+    again = planner("import", cell, folder, "--json")
+    assert again.returncode == 0
+    status = answer("status", cell)
+    assert len(status["measurements"]) == MEASUREMENTS
+    assert status["simulated"] is True
+
+    rng = np.random.default_rng(5)
+    from robots import JOINTS_DEG
+
+    poses = np.array([[rng.uniform(a, b) for a, b in JOINTS_DEG] for _ in range(30)])
+    table = tmp_path / "predict.csv"
+    with open(table, "w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["pose", *(f"joint_a{i}_deg" for i in range(1, 7))])
+        writer.writerows([[f"H{i:02d}", *row] for i, row in enumerate(poses)])
+    predicted = answer("predict", cell, table, "--out", tmp_path / "out.npz")
+    true = np.array([truth.modes(np.deg2rad(q), 4)[0] for q in poses])
+    ours = np.array([[m["frequency_hz"] for m in p["modes"]] for p in predicted["poses"]])
+    sd = np.array([[m["sd_hz"] for m in p["modes"]] for p in predicted["poses"]])
+    rmse = 100 * np.sqrt(np.mean((ours / true - 1) ** 2))
+    inside = np.mean(np.abs(ours - true) <= 1.96 * sd)
+    print(f"frequency RMSE {rmse:.2f} %, in the 95 % interval {100 * inside:.0f} %")
+    assert rmse < 3.0
+    assert inside > 0.8
+
+    with np.load(predicted["npz"]) as npz:
+        lines = npz["frequency_hz"]
+        assert npz["frf_mean"].shape == (30, 3, 3, lines.size)
+        assert npz["frf_sd"].shape == (30, 3, 3, lines.size)
+        assert np.iscomplexobj(npz["frf_mean"])
+        h = np.array([truth.accelerance(np.deg2rad(q), lines) for q in poses])
+        likeness = np.abs(np.vdot(npz["frf_mean"], h)) / (
+            np.linalg.norm(npz["frf_mean"]) * np.linalg.norm(h)
+        )
+        print(f"FRF likeness {likeness:.3f}")
+        assert likeness > 0.8
+
+    replayed = answer("replay", cell)
+    assert replayed["reproduced"]
+    assert {s["check"] for s in replayed["steps"]} <= {"identical", "kept"}
