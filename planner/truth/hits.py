@@ -4,14 +4,31 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from scipy import signal
 
-from planner.truth.model import Truth
-
 OVERSAMPLING = 16
 AXES = ("x", "y", "z")
+
+
+class TrueRobot(Protocol):
+    """What can be hit. `model.Truth` is the linear one; one with friction or backlash fits too."""
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Actuated joints in order."""
+        ...
+
+    @property
+    def description(self) -> str:
+        """Engine and seed, for the header of every file."""
+        ...
+
+    def respond(self, q: np.ndarray, force_n: np.ndarray, axis: int, step_s: float) -> np.ndarray:
+        """Accelerations (3, n) of the sensor, from rest, to a force (n,) along tcp axis 0..2."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -42,20 +59,18 @@ class SimulatedHit:
 
 
 def simulate_hit(
-    truth: Truth, q: np.ndarray, axis: str, hammer: Hammer, rng: np.random.Generator
+    truth: TrueRobot, q: np.ndarray, axis: str, hammer: Hammer, rng: np.random.Generator
 ) -> SimulatedHit:
     """One hit at pose q (rad) along a signed axis of the tcp frame ("+x")."""
     fine = hammer.sampling_rate_hz * OVERSAMPLING
     n = round(hammer.record_s * fine)
     force = _pulse(n, fine, hammer, rng)
     sense, index = (-1.0 if axis[0] == "-" else 1.0), AXES.index(axis[1])
-    response = _response(truth, q, sense * force, index, 1 / fine)
+    response = truth.respond(q, sense * force, index, 1 / fine)
     # The analyser's anti-alias filter, the same on all channels.
-    filtered = signal.sosfilt(
-        signal.butter(6, 0.4 * hammer.sampling_rate_hz, fs=fine, output="sos"),
-        np.vstack([force, response]),
-    )[:, ::OVERSAMPLING]
-    f, a = filtered[0], filtered[1:]
+    sos = signal.butter(6, 0.4 * hammer.sampling_rate_hz, fs=fine, output="sos")
+    filtered = np.asarray(signal.sosfilt(sos, np.vstack([force, response])))
+    f, a = filtered[0, ::OVERSAMPLING], filtered[1:, ::OVERSAMPLING]
     largest = np.max(np.sqrt(np.mean(a**2, axis=1)))
     f = f + hammer.force_noise * np.max(f) * rng.standard_normal(f.size)
     a = a + hammer.noise * largest * rng.standard_normal(a.shape)
@@ -71,31 +86,11 @@ def _pulse(n: int, rate_hz: float, hammer: Hammer, rng: np.random.Generator) -> 
     return hammer.peak_n * rng.uniform(0.75, 1.25) * np.sin(np.pi * phase) ** 1.5
 
 
-def _response(
-    truth: Truth, q: np.ndarray, force: np.ndarray, index: int, step_s: float
-) -> np.ndarray:
-    """Accelerations (3, n), exact for a force that is linear between samples.
-
-    Each pole obeys x' = λx + f; a = Σ R(λ²x + λf) + D f with D = Js M⁻¹ Jhᵀ, for Σ R = 0.
-    """
-    poles, residues, direct = truth.poles(q)
-    out = np.outer(direct[:, index], force).astype(complex)
-    for pole, residue in zip(poles, residues[:, :, index], strict=True):
-        z = pole * step_s
-        grow = np.exp(z)
-        b1 = (grow - 1 - z) / (z * pole)  # weight of the newer force sample
-        b0 = (grow - 1) / pole - b1
-        x = signal.lfilter([b1, b0], [1.0, -grow], force.astype(complex))
-        # Σ Rλ is the direct part: it is in `direct` already, so only λ²x is added here.
-        out += np.outer(residue, pole**2 * x)
-    return out.real
-
-
 def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, text: str) -> None:
     """One hit as UFF 58b, labelled as simulated."""
     import pyuff
 
-    path.unlink(missing_ok=True)
+    path.unlink(missing_ok=True)  # and "add": pyuff's "overwrite" loses sets before the last
     file = pyuff.UFF(str(path))
     direction = (AXES.index(hit.axis[1]) + 1) * (-1 if hit.axis[0] == "-" else 1)
     channels = [(hit.force_n, 13, "N", direction, "hammer")]
@@ -133,7 +128,7 @@ def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, text: str) -> None:
 
 
 def record_poses(
-    truth: Truth,
+    truth: TrueRobot,
     poses: Sequence[tuple[str, np.ndarray]],
     folder: Path,
     hits: Sequence[str] = ("+x", "+y", "+z"),
@@ -165,3 +160,21 @@ def record_poses(
         writer.writerow(["pose", *joints, "hit", "repeat", "file"])
         writer.writerows(rows)
     return folder
+
+
+def write_predict(
+    folder: Path,
+    joint_names: Sequence[str],
+    poses: Sequence[tuple[str, np.ndarray]],
+    peak_force_n: float | None = None,
+) -> Path:
+    """`predict.csv` (contract section 2): poses (name, q in rad) of which the FRF is wanted."""
+    path = folder / "predict.csv"
+    force = [] if peak_force_n is None else [f"{peak_force_n:g}"]
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        joints = [f"{name}_deg" for name in joint_names]
+        writer.writerow(["pose", *joints, *(["peak_force_n"] if force else [])])
+        for pose, q in poses:
+            writer.writerow([pose, *(f"{v:.4f}" for v in np.rad2deg(q)), *force])
+    return path

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import scipy.linalg
+from scipy import signal
 
 from planner.errors import InputError
+from planner.truth.mjcf import Builder
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,15 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class AddedMass:
+    """A compact mass (kg) on a link, at a position (m) in the link's frame."""
+
+    link: str
+    position_m: tuple[float, float, float]
+    mass_kg: float
+
+
+@dataclass(frozen=True)
 class Deviation:
     """How truth differs from the robot folder: seeded scatter, and what the simulation lacks.
 
@@ -42,6 +53,7 @@ class Deviation:
     inertia: float = 0.0
     com_m: float = 0.0
     extra: tuple[Spring, ...] = ()
+    added: tuple[AddedMass, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +64,8 @@ class Truth:
     joint_names: tuple[str, ...]
     springs: tuple[Spring, ...]
     description: str
+    lower_rad: np.ndarray  # joint limits (dof,)
+    upper_rad: np.ndarray
     _model: object = field(repr=False)
     _data: object = field(repr=False)
     _held: np.ndarray = field(repr=False)  # places of the robot's own joints in q
@@ -63,11 +77,7 @@ class Truth:
         """M, C, K (e, e) and the Jacobians (3, e) of hit point and sensor, in their own frames."""
         import mujoco
 
-        model, data = self._model, self._data
-        data.qpos[:] = 0.0
-        data.qpos[self._held] = q
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
+        model, data = self._posed(q)
         mujoco.mj_crb(model, data)
         full = _full_mass(model, data)
         grid = np.ix_(self._elastic, self._elastic)
@@ -81,10 +91,33 @@ class Truth:
         stiffness = np.diag([s.stiffness for s in self.springs])
         return full[grid], damping, stiffness, jacobians[0], jacobians[1]
 
+    def _posed(self, q: np.ndarray) -> tuple:
+        import mujoco
+
+        model, data = self._model, self._data
+        data.qpos[:] = 0.0
+        data.qpos[self._held] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        return model, data
+
     def position(self, q: np.ndarray) -> np.ndarray:
         """Position (3,) of the hit point in the world in m."""
-        self.matrices(q)
-        return np.array(self._data.site("tcp").xpos)
+        return self.tcp(q)[1]
+
+    def tcp(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rotation (3, 3), position (3,) and Jacobian (6, dof) of the tcp in the world.
+
+        The Jacobian is that of the robot's own joints, linear part first.
+        """
+        import mujoco
+
+        model, data = self._posed(q)
+        linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jacSite(model, data, linear, angular, model.site("tcp").id)
+        jacobian = np.vstack([linear, angular])[:, self._held]
+        site = data.site("tcp")
+        return np.array(site.xmat).reshape(3, 3), np.array(site.xpos), jacobian
 
     def poles(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Poles (2e,) in rad/s, receptance residues (2e, 3, 3), and Js M⁻¹ Jhᵀ (3, 3)."""
@@ -93,7 +126,7 @@ class Truth:
         zero, one = np.zeros((e, e)), np.eye(e)
         left = np.block([[one, zero], [zero, mass]])
         right = np.block([[zero, one], [-stiffness, -damping]])
-        poles, vectors = scipy.linalg.eig(right, left)
+        poles, vectors = scipy.linalg.eig(right, left)[:2]
         inverse = np.linalg.inv(vectors)
         entry = inverse @ np.vstack([np.zeros((e, 3)), np.linalg.solve(mass, hit.T)])
         output = sensor @ vectors[:e]
@@ -113,9 +146,29 @@ class Truth:
         iw = 2j * np.pi * np.asarray(frequency_hz)
         return iw**2 * np.einsum("kij,kf->ijf", residues, 1 / (iw - poles[:, None]))
 
+    def respond(self, q: np.ndarray, force_n: np.ndarray, axis: int, step_s: float) -> np.ndarray:
+        """Accelerations (3, n) in m/s² of the sensor to a force (n,) along tcp axis 0, 1 or 2.
+
+        From rest, and exact for a force that is linear between samples: each pole obeys
+        x' = λx + f and a = Σ λ²R x + D f with D = Js M⁻¹ Jhᵀ, because Σ R = 0 and Σ λR = D.
+        """
+        poles, residues, direct = self.poles(q)
+        out = np.outer(direct[:, axis], force_n).astype(complex)
+        for pole, residue in zip(poles, residues[:, :, axis], strict=True):
+            z = pole * step_s
+            grow = np.exp(z)
+            newer = (grow - 1 - z) / (z * pole)  # weight of the newer of two force samples
+            older = (grow - 1) / pole - newer
+            x = signal.lfilter([newer, older], [1.0, -grow], force_n.astype(complex))
+            out += np.outer(residue, pole**2 * x)
+        return out.real
+
 
 def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
-    """The true robot behind a robot folder. Raises InputError without MuJoCo."""
+    """The true robot behind a robot folder.
+
+    Raises InputError without MuJoCo, and where the folder cannot be read or does not fit together.
+    """
     try:
         import mujoco
     except ImportError:
@@ -123,30 +176,58 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
             "Simulated recordings need MuJoCo; install it with: pip install 'planner[truth]'"
         ) from None
     deviation = deviation or Deviation()
-    table = tomllib.loads(robot_toml.read_text(encoding="utf-8"))
-    root = ElementTree.parse(robot_toml.parent / table["urdf"]).getroot()
+    table, root = _read(robot_toml)
+    _check(table, root, deviation, robot_toml)
     rng = np.random.default_rng(deviation.seed)
     nominal = [
         Spring(c["joint"], tuple(c["axis"]), c["stiffness"], c["damping"])
         for c in table["compliance"]
     ]
     springs = (*(_deviating(s, deviation, rng) for s in nominal), *deviation.extra)
-    builder = _Builder(root, table, springs, deviation, rng)
+    builder = Builder(root, table, springs, deviation, rng)
     # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
     mujoco.set_mju_user_warning(lambda text: None)
     model = mujoco.MjModel.from_xml_string(builder.xml())
-    held = [model.joint(name).qposadr[0] for name in builder.joint_names]
-    elastic = [model.joint(f"spring_{i}").qposadr[0] for i in range(len(springs))]
+    held = [model.joint(name).dofadr[0] for name in builder.joint_names]
+    elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(springs))]
+    lower, upper = np.array(builder.limits).T
     return Truth(
         table["name"],
         tuple(builder.joint_names),
         springs,
         f"MuJoCo {mujoco.__version__}, seed {deviation.seed}",
+        lower,
+        upper,
         model,
         mujoco.MjData(model),
         np.array(held),
         np.array(elastic),
     )
+
+
+def _read(robot_toml: Path) -> tuple[dict, ElementTree.Element]:
+    try:
+        table = tomllib.loads(robot_toml.read_text(encoding="utf-8"))
+        root = ElementTree.parse(robot_toml.parent / table["urdf"]).getroot()
+    except (OSError, ValueError, KeyError, ElementTree.ParseError) as error:
+        raise InputError(
+            f"{robot_toml} or its URDF cannot be read ({error!r}); correct it."
+        ) from None
+    return table, root
+
+
+def _check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_toml: Path) -> None:
+    """Places that do not exist would be left out in silence otherwise."""
+    joints = {j.get("name") for j in root.findall("joint") if j.get("type") != "fixed"}
+    links = {link.get("name") for link in root.findall("link")}
+    stated = [c["joint"] for c in table.get("compliance", ())]
+    wrong = [name for name in stated if name not in joints]
+    wrong += [s.joint for s in deviation.extra if s.joint not in joints | {"base"}]
+    wrong += [a.link for a in deviation.added if a.link not in links]
+    wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]
+    if wrong or not stated:
+        what = f"no joint or link {wrong[0]}" if wrong else "no [[compliance]]"
+        raise InputError(f"{robot_toml} and its URDF have {what}; correct the name or add it.")
 
 
 def _full_mass(model: object, data: object) -> np.ndarray:
@@ -164,107 +245,3 @@ def _deviating(spring: Spring, deviation: Deviation, rng: np.random.Generator) -
     k = spring.stiffness * np.exp(deviation.stiffness * rng.standard_normal())
     c = spring.damping * np.exp(deviation.damping * rng.standard_normal())
     return Spring(spring.joint, spring.axis, float(k), float(c * k / spring.stiffness))
-
-
-class _Builder:
-    """URDF to MJCF with one hinge per joint and one per spring."""
-
-    def __init__(self, root, table, springs, deviation, rng):
-        self._links = {link.get("name"): link for link in root.findall("link")}
-        self._children: dict[str, list] = {}
-        for joint in root.findall("joint"):
-            self._children.setdefault(joint.find("parent").get("link"), []).append(joint)
-        childs = {j.find("child").get("link") for js in self._children.values() for j in js}
-        self._root = next(name for name in self._links if name not in childs)
-        self._table, self._springs = table, springs
-        self._deviation, self._rng = deviation, rng
-        self.joint_names: list[str] = []
-
-    def xml(self) -> str:
-        top = ElementTree.Element("mujoco")
-        ElementTree.SubElement(top, "compiler", angle="radian", autolimits="false")
-        world = ElementTree.SubElement(top, "worldbody")
-        base = ElementTree.SubElement(world, "body", name=self._root)
-        soft = self._hinges(base, "base")
-        self._inertial(base, self._root, moving=soft)
-        self._grow(base, self._root)
-        return ElementTree.tostring(top, encoding="unicode")
-
-    def _hinges(self, body: ElementTree.Element, joint: str) -> bool:
-        found = [i for i, s in enumerate(self._springs) if s.joint == joint]
-        for i in found:
-            axis = " ".join(repr(float(a)) for a in self._springs[i].axis)
-            ElementTree.SubElement(body, "joint", name=f"spring_{i}", type="hinge", axis=axis)
-        return bool(found)
-
-    def _grow(self, parent: ElementTree.Element, link: str) -> None:
-        for joint in self._children.get(link, []):
-            name, child = joint.get("name"), joint.find("child").get("link")
-            position, quaternion = _placement(joint.find("origin"))
-            body = ElementTree.SubElement(parent, "body", name=child, pos=position, quat=quaternion)
-            for site in ("tcp", "sensor"):
-                if child == self._table[f"{site}_frame"]:
-                    ElementTree.SubElement(body, "site", name=site)
-            turning = joint.get("type") != "fixed"
-            if turning:
-                axis = joint.find("axis")
-                xyz = "1 0 0" if axis is None else axis.get("xyz")
-                ElementTree.SubElement(body, "joint", name=name, type="hinge", axis=xyz)
-                self.joint_names.append(name)
-                self._hinges(body, name)
-            self._inertial(body, child, moving=turning)
-            self._grow(body, child)
-
-    def _inertial(self, body: ElementTree.Element, link: str, moving: bool) -> None:
-        inertial = self._links[link].find("inertial")
-        if inertial is None:
-            return
-        scale = float(np.exp(self._deviation.inertia * self._rng.standard_normal()))
-        turn = float(np.exp(self._deviation.inertia * self._rng.standard_normal()))
-        shift = self._deviation.com_m * self._rng.standard_normal(3)
-        origin = inertial.find("origin")
-        position, quaternion = _placement(origin)
-        place = np.array([float(v) for v in position.split()]) + shift
-        tensor = inertial.find("inertia")
-        entries = [
-            float(tensor.get(k, 0)) * scale * turn
-            for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-        ]
-        frame = ElementTree.SubElement(
-            body,
-            "inertial",
-            pos=" ".join(repr(float(v)) for v in place),
-            mass=repr(float(inertial.find("mass").get("value")) * scale),
-        )
-        rotation = _matrix(quaternion)
-        xx, yy, zz, xy, xz, yz = entries
-        turned = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
-        order = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-        frame.set("fullinertia", " ".join(repr(float(turned[ij])) for ij in order))
-
-
-def _placement(origin: ElementTree.Element | None) -> tuple[str, str]:
-    """Position and quaternion (w x y z) of a URDF origin."""
-    if origin is None:
-        return "0 0 0", "1 0 0 0"
-    roll, pitch, yaw = (float(v) for v in origin.get("rpy", "0 0 0").split())
-    cr, sr, cp, sp = np.cos(roll / 2), np.sin(roll / 2), np.cos(pitch / 2), np.sin(pitch / 2)
-    cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
-    quaternion = (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
-    return origin.get("xyz", "0 0 0"), " ".join(repr(float(v)) for v in quaternion)
-
-
-def _matrix(quaternion: str) -> np.ndarray:
-    w, x, y, z = (float(v) for v in quaternion.split())
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

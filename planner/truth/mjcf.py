@@ -1,0 +1,145 @@
+"""From URDF and robot.toml to a MuJoCo model with one hinge per joint and one per spring.
+
+Neither URDF reader nor rotations are shared with the planner: an error there would hide itself.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from planner.truth.model import Deviation, Spring
+
+
+class Builder:
+    """URDF to MJCF; `joint_names` and `limits` are known once `xml` has been called."""
+
+    def __init__(
+        self,
+        root: Any,  # ElementTree elements: Any spares a None check per attribute
+        table: dict,
+        springs: "tuple[Spring, ...]",
+        deviation: "Deviation",
+        rng: np.random.Generator,
+    ):
+        self._links = {link.get("name"): link for link in root.findall("link")}
+        self._children: dict[str, list[Any]] = {}
+        for joint in root.findall("joint"):
+            self._children.setdefault(joint.find("parent").get("link"), []).append(joint)
+        childs = {j.find("child").get("link") for js in self._children.values() for j in js}
+        self._root = next(name for name in self._links if name not in childs)
+        self._table, self._springs = table, springs
+        self._deviation, self._rng = deviation, rng
+        self.joint_names: list[str] = []
+        self.limits: list[tuple[float, float]] = []
+
+    def xml(self) -> str:
+        """The model as MJCF; draws the scatter of the inertias, so call it once."""
+        top = ElementTree.Element("mujoco")
+        ElementTree.SubElement(top, "compiler", angle="radian", autolimits="false")
+        world = ElementTree.SubElement(top, "worldbody")
+        base = ElementTree.SubElement(world, "body", name=self._root)
+        self._hinges(base, "base")
+        self._inertial(base, self._root)
+        self._grow(base, self._root)
+        return ElementTree.tostring(top, encoding="unicode")
+
+    def _hinges(self, body: ElementTree.Element, joint: str) -> None:
+        for i, spring in enumerate(self._springs):
+            if spring.joint == joint:
+                axis = _text(spring.axis)
+                ElementTree.SubElement(body, "joint", name=f"spring_{i}", type="hinge", axis=axis)
+
+    def _grow(self, parent: ElementTree.Element, link: str) -> None:
+        for joint in self._children.get(link, []):
+            name, child = joint.get("name"), joint.find("child").get("link")
+            position, quaternion = _placement(joint.find("origin"))
+            body = ElementTree.SubElement(parent, "body", name=child, pos=position, quat=quaternion)
+            for site in ("tcp", "sensor"):
+                if child == self._table[f"{site}_frame"]:
+                    ElementTree.SubElement(body, "site", name=site)
+            if joint.get("type") != "fixed":
+                axis = joint.find("axis")
+                xyz = "1 0 0" if axis is None else axis.get("xyz")
+                ElementTree.SubElement(body, "joint", name=name, type="hinge", axis=xyz)
+                self.joint_names.append(name)
+                self.limits.append(_limits(joint))
+                self._hinges(body, name)
+            self._inertial(body, child)
+            self._grow(body, child)
+
+    def _inertial(self, body: ElementTree.Element, link: str) -> None:
+        for extra in (a for a in self._deviation.added if a.link == link):
+            # A point would do for the mass, but MuJoCo wants every body to have some inertia.
+            lump = ElementTree.SubElement(body, "body", pos=_text(extra.position_m))
+            small = repr(1e-4 * extra.mass_kg)
+            ElementTree.SubElement(
+                lump,
+                "inertial",
+                pos="0 0 0",
+                mass=repr(float(extra.mass_kg)),
+                diaginertia=f"{small} {small} {small}",
+            )
+        inertial = self._links[link].find("inertial")
+        if inertial is None:
+            return
+        scale = float(np.exp(self._deviation.inertia * self._rng.standard_normal()))
+        turn = float(np.exp(self._deviation.inertia * self._rng.standard_normal()))
+        shift = self._deviation.com_m * self._rng.standard_normal(3)
+        position, quaternion = _placement(inertial.find("origin"))
+        place = np.array([float(v) for v in position.split()]) + shift
+        entries = inertial.find("inertia")
+        xx, yy, zz, xy, xz, yz = (
+            float(entries.get(k, 0)) * scale * turn
+            for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        )
+        rotation = _matrix(quaternion)
+        tensor = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
+        order = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+        ElementTree.SubElement(
+            body,
+            "inertial",
+            pos=_text(place),
+            mass=repr(float(inertial.find("mass").get("value")) * scale),
+            fullinertia=_text([tensor[ij] for ij in order]),
+        )
+
+
+def _text(values: Iterable[float]) -> str:
+    return " ".join(repr(float(v)) for v in values)
+
+
+def _limits(joint: Any) -> tuple[float, float]:
+    limit = joint.find("limit")
+    if limit is None or joint.get("type") == "continuous":
+        return -np.pi, np.pi
+    return float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
+
+
+def _placement(origin: ElementTree.Element | None) -> tuple[str, str]:
+    """Position and quaternion (w x y z) of a URDF origin."""
+    if origin is None:
+        return "0 0 0", "1 0 0 0"
+    roll, pitch, yaw = (float(v) for v in origin.get("rpy", "0 0 0").split())
+    cr, sr, cp, sp = np.cos(roll / 2), np.sin(roll / 2), np.cos(pitch / 2), np.sin(pitch / 2)
+    cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
+    quaternion = (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+    return origin.get("xyz", "0 0 0"), _text(quaternion)
+
+
+def _matrix(quaternion: str) -> np.ndarray:
+    w, x, y, z = (float(v) for v in quaternion.split())
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
