@@ -86,8 +86,8 @@ def _pulse(n: int, rate_hz: float, hammer: Hammer, rng: np.random.Generator) -> 
     return hammer.peak_n * rng.uniform(0.75, 1.25) * np.sin(np.pi * phase) ** 1.5
 
 
-def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, text: str) -> None:
-    """One hit as UFF 58b, labelled as simulated."""
+def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, *text: str) -> None:
+    """One hit as UFF 58b, labelled as simulated; up to 4 lines of text go into the header."""
     import pyuff
 
     path.unlink(missing_ok=True)  # and "add": pyuff's "overwrite" loses sets before the last
@@ -104,7 +104,7 @@ def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, text: str) -> None:
             "binary": 1,
             "func_type": 1,
             "id1": "SIMULATED, not measured",
-            "id2": text[:80],
+            **{f"id{k}": line[:80] for k, line in enumerate(text[:4], 2)},
             "rsp_node": 1,
             "rsp_dir": response,
             "rsp_ent_name": name.replace(" ", "_"),
@@ -152,7 +152,8 @@ def record_poses(
                 hit = simulate_hit(truth, np.deg2rad(readback), axis, hammer, rng)
                 sign = "m" if axis[0] == "-" else "p"
                 name = f"data/{pose}_{sign}{axis[1]}_{repeat}.uff"
-                write_uff(folder / name, hit, hammer, truth.description)
+                what = f"pose {pose}, hit {axis}, repeat {repeat}"
+                write_uff(folder / name, hit, hammer, truth.description, what)
                 rows.append([pose, *(f"{v:.4f}" for v in readback), axis, repeat, name])
     with open(folder / "recordings.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
