@@ -88,5 +88,5 @@ def campaign_text(count: int = 4) -> str:
         'robot = "../robot/robot.toml"\n'
         f"[workspace]\njoints_deg = {[list(r) for r in JOINTS_DEG]}\n"
         f"[modes]\ncount = {count}\nband_hz = {list(BAND_HZ)}\n"
-        "[acquisition]\nname = \"integrated_variance\"\ncandidates = 200\n"
+        '[acquisition]\nname = "integrated_variance"\ncandidates = 200\n'
     )

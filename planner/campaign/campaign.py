@@ -11,7 +11,11 @@ import numpy as np
 from planner import __version__
 from planner.campaign import store
 from planner.campaign.cell import Cell
-from planner.campaign.config import config_from_builtins, load_campaign_config
+from planner.campaign.config import (
+    CampaignConfig,
+    config_from_builtins,
+    load_campaign_config,
+)
 from planner.campaign.events import (
     AnyEvent,
     Configured,
@@ -126,7 +130,7 @@ class Campaign:
         """What campaign.toml and the robot folder say now (the log follows with the next act)."""
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
-        return Configured(msgspec.to_builtins(config), hashes, __version__)
+        return Configured(_as_logged(config), hashes, __version__)
 
     # -- acts ----------------------------------------------------------------------------------
 
@@ -356,6 +360,11 @@ class _Acting:
         self._lock.__exit__(None, None, None)
 
 
+def _as_logged(config: CampaignConfig) -> dict:
+    """The configuration as it reads back from the log, so that the two can be compared."""
+    return msgspec.json.decode(msgspec.json.encode(config))
+
+
 def _first_entry(directory: Path) -> bytes:
     """The log of a new campaign, once robot and workspace have been held against each other."""
     from datetime import UTC, datetime
@@ -367,5 +376,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(msgspec.to_builtins(config), hashes, __version__)
+    event = Configured(_as_logged(config), hashes, __version__)
     return encode_line("", Entry(1, now, event))[0]

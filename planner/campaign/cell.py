@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.acquire.propose import check_name
 from planner.campaign.config import CampaignConfig
 from planner.errors import InputError
 from planner.fusion.surrogate import SimulatedModal
@@ -28,6 +29,7 @@ class Cell:
     @classmethod
     def load(cls, robot_toml: Path, config: CampaignConfig) -> "Cell":
         """Load the robot and hold the workspace against it; InputError where they disagree."""
+        check_name(config.acquisition.name)
         robot = Robot.load(robot_toml)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
@@ -49,9 +51,12 @@ class Cell:
         """Coordinates (n, d) of poses q (n, dof) in rad that the model uses."""
         return self.workspace.features(self.robot, q)
 
-    def simulate(self, q: np.ndarray) -> SimulatedModal:
-        """Simulated modes of poses q (n, dof) in rad; NaN without a simulation."""
-        count = self.config.modes.count
+    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModal:
+        """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
+
+        As many as the campaign models, and `more` above them.
+        """
+        count = self.config.modes.count + more
         if self.simulation is None:
             empty = np.full((len(q), count), np.nan)
             residue = np.full((len(q), count, 3, 3), np.nan + 0j)

@@ -13,6 +13,9 @@ from planner.modes.types import ModalModel, Mode
 
 # How far, in log frequency, an unfitted simulation may be off; then the scatter around the shift.
 PRIOR_SD, SCATTER_SD = 0.25, 0.08
+# Simulated modes above those modelled that a measured mode may be instead: where one of the
+# modelled ones cannot be seen (nodal point), the next one must not take its label.
+ABOVE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,30 +71,39 @@ def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPo
     if not measurements:
         return ()
     q = np.deg2rad(np.array([m.joints_deg for m in measurements]))
-    simulated = cell.simulate(q)
-    expected = simulated.frequency_hz
-    first = _pass(measurements, expected, np.full(expected.shape[1], PRIOR_SD))
+    count = cell.config.modes.count
+    simulated = cell.simulate(q, ABOVE)
+    expected, shapes = simulated.frequency_hz, _shapes(simulated.residue)
+    first = _pass(measurements, expected, shapes, PRIOR_SD)
     shift = _shift(first, expected)
-    second = _pass(measurements, expected * np.exp(shift), np.full(len(shift), SCATTER_SD))
+    second = _pass(measurements, expected * np.exp(shift), shapes, SCATTER_SD)
     return tuple(
-        LabelledPose(m.pose, m.joints_deg, q[i], second[i], expected[i])
+        LabelledPose(m.pose, m.joints_deg, q[i], second[i][:count], expected[i, :count])
         for i, m in enumerate(measurements)
     )
 
 
+def _shapes(residue: np.ndarray) -> np.ndarray:
+    """Response shapes (n, k, 3) of residues (n, k, 3, 3); NaN where there is no mode."""
+    known = np.all(np.isfinite(residue), axis=(2, 3))
+    left = np.linalg.svd(np.where(known[..., None, None], residue, 0.0))[0][..., 0]
+    return np.where(known[..., None], left, np.nan)
+
+
 def _pass(
-    measurements: tuple[Measurement, ...], expected_hz: np.ndarray, sd: np.ndarray
+    measurements: tuple[Measurement, ...], expected_hz: np.ndarray, shapes: np.ndarray, sd: float
 ) -> list[tuple[Mode | None, ...]]:
     labelled = []
-    for row, measurement in zip(expected_hz, measurements, strict=True):
+    for row, shape, measurement in zip(expected_hz, shapes, measurements, strict=True):
         modes = tuple(to_mode(mode) for mode in measurement.modes)
-        if not np.all(np.isfinite(row)):
-            # Without a complete simulation there is only the order.
+        known = int(np.argmin(np.isfinite([*row, np.nan])))
+        if known == 0:  # without a simulation there is only the order
             labelled.append((*modes, *[None] * len(row))[: len(row)])
             continue
         band = (modes[0].frequency_hz, modes[-1].frequency_hz)
         model = ModalModel(modes, band, 0.0, 0)
-        labelled.append(align(model, row, expected_sd=sd).modes)
+        found = align(model, row[:known], shape[:known], np.full(known, sd)).modes
+        labelled.append((*found, *[None] * len(row))[: len(row)])
     return labelled
 
 

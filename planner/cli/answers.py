@@ -204,7 +204,8 @@ def replayed(
     from planner.show.story import Story
 
     steps, model = [], None
-    with Story(campaign.cell, rrd, viewer) as story:
+    simulated = any(m.simulated for m in campaign.state.measurements.values())
+    with Story(campaign.cell, rrd, viewer, simulated) as story:
         for step in replay(campaign, until):
             progress(f"{step.entry.seq} of {len(campaign.entries)} {step.detail}")
             story.tell(step.entry, step.state, step.model, step.measured)

@@ -1,5 +1,6 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
@@ -79,6 +80,11 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
     """TDMS files; unit and increment as LabVIEW writes them (unit_string, wf_increment)."""
     from nptdms import TdmsFile
 
+    # The library only warns of a file that is cut off, and then gives what there is.
+    warnings = _Warnings()
+    logger = logging.getLogger("nptdms")
+    logger.addHandler(warnings)
+    logger.propagate = False
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     try:
@@ -97,7 +103,22 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
         raise InputError(
             f"{path} is not a readable TDMS file ({type(error).__name__}); export it again."
         ) from None
+    finally:
+        logger.removeHandler(warnings)
+    if warnings.texts:
+        raise InputError(f"{path} is cut off ({warnings.texts[0]}); export it again.")
     return to_records(path, Named(columns, units, attributes))
+
+
+class _Warnings(logging.Handler):
+    """Keeps what a library warns of."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.texts.append(record.getMessage())
 
 
 def _read_txt(path: Path) -> tuple[Record, ...]:

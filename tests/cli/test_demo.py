@@ -1,0 +1,84 @@
+"""The demonstration: accuracy on unused poses, the simulation alone, and its Rerun recording."""
+
+import json
+
+import numpy as np
+from outside import answer
+from rerun.chunk import RrdReader
+
+from planner.demo import shipped
+
+
+def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):
+    summary = answer("demo", "--dir", tmp_path / "demo")
+    print({k: summary[k] for k in summary if "rmse" in k or "coverage" in k})
+    assert summary["simulated"] is True
+    assert summary["measurements"] <= 10
+    assert summary["frequency_rmse_percent"] <= 2.0
+    assert summary["simulation_rmse_percent"] >= 3 * summary["frequency_rmse_percent"]
+    assert len(summary["step_seconds"]) == summary["measurements"]
+    check_against_truth(summary)
+    check_recording(summary["rrd"])
+    check_replay(tmp_path, summary)
+
+
+def check_against_truth(summary):
+    """What the demonstration says of unused poses agrees with the sealed truth."""
+    truth = json.loads((shipped("kr240_plane") / "truth.json").read_text())["poses"]
+    for step in summary["steps"]:
+        true = np.array(truth[step["pose"]]["frequency_hz"])
+        measured = np.array(step["frequency_hz"][:4])
+        assert np.allclose(measured, true, rtol=3e-3)
+
+
+def check_recording(path):
+    """Opened with the SDK: entities, timeline and blueprint are there."""
+    contents = recording_contents(path)
+    wanted = ("/robot", "/cell/workspace", "/cell/measured", "/cell/proposed", "/frf/picture",
+              "/hits", "/learning", "/log", "/note", "/modes")  # fmt: skip
+    for entity in wanted:
+        assert any(e.startswith(entity) for e in contents["entities"]), entity
+    assert contents["timelines"] == {"measurement"}
+    assert contents["stores"] == {"recording", "blueprint"}
+
+
+def recording_contents(path):
+    reader = RrdReader(path)
+    entities, timelines = set(), set()
+    for entry in reader.recordings():
+        for chunk in reader.stream(store=entry):
+            entities.add(str(chunk.entity_path))
+            timelines |= set(chunk.timeline_names)
+    stores = {"recording"} if reader.recordings() else set()
+    stores |= {"blueprint"} if reader.blueprints() else set()
+    return {"entities": entities, "timelines": timelines, "stores": stores}
+
+
+def check_replay(tmp_path, summary):
+    """Replay reproduces every step, and writes the same recording."""
+    rrd = tmp_path / "again.rrd"
+    replayed = answer("replay", summary["campaign"], "--rrd", rrd)
+    assert replayed["reproduced"]
+    assert {step["check"] for step in replayed["steps"]} <= {"identical", "kept"}
+    first, second = rows(summary["rrd"]), rows(rrd)
+    assert first.keys() == second.keys()
+    different = [key for key in first if first[key] != second[key]]
+    assert different == []
+
+
+def rows(path):
+    """Values by entity, column and measurement, in order; how they were batched is chance."""
+    reader, found = RrdReader(path), {}
+    for chunk in reader.stream(store=reader.recordings()[0]):
+        batch = chunk.to_record_batch()
+        names = batch.schema.names
+        times = batch.column("measurement").to_pylist() if "measurement" in names else None
+        ids = batch.column(0).to_pylist()
+        for name in names[1:]:
+            if name == "measurement":
+                continue
+            for i, value in enumerate(batch.column(name).to_pylist()):
+                key = (str(chunk.entity_path), name, times[i] if times else None)
+                found.setdefault(key, []).append((ids[i], value))
+    order = {key: sorted(values, key=lambda v: v[0]) for key, values in found.items()}
+    return {key: [value for _, value in values] for key, values in order.items()}
