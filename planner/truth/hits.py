@@ -1,6 +1,7 @@
 """Simulated hammer hits: exact response to a pulse, the analyser's filter, noise, one UFF a hit."""
 
 import csv
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -124,7 +125,10 @@ def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, *text: str) -> None
             "data": np.asarray(samples, dtype=float),
             "x": np.arange(samples.size) / hammer.sampling_rate_hz,
         }
-        file.write_sets(entry, "add")
+        with warnings.catch_warnings():
+            # pyuff leaves closing the file to the garbage collector, which does so right here.
+            warnings.simplefilter("ignore", ResourceWarning)
+            file.write_sets(entry, "add")
 
 
 def record_poses(
