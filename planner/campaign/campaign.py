@@ -193,10 +193,10 @@ class Campaign:
                 raise InputError(f"Pose {pose} is not known; see planner status.")
             self._append(Starred(pose))
 
-    def undo(self) -> Entry:
+    def undo(self, decisions_only: bool = False) -> Entry:
         """Take back the last act (proposal, import, withdrawal, skip, star)."""
         with self._acting():
-            entry = last_act(self.entries)
+            entry = last_act(self.entries, decisions_only)
             if entry is None:
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
             self._append(Undone(entry.seq))

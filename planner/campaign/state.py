@@ -83,11 +83,12 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     return state
 
 
-def last_act(entries: Iterable[Entry]) -> Entry | None:
-    """The act that `undo` would take back."""
+def last_act(entries: Iterable[Entry], decisions_only: bool = False) -> Entry | None:
+    """The act that `undo` would take back; proposals are acts, but nobody's decisions."""
     entries = tuple(entries)
     undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
-    acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
+    kinds = tuple(kind for kind in ACTS if not (decisions_only and kind is Proposed))
+    acts = [e for e in entries if isinstance(e.event, kinds) and e.seq not in undone]
     return acts[-1] if acts else None
 
 

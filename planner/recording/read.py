@@ -84,7 +84,10 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
     warnings = _Warnings()
     logger = logging.getLogger("nptdms")
     logger.addHandler(warnings)
-    logger.propagate = False
+    for name in list(logging.root.manager.loggerDict):
+        if name.startswith("nptdms"):
+            for handler in logging.getLogger(name).handlers:
+                handler.setLevel(logging.CRITICAL if handler is not warnings else logging.WARNING)
     columns: dict[str, np.ndarray] = {}
     units: dict[str, str] = {}
     try:

@@ -50,6 +50,11 @@ def read_uff(path: Path) -> tuple[Record, ...]:
 def _sets(path: Path) -> list[dict[str, Any]]:
     import pyuff
 
+    with open(path, "rb") as file:
+        file.seek(-min(path.stat().st_size, 256), 2)
+        end = file.read().rstrip()
+    if not end.endswith(b"-1"):  # the parser would leave out the dataset that is cut off
+        raise InputError(f"{path} does not end with a whole dataset; export it again.")
     try:
         with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
             warnings.simplefilter("ignore")

@@ -73,6 +73,8 @@ class _Session:
         self.history: list[float] = []
         self.stop = ""
         self.told = 0
+        self.shown_count = 0
+        self.told_of: set[tuple[Path, str]] = set()
         self.announced = False
 
     def run(self) -> SessionSummary:
@@ -140,15 +142,15 @@ class _Session:
         return self.aside | {hit.sha256 for m in measurements for hit in m.hits}
 
     def _arrived(self, whole: list[Path], waiting: list[tuple[Path, str]]) -> None:
-        if whole:
+        if len(whole) != self.shown_count:
+            self.shown_count = len(whole)
             names = ", ".join(p.name for p in whole[-4:])
             text = f"{len(whole)} of {self.hits_per_pose} hits wait ({names})"
             self.console.print(Text(text, style="green"))
         for path, why in waiting:
-            if why != "is being written":
+            if why != "is being written" and (path, why) not in self.told_of:
+                self.told_of.add((path, why))
                 self.console.print(Text(f"not whole yet: {why}", style="dim"))
-            else:
-                self.console.print(Text(f"{path.name} {why}", style="dim"))
 
     def _key(self, key: str | None, proposal: Proposal, whole: list[Path]) -> bool:
         """Act on a key; True when the pose is over."""
@@ -167,7 +169,7 @@ class _Session:
                     self.console.print(Text(f"{proposal.pose} will not be offered again."))
                     return True
                 case "u":
-                    entry = self.campaign.undo()
+                    entry = self.campaign.undo(decisions_only=True)
                     kind = type(entry.event).__name__.lower()
                     self.console.print(Text(f"Took back entry {entry.seq} ({kind})."))
                     return True

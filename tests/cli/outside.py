@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from robots import campaign_text, make_arm
 
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import Deviation, Truth, load_truth
+from robots import campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)

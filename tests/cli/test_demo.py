@@ -3,9 +3,9 @@
 import json
 
 import numpy as np
-from outside import answer
 from rerun.chunk import RrdReader
 
+from outside import answer
 from planner.demo import shipped
 
 

@@ -3,10 +3,10 @@
 import csv
 
 import numpy as np
-from outside import answer, make_cell, planner, record
-from robots import JOINTS_DEG
 
+from outside import answer, make_cell, planner, record
 from planner.truth.model import load_truth
+from robots import JOINTS_DEG
 
 MEASUREMENTS = 8
 

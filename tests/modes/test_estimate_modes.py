@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from modal_systems import System, as_frf, exact_frf, noisy, random_system
 
+from modal_systems import System, as_frf, exact_frf, noisy, random_system
 from planner.errors import RefusedError
 from planner.modes.compare import mac
 from planner.modes.estimate import estimate_modes, identification

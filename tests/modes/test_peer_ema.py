@@ -7,8 +7,8 @@ import warnings
 
 import numpy as np
 import pytest
-from modal_systems import as_frf, exact_frf, noisy, random_system
 
+from modal_systems import as_frf, exact_frf, noisy, random_system
 from planner.modes.estimate import estimate_modes
 
 LINES = np.arange(2.0, 80.0, 0.1)

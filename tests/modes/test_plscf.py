@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from modal_systems import System, exact_frf, noisy, random_system
 
+from modal_systems import System, exact_frf, noisy, random_system
 from planner.modes.plscf import plscf
 from planner.modes.residues import rank_one
 from planner.modes.stabilisation import diagram, stable

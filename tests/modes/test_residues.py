@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from modal_systems import exact_frf, random_system
 
+from modal_systems import exact_frf, random_system
 from planner.frf.modal import accelerance
 from planner.modes.data import Data
 from planner.modes.refine import refine

@@ -1,0 +1,138 @@
+"""The terminal session with a fake analyser that writes slowly and a scripted engineer."""
+
+import io
+import shutil
+import threading
+import time
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from outside import make_cell, record
+from planner.campaign.campaign import Campaign
+from planner.session.watch import watch
+
+WANTED = (
+    "joint_a1",
+    "angle (°)",
+    "expected (Hz)",
+    "damping (%)",
+    "tool at x",
+    "measured (Hz)",
+    "off by (sd)",
+    "sd of frequencies",
+    "target 1 %",
+    "min per pose",
+    "SIMULATED",
+)
+
+
+class Script:
+    """Keys pressed when their moment has come: a function of the session's screen so far."""
+
+    def __init__(self, console, presses):
+        self.console, self.presses = console, list(presses)
+        self.text = ""
+
+    def get(self, timeout_s):
+        time.sleep(min(timeout_s, 0.05))
+        self.text = self.console.export_text(clear=False)
+        if self.presses and self.presses[0][0](self.text):
+            return self.presses.pop(0)[1]
+        return None
+
+
+@pytest.fixture
+def cell(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
+    (tmp_path / "inbox").mkdir()
+    return campaign, truth, tmp_path
+
+
+def screen():
+    return Console(width=100, record=True, file=io.StringIO(), force_terminal=False)
+
+
+def deliver(truth, tmp_path, proposal, number, torn=False):
+    """Export the hits of a pose, each file in two writes."""
+    folder = record(truth, tmp_path / f"made{number}", proposal.pose, proposal.joints_deg, number)
+    for path in sorted((folder / "data").iterdir()):
+        data, target = path.read_bytes(), tmp_path / "inbox" / path.name
+        target.write_bytes(data[: len(data) // 3])
+        time.sleep(0.02)
+        if not torn:
+            target.write_bytes(data)
+
+
+def wait(text):
+    return lambda screen: text in screen
+
+
+def test_a_session_shows_imports_and_goes_on(cell):
+    campaign, truth, tmp_path = cell
+    console = screen()
+    proposal = campaign.next()[0]
+    analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
+    script = Script(console, [
+        (wait("9 of 9 hits wait"), "?"), (wait("set the waiting hits aside"), "s"),
+        (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("not be offered"), "u"),
+        (wait("Took back"), "q"),
+    ])  # fmt: skip
+    analyser.start()
+    summary = watch(campaign, tmp_path / "inbox", console=console, keys=script,
+                    hits_per_pose=9, quiet_s=0.15, limit_s=60)  # fmt: skip
+    analyser.join()
+    text = console.export_text(clear=False)
+    print(text)
+    assert summary.stopped == "quit"
+    assert summary.measured == ("P001",)
+    for wanted in WANTED:
+        assert wanted in text, wanted
+    assert max(len(line) for line in text.splitlines()) <= 100
+    assert campaign.state.starred == {"P001"}
+    assert not campaign.state.skipped
+
+
+def test_resume_ignores_what_was_imported_and_waits_for_torn_files(cell):
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    deliver(truth, tmp_path, proposal, 0)
+    inbox = tmp_path / "inbox"
+    first = watch(campaign, inbox, console=screen(), keys=Script(screen(), []), auto=True,
+                  hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
+    assert first.measured == ("P001",)
+    again = Campaign(campaign.directory)
+    deliver(truth, tmp_path, again.next()[0], 1, torn=True)
+    console = screen()
+    second = watch(again, inbox, console=console, keys=Script(screen(), []), auto=True,
+                   hits_per_pose=9, quiet_s=0.05, limit_s=3)  # fmt: skip
+    assert second.measured == ()
+    assert second.stopped == "time limit"
+    assert "not whole yet" in console.export_text()
+    assert list(again.state.measurements) == ["P001"]
+
+
+def test_refused_hits_are_not_imported_nor_offered_again(cell):
+    campaign, truth, tmp_path = cell
+    deliver(truth, tmp_path, campaign.next()[0], 0)
+    console = screen()
+    script = Script(console, [(wait("9 of 9"), "r"), (wait("set aside"), "a"),
+                              (wait("No whole new file"), "q")])  # fmt: skip
+    watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
+          quiet_s=0.05, limit_s=30)  # fmt: skip
+    assert campaign.state.measurements == {}
+
+
+def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    folder = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
+    shutil.rmtree(tmp_path / "inbox")
+    shutil.copytree(folder, tmp_path / "inbox")
+    watch(campaign, tmp_path / "inbox", console=screen(), keys=Script(screen(), []), auto=True,
+          hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
+    measured = campaign.state.measurements[proposal.pose].joints_deg
+    off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
+    assert 0 < off <= 0.011

@@ -1,0 +1,195 @@
+"""The engine behind simulated recordings: analytic cases, laws, and two engines that agree."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from known_robots import KNOWN_ROBOTS, KR10
+from planner.errors import InputError
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.robot.workspace import Workspace
+from planner.truth import inverse
+from planner.truth.model import AddedMass, Deviation, Spring, load_truth
+
+MASS, RADIUS, MOMENT, STIFFNESS, DAMPING = 3.0, 0.4, 0.05, 2.0e4, 12.0
+INERTIA = MOMENT + MASS * RADIUS**2
+
+PENDULUM = f"""<robot name="one"><link name="base_link"/><link name="arm"><inertial>
+<origin xyz="{RADIUS} 0 0" rpy="0 0 0"/><mass value="{MASS}"/>
+<inertia ixx="{MOMENT}" iyy="{MOMENT}" izz="{MOMENT}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tip"/><joint name="turn" type="revolute"><parent link="base_link"/><child link="arm"/>
+<origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="0"/></joint><joint name="end" type="fixed">
+<parent link="arm"/><child link="tip"/><origin xyz="0.7 0 0" rpy="0 0 0"/></joint></robot>"""
+
+PENDULUM_TOML = f"""name = "one"
+urdf = "one.urdf"
+tcp_frame = "tip"
+sensor_frame = "tip"
+[[compliance]]
+joint = "turn"
+axis = [0, 0, 1]
+stiffness = {STIFFNESS}
+damping = {DAMPING}
+"""
+
+
+@pytest.fixture
+def pendulum(tmp_path) -> Path:
+    (tmp_path / "one.urdf").write_text(PENDULUM)
+    path = tmp_path / "robot.toml"
+    path.write_text(PENDULUM_TOML)
+    return path
+
+
+def folder(tmp_path: Path, name: str, per_joint: int) -> Path:
+    return KNOWN_ROBOTS[name].write(tmp_path / name, per_joint)
+
+
+def test_one_degree_of_freedom_is_the_textbook_oscillator(pendulum):
+    truth, q = load_truth(pendulum), np.array([0.8])
+    frequency, damping, residues = truth.modes(q, 3)
+    natural = np.sqrt(STIFFNESS / INERTIA)
+    assert frequency == pytest.approx([natural / (2 * np.pi)], rel=1e-12)
+    assert damping == pytest.approx([DAMPING / (2 * np.sqrt(STIFFNESS * INERTIA))], rel=1e-10)
+    damped = natural * np.sqrt(1 - damping[0] ** 2)
+    assert residues[0, 1, 1] == pytest.approx(0.7**2 / INERTIA / (2j * damped), rel=1e-10)
+
+    f = np.linspace(1.0, 60.0, 97)
+    w = 2 * np.pi * f
+    yy = -(w**2) * 0.7**2 / (STIFFNESS - INERTIA * w**2 + 1j * w * DAMPING)
+    accelerance = truth.accelerance(q, f)
+    assert accelerance[1, 1] == pytest.approx(yy, rel=1e-9)
+    others = accelerance[[0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]]
+    assert np.max(np.abs(others)) < 1e-12 * np.max(np.abs(yy))
+
+
+def test_response_is_that_of_an_ode_solver(tmp_path):
+    truth = load_truth(folder(tmp_path, "kr10", 1))
+    q, step, n, axis = KR10.poses(1)[0], 1 / 8000, 800, 1
+    t = np.arange(n) * step
+    force = 80 * np.sin(np.pi * np.clip((t - 0.01) / 0.006, 0, 1)) ** 2
+    mass, damping, stiffness, hit, sensor = truth.matrices(q)
+    e = len(mass)
+
+    def acceleration(y, f):
+        return np.linalg.solve(mass, hit[axis] * f - damping @ y[e:] - stiffness @ y[:e])
+
+    def slope(time, y):
+        return np.concatenate([y[e:], acceleration(y, np.interp(time, t, force))])
+
+    found = solve_ivp(slope, (0, t[-1]), np.zeros(2 * e), "Radau", t[::20],
+                      rtol=1e-8, atol=1e-12, max_step=2e-4)  # fmt: skip
+    expected = [sensor @ acceleration(y, f) for y, f in zip(found.y.T, force[::20], strict=True)]
+    response = truth.respond(q, force, axis, step)
+    assert response.shape == (3, n)
+    error = np.max(np.abs(response[:, ::20] - np.transpose(expected)))
+    assert error < 1e-4 * np.max(np.abs(response))
+
+
+@pytest.mark.parametrize("per_joint", [1, 2, 3])
+@pytest.mark.parametrize("name", sorted(KNOWN_ROBOTS))
+def test_agrees_with_the_planners_own_simulation(tmp_path, name, per_joint):
+    """MuJoCo and Pinocchio, two URDF readers, two eigenproblems: one robot."""
+    path = folder(tmp_path, name, per_joint)
+    truth, simulation = load_truth(path), Simulation(Robot.load(path))
+    f = np.linspace(4, 120, 60)
+    for q in KNOWN_ROBOTS[name].poses(3, seed=per_joint):
+        ours, theirs = truth.accelerance(q, f), simulation.accelerance(q, f)[0]
+        assert np.max(np.abs(ours - theirs)) < 1e-7 * np.max(np.abs(ours))
+
+
+def test_reciprocity_where_hammer_and_sensor_meet(tmp_path):
+    path = folder(tmp_path, "kr210", 3)
+    path.write_text(path.read_text().replace('sensor_frame = "sensor"', 'sensor_frame = "tcp"'))
+    truth = load_truth(path, Deviation(5, 0.2, 0.2, 0.05, 0.01))
+    for q in KNOWN_ROBOTS["kr210"].poses(3):
+        H = truth.accelerance(q, np.linspace(5, 80, 20))
+        assert np.max(np.abs(H - H.transpose(1, 0, 2))) < 1e-7 * np.max(np.abs(H))
+
+
+def test_an_added_mass_enters_the_mass_matrix_where_it_sits(tmp_path):
+    path, place = folder(tmp_path, "kr210", 2), KNOWN_ROBOTS["kr210"].tcp
+    q = KNOWN_ROBOTS["kr210"].poses(1)[0]
+    plain = load_truth(path)
+    loaded = load_truth(path, Deviation(added=(AddedMass("link_6", tuple(place), 12.0),)))
+    hit = plain.matrices(q)[3]
+    difference = loaded.matrices(q)[0] - plain.matrices(q)[0]
+    # The lump has a gyration radius of 1 cm beside being a point.
+    assert np.max(np.abs(difference - 12.0 * hit.T @ hit)) < 12.0 * 2e-4
+    assert np.all(loaded.modes(q, 4)[0] < plain.modes(q, 4)[0])
+
+
+def test_a_base_that_gives_way_lowers_frequencies_and_a_rigid_one_does_not(tmp_path):
+    path, q = folder(tmp_path, "kr210", 2), KNOWN_ROBOTS["kr210"].poses(1)[0]
+    plain = load_truth(path).modes(q, 4)[0]
+
+    def tilting(stiffness: float) -> np.ndarray:
+        axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+        extra = tuple(Spring("base", axis, stiffness, 1e-4 * stiffness) for axis in axes)
+        return load_truth(path, Deviation(extra=extra)).modes(q, 4)[0]
+
+    assert tilting(1e12) == pytest.approx(plain, rel=1e-4)
+    assert np.all(tilting(1e7) < plain * (1 - 1e-4))
+    assert tilting(1e7)[0] < 0.9 * plain[0]
+
+
+def test_deviations_follow_the_seed(tmp_path):
+    path, q = folder(tmp_path, "kr10", 2), KR10.poses(1)[0]
+
+    def modes(seed: int, **scatter: float) -> np.ndarray:
+        return load_truth(path, Deviation(seed, **scatter)).modes(q, 5)[0]
+
+    scatter = {"stiffness": 0.2, "damping": 0.1, "inertia": 0.05, "com_m": 0.002}
+    assert np.array_equal(modes(7, **scatter), modes(7, **scatter))
+    assert np.all(np.abs(modes(7, **scatter) / modes(8, **scatter) - 1) > 1e-5)
+    assert np.array_equal(modes(7), modes(8))
+    assert modes(0, inertia=0.04) == pytest.approx(modes(0), rel=0.1)
+    assert not np.allclose(modes(0, inertia=0.04), modes(0), rtol=1e-4)
+
+
+@pytest.mark.parametrize("name", sorted(KNOWN_ROBOTS))
+def test_inverse_kinematics_reaches_the_placement(tmp_path, name):
+    truth, known = load_truth(folder(tmp_path, name, 1)), KNOWN_ROBOTS[name]
+    rng = np.random.default_rng(1)
+    for q in known.poses(5):
+        rotation, position, _ = truth.tcp(q)
+        found = inverse.joint_angles(truth, rotation, position, q + rng.uniform(-0.2, 0.2, 6))
+        assert found is not None
+        again, place, _ = truth.tcp(found)
+        assert np.allclose(again, rotation, atol=1e-9)
+        assert np.allclose(place, position, atol=1e-9)
+        assert np.all((found >= truth.lower_rad) & (found <= truth.upper_rad))
+    assert inverse.joint_angles(truth, np.eye(3), np.array([9.0, 0, 1]), known.poses(1)[0]) is None
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (0.6, 0.0, -0.8)])
+def test_rotation_about_the_tool_means_what_the_planner_means(axis):
+    workspace = Workspace(np.zeros(4), np.zeros(4), (), np.array(axis))
+    for angle in (-0.7, 0.0, 1.2):
+        ours = inverse.tool_rotation(np.array(axis), angle)
+        assert np.allclose(ours, workspace.rotation(angle), atol=1e-12)
+        assert np.linalg.det(ours) == pytest.approx(1)
+
+
+def test_what_cannot_be_built_is_said_in_words(pendulum, monkeypatch):
+    with pytest.raises(InputError, match=r"cannot be read"):
+        load_truth(pendulum.with_name("nothing.toml"))
+    with pytest.raises(InputError, match=r"no joint or link elbow"):
+        load_truth(pendulum, Deviation(extra=(Spring("elbow", (1.0, 0, 0), 1e6, 1.0),)))
+    with pytest.raises(InputError, match=r"no joint or link hose"):
+        load_truth(pendulum, Deviation(added=(AddedMass("hose", (0.0, 0, 0), 1.0),)))
+    text = pendulum.read_text()
+    pendulum.write_text(text.replace('tcp_frame = "tip"', 'tcp_frame = "tap"'))
+    with pytest.raises(InputError, match=r"no joint or link tap"):
+        load_truth(pendulum)
+    pendulum.write_text(text[: text.index("[[")])
+    with pytest.raises(InputError, match=r"no \[\[compliance\]\]"):
+        load_truth(pendulum)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(InputError, match=r"pip install"):
+        load_truth(pendulum)
