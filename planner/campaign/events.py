@@ -7,7 +7,7 @@ class Event(msgspec.Struct, frozen=True, tag_field="kind"):
     """Base of every entry of the log."""
 
 
-class Configured(Event, tag="configured"):
+class Configured(Event, frozen=True, tag="configured"):
     """The campaign was started, or its campaign.toml or robot folder was changed by hand.
 
     `config` is campaign.toml; `robot` maps each file of the robot folder to its sha256.
@@ -28,7 +28,7 @@ class Proposal(msgspec.Struct, frozen=True):
     reason: str
 
 
-class Proposed(Event, tag="proposed"):
+class Proposed(Event, frozen=True, tag="proposed"):
     """`count` poses were asked for; these replace the poses proposed before and not yet hit."""
 
     acquisition: str
@@ -64,7 +64,7 @@ class MeasuredMode(msgspec.Struct, frozen=True):
     probability: float = 1.0
 
 
-class Imported(Event, tag="imported"):
+class Imported(Event, frozen=True, tag="imported"):
     """Hits at one pose were imported; `modes` are those of all its accepted hits so far."""
 
     pose: str
@@ -74,27 +74,27 @@ class Imported(Event, tag="imported"):
     remarks: tuple[str, ...] = ()
 
 
-class Withdrawn(Event, tag="withdrawn"):
+class Withdrawn(Event, frozen=True, tag="withdrawn"):
     """A measured pose was set aside; its recordings stay."""
 
     pose: str
     reason: str = ""
 
 
-class Skipped(Event, tag="skipped"):
+class Skipped(Event, frozen=True, tag="skipped"):
     """A proposed pose cannot or shall not be measured; it is not offered again."""
 
     pose: str
     reason: str = ""
 
 
-class Starred(Event, tag="starred"):
+class Starred(Event, frozen=True, tag="starred"):
     """The engineer marked a pose as worth a second look."""
 
     pose: str
 
 
-class Undone(Event, tag="undone"):
+class Undone(Event, frozen=True, tag="undone"):
     """The act with sequence number `act` was taken back."""
 
     act: int

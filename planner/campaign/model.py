@@ -75,12 +75,17 @@ def propose(
         Proposal(
             pose=f"P{state.proposals_made + i + 1:03d}",
             joints_deg=tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])),
-            position_m=tuple(round(float(v), 5) for v in candidates.position_m[pick.index]),
+            position_m=_xyz(candidates.position_m[pick.index]),
             score=float(pick.score),
             reason=_reason(model, pick.index, acquisition),
         )
         for i, pick in enumerate(picks)
     )
+
+
+def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 5) for v in position_m)
+    return x, y, z
 
 
 def _reason(model: Model, index: int, acquisition: str) -> str:

@@ -213,7 +213,8 @@ def _moments(
     frequency_hz: np.ndarray, poles: np.ndarray, residue: np.ndarray, chunk: int = 64
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sd over samples, in chunks that stay in the cache."""
-    n, total, square = len(poles), 0.0, 0.0
+    n, size = len(poles), len(frequency_hz)
+    total, square = np.zeros((3, 3, size), complex), np.zeros((3, 3, size))
     for start in range(0, n, chunk):
         part = slice(start, start + chunk)
         h = modal.accelerance(frequency_hz, poles[part], residue[part])

@@ -27,7 +27,7 @@ def _columns(path: Path, entries: dict[str, object]) -> Named:
             item = value.item()
             attributes[name] = item.decode() if isinstance(item, bytes) else str(item)
     if not columns:
-        shapes = ", ".join(f"{n} {np.shape(e)}" for n, e in list(entries.items())[:5])
+        shapes = ", ".join(f"{n} {np.asarray(e).shape}" for n, e in list(entries.items())[:5])
         raise InputError(
             f"{path} holds no named vectors ({shapes or 'nothing'}); name them time_s, force_n, "
             f"acceleration_x_m_s2 and so on."

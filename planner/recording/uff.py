@@ -62,7 +62,8 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             count = len(file.get_set_types())
             if not count:
                 raise InputError(f"{path} is no universal file (no dataset in it); export again.")
-            return [file.read_sets(i) for i in range(count)]
+            sets: list[Any] = [file.read_sets(i) for i in range(count)]
+            return sets
     except InputError:
         raise
     except Exception as error:  # the parser raises whatever the junk makes it raise

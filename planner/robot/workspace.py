@@ -18,10 +18,14 @@ TRIES = 4  # points tried per candidate wanted, before a sparse workspace is acc
 class WorkspaceTable(Protocol):
     """The [workspace] table of campaign.toml (contract section 3)."""
 
-    joints_deg: list[tuple[float, float]] | None
-    position_m: list[tuple[float, float]] | None
-    tool_axis: tuple[float, float, float] | None
-    rotation_deg: tuple[float, float] | None
+    @property
+    def joints_deg(self) -> list[tuple[float, float]] | None: ...
+    @property
+    def position_m(self) -> list[tuple[float, float]] | None: ...
+    @property
+    def tool_axis(self) -> tuple[float, float, float] | None: ...
+    @property
+    def rotation_deg(self) -> tuple[float, float] | None: ...
 
 
 @dataclass(frozen=True, eq=False)
