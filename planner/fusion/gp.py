@@ -119,14 +119,19 @@ def fit(
     first, second = normal_points(samples, p)
     y = (padded.y - prior.mean[:, None]) * padded.mask
     remarks: tuple[str, ...] = ()
-    for jitter in JITTERS:
-        theta, whiten, weights = _fit(
+
+    def attempt(jitter: float) -> tuple[Array, Array, Array]:
+        return _fit(
             kernel, kept, padded.x, padded.low, padded.mask, y, padded.variance,
             prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, second, jitter,
         )  # fmt: skip
+
+    theta, whiten, weights = attempt(JITTERS[0])
+    for jitter in JITTERS[1:]:
         if bool(jnp.all(jnp.isfinite(weights))):
             break
-        remarks = (f"The covariance was singular; a jitter above {jitter:g} was needed.",)
+        theta, whiten, weights = attempt(jitter)
+        remarks = (f"The covariance was singular; a jitter of {jitter:g} was added.",)
     return Posterior(
         padded.x, padded.low, padded.mask, np.array(theta), np.array(whiten), np.array(weights),
         prior, kernel, remarks,
