@@ -18,6 +18,7 @@ NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
 ALIVE = 0.005  # response left at the record's end, over its peak, that counts as cut off
 SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
+RINGING = 32  # samples for which an anti-alias filter rings after the pulse
 LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 
 
@@ -98,7 +99,7 @@ def _spectra(hit: Hit, start: int, stop: int, chosen: np.ndarray) -> _Spectra:
     response = np.array(hit.acceleration_m_s2[:, start:stop])
     peak = int(np.argmax(np.abs(force - np.median(force))))
     first, last = _pulse(force, peak)
-    quiet = max(0, first - 2)
+    quiet = _quiet(force, peak)
     noise = np.full(3, np.nan)
     if quiet >= LEAST_QUIET:
         force = force - np.mean(force[:quiet])
@@ -126,8 +127,15 @@ def _pulse(force: np.ndarray, peak: int) -> tuple[int, int]:
         first -= 1
     while last + 1 in above:
         last += 1
-    margin = 8 + 3 * (last - first + 1)
+    margin = RINGING + 3 * (last - first + 1)
     return max(0, first - margin), min(force.size, last + 1 + margin)
+
+
+def _quiet(force: np.ndarray, peak: int) -> int:
+    """Samples at the start in which nothing has happened yet."""
+    centred = np.abs(force - np.median(force))
+    level = max(0.01 * centred[peak], 5 * 1.4826 * float(np.median(centred)))
+    return max(0, int(np.argmax(centred > level)) - 4)
 
 
 def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -149,9 +157,12 @@ def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarr
     if n == 1:
         noise = group[0].noise_power
         return h, noise[:, None] / sff[None, :], np.full(h.shape, np.nan)
-    error = np.sum(np.abs(response - h[None] * force[:, None]) ** 2, axis=0) / (n - 1)
+    # Noise may grow with the hit: each hit counts with its own error (White's estimator, HC2).
+    share = np.abs(force) ** 2 / sff
+    error = np.abs(response - h[None] * force[:, None]) ** 2 / np.maximum(1 - share, 1e-6)[:, None]
+    variance = sum(_smooth(e) * s for e, s in zip(error, share, strict=True)) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
-    return h, _smooth(error) / sff, coherence
+    return h, np.asarray(variance), coherence
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

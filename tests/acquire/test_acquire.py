@@ -1,0 +1,80 @@
+"""Acquisitions: exact against a refit, deterministic, never the same place twice."""
+
+import numpy as np
+import pytest
+
+from planner.acquire.integrated_variance import integrated_variance
+from planner.acquire.outputs import FrequencyOutputs
+from planner.acquire.propose import ACQUISITIONS, DESIGNS, propose
+from planner.errors import InputError
+from planner.fusion.surrogate import fit_surrogate
+from test_fusion import observed, simulated
+
+X = np.random.default_rng(4).random((120, 2))
+NAMES = [*ACQUISITIONS, *DESIGNS]
+
+
+@pytest.fixture(scope="module")
+def surrogate():
+    return fit_surrogate(observed(5, 0))
+
+
+def conditioned_variance(outputs, k, c, low_c):
+    """Mean variance over the workspace once c is measured, by adding a row to the GP itself."""
+    post, total = outputs.posterior, []
+    known = np.flatnonzero(post.mask[k])
+    x = np.vstack([post.x[known], c[None]])
+    low = np.append(post.low[k][known], low_c)
+    for s in range(len(post.theta[k])):
+        whiten = post.whiten[k][s][np.ix_(known, known)]
+        noisy = np.linalg.inv(whiten.T @ whiten)  # covariance of what was measured, with noise
+        cross = post._prior(k, post.x[known], low[:-1], c[None], low[-1:])[s]
+        own = post._prior(k, c[None], low[-1:], c[None], low[-1:])[s] + outputs.noise[k]
+        grown = np.block([[noisy, cross], [cross.T, own]])
+        at = post._prior(k, x, low, outputs.x, outputs.low[:, k])[s]
+        there = post._prior(k, outputs.x, outputs.low[:, k], outputs.x, outputs.low[:, k])[s]
+        reduced = np.sum(at * np.linalg.solve(grown, at), axis=0)
+        total.append(np.mean(np.diag(there) - reduced))
+    return float(np.mean(total))
+
+
+def test_integrated_variance_is_that_of_an_actual_refit(surrogate):
+    low = surrogate.frequency_inputs(simulated(X))
+    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30])
+    score = integrated_variance(outputs, X[:4], low[:4])
+    for i in range(4):
+        drop = 0.0
+        for k in range(4):
+            _, _, before = outputs.covariance(k, X[:1], low[:1], outputs.x, outputs.low)
+            after = conditioned_variance(outputs, k, X[i], low[i, k])
+            drop += outputs.weights[k] * (np.mean(before) - after)
+        assert score[i] == pytest.approx(drop, rel=1e-6)
+
+
+def test_planned_poses_count_as_if_measured(surrogate):
+    low = surrogate.frequency_inputs(simulated(X))
+    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30]).planning(X[40], low[40])
+    _, _, variance = outputs.covariance(1, X[:1], low[:1], outputs.x, outputs.low)
+    assert np.mean(variance) == pytest.approx(
+        conditioned_variance(outputs, 1, X[40], low[40, 1]), rel=1e-6
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_strategy_keeps_the_contract(surrogate, name):
+    taken = X[:20]
+    first = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
+    again = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
+    assert [p.index for p in first] == [p.index for p in again]
+    assert len({p.index for p in first}) == 5
+    assert all(p.index >= 20 for p in first)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_when_nothing_is_left_nothing_is_proposed(surrogate, name):
+    assert propose(name, surrogate, X[:3], simulated(X[:3]), 1, X[:3], seed=0) == ()
+
+
+def test_unknown_names_are_refused(surrogate):
+    with pytest.raises(InputError, match="integrated_variance"):
+        propose("crystal_ball", surrogate, X, simulated(X), 1, None, seed=0)
