@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.campaign.campaign import Campaign, ImportReport
+from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
+from planner.campaign.importing import ImportReport
 from planner.campaign.labels import from_mode, label
 from planner.campaign.state import Measurement
 from planner.errors import InputError, NoPoseLeftError

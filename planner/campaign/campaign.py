@@ -2,11 +2,9 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
-import numpy as np
 
 from planner import __version__
 from planner.campaign import store
@@ -29,31 +27,20 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.campaign.importing import (
+    ImportReport,
+    displacement,
+    keep_files,
+    measure_files,
+    place,
+)
 from planner.campaign.intake import Delivery, sort_paths
 from planner.campaign.journal import Journal
 from planner.campaign.labels import from_mode
 from planner.campaign.model import Model, build, propose
-from planner.campaign.state import CampaignState, Measurement, fold, last_act
+from planner.campaign.state import CampaignState, fold, last_act
 from planner.errors import InputError
-from planner.modes.measure import MeasuredPose, Source, measure
-
-SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
-
-
-@dataclass(frozen=True, eq=False)
-class ImportReport:
-    """What one import did to one pose: files, modes, and the model before and after."""
-
-    pose: str
-    accepted: tuple[HitRecord, ...]
-    refused: tuple[HitRecord, ...]
-    already: tuple[str, ...]  # files that were imported before
-    measurement: Measurement | None
-    measured: MeasuredPose | None
-    model_before: Model
-    model: Model
-    refit_seconds: float
-    remarks: tuple[str, ...] = ()
+from planner.modes.measure import Source
 
 
 class Campaign:
@@ -163,7 +150,7 @@ class Campaign:
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(paths, self.cell.robot.joint_names, pose, default)
-            placed = [(delivery, self._place(delivery)) for delivery in deliveries]
+            placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             reports = []
             for delivery, joints_deg in placed:
                 if progress:
@@ -219,40 +206,16 @@ class Campaign:
             store.keep_robot_files(self.directory, configured.robot)
             self._append(configured)
 
-    def _place(self, delivery: Delivery) -> tuple[float, ...]:
-        """Readback angles of a delivery, checked against robot, proposal and earlier hits."""
-        state = self.state
-        known = state.measurements.get(delivery.pose)
-        proposal = state.proposals.get(delivery.pose)
-        if delivery.joints_deg is None:
-            stated = known or proposal
-            if stated is None:
-                raise InputError(
-                    f"No joint angles are known for pose {delivery.pose}; import a folder with "
-                    f"recordings.csv, or name a proposed pose."
-                )
-            return stated.joints_deg
-        self.cell.check_pose(delivery.joints_deg, delivery.row)
-        if known is not None:
-            off = np.max(np.abs(np.subtract(known.joints_deg, delivery.joints_deg)))
-            if off > SAME_POSE_DEG:
-                raise InputError(
-                    f"{delivery.row}: pose {delivery.pose} was imported before at joint angles "
-                    f"that differ by {off:.2f}°; give the new measurement another name."
-                )
-        return delivery.joints_deg
-
     def _import_pose(self, delivery: Delivery, joints_deg: tuple[float, ...]) -> ImportReport:
         before, state = self.model, self.state
-        fresh, already = self._store_new(delivery, state)
-        if not fresh:
-            return ImportReport(
-                delivery.pose, (), (), already, state.measurements.get(delivery.pose), None,
-                before, before, 0.0,
-            )  # fmt: skip
         known = state.measurements.get(delivery.pose)
+        fresh, already = keep_files(self.directory, delivery, state)
+        if not fresh:
+            return ImportReport(delivery.pose, (), (), already, known, None, before, before, 0.0)
         started = time.perf_counter()
-        hits, measured = self._measure(fresh, known)
+        old = tuple(self.source_of(hit) for hit in known.accepted) if known else ()
+        band_hz = self.cell.config.modes.band_hz
+        hits, measured = measure_files(self.directory, old, fresh, band_hz)
         event = Imported(
             pose=delivery.pose,
             joints_deg=known.joints_deg if known else joints_deg,
@@ -272,73 +235,13 @@ class Campaign:
             model_before=before,
             model=model,
             refit_seconds=time.perf_counter() - started,
-            remarks=(*measured.remarks, *self._displacement(delivery, joints_deg)),
+            remarks=(*measured.remarks, *displacement(state, delivery, joints_deg)),
         )
-
-    def _store_new(
-        self, delivery: Delivery, state: CampaignState
-    ) -> tuple[tuple[tuple[Source, str, str], ...], tuple[str, ...]]:
-        """Keep the raw files; those imported before at this pose are only named."""
-        owner = {h.sha256: m.pose for m in state.measurements.values() for h in m.hits}
-        fresh: dict[str, tuple[Source, str, str]] = {}
-        already = []
-        for source in delivery.sources:
-            digest, suffix = store.store_recording(self.directory, source.path)
-            if owner.get(digest, delivery.pose) != delivery.pose:
-                raise InputError(
-                    f"{source.path} was imported before as a recording of pose {owner[digest]}; "
-                    f"it cannot belong to {delivery.pose} too."
-                )
-            if digest in owner or digest in fresh:
-                already.append(source.name)
-            else:
-                fresh[digest] = (source, digest, suffix)
-        return tuple(fresh.values()), tuple(already)
-
-    def _measure(
-        self, fresh: tuple[tuple[Source, str, str], ...], known: Measurement | None
-    ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
-        """Verdicts on the new files and the modes of all good hits of the pose, old and new."""
-        old = known.accepted if known else ()
-        sources = [self.source_of(hit) for hit in old]
-        sources += [
-            Source(store.recording_path(self.directory, digest, suffix), s.name, s.hit, s.repeat)
-            for s, digest, suffix in fresh
-        ]
-        measured = measure(tuple(sources), self.cell.config.modes.band_hz)
-        records = tuple(
-            HitRecord(
-                file=source.name,
-                sha256=digest,
-                suffix=suffix,
-                hit=verdict.axis,
-                repeat=source.repeat,
-                accepted=verdict.accepted,
-                reason=verdict.reason,
-                simulated=verdict.simulated,
-            )
-            for verdict, (source, digest, suffix) in zip(
-                measured.verdicts[len(old) :], fresh, strict=True
-            )
-        )
-        return records, measured
 
     def source_of(self, hit: HitRecord) -> Source:
         """The kept copy of a recording."""
         path = store.recording_path(self.directory, hit.sha256, hit.suffix)
         return Source(path, hit.file, hit.hit, hit.repeat)
-
-    def _displacement(self, delivery: Delivery, joints_deg: tuple[float, ...]) -> tuple[str, ...]:
-        proposal = self.state.proposals.get(delivery.pose)
-        if proposal is None:
-            return ()
-        off = float(np.max(np.abs(np.subtract(proposal.joints_deg, joints_deg))))
-        if off <= SAME_POSE_DEG:
-            return ()
-        return (
-            f"The readback of {delivery.pose} is up to {off:.2f}° from its setpoint; the readback "
-            f"is used.",
-        )
 
 
 class _Acting:

@@ -8,8 +8,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from planner.campaign.campaign import Campaign, ImportReport
+from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry, HitRecord, Proposal
+from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.errors import InputError
 

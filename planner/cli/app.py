@@ -207,12 +207,13 @@ def modes(
     force: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Force channel, if not labelled.")
     ] = None,
+    estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
     as_json: AsJson = False,
 ) -> int:
     """Experimental modal analysis of one pose's hits."""
     from planner.cli import modal, render
 
-    answer = modal.analyse(tuple(paths), band_hz, force)
+    answer = modal.analyse(tuple(paths), band_hz, force, estimator)
     refused = answer["refused"]
     for entry in refused:
         warn(f"Refused {entry['file']}: {entry['reason']}")

@@ -12,15 +12,20 @@ TABLE = "recordings.csv"
 
 
 def analyse(
-    paths: tuple[Path, ...], band_hz: tuple[float, float] | None, force: str | None
+    paths: tuple[Path, ...],
+    band_hz: tuple[float, float] | None,
+    force: str | None,
+    estimator: str = "h1",
 ) -> dict[str, Any]:
     """Answer of `modes`. Raises RefusedError if no file could be used."""
+    if estimator not in ("h1", "h2", "hv"):
+        raise InputError(f"--estimator {estimator} is not known; give h1, h2 or hv.")
     if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
         raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
     sources = _sources(paths)
     if force is not None:
         return _by_channel(sources, band_hz, force)
-    measured = measure(sources, band_hz or DEFAULT_BAND_HZ)
+    measured = measure(sources, band_hz or DEFAULT_BAND_HZ, estimator)
     refused = [
         {"file": v.source.name, "reason": v.reason} for v in measured.verdicts if not v.accepted
     ]

@@ -191,6 +191,11 @@ def modes(answer: dict[str, Any]) -> RenderableType:
 
 def demo(answer: dict[str, Any]) -> RenderableType:
     """Text of `demo`."""
+    course = table("Course", "measurement", "pose", "measured (Hz)", "sd of frequencies (%)")
+    for number, step in enumerate(answer["steps"], 1):
+        hz = "  ".join(f"{f:.2f}" for f in step["frequency_hz"])
+        sd = "  ".join(f"{v:.2f}" for v in step["frequency_sd_percent"])
+        course.add_row(str(number), step["pose"], hz, sd)
     made = table(
         f"Demonstration on {answer['robot']}: {answer['measurements']} of {answer['pool']} poses",
         *("mode", "planner RMSE (%)", "simulation alone RMSE (%)", "in 95 % interval (%)"),
@@ -217,4 +222,4 @@ def demo(answer: dict[str, Any]) -> RenderableType:
         f"Campaign: {answer['campaign']}",
         f"Rerun recording: {answer['rrd']} (open with: rerun FILE)",
     ]
-    return Group(made, Text("\n".join(lines)), SIMULATED)
+    return Group(course, made, Text("\n".join(lines)), SIMULATED)

@@ -32,11 +32,18 @@ class _Spectra:
     noise_power: np.ndarray
 
 
-def estimate(hits: tuple[Hit, ...], band_hz: tuple[float, float], estimator: str = "h1") -> Frf:
+def estimate(
+    hits: tuple[Hit, ...],
+    band_hz: tuple[float, float],
+    estimator: str = "h1",
+    exponential_rate_1_s: float = 0.0,
+) -> Frf:
     """FRF matrix of one pose from its hits (any order and number per axis).
 
     `estimator` is "h1" (noise on the responses), "h2" (noise on the force) or "hv" (both).
-    Raises RefusedError if the hits do not fit together.
+    An exponential window e^(−rate·t), t from the pulse, may be laid over force and responses;
+    the result is then exactly H at iω + rate, and says so. Raises RefusedError if the hits do
+    not fit together.
     """
     if estimator not in ("h1", "h2", "hv"):
         raise ValueError(f"unknown estimator {estimator}")
@@ -50,7 +57,8 @@ def estimate(hits: tuple[Hit, ...], band_hz: tuple[float, float], estimator: str
     frequency = np.fft.rfftfreq(length, 1 / rate)
     chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
     frequency = frequency[chosen]
-    spectra = [_spectra(hit, *cut, chosen) for hit, cut in zip(hits, cuts, strict=True)]
+    window = _exponential(length, _onset(hits[0]) - cuts[0][0], exponential_rate_1_s / rate)
+    spectra = [_spectra(hit, *cut, chosen, window) for hit, cut in zip(hits, cuts, strict=True)]
     shape = (3, 3, frequency.size)
     h, variance, coherence = (
         np.full(shape, np.nan + 0j),
@@ -70,7 +78,7 @@ def estimate(hits: tuple[Hit, ...], band_hz: tuple[float, float], estimator: str
         coherence,
         (counts[0], counts[1], counts[2]),
         _usable(spectra, frequency, band_hz),
-        0.0,
+        exponential_rate_1_s,
         tuple(remarks),
         _tail(hits, cuts),
     )
@@ -94,7 +102,14 @@ def _alignment(hits: tuple[Hit, ...]) -> tuple[list[tuple[int, int]], list[str]]
     return [(onset - before, onset + after) for onset in onsets], remarks
 
 
-def _spectra(hit: Hit, start: int, stop: int, chosen: np.ndarray) -> _Spectra:
+def _exponential(length: int, onset: int, rate_per_sample: float) -> np.ndarray:
+    """The window, 1 at the pulse; with rate 0 it is 1 everywhere."""
+    return np.exp(-rate_per_sample * (np.arange(length) - onset))
+
+
+def _spectra(
+    hit: Hit, start: int, stop: int, chosen: np.ndarray, exponential: np.ndarray
+) -> _Spectra:
     force = np.array(hit.force_n[start:stop])
     response = np.array(hit.acceleration_m_s2[:, start:stop])
     peak = int(np.argmax(np.abs(force - np.median(force))))
@@ -104,11 +119,12 @@ def _spectra(hit: Hit, start: int, stop: int, chosen: np.ndarray) -> _Spectra:
     if quiet >= LEAST_QUIET:
         force = force - np.mean(force[:quiet])
         response = response - np.mean(response[:, :quiet], axis=1, keepdims=True)
-        noise = np.var(response[:, :quiet], axis=1, ddof=1) * force.size
+        noise = np.var(response[:, :quiet], axis=1, ddof=1) * np.sum(exponential**2)
     else:
         force = force - np.median(force)
     window = np.zeros(force.size)
-    window[first:last] = 1.0
+    window[first:last] = exponential[first:last]
+    response = response * exponential
     sign = hit.sign
     return _Spectra(
         hit.axis_index,

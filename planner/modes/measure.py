@@ -42,7 +42,9 @@ class MeasuredPose:
     remarks: tuple[str, ...] = ()
 
 
-def measure(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> MeasuredPose:
+def measure(
+    sources: tuple[Source, ...], band_hz: tuple[float, float], estimator: str = "h1"
+) -> MeasuredPose:
     """Read and screen every file, estimate the FRF from the good hits and the modes from it.
 
     A file that cannot be used is refused with its reason, never dropped in silence.
@@ -56,7 +58,7 @@ def measure(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> Measur
         frfs += records
         verdicts.append(verdict)
     hits = _drop_inconsistent(hits, verdicts, band_hz)
-    frf, modal, remarks = _identify(tuple(hit for _, hit in hits), frfs, band_hz)
+    frf, modal, remarks = _identify(tuple(hit for _, hit in hits), frfs, band_hz, estimator)
     return MeasuredPose(tuple(verdicts), tuple(h for _, h in hits), frf, modal, remarks)
 
 
@@ -114,7 +116,7 @@ def _drop_inconsistent(
 
 
 def _identify(
-    hits: tuple[Hit, ...], frfs: list[FrfRecord], band_hz: tuple[float, float]
+    hits: tuple[Hit, ...], frfs: list[FrfRecord], band_hz: tuple[float, float], estimator: str
 ) -> tuple[Frf | None, ModalModel | None, tuple[str, ...]]:
     from planner.frf.estimate import estimate, from_records
     from planner.modes.estimate import estimate_modes
@@ -126,7 +128,7 @@ def _identify(
             "The files of this pose mix time histories and exported FRFs; import one kind only."
         )
     try:
-        frf = estimate(hits, band_hz) if hits else from_records(tuple(frfs))
+        frf = estimate(hits, band_hz, estimator) if hits else from_records(tuple(frfs))
     except RefusedError as error:
         return None, None, (str(error),)
     try:

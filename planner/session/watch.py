@@ -9,8 +9,9 @@ import numpy as np
 from rich.console import Console
 from rich.text import Text
 
-from planner.campaign.campaign import Campaign, ImportReport
+from planner.campaign.campaign import Campaign
 from planner.campaign.events import Imported, Proposal
+from planner.campaign.importing import ImportReport
 from planner.errors import InputError, NoPoseLeftError, PlannerError
 from planner.session.inbox import TABLE, Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys

@@ -6,8 +6,8 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.campaign import ImportReport
 from planner.campaign.events import Proposal
+from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 
 KEYS = "[a] accept  [r] refuse  [s] star  [k] skip  [n] propose anew  [u] undo  [q] quit  [?] help"

@@ -5,6 +5,7 @@ import pytest
 
 from planner.errors import RefusedError
 from planner.frf.estimate import estimate, from_records
+from planner.modes.estimate import estimate_modes
 from planner.recording.types import FrfRecord
 from simulated_hits import RATE_HZ, exact_accelerance, make_hit
 
@@ -92,3 +93,15 @@ def test_exported_receptance_becomes_accelerance():
     )  # fmt: skip
     frf = from_records((record,))
     np.testing.assert_allclose(frf.accelerance, -exact_accelerance(frf.frequency_hz), rtol=1e-10)
+
+
+@pytest.mark.parametrize("record_s", [6.0, 1.5])
+def test_damping_is_right_with_and_without_an_exponential_window(record_s):
+    """Also where the record ends long before the decay does."""
+    hits = hits_of(np.random.default_rng(5), 0.01, 3, record_s=record_s)
+    for rate in (0.0, 3.0):
+        frf = estimate(hits, BAND, exponential_rate_1_s=rate)
+        assert frf.exponential_rate_1_s == rate
+        modes = estimate_modes(frf, BAND).modes
+        assert [m.frequency_hz for m in modes] == pytest.approx([11.0, 27.0], rel=2e-3)
+        assert [m.damping_ratio for m in modes] == pytest.approx([0.025, 0.025], rel=0.05)

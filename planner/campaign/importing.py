@@ -1,0 +1,127 @@
+"""Importing the hits of one pose: where they belong, which are new, what they give."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign import store
+from planner.campaign.cell import Cell
+from planner.campaign.events import HitRecord
+from planner.campaign.intake import Delivery
+from planner.campaign.model import Model
+from planner.campaign.state import CampaignState, Measurement
+from planner.errors import InputError
+from planner.modes.measure import MeasuredPose, Source, measure
+
+SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
+
+Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
+
+
+@dataclass(frozen=True, eq=False)
+class ImportReport:
+    """What one import did to one pose: files, modes, and the model before and after."""
+
+    pose: str
+    accepted: tuple[HitRecord, ...]
+    refused: tuple[HitRecord, ...]
+    already: tuple[str, ...]  # files that were imported before
+    measurement: Measurement | None
+    measured: MeasuredPose | None
+    model_before: Model
+    model: Model
+    refit_seconds: float
+    remarks: tuple[str, ...] = ()
+
+
+def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, ...]:
+    """Readback angles (°) of a delivery, checked against robot, proposal and earlier hits.
+
+    Raises InputError where they are not known or contradict each other.
+    """
+    known = state.measurements.get(delivery.pose)
+    if delivery.joints_deg is None:
+        stated = known or state.proposals.get(delivery.pose)
+        if stated is None:
+            raise InputError(
+                f"No joint angles are known for pose {delivery.pose}; import a folder with "
+                f"recordings.csv, or name a proposed pose."
+            )
+        return stated.joints_deg
+    cell.check_pose(delivery.joints_deg, delivery.row)
+    if known is not None:
+        off = np.max(np.abs(np.subtract(known.joints_deg, delivery.joints_deg)))
+        if off > SAME_POSE_DEG:
+            raise InputError(
+                f"{delivery.row}: pose {delivery.pose} was imported before at joint angles "
+                f"that differ by {off:.2f}°; give the new measurement another name."
+            )
+    return delivery.joints_deg
+
+
+def keep_files(
+    directory: Path, delivery: Delivery, state: CampaignState
+) -> tuple[tuple[Kept, ...], tuple[str, ...]]:
+    """Keep the raw files; those imported before at this pose are only named.
+
+    Raises InputError for a recording that belongs to another pose already.
+    """
+    owner = {h.sha256: m.pose for m in state.measurements.values() for h in m.hits}
+    fresh: dict[str, Kept] = {}
+    already = []
+    for source in delivery.sources:
+        digest, suffix = store.store_recording(directory, source.path)
+        if owner.get(digest, delivery.pose) != delivery.pose:
+            raise InputError(
+                f"{source.path} was imported before as a recording of pose {owner[digest]}; "
+                f"it cannot belong to {delivery.pose} too."
+            )
+        if digest in owner or digest in fresh:
+            already.append(source.name)
+        else:
+            fresh[digest] = (source, digest, suffix)
+    return tuple(fresh.values()), tuple(already)
+
+
+def measure_files(
+    directory: Path, old: tuple[Source, ...], fresh: tuple[Kept, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
+    """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
+    new = tuple(
+        Source(store.recording_path(directory, digest, suffix), s.name, s.hit, s.repeat)
+        for s, digest, suffix in fresh
+    )
+    measured = measure((*old, *new), band_hz)
+    records = tuple(
+        HitRecord(
+            file=source.name,
+            sha256=digest,
+            suffix=suffix,
+            hit=verdict.axis,
+            repeat=source.repeat,
+            accepted=verdict.accepted,
+            reason=verdict.reason,
+            simulated=verdict.simulated,
+        )
+        for verdict, (source, digest, suffix) in zip(
+            measured.verdicts[len(old) :], fresh, strict=True
+        )
+    )
+    return records, measured
+
+
+def displacement(
+    state: CampaignState, delivery: Delivery, joints_deg: tuple[float, ...]
+) -> tuple[str, ...]:
+    """A remark if the robot stood elsewhere than proposed."""
+    proposal = state.proposals.get(delivery.pose)
+    if proposal is None:
+        return ()
+    off = float(np.max(np.abs(np.subtract(proposal.joints_deg, joints_deg))))
+    if off <= SAME_POSE_DEG:
+        return ()
+    return (
+        f"The readback of {delivery.pose} is up to {off:.2f}° from its setpoint; the readback "
+        f"is used.",
+    )
