@@ -72,9 +72,9 @@ def play(
     rrd = campaign.directory / "demo.rrd"
     used: list[str] = []
     steps: list[dict[str, Any]] = []
+    started = time.perf_counter()
     with Story(campaign.cell, rrd, viewer, simulated=True) as story:
         story.tell(campaign.entries[0], campaign.state, campaign.model)
-        started = time.perf_counter()
         proposal = campaign.next()[0]
         story.tell(campaign.entries[-1], campaign.state, campaign.model)
         while len(used) < min(measurements, len(pool.rows)) and not _done(campaign):

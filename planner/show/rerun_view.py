@@ -4,9 +4,12 @@ Timeline "measurement" counts measured poses. The recording holds nothing but wh
 determines (no clock), so the same campaign gives the same recording.
 """
 
+import contextlib
 import hashlib
+import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +27,9 @@ from planner.modes.measure import MeasuredPose
 from planner.show import plots
 
 TIMELINE = "measurement"
-VIEWER = "rerun+http://127.0.0.1:9876/proxy"
+PORT = 9876
+VIEWER = f"rerun+http://127.0.0.1:{PORT}/proxy"
+VIEWER_START_S = 15.0
 COLOURS = {"proposed": (255, 140, 0), "measured": (220, 30, 30), "hit": (30, 90, 255)}
 LINES = 300  # frequency lines of the pictures
 
@@ -209,7 +214,8 @@ class RerunView:
 
     def close(self) -> None:
         """Write everything out."""
-        self._stream.flush()
+        with contextlib.suppress(Exception):  # a viewer that was closed meanwhile
+            self._stream.flush(timeout_sec=10.0)
         self._stream.disconnect()
 
 
@@ -227,16 +233,40 @@ def _sinks(rrd: Path | None, viewer: bool) -> list:
         except OSError as error:
             raise InputError(f"{rrd} cannot be written ({error.strerror}); name another.") from None
         sinks.append(rr.FileSink(str(rrd)))
-    if viewer:
-        # The viewer listens on every network interface unless told otherwise.
-        subprocess.Popen(
-            [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", "9876"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
+    if viewer and _start_viewer():
         sinks.append(rr.GrpcSink(VIEWER))
     return sinks
+
+
+def _start_viewer() -> bool:
+    """Open the viewer unless one listens already; False, with a word, if there can be none."""
+    if _listens():
+        return True
+    # The viewer listens on every network interface unless told otherwise.
+    process = subprocess.Popen(
+        [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(PORT)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    until = time.monotonic() + VIEWER_START_S
+    while time.monotonic() < until and process.poll() is None:
+        if _listens():
+            # Without a display it listens first and ends then.
+            time.sleep(0.5)
+            if process.poll() is None:
+                return True
+        time.sleep(0.1)
+    if process.poll() is None:
+        process.kill()
+    print("The Rerun viewer did not open here; going on without it.", file=sys.stderr)
+    return False
+
+
+def _listens() -> bool:
+    with socket.socket() as probe:
+        probe.settimeout(0.2)
+        return probe.connect_ex(("127.0.0.1", PORT)) == 0
 
 
 def _blueprint(cell: Cell) -> rrb.Blueprint:
