@@ -10,7 +10,8 @@ from planner.acquire.integrated_variance import integrated_variance
 from planner.acquire.outputs import FrequencyOutputs
 from planner.acquire.variance import variance
 from planner.errors import InputError
-from planner.fusion.surrogate import SimulatedModal, Surrogate
+from planner.fusion.surrogate import Surrogate
+from planner.physics.dynamics import SimulatedModes
 
 Score = Callable[[FrequencyOutputs, np.ndarray, np.ndarray], np.ndarray]
 Design = Callable[[np.ndarray, np.ndarray, int, int], np.ndarray]
@@ -47,7 +48,7 @@ def propose(
     name: str,
     surrogate: Surrogate,
     x: np.ndarray,
-    simulated: SimulatedModal,
+    simulated: SimulatedModes,
     count: int,
     exclude: np.ndarray | None,
     seed: int,
@@ -72,7 +73,7 @@ def _one_after_another(
     score: Score,
     surrogate: Surrogate,
     x: np.ndarray,
-    simulated: SimulatedModal,
+    simulated: SimulatedModes,
     count: int,
     free: np.ndarray,
 ) -> tuple[Pick, ...]:

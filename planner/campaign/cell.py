@@ -9,7 +9,7 @@ import numpy as np
 from planner.acquire.propose import check_name
 from planner.campaign.config import CampaignConfig
 from planner.errors import InputError
-from planner.fusion.surrogate import SimulatedModal
+from planner.physics.dynamics import SimulatedModes
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
@@ -43,7 +43,7 @@ class Cell:
         )
 
     @cached_property
-    def simulated_candidates(self) -> SimulatedModal:
+    def simulated_candidates(self) -> SimulatedModes:
         """What the simulation says at the candidates."""
         return self.simulate(self.candidates.q)
 
@@ -51,7 +51,7 @@ class Cell:
         """Coordinates (n, d) of poses q (n, dof) in rad that the model uses."""
         return self.workspace.features(self.robot, q)
 
-    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModal:
+    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
 
         As many as the campaign models, and `more` above them.
@@ -60,9 +60,8 @@ class Cell:
         if self.simulation is None:
             empty = np.full((len(q), count), np.nan)
             residue = np.full((len(q), count, 3, 3), np.nan + 0j)
-            return SimulatedModal(empty, empty, residue)
-        modes = self.simulation.modes(q, count)
-        return SimulatedModal(modes.frequency_hz, modes.damping_ratio, modes.residue)
+            return SimulatedModes(empty, empty, residue)
+        return self.simulation.modes(q, count)
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad; InputError if the robot cannot stand there."""

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
+from planner.tomlfile import load_toml
 
 
 class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -58,14 +59,7 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def load_campaign_config(path: Path) -> CampaignConfig:
     """Read and check campaign.toml; InputError with one sentence where it is wrong."""
-    try:
-        config = msgspec.toml.decode(path.read_bytes(), type=CampaignConfig)
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; name a campaign.toml.") from None
-    except (IsADirectoryError, PermissionError) as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); name a file.") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is not a valid campaign.toml ({error}); correct it.") from None
+    config = load_toml(path, CampaignConfig, "campaign.toml")
     _check(config, path)
     return config
 

@@ -5,9 +5,8 @@ from pathlib import Path
 
 from planner.errors import InputError
 from planner.modes.measure import Source
+from planner.recording.folder import TABLE, files_in, read_recordings
 from planner.recording.types import PoseRow
-
-TABLE = "recordings.csv"
 
 
 @dataclass(frozen=True)
@@ -38,10 +37,7 @@ def sort_paths(
         if table.is_file():
             deliveries += _from_table(table.parent, joint_names, pose)
         elif path.is_dir():
-            found = sorted(p for p in path.iterdir() if p.is_file() and p.name[0] != ".")
-            if not found:
-                raise InputError(f"{path} is empty; name a folder that holds recordings.")
-            bare += found
+            bare += files_in(path)
         elif path.is_file():
             bare.append(path)
         else:
@@ -58,8 +54,6 @@ def sort_paths(
 
 
 def _from_table(folder: Path, joint_names: tuple[str, ...], pose: str | None) -> list[Delivery]:
-    from planner.recording.folder import read_recordings
-
     recordings = read_recordings(folder, joint_names)
     rows: dict[str, list[PoseRow]] = {}
     for row in recordings.rows:

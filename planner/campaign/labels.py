@@ -7,9 +7,10 @@ import numpy as np
 from planner.campaign.cell import Cell
 from planner.campaign.events import MeasuredMode
 from planner.campaign.state import Measurement
-from planner.fusion.surrogate import ModalObservations, SimulatedModal
+from planner.fusion.surrogate import ModalObservations
 from planner.modes.compare import align
 from planner.modes.types import ModalModel, Mode
+from planner.physics.dynamics import SimulatedModes
 
 # How far, in log frequency, an unfitted simulation may be off; then the scatter around the shift.
 PRIOR_SD, SCATTER_SD = 0.25, 0.08
@@ -140,6 +141,6 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
     )
 
 
-def _none(count: int) -> SimulatedModal:
+def _none(count: int) -> SimulatedModes:
     empty = np.zeros((0, count))
-    return SimulatedModal(empty, empty, np.zeros((0, count, 3, 3), complex))
+    return SimulatedModes(empty, empty, np.zeros((0, count, 3, 3), complex))

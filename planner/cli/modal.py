@@ -6,9 +6,9 @@ from typing import Any
 from planner.errors import InputError, RefusedError
 from planner.modes.measure import Source, measure
 from planner.modes.types import ModalModel
+from planner.recording.folder import files_in
 
 DEFAULT_BAND_HZ = (4.0, 60.0)
-TABLE = "recordings.csv"
 
 
 def analyse(
@@ -49,10 +49,7 @@ def _sources(paths: tuple[Path, ...]) -> tuple[Source, ...]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.is_file() and p.name != TABLE)
-            if not inside:
-                raise InputError(f"{path} holds no files; name the recordings of one pose.")
-            found += inside
+            found += files_in(path)
         elif path.is_file():
             found.append(path)
         else:

@@ -13,6 +13,7 @@ from scipy.stats import norm, qmc
 from planner.frf import modal
 from planner.fusion.ar1 import AR1, OutputPrior, fit_ar1
 from planner.fusion.data import TrainingData
+from planner.physics.dynamics import SimulatedModes
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
 FREQUENCY = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
@@ -26,18 +27,6 @@ RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
 
 @dataclass(frozen=True, eq=False)
-class SimulatedModal:
-    """What the simulation says at n poses; NaN where it has no such mode.
-
-    frequency_hz (n, k), damping_ratio (n, k), residue (n, k, 3, 3) in m/(N·s).
-    """
-
-    frequency_hz: np.ndarray
-    damping_ratio: np.ndarray
-    residue: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class ModalObservations:
     """Measured modes by label at n poses, x (n, d); NaN where a mode or a column is missing."""
 
@@ -48,7 +37,7 @@ class ModalObservations:
     damping_sd: np.ndarray
     residue: np.ndarray  # (n, k, 3, 3)
     residue_sd: np.ndarray
-    simulated: SimulatedModal
+    simulated: SimulatedModes
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +68,11 @@ class Surrogate:
         """Number of labels."""
         return len(self.scale)
 
-    def frequency_inputs(self, simulated: SimulatedModal) -> np.ndarray:
+    def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
         return self.primary.split(_primary_low(simulated))[1][:, : self.count]
 
-    def predict(self, x: np.ndarray, simulated: SimulatedModal) -> ModalPrediction:
+    def predict(self, x: np.ndarray, simulated: SimulatedModes) -> ModalPrediction:
         """Modes at x (q, d) where the simulation says `simulated`."""
         q, k = len(x), self.count
         mean, sd = self.primary.predict(x, _primary_low(simulated))
@@ -107,7 +96,7 @@ def _relative_sd(sd: np.ndarray) -> np.ndarray:
     return np.sqrt(np.expm1(sd**2)) * np.exp(sd**2 / 2)
 
 
-def _primary_low(simulated: SimulatedModal) -> np.ndarray:
+def _primary_low(simulated: SimulatedModes) -> np.ndarray:
     """Low fidelity (n, 2k) of the primary outputs: log f; none for damping."""
     return np.concatenate(
         [np.log(simulated.frequency_hz), np.full_like(simulated.frequency_hz, np.nan)], axis=1

@@ -9,6 +9,7 @@ from planner.errors import InputError
 from planner.recording.tables import hit_direction
 from planner.recording.types import PoseRow, RecordingsFolder
 
+TABLE = "recordings.csv"
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ROWS = 200_000
 SAME_POSE_DEG = 0.5  # readback of one pose may scatter by less
@@ -16,7 +17,7 @@ SAME_POSE_DEG = 0.5  # readback of one pose may scatter by less
 
 def read_recordings(folder: Path, joint_names: tuple[str, ...]) -> RecordingsFolder:
     """The table of a recordings folder. Raises InputError naming file, row and remedy."""
-    path = folder / "recordings.csv"
+    path = folder / TABLE
     header, lines = _table(path)
     joints = _joint_columns(path, header, joint_names, {"pose", "hit", "repeat", "file"})
     for name in ("pose", "hit", "file"):
@@ -62,6 +63,15 @@ def read_poses(path: Path, joint_names: tuple[str, ...]) -> tuple[PoseRow, ...]:
         angles = tuple(_number(path, number, name, cells[name]) for name in joints)
         rows.append(PoseRow(pose, angles, number, peak_force_n=force))
     return tuple(rows)
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Files of a folder without a table, by name. Raises InputError if there are none."""
+    found = sorted(p for p in folder.iterdir() if p.is_file() and p.name[0] != ".")
+    found = [path for path in found if path.name != TABLE]
+    if not found:
+        raise InputError(f"{folder} holds no recordings; name a folder that does.")
+    return found
 
 
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:

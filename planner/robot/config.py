@@ -5,6 +5,7 @@ from pathlib import Path
 import msgspec
 
 from planner.errors import InputError
+from planner.tomlfile import load_toml
 
 
 class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,14 +49,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def load_config(path: Path) -> RobotConfig:
     """Read and check robot.toml; InputError with one sentence where it is wrong."""
-    try:
-        config = msgspec.toml.decode(path.read_bytes(), type=RobotConfig)
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; name a robot.toml.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); name a file.") from None
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path} is not a valid robot.toml ({error}); correct it.") from None
+    config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
     return config
 

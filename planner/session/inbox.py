@@ -6,9 +6,8 @@ from pathlib import Path
 
 from planner.campaign.store import read_bytes, sha256
 from planner.errors import PlannerError
+from planner.recording.folder import TABLE
 from planner.recording.read import READERS, read
-
-TABLE = "recordings.csv"
 
 
 @dataclass

@@ -13,7 +13,8 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Imported, Proposal
 from planner.campaign.importing import ImportReport
 from planner.errors import InputError, NoPoseLeftError, PlannerError
-from planner.session.inbox import TABLE, Inbox
+from planner.recording.folder import TABLE
+from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.show import terminal
 from planner.show.story import Story

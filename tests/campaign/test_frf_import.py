@@ -4,8 +4,8 @@ import csv
 
 import numpy as np
 import pyuff
-from outside import make_cell
 
+from outside import make_cell
 from planner.campaign.campaign import Campaign
 
 LINES = np.arange(4.0, 130.0, 0.25)

@@ -12,10 +12,10 @@ from planner.fusion.kernels import KERNELS
 from planner.fusion.surrogate import (
     ModalObservations,
     ModalPrediction,
-    SimulatedModal,
     fit_surrogate,
     frf_prediction,
 )
+from planner.physics.dynamics import SimulatedModes
 
 PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.3, amplitude=0.1, nugget=0.01)
 
@@ -138,7 +138,7 @@ def simulated(x, k=4):
     f = np.stack(
         [(8 + 9 * i) * (1 + 0.2 * x[:, 0] * (-1) ** i + 0.1 * x[:, 1]) for i in range(k)], 1
     )
-    return SimulatedModal(f, np.full(f.shape, 0.02), np.full((*f.shape, 3, 3), -1e-6j))
+    return SimulatedModes(f, np.full(f.shape, 0.02), np.full((*f.shape, 3, 3), -1e-6j))
 
 
 def observed(n, seed, scale=1.12):

@@ -1,0 +1,79 @@
+"""How long a person waits, with a peer in the same run: pytest -m slow tests/benchmarks -s"""
+
+import statistics
+import time
+
+import numpy as np
+import pytest
+
+from planner.campaign.cell import Cell
+from planner.campaign.config import load_campaign_config
+from planner.demo import Pool, shipped
+from planner.fusion.surrogate import fit_surrogate
+from planner.modes.measure import Source, measure
+from planner.physics.dynamics import direct_accelerance
+from test_fusion import observed, simulated
+
+pytestmark = pytest.mark.slow
+
+
+def seconds(action, repeats=7):
+    """Median after one warm-up."""
+    action()
+    taken = []
+    for _ in range(repeats):
+        started = time.perf_counter()
+        action()
+        taken.append(time.perf_counter() - started)
+    return statistics.median(taken)
+
+
+@pytest.fixture(scope="module")
+def cell():
+    folder = shipped("kr240_plane")
+    return Cell.load(
+        folder / "robot" / "robot.toml", load_campaign_config(folder / "campaign.toml")
+    )
+
+
+def test_frf_against_a_direct_solution(cell):
+    q, lines = cell.candidates.q[:1], np.linspace(4, 60, 800)
+    simulation, m = cell.simulation, cell.simulation.elastic.matrices(q)
+    ours = seconds(lambda: simulation.accelerance(q, lines))
+    matrices = m.mass[0], simulation.damping, simulation.stiffness, m.hit[0], m.sensor[0]
+    direct = seconds(lambda: direct_accelerance(*matrices, lines), 3)
+    print(
+        f"\nFRF 3 × 3 × 800 lines, 18 elastic rotations: {1e3 * ours:.2f} ms, "
+        f"direct solution {1e3 * direct:.1f} ms, ratio {direct / ours:.0f}"
+    )
+    assert ours < direct
+
+
+def test_files_to_modes(cell):
+    folder = shipped("kr240_plane") / "recordings"
+    rows = Pool.load(folder, cell.robot.joint_names).rows["A34"]
+    sources = tuple(Source(r.file, r.file.name, r.hit) for r in rows)
+    print(f"\n12 hits from files to modes: {seconds(lambda: measure(sources, (4.0, 60.0))):.2f} s")
+
+
+@pytest.mark.filterwarnings("ignore")  # the peer's optimiser meets its bounds
+def test_refit_against_scikit_learn():
+    """80 outputs, hyperparameters averaged, against one point estimate of each of 4 outputs."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    seen = observed(12, 0)
+    query = np.random.default_rng(0).random((500, 2))
+    ours = seconds(lambda: fit_surrogate(seen).predict(query, simulated(query)))
+
+    def peer():
+        for k in range(4):
+            kernel = ConstantKernel(0.01) * Matern([1.0, 1.0], nu=2.5) + WhiteKernel(1e-6)
+            model = GaussianProcessRegressor(kernel, n_restarts_optimizer=5, normalize_y=True)
+            model.fit(seen.x, np.log(seen.frequency_hz[:, k])).predict(query, return_std=True)
+
+    theirs = seconds(peer, 3)
+    print(
+        f"\nrefit and prediction at 500 points: {ours:.2f} s for 80 outputs, scikit-learn with 5 "
+        f"restarts {theirs:.2f} s for 4, ratio per output {theirs / 4 / (ours / 80):.0f}"
+    )
