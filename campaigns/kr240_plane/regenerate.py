@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from planner.truth import inverse
+from planner.truth.deviation import Deviation, Spring
 from planner.truth.hits import record_poses
-from planner.truth.model import Deviation, Spring, Truth, load_truth
+from planner.truth.model import Truth, load_truth
 
 HERE = Path(__file__).parent
 # Table A1 of Busch et al. 2022, mended: see NOTES.md.

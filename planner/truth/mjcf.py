@@ -5,12 +5,11 @@ Neither URDF reader nor rotations are shared with the planner: an error there wo
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from planner.truth.model import Deviation, Spring
+from planner.truth.deviation import Deviation, Spring
 
 
 class Builder:
@@ -20,8 +19,8 @@ class Builder:
         self,
         root: Any,  # ElementTree elements: Any spares a None check per attribute
         table: dict,
-        springs: "tuple[Spring, ...]",
-        deviation: "Deviation",
+        springs: tuple[Spring, ...],
+        deviation: Deviation,
         rng: np.random.Generator,
     ):
         self._links = {link.get("name"): link for link in root.findall("link")}

@@ -26,7 +26,8 @@ for place in sys.argv[3].split(os.pathsep):
     sys.path.insert(0, place)
 from outside import make_cell, record
 from planner.cli.run import run
-from planner.truth.model import Deviation, load_truth
+from planner.truth.deviation import Deviation
+from planner.truth.model import load_truth
 
 root, wanted = Path(sys.argv[1]), int(sys.argv[2])
 truth = load_truth(root / "robot" / "robot.toml", Deviation(seed=3, stiffness=0.12, inertia=0.04))

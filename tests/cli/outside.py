@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
-from planner.truth.model import Deviation, Truth, load_truth
+from planner.truth.model import Truth, load_truth
 from robots import campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")

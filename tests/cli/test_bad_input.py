@@ -196,6 +196,14 @@ def bad_columns(hit) -> dict[str, dict[str, np.ndarray]]:
         "noise only": {**good, "force_n": np.random.default_rng(0).standard_normal(spoilt.size)},
         "clipped": {**good, "acceleration_x_m_s2": np.clip(good["acceleration_x_m_s2"], -1, 1)},
         "two samples": {k: v[:2] for k, v in good.items()},
+        "swapped": {
+            **good,
+            "force_n": good["acceleration_y_m_s2"],
+            "acceleration_y_m_s2": good["force_n"],
+        },
+        "force in an unknown unit": {
+            ("force_parsec" if k == "force_n" else k): v for k, v in good.items()
+        },
     }
 
 
@@ -314,6 +322,17 @@ def test_usage(bench):
         ("frobnicate",),
     ]:
         expect_one_sentence(*call(*arguments), str(arguments[0]))
+
+
+def test_huge_files_are_refused_without_reading_them(bench):
+    root, *_ = bench
+    for name, size in (("huge.uff", 2**30), ("huge.mat", 2**30), ("huge.csv", 2**30)):
+        with open(root / name, "wb") as file:
+            file.truncate(size)
+        expect_one_sentence(*call("modes", root / name, "--json"), name, name, "No modes")
+        expect_one_sentence(*call("import", root / "cell", root / name, "--pose", "G1"), name)
+    expect_one_sentence(*call("predict", root / "cell", root / "huge.csv", "--json"), "huge table")
+    assert sum(p.stat().st_size for p in (root / "cell").rglob("*") if p.is_file()) < 10**8
 
 
 def test_damaged_log_exits_5(bench):

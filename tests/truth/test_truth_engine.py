@@ -13,7 +13,8 @@ from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth import inverse
-from planner.truth.model import AddedMass, Deviation, Spring, load_truth
+from planner.truth.deviation import AddedMass, Deviation, Spring
+from planner.truth.model import load_truth
 
 MASS, RADIUS, MOMENT, STIFFNESS, DAMPING = 3.0, 0.4, 0.05, 2.0e4, 12.0
 INERTIA = MOMENT + MASS * RADIUS**2
