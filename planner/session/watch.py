@@ -14,6 +14,7 @@ from planner.campaign.events import Imported, Proposal
 from planner.campaign.importing import ImportReport
 from planner.errors import InputError, NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
+from planner.replay import replay
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.show import terminal
@@ -54,6 +55,9 @@ def watch(
     with ExitStack() as stack:
         source = keys or stack.enter_context(terminal_keys())
         story = stack.enter_context(Story(campaign.cell, rrd, viewer))
+        if rrd is not None or viewer:  # a resumed session shows what went before, too
+            for step in replay(campaign):
+                story.tell(step.entry, step.state, step.model, step.measured)
         session = _Session(
             campaign, Inbox(folder, quiet_s), console, source, story,
             auto or isinstance(source, NoKeys), hits_per_pose, limit_s,
@@ -74,7 +78,7 @@ class _Session:
         self.measured: list[str] = []
         self.history: list[float] = []
         self.stop = ""
-        self.told = 0
+        self.told = len(campaign.entries)
         self.shown_count = 0
         self.told_of: set[tuple[Path, str]] = set()
         self.announced = False

@@ -63,6 +63,8 @@ class Story:
         pose = next((p for p in model.labelled if p.pose == event.pose), None)
         found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes)
         text = f"Imported {event.pose}: {found or 'no usable modes'}"
+        if any(hit.simulated for hit in event.hits):
+            self._view.label_simulated()
         for hit in event.hits:
             if not hit.accepted:
                 self._view.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")

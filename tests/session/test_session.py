@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 from rich.console import Console
 
 from outside import make_cell, record
@@ -131,8 +132,13 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
     folder = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
     shutil.rmtree(tmp_path / "inbox")
     shutil.copytree(folder, tmp_path / "inbox")
-    watch(campaign, tmp_path / "inbox", console=screen(), keys=Script(screen(), []), auto=True,
-          hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
+    rrd = tmp_path / "session.rrd"
+    for limit_s in (4, 1):  # the second session resumes, and its recording tells it all
+        watch(campaign, tmp_path / "inbox", console=screen(), keys=Script(screen(), []), auto=True,
+              hits_per_pose=9, quiet_s=0.05, limit_s=limit_s, rrd=rrd)  # fmt: skip
+    reader = RrdReader(rrd)
+    seen = {str(chunk.entity_path) for chunk in reader.stream(store=reader.recordings()[0])}
+    assert {"/note", "/frf/picture", "/cell/measured", "/cell/proposed"} <= seen
     measured = campaign.state.measurements[proposal.pose].joints_deg
     off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
     assert 0 < off <= 0.011
