@@ -32,17 +32,22 @@ class OutputPrior:
 
 @dataclass(frozen=True, eq=False)
 class AR1:
-    """Fitted outputs; `uses_low` (m,): which stand on the simulation; `centre` (m,): its mean."""
+    """Fitted outputs; `uses_low` (m,): which stand on the simulation.
+
+    Where the simulation has no value, it is taken as `centre` ± `unknown_sd` (m,).
+    """
 
     posterior: Posterior
     uses_low: np.ndarray
     centre: np.ndarray
+    unknown_sd: np.ndarray
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
         base, offset = self.split(low)
         mean, sd = self.posterior.predict(x, offset)
-        return mean + base, sd
+        blind = self.uses_low[None, :] & ~np.isfinite(low)
+        return mean + base, np.hypot(sd, blind * self.unknown_sd[None, :])
 
     def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""
@@ -61,16 +66,37 @@ def fit_ar1(
     kernel: str = "matern52",
 ) -> AR1:
     """Fit m outputs; per output its prior with and without simulation, and y_L's `centre` (m,)."""
-    n, d = data.x.shape
-    # With no measurement yet the simulation, where there is one, is all there is to stand on.
-    uses_low = np.all(np.isfinite(data.low), axis=0) if n else np.isfinite(centre)
+    uses_low = _uses_low(data, centre)
     centre = np.where(uses_low, np.nan_to_num(centre), 0.0)
+    unknown_sd = _unknown_sd(data.low, without_low)
     priors = [a if u else b for a, b, u in zip(with_low, without_low, uses_low, strict=True)]
-    base = np.where(uses_low[None, :], data.low, 0.0)
-    offset = np.where(uses_low[None, :], data.low - centre[None, :], 0.0)
-    padded = pad(TrainingData(data.x, data.y - base, data.sd, offset), uses_low)
-    posterior = fit(padded, _stack(priors, uses_low, d), samples, kept, kernel)
-    return AR1(posterior, uses_low, centre)
+    blind = uses_low[None, :] & ~np.isfinite(data.low)
+    low = np.where(uses_low[None, :], np.where(blind, centre[None, :], data.low), 0.0)
+    sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
+    padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
+    posterior = fit(padded, _stack(priors, uses_low, data.x.shape[1]), samples, kept, kernel)
+    return AR1(posterior, uses_low, centre, unknown_sd)
+
+
+def _uses_low(data: TrainingData, centre: np.ndarray) -> np.ndarray:
+    """Which outputs (m,) stand on the simulation: those it has at most of the measured poses."""
+    measured, simulated = np.isfinite(data.y), np.isfinite(data.low)
+    most = 2 * np.sum(measured & simulated, axis=0) >= np.sum(measured, axis=0)
+    # With no measurement yet the simulation, where there is one, is all there is to stand on.
+    alone = simulated.any(axis=0) if len(data.x) else np.isfinite(centre)
+    return np.where(measured.any(axis=0), most, alone)
+
+
+def _unknown_sd(low: np.ndarray, priors: tuple[OutputPrior, ...]) -> np.ndarray:
+    """Sd (m,) of the simulation's value where it has none: its scatter over the poses seen."""
+    known = np.isfinite(low)
+    count = np.maximum(known.sum(axis=0), 1)
+    filled = np.where(known, low, 0.0)
+    mean = filled.sum(axis=0) / count
+    scatter = np.sqrt(np.sum(np.where(known, low - mean[None, :], 0.0) ** 2, axis=0) / count)
+    amplitude = np.array([p.amplitude for p in priors])
+    never_seen = np.hypot(amplitude, np.array([p.bias_sd for p in priors]))
+    return np.where(known.sum(axis=0) > 1, np.maximum(scatter, amplitude), never_seen)
 
 
 def _stack(priors: list[OutputPrior], uses_low: np.ndarray, d: int) -> Prior:

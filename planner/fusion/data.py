@@ -12,6 +12,7 @@ class TrainingData:
     """n poses, m outputs. x (n, d) in model coordinates; y, sd, low (n, m), NaN where missing.
 
     `low` is the simulation's value of the same output; a column without any number has none.
+    A value whose sd is NaN still counts: the nugget, which is learned, is then all its noise.
     """
 
     x: np.ndarray
@@ -37,17 +38,17 @@ def capacity(n: int) -> int:
 
 
 def pad(data: TrainingData, uses_low: np.ndarray) -> Padded:
-    """Pad to capacity. A value counts if it and its sd, and its low fidelity if used, are known."""
+    """Pad to capacity. A value counts if it is known, and its low fidelity too where used."""
     n, d = data.x.shape
     m = data.y.shape[1]
     c = capacity(n)
-    known = np.isfinite(data.y) & np.isfinite(data.sd) & (np.isfinite(data.low) | ~uses_low)
+    known = np.isfinite(data.y) & ~np.isinf(data.sd) & (np.isfinite(data.low) | ~uses_low)
     out = Padded(
         np.zeros((c, d)), np.zeros((m, c)), np.ones((m, c)), np.zeros((m, c)), np.zeros((m, c))
     )
     out.x[:n] = data.x
     out.mask[:, :n] = known.T
     out.y[:, :n] = np.where(known, data.y, 0.0).T
-    out.variance[:, :n] = np.where(known, data.sd, 1.0).T ** 2
+    out.variance[:, :n] = np.where(known, np.nan_to_num(data.sd), 1.0).T ** 2
     out.low[:, :n] = np.where(known & uses_low, data.low, 0.0).T
     return out

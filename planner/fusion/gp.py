@@ -18,6 +18,7 @@ from jax import Array
 from jax.scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import norm, qmc
 
+from planner.errors import InputError
 from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.data import Padded
 from planner.fusion.kernels import KERNELS
@@ -114,7 +115,10 @@ class Posterior:
 def fit(
     padded: Padded, prior: Prior, samples: int = 256, kept: int = 32, kernel: str = "matern52"
 ) -> Posterior:
-    """Posterior of all outputs; y and low of `padded` as they are, prior mean taken off here."""
+    """Posterior of all outputs; y and low of `padded` as they are, prior mean taken off here.
+
+    InputError if the covariance stays singular whatever is added to its diagonal.
+    """
     p = prior.theta_mean.shape[1]
     first, second = normal_points(samples, p)
     y = (padded.y - prior.mean[:, None]) * padded.mask
@@ -126,16 +130,17 @@ def fit(
             prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, second, jitter,
         )  # fmt: skip
 
-    theta, whiten, weights = attempt(JITTERS[0])
-    for jitter in JITTERS[1:]:
-        if bool(jnp.all(jnp.isfinite(weights))):
-            break
-        theta, whiten, weights = attempt(jitter)
-        remarks = (f"The covariance was singular; a jitter of {jitter:g} was added.",)
-    return Posterior(
-        padded.x, padded.low, padded.mask, np.array(theta), np.array(whiten), np.array(weights),
-        prior, kernel, remarks,
-    )  # fmt: skip
+    for jitter in JITTERS:
+        theta, whiten, weights = (np.array(a) for a in attempt(jitter))
+        if np.isfinite(weights).all() and np.isfinite(whiten).all():
+            return Posterior(
+                padded.x, padded.low, padded.mask, theta, whiten, weights, prior, kernel, remarks
+            )
+        remarks = (f"The covariance was singular; more than {jitter:g} had to be added to it.",)
+    raise InputError(
+        "No Gaussian process fits the measured modes; set aside poses that are measured twice "
+        "or far off with `planner withdraw`."
+    )
 
 
 def normal_points(samples: int, p: int) -> tuple[np.ndarray, np.ndarray]:
@@ -222,6 +227,10 @@ def _sample(score, first: Array, second: Array, kept: int) -> Array:
     prior = _log_normal(points)
     log_weight = like + prior - jnp.logaddexp(prior, proposal)
     weight = jax.nn.softmax(log_weight)
+    # Every 16th point of a Sobol sequence is not spread evenly; in the order of the steepness of
+    # δ, on which predictions away from the data hang, every 16th is.
+    order = jnp.argsort(points[:, 0] - jnp.mean(points[:, 2:], axis=1))
+    points, weight = points[order], weight[order]
     edges = jnp.cumsum(weight)
     picks = jnp.searchsorted(edges, (jnp.arange(kept) + 0.5) / kept * edges[-1])
     return points[jnp.clip(picks, 0, points.shape[0] - 1)]

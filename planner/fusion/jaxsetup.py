@@ -1,6 +1,8 @@
 """JAX as every module here wants it: float64, strict shapes, compiled code kept between runs."""
 
 import os
+import sys
+import tempfile
 from pathlib import Path
 
 # Matrices here are small: threads gain nothing, and on few cores nested parallel LAPACK calls
@@ -18,13 +20,17 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 
 def _cache_folder() -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    return Path(base) / "planner" if base else Path.home() / ".cache" / "planner"
+    own = "Library/Caches" if sys.platform == "darwin" else ".cache"
+    return (Path(base) if base else Path.home() / own) / "planner" / "jax"
 
 
 try:
-    _cache_folder().mkdir(parents=True, exist_ok=True)
-    jax.config.update("jax_compilation_cache_dir", str(_cache_folder() / "jax"))
+    folder = _cache_folder()
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        pass  # JAX would warn at every compilation if it could not write there
+    jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-except OSError:
+except (OSError, RuntimeError):  # RuntimeError: a user without a home
     pass  # a cache that cannot be kept costs seconds, nothing else

@@ -98,9 +98,13 @@ def _relative_sd(sd: np.ndarray) -> np.ndarray:
 
 def _primary_low(simulated: SimulatedModes) -> np.ndarray:
     """Low fidelity (n, 2k) of the primary outputs: log f; none for damping."""
-    return np.concatenate(
-        [np.log(simulated.frequency_hz), np.full_like(simulated.frequency_hz, np.nan)], axis=1
-    )
+    frequency = _log(simulated.frequency_hz)
+    return np.concatenate([frequency, np.full_like(frequency, np.nan)], axis=1)
+
+
+def _log(value: np.ndarray) -> np.ndarray:
+    """Logarithm; NaN (missing) for what is not positive, as of a mode that a fit left unstable."""
+    return np.log(np.where(value > 0, value, np.nan))
 
 
 def _parts(residue: np.ndarray) -> np.ndarray:
@@ -109,16 +113,24 @@ def _parts(residue: np.ndarray) -> np.ndarray:
     return both.reshape(len(residue), 18 * residue.shape[1])
 
 
-def fit_surrogate(seen: ModalObservations, has_simulation: bool = True) -> Surrogate:
-    """Fit all outputs to the measured modes (n may be 0: then the prior speaks)."""
+def fit_surrogate(
+    seen: ModalObservations, has_simulation: bool = True, reference: SimulatedModes | None = None
+) -> Surrogate:
+    """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
+
+    `reference` is the simulation over the workspace: it says how large frequencies and residues
+    are before anything is measured.
+    """
     k = seen.frequency_hz.shape[1]
-    y = np.concatenate([np.log(seen.frequency_hz), np.log(seen.damping_ratio)], axis=1)
-    sd = np.concatenate(
-        [seen.frequency_sd_hz / seen.frequency_hz, seen.damping_sd / seen.damping_ratio], axis=1
-    )
+    y = np.concatenate([_log(seen.frequency_hz), _log(seen.damping_ratio)], axis=1)
+    f, zeta = np.exp(y[:, :k]), np.exp(y[:, k:])
+    sd = np.concatenate([seen.frequency_sd_hz / f, seen.damping_sd / zeta], axis=1)
     low = _primary_low(seen.simulated)
+    default = np.full(k, np.log(20.0) if has_simulation else np.nan)
+    if reference is not None:
+        default = _centre(_log(reference.frequency_hz), default)
     centre = np.full(2 * k, np.nan)
-    centre[:k] = _centre(low[:, :k], np.log(20.0) if has_simulation else np.nan)
+    centre[:k] = _centre(low[:, :k], default)
     primary = fit_ar1(
         TrainingData(seen.x, y, sd, low),
         (*[FREQUENCY] * k, *[DAMPING] * k),
@@ -127,7 +139,7 @@ def fit_surrogate(seen: ModalObservations, has_simulation: bool = True) -> Surro
         SAMPLES,
         KEPT,
     )
-    scale = _scale(seen)
+    scale = _scale(seen, reference)
     wide = np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
@@ -142,17 +154,18 @@ def fit_surrogate(seen: ModalObservations, has_simulation: bool = True) -> Surro
     return Surrogate(primary, residue, scale)
 
 
-def _centre(low: np.ndarray, default: float) -> np.ndarray:
-    """Mean of each column, `default` where nothing is known."""
+def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:
+    """Mean of each column (k,), `default` (k,) where nothing is known."""
     known = np.isfinite(low)
     total = np.where(known, low, 0.0).sum(axis=0)
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), default)
 
 
-def _scale(seen: ModalObservations) -> np.ndarray:
+def _scale(seen: ModalObservations, reference: SimulatedModes | None) -> np.ndarray:
     """Size (k,) of each mode's residues: measured, else simulated, else typical."""
     out = np.full(seen.frequency_hz.shape[1], np.nan)
-    for residue in (seen.residue, seen.simulated.residue):
+    simulated = reference.residue if reference is not None else seen.simulated.residue
+    for residue in (seen.residue, seen.simulated.residue, simulated):
         size = np.abs(residue)
         known = np.isfinite(size)
         mean = np.where(known, size, 0.0) ** 2

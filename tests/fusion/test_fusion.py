@@ -65,9 +65,9 @@ def test_posterior_is_the_textbook_one(kernel):
             own = _covariance(kernel, xq, offset[:, j], xq, offset[:, j], theta)
             means.append(cross.T @ inverse @ (training.y[:, j] - training.low[:, j]))
             variances.append(np.diag(own - cross.T @ inverse @ cross))
-        np.testing.assert_allclose(mean[:, j] - base[:, j], np.mean(means, axis=0), atol=1e-8)
+        np.testing.assert_allclose(mean[:, j] - base[:, j], np.mean(means, axis=0), atol=1e-10)
         variance = np.mean(variances, axis=0) + np.var(means, axis=0)
-        np.testing.assert_allclose(sd[:, j] ** 2, variance, atol=1e-8)
+        np.testing.assert_allclose(sd[:, j] ** 2, variance, atol=1e-10)
 
 
 def _covariance(kernel, xa, la, xb, lb, theta):
@@ -126,7 +126,6 @@ def test_padding_changes_nothing_and_growth_compiles_nothing():
     assert np.array_equal(results[-1], again)  # bit for bit
     small, large = data(16), data(17)
     cut = TrainingData(*(a[:16] for a in vars(large).values()))
-    np.testing.assert_allclose(cut.y, small.y[:16] * 0 + cut.y)
     masked = TrainingData(large.x, np.vstack([cut.y, np.full((1, 3), np.nan)]), large.sd, large.low)
     a = fit(cut).predict(small.x, small.low)
     b = fit(masked).predict(small.x, small.low)
