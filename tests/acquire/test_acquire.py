@@ -60,6 +60,39 @@ def test_planned_poses_count_as_if_measured(surrogate):
     )
 
 
+@pytest.mark.parametrize("name", ACQUISITIONS)
+def test_a_score_belongs_to_its_candidate_alone(surrogate, name):
+    """More candidates than are taken at a time, in another order: the same score for each."""
+    x = np.random.default_rng(8).random((300, 2))
+    low = surrogate.frequency_inputs(simulated(x))
+    outputs = FrequencyOutputs.of(surrogate, X[:20], surrogate.frequency_inputs(simulated(X[:20])))
+    order = np.random.default_rng(9).permutation(300)
+    score = ACQUISITIONS[name](outputs, x, low)
+    again = ACQUISITIONS[name](outputs, x[order], low[order])
+    np.testing.assert_allclose(again, score[order], rtol=1e-9)
+    assert (score > 0).all()
+    assert ACQUISITIONS[name](outputs, x[:0], low[:0]).shape == (0,)
+
+
+def test_variance_is_what_prediction_says_but_for_doubt_about_hyperparameters(surrogate):
+    low = surrogate.frequency_inputs(simulated(X))
+    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30])
+    _, sd = surrogate.primary.predict(
+        X, np.concatenate([np.log(simulated(X).frequency_hz), np.full((120, 4), np.nan)], axis=1)
+    )
+    total = np.mean(sd[:, :4] ** 2, axis=1)
+    score = ACQUISITIONS["variance"](outputs, X, low)
+    assert (score <= total * (1 + 1e-9)).all()
+    assert np.corrcoef(score, total)[0, 1] > 0.9
+
+
+def test_a_planned_pose_is_known_to_within_its_noise(surrogate):
+    low = surrogate.frequency_inputs(simulated(X))
+    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30]).planning(X[40], low[40])
+    for k in range(4):
+        assert outputs.variance(k, X[40:41], low[40:41])[0] <= outputs.noise[k]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_every_strategy_keeps_the_contract(surrogate, name):
     taken = X[:20]
