@@ -7,7 +7,8 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.robot import Robot, silenced
+from planner.robot.robot import Robot
+from planner.robot.urdf import mesh_folders, quiet
 
 LIMIT_TOLERANCE_RAD = 1e-9
 ALWAYS = 24  # poses at which a pair must touch to be taken for overlapping geometry
@@ -16,49 +17,75 @@ ALWAYS = 24  # poses at which a pair must touch to be taken for overlapping geom
 class Collisions:
     """Says what keeps a robot from standing at a pose.
 
-    Checked are all pairs of links except neighbours, links that overlap at every pose (their
-    geometry does, not the robot), and those that robot.toml's [collision] ignores; and every
-    moving link against every [[obstacle]].
+    Checked are all pairs of links except neighbours (shapes at a joint overlap by design), links
+    that touch at every one of a spread of poses (their geometry does, not the robot), and those
+    that robot.toml's [collision] ignores; and every moving link against every [[obstacle]].
+    An obstacle that is always touched stays in: there it is the obstacle that is wrong, and only
+    the engineer can tell. Raises InputError where [collision] names what does not exist.
     """
 
     def __init__(self, robot: Robot):
         self.robot = robot
+        self._check_names()
+
+    def _check_names(self) -> None:
+        config, model = self.robot.config, self.robot.model
+        obstacles = {block.name for block in config.obstacle}
+        links = {str(f.name) for f in model.frames if f.type == pin.FrameType.BODY}
+        for name in sorted(obstacles & links):
+            raise InputError(
+                f'{self.robot.path}: [[obstacle]] "{name}" has the name of a link of '
+                f"{self.robot.urdf_path.name}; rename it."
+            )
+        for name in (name for pair in config.collision.ignore for name in pair):
+            if name not in obstacles | links:
+                raise InputError(
+                    f'{self.robot.path}: [collision] ignore names "{name}", which is neither a '
+                    f"link of {self.robot.urdf_path.name} nor an [[obstacle]]; correct it."
+                )
 
     @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data]:
         robot = self.robot
         geometry = _link_geometry(robot)
         links = list(range(geometry.ngeoms))
-        boxes = [geometry.addGeometryObject(obj) for obj in _obstacles(robot)]
-        ignored = {frozenset(pair) for pair in robot.config.collision.ignore}
         for i, j in [(i, j) for i in links for j in links if i < j]:
             a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
-            names = frozenset((self._link(geometry, i), self._link(geometry, j)))
-            if names not in ignored and not _neighbours(robot.model, a, b):
+            if not self._ignored(geometry, i, j) and not _neighbours(robot.model, a, b):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
-        for i in links:
-            for box in boxes:
-                names = frozenset((self._link(geometry, i), geometry.geometryObjects[box].name))
-                if geometry.geometryObjects[i].parentJoint > 0 and names not in ignored:
-                    geometry.addCollisionPair(pin.CollisionPair(i, box))
         self._drop_overlapping(geometry)
+        for box in [geometry.addGeometryObject(obj) for obj in _obstacles(robot)]:
+            for i in links:
+                moves = geometry.geometryObjects[i].parentJoint > 0
+                if moves and not self._ignored(geometry, i, box):
+                    geometry.addCollisionPair(pin.CollisionPair(i, box))
+        return geometry, self._data(geometry), robot.model.createData()
+
+    def _data(self, geometry: pin.GeometryModel) -> pin.GeometryData:
         data = geometry.createData()
         for request in data.collisionRequests:
-            request.security_margin = robot.config.collision.margin_m
-        return geometry, data, robot.model.createData()
+            request.security_margin = self.robot.config.collision.margin_m
+        return data
 
-    def _link(self, geometry: pin.GeometryModel, index: int) -> str:
-        frame = geometry.geometryObjects[index].parentFrame
-        return str(self.robot.model.frames[frame].name)
+    def _name(self, geometry: pin.GeometryModel, index: int) -> str:
+        """Link or obstacle that a shape belongs to."""
+        shape = geometry.geometryObjects[index]
+        if shape.parentFrame >= self.robot.model.nframes:  # obstacles belong to no frame
+            return shape.name
+        return str(self.robot.model.frames[shape.parentFrame].name)
+
+    def _ignored(self, geometry: pin.GeometryModel, i: int, j: int) -> bool:
+        names = {self._name(geometry, i), self._name(geometry, j)}
+        return any(names == set(pair) for pair in self.robot.config.collision.ignore)
 
     def _drop_overlapping(self, geometry: pin.GeometryModel) -> None:
         """Remove pairs of links that touch at every one of a spread of poses."""
         rng = np.random.default_rng(0)
-        robot, data = self.robot, geometry.createData()
+        robot, data, kinematics = self.robot, self._data(geometry), self.robot.model.createData()
         always = np.ones(len(geometry.collisionPairs), dtype=bool)
         for _ in range(ALWAYS):
             q = rng.uniform(robot.lower_rad, robot.upper_rad)
-            pin.computeCollisions(robot.model, robot.model.createData(), geometry, data, q, False)
+            pin.computeCollisions(robot.model, kinematics, geometry, data, q, False)
             always &= [r.isCollision() for r in data.collisionResults]
         for pair in [p for p, a in zip(list(geometry.collisionPairs), always, strict=True) if a]:
             geometry.removeCollisionPair(pair)
@@ -69,7 +96,9 @@ class Collisions:
         for name, value, low, high in zip(
             robot.joint_names, q, robot.lower_rad, robot.upper_rad, strict=True
         ):
-            if value < low - LIMIT_TOLERANCE_RAD or value > high + LIMIT_TOLERANCE_RAD:
+            if np.isnan(value):
+                found.append(f"{name} has no angle")
+            elif not low - LIMIT_TOLERANCE_RAD <= value <= high + LIMIT_TOLERANCE_RAD:
                 side, limit = ("below", low) if value < low else ("above", high)
                 found.append(
                     f"{name} at {np.rad2deg(value):.1f}° is {side} its limit of "
@@ -78,7 +107,7 @@ class Collisions:
         return tuple(found)
 
     def contacts(self, q: np.ndarray) -> tuple[str, ...]:
-        """Pairs in contact, one phrase each."""
+        """Pairs in contact (closer than margin_m) at finite q (dof,), one phrase each."""
         geometry, data, kinematics = self._geometry
         if not len(geometry.collisionPairs):
             return ()
@@ -87,9 +116,8 @@ class Collisions:
         found = []
         for pair, result in zip(geometry.collisionPairs, data.collisionResults, strict=True):
             if result.isCollision():
-                second = geometry.geometryObjects[pair.second]
-                other = self._link(geometry, pair.second) if second.parentJoint else second.name
-                found.append(f"{self._link(geometry, pair.first)} touches {other}")
+                names = self._name(geometry, pair.first), self._name(geometry, pair.second)
+                found.append(" touches ".join(names))
         return tuple(dict.fromkeys(found))
 
     def free(self, q: np.ndarray) -> bool:
@@ -104,12 +132,13 @@ class Collisions:
 
     def violations(self, q: np.ndarray) -> tuple[str, ...]:
         """All that is wrong with a pose (dof,), limits first; empty when it is free."""
-        return self.limits(q) + self.contacts(q)
+        limits = self.limits(q)
+        return limits + self.contacts(q) if np.all(np.isfinite(q)) else limits
 
 
 def _link_geometry(robot: Robot) -> pin.GeometryModel:
-    folders = [str(robot.urdf_path.parent), str(robot.urdf_path.parent.parent)]
-    with silenced():
+    folders = mesh_folders(robot.urdf_path)
+    with quiet():
         try:
             return pin.buildGeomFromUrdfString(
                 robot.model, robot.urdf_text, pin.GeometryType.COLLISION, package_dirs=folders

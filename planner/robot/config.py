@@ -68,14 +68,34 @@ def _check(config: RobotConfig, path: Path) -> None:
         length = sum(a * a for a in block.axis) ** 0.5
         if not abs(length - 1) < 1e-3:
             raise InputError(f"{entry} has an axis of length {length:.4g}; give a unit vector.")
-    for block in config.obstacle:
-        if not all(0 < size < 1e4 for size in block.size_m):
-            raise InputError(
-                f"{path}: [[obstacle]] {block.name} has sizes {list(block.size_m)}; "
-                f"give three lengths above 0 m."
-            )
+    _check_obstacles(config, path)
+    margin = config.collision.margin_m
+    if not 0 <= margin < 1:
+        raise InputError(
+            f"{path}: [collision] margin_m is {margin}; it must be at least 0 m and below 1 m."
+        )
     low, high = config.band_hz
     if not 0 < low < high < float("inf"):
         raise InputError(f"{path}: band_hz {[low, high]} must rise from above 0 Hz; correct it.")
     if not all(abs(g) < 100 for g in config.gravity):
         raise InputError(f"{path}: gravity {list(config.gravity)} is not in m/s²; correct it.")
+
+
+def _check_obstacles(config: RobotConfig, path: Path) -> None:
+    names = [block.name for block in config.obstacle]
+    for number, block in enumerate(config.obstacle, 1):
+        if names.index(block.name) != number - 1:
+            raise InputError(
+                f'{path}: [[obstacle]] number {number} is named "{block.name}" like an earlier '
+                f"one; give every obstacle a name of its own."
+            )
+        if not all(0 < size < 1e4 for size in block.size_m):
+            raise InputError(
+                f"{path}: [[obstacle]] {block.name} has sizes {list(block.size_m)}; "
+                f"give three lengths above 0 m."
+            )
+        if not all(abs(value) < 1e4 for value in (*block.center_m, *block.rpy_deg)):
+            raise InputError(
+                f"{path}: [[obstacle]] {block.name} has center_m {list(block.center_m)} and "
+                f"rpy_deg {list(block.rpy_deg)}; give finite numbers."
+            )

@@ -13,6 +13,8 @@ import pinocchio as pin
 from planner.errors import InputError
 from planner.robot.robot import Robot
 
+SINGULAR = 1e-12  # smallest eigenvalue of the mass matrix scaled to ones on its diagonal
+
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
@@ -38,12 +40,26 @@ class ElasticModel:
         self.robot = robot
         self.stiffness = np.array([c.stiffness for c in robot.config.compliance])
         self.damping = np.array([c.damping for c in robot.config.compliance])
-        self._model, rigid, elastic = _with_virtual_joints(robot)
+        self._model, rigid, elastic, (self._tcp, self._sensor) = _with_virtual_joints(robot)
         self._data = self._model.createData()
         self._rigid, self._elastic = np.array(rigid), np.array(elastic)
         self._grid = np.ix_(self._elastic, self._elastic)
-        self._tcp = self._model.getFrameId(robot.config.tcp_frame)
-        self._sensor = self._model.getFrameId(robot.config.sensor_frame)
+        self._check_mass()
+
+    def _check_mass(self) -> None:
+        """Every elastic rotation must move inertia of its own; otherwise no M⁻¹ exists."""
+        middle = (self.robot.lower_rad + self.robot.upper_rad) / 2
+        mass = self.matrices(middle).mass[0]
+        scale = np.sqrt(np.maximum(np.diagonal(mass), np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(mass / np.outer(scale, scale))
+        if not values[0] > SINGULAR:
+            number = int(np.argmax(np.abs(vectors[:, 0])))
+            block = self.robot.config.compliance[number]
+            raise InputError(
+                f"{self.robot.path}: [[compliance]] number {number + 1} ({block.joint}) moves no "
+                f"inertia of its own; give the links outboard of it an <inertial> in "
+                f"{self.robot.urdf_path.name}, or remove the block if its axis is listed twice."
+            )
 
     @property
     def size(self) -> int:
@@ -68,8 +84,10 @@ class ElasticModel:
         return Matrices(mass, hit, sensor)
 
 
-def _with_virtual_joints(robot: Robot) -> tuple[pin.Model, list[int], list[int]]:
-    """The robot's model with virtual joints, and where its own and they stand in q.
+def _with_virtual_joints(
+    robot: Robot,
+) -> tuple[pin.Model, list[int], list[int], tuple[int, int]]:
+    """The robot's model with virtual joints, where its own and they stand in q, tcp and sensor.
 
     The virtual joints are listed in the order of robot.toml.
     """
@@ -101,9 +119,12 @@ def _with_virtual_joints(robot: Robot) -> tuple[pin.Model, list[int], list[int]]
                 place[number] = model.joints[outer].idx_q
         model.appendBodyToJoint(outer, source.inertias[joint], pin.SE3.Identity())
         last[joint] = outer
-    for name in {config.tcp_frame, config.sensor_frame}:
-        frame = source.frames[source.getFrameId(name)]
-        model.addFrame(
-            pin.Frame(name, last[frame.parentJoint], 0, frame.placement, pin.FrameType.OP_FRAME)
+    frames = []
+    for name, index in (("tcp", robot.tcp_id), ("sensor", robot.sensor_id)):
+        frame = source.frames[index]
+        parent = last[frame.parentJoint]
+        frames.append(
+            model.addFrame(pin.Frame(name, parent, 0, frame.placement, pin.FrameType.OP_FRAME))
         )
-    return model, rigid, [place[number] for number in range(len(config.compliance))]
+    elastic = [place[number] for number in range(len(config.compliance))]
+    return model, rigid, elastic, (frames[0], frames[1])

@@ -10,14 +10,21 @@ from planner.robot.robot import Robot
 
 TOLERANCE = 1e-6  # m and rad
 DAMPING = 1e-3
+STALLED = 12  # iterations without progress after which a descent is given up
+OUT_OF_REACH = "out of reach"
 
 
 @dataclass(frozen=True, eq=False)
 class InverseResult:
-    """Joint angles (dof,) in rad, or None and the reason in words."""
+    """Joint angles (dof,) in rad, or None with the reason in words and its kind.
+
+    `kind` holds no figures, so that kinds can be counted: "out of reach", "limit of joint_3" or
+    "link_4 touches table".
+    """
 
     q: np.ndarray | None
     reason: str = ""
+    kind: str = ""
 
 
 def solve(
@@ -31,44 +38,60 @@ def solve(
 ) -> InverseResult:
     """Angles at which the tcp has the given rotation (3, 3) and position (3,).
 
-    Damped least squares (Wampler 1986) from `start`, the middle of the range, then random
+    Damped least squares (Wampler 1986) from `start` or the middle of the range, then from random
     starts; the same call gives the same answer. Of what fails, the nearest miss is reported:
     contact before limit before reach.
     """
+    beyond = float(np.linalg.norm(np.asarray(position_m) - robot.shoulder_m)) - robot.reach_m
+    if beyond > TOLERANCE:
+        return _unreached(beyond)
     target = pin.SE3(np.asarray(rotation, dtype=float), np.asarray(position_m, dtype=float))
     rng = np.random.default_rng(seed)
     middle = (robot.lower_rad + robot.upper_rad) / 2
-    starts = [middle if start is None else np.asarray(start, dtype=float)]
+    at = middle if start is None else np.asarray(start, dtype=float)
     contact = limit = ""
     miss_m = np.inf
     for attempt in range(restarts + 1):
         if attempt:
-            starts.append(rng.uniform(robot.lower_rad, robot.upper_rad))
-        q, error_m = _descend(robot, target, starts[-1], bounded=True)
+            at = rng.uniform(robot.lower_rad, robot.upper_rad)
+        q, error_m = _descend(robot, target, at, bounded=True)
+        if q is None and not contact and (restarts or not limit):
+            q, broken = _beyond_limits(robot, target, at)
+            limit = limit or broken
+            # A warm start alone is meant to stay on its branch: no turning around the limits.
+            q = q if restarts else None
         if q is not None:
             contacts = collisions.contacts(q) if collisions else ()
             if not contacts:
                 return InverseResult(q)
             contact = contact or contacts[0]
-            continue
         miss_m = min(miss_m, error_m)
-        if not limit and not contact:
-            limit = _beyond_limits(robot, target, starts[-1])
     if contact:
-        return InverseResult(None, contact)
+        return InverseResult(None, contact, contact)
     if limit:
-        return InverseResult(None, limit)
-    return InverseResult(None, f"out of reach: the tool comes no closer than {miss_m:.3f} m")
+        return InverseResult(None, limit, f"limit of {limit.split(' at ')[0]}")
+    return _unreached(miss_m)
 
 
-def _beyond_limits(robot: Robot, target: pin.SE3, start: np.ndarray) -> str:
-    """Which limit a solution without limits would break; empty if there is none."""
+def _unreached(miss_m: float) -> InverseResult:
+    text = f"{OUT_OF_REACH}: the tool comes no closer than {miss_m:.3f} m in this orientation"
+    return InverseResult(None, text, OUT_OF_REACH)
+
+
+def _beyond_limits(
+    robot: Robot, target: pin.SE3, start: np.ndarray
+) -> tuple[np.ndarray | None, str]:
+    """A solution found without minding the limits, if whole turns bring it within them.
+
+    Otherwise None and the first limit that it would break; "" if there is no solution at all.
+    """
     q, _ = _descend(robot, target, start, bounded=False)
     if q is None:
-        return ""
-    q = (q + np.pi) % (2 * np.pi) - np.pi
+        return None, ""
+    middle = (robot.lower_rad + robot.upper_rad) / 2
+    q = q - 2 * np.pi * np.round((q - middle) / (2 * np.pi))
     broken = Collisions(robot).limits(q)
-    return broken[0] if broken else ""
+    return (None, broken[0]) if broken else (q, "")
 
 
 def _descend(
@@ -77,7 +100,7 @@ def _descend(
     """Solution or None, and the position error left (m)."""
     model, data, frame = robot.model, robot._data, robot.tcp_id
     q, damping = start.copy(), DAMPING
-    best = np.inf
+    best, since = np.inf, 0
     for _ in range(iterations):
         pin.framesForwardKinematics(model, data, q)
         error = pin.log6(data.oMf[frame].actInv(target)).vector
@@ -85,7 +108,10 @@ def _descend(
         if size < TOLERANCE:
             return q, 0.0
         damping = max(damping * 0.3, 1e-6) if size < best else min(damping * 10, 1.0)
+        since = 0 if size < 0.999 * best else since + 1
         best = min(best, size)
+        if since == STALLED:
+            break
         jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
         step = _step(jacobian, error, damping)
         if bounded:

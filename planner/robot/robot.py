@@ -1,10 +1,6 @@
 """A robot: kinematics and limits from its URDF, the elastic part from robot.toml."""
 
-import os
-import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +10,15 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.config import RobotConfig, load_config
+from planner.robot.urdf import build_model, joint_axes, read_urdf
 
-FIXED, TURNING = ("fixed",), ("revolute", "continuous")
+# A link and the joint that carries it may share a name; the link is meant.
+FRAME_TYPES = (
+    pin.FrameType.BODY,
+    pin.FrameType.FIXED_JOINT,
+    pin.FrameType.JOINT,
+    pin.FrameType.OP_FRAME,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,27 +37,23 @@ class Robot:
         """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy."""
         config = load_config(robot_toml)
         urdf = (robot_toml.parent / config.urdf).resolve()
-        root = _parse(urdf, robot_toml)
-        axes = _axes(root, urdf)
+        root = read_urdf(urdf, robot_toml)
         text = ElementTree.tostring(root, encoding="unicode")
-        with silenced():
-            try:
-                model = pin.buildModelFromXML(text)
-            except Exception as error:
-                raise InputError(f"{urdf} is not a usable URDF ({error}); correct it.") from None
+        model = build_model(text, urdf)
+        axes = joint_axes(root, tuple(model.names)[1:])
         robot = cls(config, robot_toml, urdf, text, model, axes)
         robot._check()
         return robot
 
     def _check(self) -> None:
-        for entry, frame in (
+        for entry, name in (
             ("tcp_frame", self.config.tcp_frame),
             ("sensor_frame", self.config.sensor_frame),
         ):
-            if not self.model.existFrame(frame):
+            if self.model.frames[self._frame_id(entry, name)].parentJoint == 0:
                 raise InputError(
-                    f'{self.path}: {entry} "{frame}" is no frame of {self.urdf_path.name}; '
-                    f"add it there as a link on a fixed joint, or correct the name."
+                    f'{self.path}: {entry} "{name}" is fixed to the base and never moves; name a '
+                    f"frame on the tool."
                 )
         for block in self.config.compliance:
             if block.joint not in self.joint_names:
@@ -101,7 +100,39 @@ class Robot:
     @cached_property
     def tcp_id(self) -> int:
         """Pinocchio's frame number of the tcp."""
-        return self.model.getFrameId(self.config.tcp_frame)
+        return self._frame_id("tcp_frame", self.config.tcp_frame)
+
+    @cached_property
+    def sensor_id(self) -> int:
+        """Pinocchio's frame number of the sensor."""
+        return self._frame_id("sensor_frame", self.config.sensor_frame)
+
+    def _frame_id(self, entry: str, name: str) -> int:
+        for kind in FRAME_TYPES:
+            if name != "universe" and self.model.existFrame(name, kind):
+                return self.model.getFrameId(name, kind)
+        raise InputError(
+            f'{self.path}: {entry} "{name}" is no frame of {self.urdf_path.name}; '
+            f"add it there as a link on a fixed joint, or correct the name."
+        )
+
+    @cached_property
+    def shoulder_m(self) -> np.ndarray:
+        """Where the first joint of the tcp's chain stands in the world (3,)."""
+        joint = self.model.frames[self.tcp_id].parentJoint
+        while self.model.parents[joint] != 0:
+            joint = self.model.parents[joint]
+        return np.array(self.model.jointPlacements[joint].translation)
+
+    @cached_property
+    def reach_m(self) -> float:
+        """No pose brings the tcp farther from the shoulder than this (arm pulled straight)."""
+        frame = self.model.frames[self.tcp_id]
+        length, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
+        while self.model.parents[joint] != 0:
+            length += float(np.linalg.norm(self.model.jointPlacements[joint].translation))
+            joint = self.model.parents[joint]
+        return length
 
     def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) and position (3,) of the tcp in the world at q (dof,)."""
@@ -121,75 +152,3 @@ class Robot:
         return pin.computeFrameJacobian(
             self.model, self._data, np.asarray(q, dtype=float), self.tcp_id, pin.LOCAL
         )
-
-
-def _parse(urdf: Path, robot_toml: Path) -> ElementTree.Element:
-    try:
-        root = ElementTree.fromstring(urdf.read_bytes())
-    except FileNotFoundError:
-        raise InputError(
-            f"{robot_toml}: its URDF {urdf} does not exist; correct the entry urdf."
-        ) from None
-    except (OSError, ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
-    if root.tag != "robot":
-        raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
-    return root
-
-
-def _axes(root: ElementTree.Element, urdf: Path) -> tuple[np.ndarray, ...]:
-    """Axes of the turning joints, sorted as Pinocchio will number them; limits completed."""
-    axes: dict[str, np.ndarray] = {}
-    for joint in root.findall("joint"):
-        name, kind = joint.get("name", "?"), joint.get("type")
-        if kind in FIXED:
-            continue
-        if kind not in TURNING:
-            raise InputError(
-                f"{urdf}: joint {name} is of type {kind}; only revolute, continuous and fixed "
-                f"joints are supported."
-            )
-        limit = joint.find("limit")
-        if kind == "continuous":
-            speed = "3.14" if limit is None else limit.get("velocity", "3.14")
-            joint.set("type", "revolute")
-            for old in joint.findall("limit"):
-                joint.remove(old)
-            ElementTree.SubElement(
-                joint, "limit", lower=str(-np.pi), upper=str(np.pi), velocity=speed, effort="0"
-            )
-        elif limit is None:
-            raise InputError(f"{urdf}: revolute joint {name} has no <limit>; add its range.")
-        element = joint.find("axis")
-        text = "1 0 0" if element is None else element.get("xyz", "1 0 0")
-        try:
-            axis = np.array([float(v) for v in text.split()])
-            axes[name] = axis / np.linalg.norm(axis)
-        except ValueError:
-            raise InputError(f'{urdf}: joint {name} has axis "{text}"; give 3 numbers.') from None
-    if not axes:
-        raise InputError(f"{urdf} has no turning joint; name the URDF of a robot arm.")
-    with silenced():
-        try:
-            model = pin.buildModelFromXML(ElementTree.tostring(root, encoding="unicode"))
-        except Exception as error:
-            raise InputError(f"{urdf} is not a usable URDF ({error}); correct it.") from None
-    return tuple(axes[name] for name in tuple(model.names)[1:])
-
-
-@contextmanager
-def silenced() -> Iterator[None]:
-    """Keep the URDF parser's own chatter off the terminal (it writes past Python)."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = [os.dup(1), os.dup(2)]
-    null = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(null, 1)
-        os.dup2(null, 2)
-        yield
-    finally:
-        for number, handle in enumerate(kept, 1):
-            os.dup2(handle, number)
-            os.close(handle)
-        os.close(null)

@@ -1,0 +1,194 @@
+"""URDF files: read, checked, and parsed by Pinocchio without chatter on the terminal."""
+
+import os
+import re
+import sys
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from planner.errors import InputError
+
+FIXED, TURNING = ("fixed",), ("revolute", "continuous")
+
+
+def read_urdf(urdf: Path, robot_toml: Path) -> ElementTree.Element:
+    """The checked XML; continuous joints are given limits of ±180°. Raises InputError."""
+    try:
+        root = ElementTree.fromstring(urdf.read_bytes())
+    except FileNotFoundError:
+        raise InputError(
+            f"{robot_toml}: its URDF {urdf} does not exist; correct the entry urdf."
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f"{robot_toml}: its URDF {urdf} cannot be read ({error.strerror}); correct the entry "
+            f"urdf."
+        ) from None
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
+    if root.tag != "robot":
+        raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
+    turning = [joint for joint in root.findall("joint") if joint.get("type") not in FIXED]
+    for joint in turning:
+        _complete(joint, urdf)
+    if not turning:
+        raise InputError(f"{urdf} has no turning joint; name the URDF of a robot arm.")
+    _check_tree(root, urdf)
+    _check_shapes(root, urdf)
+    return root
+
+
+def build_model(text: str, urdf: Path) -> pin.Model:
+    """Pinocchio's model; InputError with the parser's own words where it refuses or skips."""
+    with quiet() as said:
+        try:
+            model = pin.buildModelFromXML(text)
+        except Exception as error:
+            fault = _complaint(said()) or " ".join(str(error).split())
+            raise InputError(f"{urdf} is not a usable URDF ({fault}); correct it.") from None
+        # The parser goes on without an <inertial> or <collision> that it does not understand.
+        if "Could not parse" in said():
+            raise InputError(f"{urdf} is not a usable URDF ({_complaint(said())}); correct it.")
+    _check_inertias(model, urdf)
+    return model
+
+
+def joint_axes(root: ElementTree.Element, names: tuple[str, ...]) -> tuple[np.ndarray, ...]:
+    """Unit axes (3,) of the named joints in their own frames."""
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    axes = [_numbers(_axis_text(joints[name])) for name in names]
+    return tuple(axis / np.linalg.norm(axis) for axis in axes)
+
+
+def mesh_folders(urdf: Path) -> list[str]:
+    """Where meshes (package://, relative) are looked for."""
+    return [str(urdf.parent), str(urdf.parent.parent)]
+
+
+@contextmanager
+def quiet() -> Iterator:
+    """Keep the parser's chatter off the terminal (it writes past Python); yields what it said."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [os.dup(1), os.dup(2)]
+    with tempfile.TemporaryFile() as file:
+
+        def said() -> str:
+            file.seek(0)
+            return file.read().decode(errors="replace")
+
+        try:
+            os.dup2(file.fileno(), 1)
+            os.dup2(file.fileno(), 2)
+            yield said
+        finally:
+            for number, handle in enumerate(kept, 1):
+                os.dup2(handle, number)
+                os.close(handle)
+
+
+def _complaint(chatter: str) -> str:
+    """What the parser found, and (its second line) in which joint or link."""
+    lines = re.findall(r"Error:\s*(.+)", chatter)[:2]
+    return ", ".join(dict.fromkeys(line.split(".  ")[0].strip().rstrip(".") for line in lines))
+
+
+def _axis_text(joint: ElementTree.Element) -> str:
+    element = joint.find("axis")
+    return "1 0 0" if element is None else element.get("xyz", "1 0 0")
+
+
+def _numbers(text: str) -> np.ndarray:
+    try:
+        return np.array([float(v) for v in text.split()])
+    except ValueError:
+        return np.full(3, np.nan)
+
+
+def _complete(joint: ElementTree.Element, urdf: Path) -> None:
+    """Check a moving joint's type, axis and limits; give a continuous one limits of ±180°."""
+    name, kind, limit = joint.get("name", "?"), joint.get("type"), joint.find("limit")
+    if kind not in TURNING:
+        raise InputError(
+            f"{urdf}: joint {name} is of type {kind}; only revolute, continuous and fixed "
+            f"joints are supported."
+        )
+    axis = _numbers(_axis_text(joint))
+    if axis.shape != (3,) or not 1e-6 < np.linalg.norm(axis) < np.inf:
+        raise InputError(
+            f'{urdf}: joint {name} has axis "{_axis_text(joint)}"; give 3 numbers, not all 0.'
+        )
+    if joint.find("mimic") is not None:
+        raise InputError(
+            f"{urdf}: joint {name} follows another joint (<mimic>), which is not supported; "
+            f"make it a fixed joint."
+        )
+    if kind == "continuous":
+        speed = "3.14" if limit is None else limit.get("velocity", "3.14")
+        joint.set("type", "revolute")
+        for old in joint.findall("limit"):
+            joint.remove(old)
+        ElementTree.SubElement(
+            joint, "limit", lower=str(-np.pi), upper=str(np.pi), velocity=speed, effort="0"
+        )
+    elif limit is None:
+        raise InputError(f"{urdf}: revolute joint {name} has no <limit>; add its range.")
+
+
+def _check_tree(root: ElementTree.Element, urdf: Path) -> None:
+    """Joints must not form a loop: the parser then silently drops what hangs in it."""
+    parent_of: dict[str, str] = {}
+    for joint in root.findall("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is None or child is None:
+            raise InputError(
+                f"{urdf}: joint {joint.get('name', '?')} needs a <parent> and a <child>; add them."
+            )
+        parent_of[child.get("link", "")] = parent.get("link", "")
+    for link in parent_of:
+        at, steps = link, 0
+        while at in parent_of:
+            at, steps = parent_of[at], steps + 1
+            if steps > len(parent_of):
+                raise InputError(
+                    f"{urdf}: the joints around link {link} form a loop; an arm must be a tree "
+                    f"that starts at its base."
+                )
+
+
+def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
+    """Collision shapes need positive sizes, and meshes a file."""
+    for link in root.findall("link"):
+        for shape in link.findall("collision/geometry/*"):
+            sizes = [shape.get(key) for key in ("size", "radius", "length")]
+            numbers = _numbers(" ".join(size for size in sizes if size is not None))
+            if shape.tag != "mesh" and not np.all((numbers > 0) & (numbers < 1e4)):
+                raise InputError(
+                    f"{urdf}: the collision {shape.tag} of link {link.get('name', '?')} has sizes "
+                    f"{numbers.tolist()}; give lengths above 0 m."
+                )
+        for mesh in link.findall("collision/geometry/mesh"):
+            file = re.sub(r"^(package|model|file)://", "", mesh.get("filename", ""))
+            places = [Path(folder) / file for folder in ["/", *mesh_folders(urdf)]]
+            if not any(place.is_file() for place in places):
+                raise InputError(
+                    f"{urdf}: collision mesh {mesh.get('filename', '')} of link "
+                    f"{link.get('name', '?')} cannot be found; put it beside the URDF or use a "
+                    f"box, cylinder or sphere."
+                )
+
+
+def _check_inertias(model: pin.Model, urdf: Path) -> None:
+    for name, inertia in list(zip(model.names, model.inertias, strict=True))[1:]:
+        moments = np.linalg.eigvalsh(inertia.inertia)
+        if inertia.mass < 0 or moments[0] < -1e-9 * abs(moments[-1]):
+            raise InputError(
+                f"{urdf}: the links that turn with {name} have mass {inertia.mass:.4g} kg and "
+                f"principal moments {np.round(moments, 6).tolist()} kg·m²; none may be negative."
+            )

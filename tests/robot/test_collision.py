@@ -1,0 +1,114 @@
+"""What keeps a robot from a pose, in words: limits, links, obstacles, and what may touch."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.robot.collision import Collisions
+from planner.robot.robot import Robot
+from robots import LIMITS_DEG, make_arm
+
+FREE = np.deg2rad([0, -60, 60, 0, 20, 0])
+LOW = np.deg2rad([0, 45, 40, 0, 0, 0])  # links in the floor
+
+
+@pytest.fixture
+def arm(tmp_path) -> Path:
+    return make_arm(tmp_path)
+
+
+def collisions(path: Path, more: str = "") -> Collisions:
+    path.write_text(path.read_text() + more)
+    return Collisions(Robot.load(path))
+
+
+def box(name: str, center, size=(0.1, 0.1, 0.1), rpy=(0, 0, 0)) -> str:
+    center = [float(c) for c in center]
+    entries = f"center_m = {center}\nsize_m = {list(size)}\nrpy_deg = {list(rpy)}\n"
+    return f'[[obstacle]]\nname = "{name}"\n{entries}'
+
+
+@pytest.mark.parametrize("joint", range(6))
+@pytest.mark.parametrize("side", [0, 1])
+def test_every_limit_is_said(arm, joint, side):
+    limit = LIMITS_DEG[joint][side]
+    found = collisions(arm)
+    q = FREE.copy()
+    q[joint] = np.deg2rad(limit)
+    assert found.limits(q) == ()  # the limit itself is allowed
+    q[joint] = np.deg2rad(limit + (5 if side else -5))
+    word = "above" if side else "below"
+    said = f"joint_a{joint + 1} at {limit + (5 if side else -5):.1f}° is {word} its limit of"
+    assert found.limits(q) == (f"{said} {limit:.1f}°",)
+    assert not found.free(q)
+
+
+def test_limits_come_before_contacts(arm):
+    found, q = collisions(arm), LOW.copy()
+    q[5] = 7.0
+    assert found.violations(q) == found.limits(q) + found.contacts(q)
+    assert "joint_a6" in found.violations(q)[0]
+    assert "touches" in found.violations(q)[1]
+    assert found.violations(FREE) == ()
+
+
+def test_an_obstacle_is_called_by_its_name(arm):
+    _, place = Robot.load(arm).forward(FREE)
+    inside = (place[0] - 0.12, place[1], place[2] + 0.05)
+    found = collisions(arm, box("vice", inside, (0.2, 0.2, 0.2)) + box("fence", (3, 3, 1)))
+    contacts = found.contacts(FREE)
+    assert contacts
+    assert all(c.endswith("touches vice") for c in contacts)
+    assert not found.free(FREE)
+
+
+def test_an_obstacle_can_be_turned(arm):
+    """A long beam beside the tool, that touches only once it is turned across."""
+    _, place = Robot.load(arm).forward(FREE)
+    beam = (place[0], place[1] + 0.6, place[2])
+    along, across = (1.0, 0.1, 0.3), (0, 0, 90)
+    assert collisions(arm, box("beam", beam, along)).free(FREE)
+    turned = make_arm(arm.parent / "turned")
+    beside = (place[0] - 0.15, place[1] + 0.45, place[2] + 0.1)
+    plain = collisions(turned, box("beam", beside, along)).contacts(FREE)
+    turned = make_arm(arm.parent / "turned")
+    crossing = collisions(turned, box("beam", beside, along, across)).contacts(FREE)
+    assert plain == ()
+    assert crossing
+    assert all("beam" in c for c in crossing)
+
+
+def test_what_is_ignored_may_touch(arm):
+    hits = collisions(arm).contacts(LOW)
+    pairs = [c.split(" touches ") for c in hits]
+    assert pairs
+    ignored = collisions(arm, f"[collision]\nignore = {pairs}\n")
+    assert ignored.contacts(LOW) == ()
+    assert ignored.free(LOW)
+
+
+def test_the_order_within_an_ignored_pair_does_not_matter(arm):
+    pairs = [c.split(" touches ")[::-1] for c in collisions(arm).contacts(LOW)]
+    assert collisions(arm, f"[collision]\nignore = {pairs}\n").free(LOW)
+
+
+def test_a_margin_counts_as_contact(arm):
+    assert collisions(arm).free(FREE)
+    wide = collisions(arm, "[collision]\nmargin_m = 0.9\n")
+    assert any("floor" in c for c in wide.contacts(FREE))
+
+
+def test_free_agrees_with_violations_and_only_links_apart_can_touch(arm):
+    found = collisions(arm)
+    robot = found.robot
+    rng = np.random.default_rng(2)
+    names = ["base_link", *(f"link_{i}" for i in range(1, 7))]
+    touched = 0
+    for q in rng.uniform(robot.lower_rad, robot.upper_rad, (150, 6)):
+        contacts = found.contacts(q)
+        assert found.free(q) == (contacts == ())
+        touched += bool(contacts)
+        for a, b in (c.split(" touches ") for c in contacts):
+            assert b == "floor" or abs(names.index(a) - names.index(b)) > 1
+    assert 0 < touched < 150

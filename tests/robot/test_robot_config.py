@@ -1,0 +1,126 @@
+"""A wrong robot folder is refused in one sentence that names file, entry and remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from planner.errors import InputError
+from planner.robot.elastic import ElasticModel
+from planner.robot.robot import Robot
+from robots import make_arm
+
+LIMIT = '<limit lower="0.5" upper="0.5" velocity="1" effort="0"/>'
+NO_RANGE = f"""<robot name="one"><link name="base"/><link name="tool"/><link name="accelerometer"/>
+<joint name="turn" type="revolute"><parent link="base"/><child link="tool"/>{LIMIT}</joint>
+<joint name="end" type="fixed"><parent link="tool"/><child link="accelerometer"/></joint></robot>"""
+SIZES = "size_m = [4, 4, 0.1]"
+
+# What is wrong: (old text, new text, words that the sentence has to hold).
+WRONG_TOML = {
+    "not toml": ("name = ", "name = = ", ["robot.toml"]),
+    "no name": ('name = "small arm"', "", ["name"]),
+    "unknown entry": ("gravity", "gravitation", ["gravitation"]),
+    "a text for a number": ("band_hz = [5.0, 110.0]", 'band_hz = "low"', ["band_hz"]),
+    "one end of a band": ("band_hz = [5.0, 110.0]", "band_hz = [5.0]", ["band_hz"]),
+    "a band that falls": ("[5.0, 110.0]", "[110.0, 5.0]", ["band_hz", "rise"]),
+    "a band from 0": ("[5.0, 110.0]", "[0.0, 110.0]", ["band_hz", "above 0 Hz"]),
+    "an endless band": ("[5.0, 110.0]", "[5.0, inf]", ["band_hz"]),
+    "gravity in g": ("-9.81]", "-981.0]", ["gravity", "m/s²"]),
+    "gravity is no number": ("-9.81]", "nan]", ["gravity"]),
+    "no stiffness": ("stiffness = 60000.0", "stiffness = 0.0", ["number 1", "joint_a1", "above 0"]),
+    "endless stiffness": ("stiffness = 60000.0", "stiffness = inf", ["stiffness"]),
+    "stiffness is no number": ("stiffness = 60000.0", "stiffness = nan", ["stiffness"]),
+    "negative damping": (
+        "damping = 23.99",
+        "damping = -23.99",
+        ["number 2", "joint_a2", "damping"],
+    ),
+    "no unit axis": ("axis = [0, 0, 1]", "axis = [0, 0, 2]", ["length 2", "unit vector"]),
+    "no axis": ("axis = [0, 0, 1]", "axis = [0, 0, 0]", ["length 0", "unit vector"]),
+    "an axis in the plane": ("axis = [0, 0, 1]", "axis = [0, 1]", ["axis"]),
+    "an elastic joint unknown": ('joint = "joint_a3"', 'joint = "elbow"', ["elbow", "joint_a3"]),
+    "a flat obstacle": (SIZES, "size_m = [4, 4, 0]", ["floor", "above 0 m"]),
+    "a tool unknown": ('tcp_frame = "tool"', 'tcp_frame = "tol"', ["tcp_frame", '"tol"']),
+    "a sensor unknown": ('"accelerometer"', '"adxl"', ["sensor_frame", '"adxl"']),
+    "a URDF that is missing": ('"arm.urdf"', '"leg.urdf"', ["leg.urdf", "does not exist"]),
+    "a folder for a URDF": ('"arm.urdf"', '"."', ["cannot be read"]),
+}
+WRONG_URDF = {
+    "cut off": ("</robot>", "", ["not a readable URDF"]),
+    "no robot at the top": (None, "<mujoco/>", ["<mujoco>", "<robot>"]),
+    "no turning joint": (None, '<robot name="x"><link name="a"/></robot>', ["no turning joint"]),
+    "a sliding joint": ('type="revolute"', 'type="prismatic"', ["joint_a1", "prismatic"]),
+    "an axis in words": ('<axis xyz="0 1 0"/>', '<axis xyz="up"/>', ["joint_a2", '"up"']),
+    "an axis of two numbers": ('<axis xyz="0 1 0"/>', '<axis xyz="0 1"/>', ["arm.urdf"]),
+    "limits in words": ('lower="', 'lower="about ', ["not a usable URDF"]),
+    "no range": (None, NO_RANGE, ["turn", "no range", "lower and upper"]),
+    "no limits": (None, NO_RANGE.replace(LIMIT, ""), ["turn", "no <limit>"]),
+}
+
+
+@pytest.fixture
+def arm(tmp_path) -> Path:
+    return make_arm(tmp_path)
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as caught:
+        Robot.load(path)
+    return str(caught.value)
+
+
+def is_one_sentence(text: str) -> bool:
+    return "\n" not in text and text.endswith(".") and "Traceback" not in text
+
+
+@pytest.mark.parametrize("case", WRONG_TOML)
+def test_wrong_robot_toml(arm, case):
+    old, new, words = WRONG_TOML[case]
+    text = arm.read_text()
+    assert old in text
+    arm.write_text(text.replace(old, new, 1))
+    said = refusal(arm)
+    assert is_one_sentence(said)
+    assert str(arm.parent) in said
+    assert [w for w in words if w not in said] == []
+
+
+@pytest.mark.parametrize("case", WRONG_URDF)
+def test_wrong_urdf(arm, case):
+    old, new, words = WRONG_URDF[case]
+    urdf = arm.with_name("arm.urdf")
+    text = urdf.read_text()
+    urdf.write_text(new if old is None else text.replace(old, new, 1))
+    arm.write_text(arm.read_text().split("[[compliance]]")[0])
+    said = refusal(arm)
+    assert "\n" not in said.strip()
+    assert [w for w in words if w not in said] == []
+
+
+def test_a_missing_robot_toml(tmp_path):
+    said = refusal(tmp_path / "robot.toml")
+    assert is_one_sentence(said)
+    assert "does not exist" in said
+
+
+def test_binary_rubbish(arm):
+    arm.write_bytes(bytes(range(256)))
+    assert "not a valid robot.toml" in refusal(arm)
+
+
+def test_elastic_joints_are_needed_for_a_simulation_only(arm):
+    arm.write_text(arm.read_text().split("[[compliance]]")[0])
+    robot = Robot.load(arm)
+    with pytest.raises(InputError) as caught:
+        ElasticModel(robot)
+    assert is_one_sentence(str(caught.value))
+    assert "[[compliance]]" in str(caught.value)
+
+
+def test_nothing_is_printed_by_the_urdf_reader(arm, capfd):
+    urdf = arm.with_name("arm.urdf")
+    urdf.write_text(urdf.read_text().replace('lower="', 'lower="about ', 1))
+    refusal(arm)
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert err == ""
