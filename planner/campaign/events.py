@@ -2,6 +2,8 @@
 
 import msgspec
 
+from planner.modes.types import LEAST_PROBABILITY
+
 
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):
     """Base of every entry of the log."""
@@ -62,6 +64,11 @@ class MeasuredMode(msgspec.Struct, frozen=True):
     shape: tuple[tuple[float, float], ...]
     residue: tuple[tuple[float | None, float | None, float | None], ...]
     probability: float = 1.0
+
+    @property
+    def likely(self) -> bool:
+        """Whether it is a mode by its own pose's recordings, not only where others vouch."""
+        return self.probability >= LEAST_PROBABILITY
 
 
 class Imported(Event, frozen=True, tag="imported"):

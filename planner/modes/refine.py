@@ -66,7 +66,8 @@ def refine(
     point = _evaluate(lines, data, weight, poles, residual_terms)
     converged = False
     for _ in range(max_iterations):
-        scale = np.sqrt(np.diag(point.hessian)) + 1e-300
+        diagonal = np.diag(point.hessian)
+        scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
         hessian = point.hessian / scale[:, None] / scale
         step = np.linalg.solve(hessian + damping * np.eye(2 * m), point.gradient / scale)
         step = step / scale
