@@ -46,7 +46,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
     """All modes that the lines of `data` carry, None where there is none."""
     # At least as many lines as half the unknowns of one column need, and once that to spare.
     top = max(2, min(max_order, data.frequency_hz.size // 3))
-    orders = tuple(range(2, top + 1))
+    orders = ladder(top)
     weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
     sets = plscf(data.frequency_hz, data.response, orders, weight)
     reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
@@ -61,6 +61,16 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))
     return Identification(modes, data, found, fitted, relative, top) if modes else None
+
+
+def ladder(top: int) -> tuple[int, ...]:
+    """Model orders of the diagram: all at first, then every second, then every fourth.
+
+    High orders cost most (their cube) and differ least from their neighbours.
+    """
+    steps = ((2, 20, 1), (20, 40, 2), (40, top, 4))
+    orders = {n for low, high, step in steps for n in range(low, min(high, top) + 1, step)}
+    return tuple(sorted(orders | {top}))
 
 
 def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
