@@ -7,6 +7,7 @@ is a direct FRF, response = hit: cross FRFs that vanish by symmetry hold noise a
 every model, the true one included, fails.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,6 +101,12 @@ def agreement(
         measured, simulated = measured[..., inside], simulated[..., inside]
     error, size = _norms(measured, simulated)
     return Agreement(frac(measured, simulated), complex_frac(measured, simulated), error, size)
+
+
+def stack(parts: Sequence[Agreement]) -> Agreement:
+    """All poses of several agreements: how poses with frequency lines of their own are joined."""
+    columns = zip(*((p.frac, p.complex_frac, p.error, p.size) for p in parts), strict=True)
+    return Agreement(*(np.concatenate(column) for column in columns))
 
 
 def direct_mean(values: np.ndarray) -> float:

@@ -6,7 +6,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-FAINTEST_DB = 60.0  # below the strongest resonance; what is fainter is drawn alike
+FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn alike
 DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
 

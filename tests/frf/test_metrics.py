@@ -140,6 +140,18 @@ def test_agreement_of_a_band_and_of_a_path():
     assert path.frobenius.max() < 1
 
 
+def test_poses_with_lines_of_their_own_are_stacked():
+    measured, simulated = random_frf(9), random_frf(10)
+    whole = metrics.agreement(measured, simulated)
+    parts = [metrics.agreement(measured[i : i + 1], simulated[i : i + 1]) for i in range(3)]
+    stacked = metrics.stack(parts)
+    np.testing.assert_array_equal(stacked.frac, whole.frac)
+    np.testing.assert_array_equal(stacked.frobenius, whole.frobenius)
+    finer = np.repeat(measured[2:], 2, axis=-1), np.repeat(simulated[2:], 2, axis=-1)
+    joined = metrics.stack([*parts[:2], metrics.agreement(*finer)])
+    np.testing.assert_allclose(joined.global_frac, whole.global_frac)
+
+
 def test_what_cannot_be_compared():
     measured, simulated = random_frf(7), random_frf(8)
     with pytest.raises(ValueError, match="no frequency line"):

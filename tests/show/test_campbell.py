@@ -45,7 +45,7 @@ def test_measured_and_simulated_share_their_colours():
         for c in panels(figure)[title].collections
         if isinstance(c, QuadMesh)
     ]
-    assert limits == [(-40, 20), (-40, 20)]
+    assert limits == [(-30, 20), (-30, 20)]
 
 
 def test_only_a_simulation_of_one_pose_with_log_frequency():
