@@ -2,9 +2,10 @@
 
 FRFs have the shape (pose, response, hit, F), accelerance in m/s²/N. Columns that were never hit
 are NaN in the measured FRFs and in every figure made from them; averages leave them out. Two FRFs
-that are zero on every line agree (1); a zero FRF and any other do not (0). The paper's direction d
-is a direct FRF, response = hit: cross FRFs that vanish by symmetry hold noise alone, on which
-every model, the true one included, fails.
+that are zero on every line agree (1); a zero FRF and any other do not (0). Every pair of response
+and hit has its own figures. The paper's direction d is taken as the direct FRF, response = hit:
+cross FRFs that vanish by symmetry hold noise alone, on which every model, the true one included,
+fails.
 """
 
 from collections.abc import Sequence

@@ -134,6 +134,19 @@ def test_only_24_parameters_give_the_kr10_a_resonance_between_50_and_80_hz():
     assert np.isnan(f12[:, 5]).all()  # the wrist's roll is overdamped
 
 
+def test_first_frequency_falls_away_from_the_base_and_2022_is_nearly_2020():
+    """Busch et al. 2022, section 2.1 and 2.3.1 ("equivalent to the model published in [16]")."""
+    robot, older = load("kr240_busch2022", "robot"), load("kr240_busch2020", "robot")
+    table = load_campaign_config(shipped("kr240_busch2022") / "campaign.toml")
+    found = Workspace.from_table(table.workspace, robot).candidates(robot, 64, 0)
+    frequency = Simulation(robot).modes(found.q, 4).frequency_hz
+    distance = np.hypot(*found.position_m[:, :2].T)
+    assert np.corrcoef(distance, frequency[:, 0])[0, 1] < -0.95
+    np.testing.assert_allclose(
+        frequency, Simulation(older).modes(found.q, 4).frequency_hz, rtol=0.01
+    )
+
+
 def driving_point(name: str, joint_3_deg: np.ndarray, lines_hz: np.ndarray, joints=None):
     """Horizontal driving-point accelerance (n, F), across the arm's plane, in m/s²/N."""
     robot = load("kr240_busch2020", name)
