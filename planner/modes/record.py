@@ -56,6 +56,15 @@ def modes_from_record(
     nothing scales them. Remarks say which channels and pulses are faulty. Raises InputError for
     an unknown force channel and RefusedError where no mode can be found.
     """
+    return analyse_record(record, force_channel, band_hz)[0]
+
+
+def analyse_record(
+    record: TimeRecord,
+    force_channel: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+) -> tuple[ModalModel, Identification]:
+    """The same with everything in between (stabilisation diagram, fit)."""
     remarks = list(record.remarks)
     force = _force(record, force_channel)
     decays = _decays(record, force, remarks)
@@ -74,7 +83,7 @@ def modes_from_record(
         + ", ".join(decays.names)
         + "; without a usable force they are not scaled."
     )
-    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks))
+    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks)), found
 
 
 def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:

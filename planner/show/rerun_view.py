@@ -1,15 +1,10 @@
-"""The Rerun view of a campaign; the only module that imports Rerun.
+"""The Rerun view of a campaign.
 
 Timeline "measurement" counts measured poses. The recording holds nothing but what the campaign
 determines (no clock), so the same campaign gives the same recording.
 """
 
 import contextlib
-import hashlib
-import socket
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +17,11 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
-from planner.errors import InputError
 from planner.modes.measure import MeasuredPose
 from planner.show import plots
+from planner.show.rerun_stream import open_stream
 
 TIMELINE = "measurement"
-PORT = 9876
-VIEWER = f"rerun+http://127.0.0.1:{PORT}/proxy"
-VIEWER_START_S = 15.0
 COLOURS = {"proposed": (255, 140, 0), "measured": (220, 30, 30), "hit": (30, 90, 255)}
 LINES = 300  # frequency lines of the pictures
 
@@ -39,13 +31,8 @@ class RerunView:
 
     def __init__(self, cell: Cell, rrd: Path | None, viewer: bool = False, simulated: bool = False):
         self._cell = cell
-        name = hashlib.sha256(f"{cell.robot.name}|{cell.config}".encode()).hexdigest()[:32]
-        self._stream = rr.RecordingStream("planner", recording_id=name, send_properties=False)
-        # The clock would make two recordings of one campaign differ.
-        self._stream.set_log_time_enabled(False)
-        self._stream.set_log_tick_enabled(False)
-        self._stream.set_sinks(*_sinks(rrd, viewer), default_blueprint=_blueprint(cell))
-        self._stream.send_recording_name(cell.robot.name)
+        identity = f"{cell.robot.name}|{cell.config}"
+        self._stream = open_stream(identity, cell.robot.name, _blueprint(cell), rrd, viewer)
         self._tree = self._robot()
         self._obstacles()
         if simulated:
@@ -222,51 +209,6 @@ class RerunView:
 def hit_sign(axis: str) -> float:
     """Sense of a signed axis."""
     return -1.0 if axis[0] == "-" else 1.0
-
-
-def _sinks(rrd: Path | None, viewer: bool) -> list:
-    sinks = []
-    if rrd is not None:
-        try:
-            rrd.parent.mkdir(parents=True, exist_ok=True)
-            rrd.write_bytes(b"")
-        except OSError as error:
-            raise InputError(f"{rrd} cannot be written ({error.strerror}); name another.") from None
-        sinks.append(rr.FileSink(str(rrd)))
-    if viewer and _start_viewer():
-        sinks.append(rr.GrpcSink(VIEWER))
-    return sinks
-
-
-def _start_viewer() -> bool:
-    """Open the viewer unless one listens already; False, with a word, if there can be none."""
-    if _listens():
-        return True
-    # The viewer listens on every network interface unless told otherwise.
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(PORT)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    until = time.monotonic() + VIEWER_START_S
-    while time.monotonic() < until and process.poll() is None:
-        if _listens():
-            # Without a display it listens first and ends then.
-            time.sleep(0.5)
-            if process.poll() is None:
-                return True
-        time.sleep(0.1)
-    if process.poll() is None:
-        process.kill()
-    print("The Rerun viewer did not open here; going on without it.", file=sys.stderr)
-    return False
-
-
-def _listens() -> bool:
-    with socket.socket() as probe:
-        probe.settimeout(0.2)
-        return probe.connect_ex(("127.0.0.1", PORT)) == 0
 
 
 def _blueprint(cell: Cell) -> rrb.Blueprint:
