@@ -60,9 +60,7 @@ def modes_from_record(
 
 
 def analyse_record(
-    record: TimeRecord,
-    force_channel: str | None = None,
-    band_hz: tuple[float, float] | None = None,
+    record: TimeRecord, force_channel: str | None, band_hz: tuple[float, float] | None
 ) -> tuple[ModalModel, Identification]:
     """The same with everything in between (stabilisation diagram, fit)."""
     remarks = list(record.remarks)
@@ -70,11 +68,8 @@ def analyse_record(
     decays = _decays(record, force, remarks)
     band = band_hz or _band(decays)
     decays, found = _identify_sound(record, decays, band, remarks)
-    kept = [
-        mode
-        for mode in found.modes
-        if band[0] <= mode.frequency_hz <= band[1] and mode.probability >= LEAST_PROBABILITY
-    ]
+    sure = [mode for mode in found.modes if mode.probability >= LEAST_PROBABILITY]
+    kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = _merge(kept, remarks)
     if not modes:
         raise RefusedError(_nothing(record, band))

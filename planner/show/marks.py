@@ -1,5 +1,7 @@
 """What the pictures of a modal analysis share: panels, marked modes, labels that keep apart."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -10,12 +12,12 @@ from planner.frf.types import Frf
 from planner.modes.types import ModalModel
 
 MODE, USABLE = "tab:blue", "tab:green"
-COLUMNS = 11  # labels of several lines that fit side by side; more are turned upright
+COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
 
 def panels(
-    size: tuple[float, float], title: str, rows: int = 1, columns: int = 1, **layout: object
-) -> tuple[Figure, np.ndarray]:
+    size: tuple[float, float], title: str, rows: int = 1, columns: int = 1, **layout: Any
+) -> tuple[Figure, Any]:
     """A figure (size in inches) with panels (rows, columns) that share the frequency axis."""
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
@@ -36,11 +38,12 @@ def spread(x: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
 
 
 def with_sd(value: float, sd: float) -> str:
-    """A value and its standard deviation, to the digit that the latter leaves (1 to 3 decimals)."""
+    """A value and its standard deviation, both to the digit where the latter begins (1 to 4)."""
     if not np.isfinite(sd):
         return f"{value:.2f}"
-    decimals = 3 if sd == 0 else int(np.clip(np.ceil(-np.log10(sd)), 1, 3))
-    return f"{value:.{decimals}f} ± {sd:.{decimals}f}"
+    decimals = int(np.clip(np.ceil(-np.log10(max(sd, 1e-300))), 1, 4))
+    small = f"{sd:.0e}" if sd < 0.5e-4 else f"{sd:.{decimals}f}"
+    return f"{value:.{decimals}f} ± {small}"
 
 
 def label_modes(panel: Axes, modal: ModalModel) -> None:
@@ -68,7 +71,7 @@ def label_modes(panel: Axes, modal: ModalModel) -> None:
             rotation=90 if upright else 0,
             fontsize=7.5,
             color=MODE,
-            arrowprops={"arrowstyle": "-", "color": MODE, "lw": 0.8, "shrinkA": 0, "shrinkB": 0},
+            arrowprops={"arrowstyle": "-", "color": MODE, "lw": 0.8, "relpos": (0.5, 0.0)},
         )
 
 
@@ -76,7 +79,7 @@ def number_modes(panel: Axes, modal: ModalModel) -> None:
     """Modes as thin vertical lines, with their numbers inside at the top."""
     low, high = panel.get_xlim()
     frequency = np.array([mode.frequency_hz for mode in modal.modes])
-    places = spread(frequency, 0.03 * (high - low), low, high)
+    places = spread(frequency, 0.026 * (high - low), low, high)
     for k, (line, x) in enumerate(zip(frequency, places, strict=True)):
         panel.axvline(line, color=MODE, lw=0.8, ls=":")
         panel.text(

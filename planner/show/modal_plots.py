@@ -1,5 +1,7 @@
 """Pictures of a modal analysis: stabilisation diagram, FRFs and their fit, coherence, AutoMAC."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,6 +16,7 @@ from planner.modes.identify import Identification
 from planner.modes.stabilisation import stable
 from planner.modes.types import ModalModel
 from planner.show.marks import (
+    COLUMNS,
     MODE,
     USABLE,
     label_ends,
@@ -59,7 +62,7 @@ def stabilisation_figure(
     (CMIF; Shih et al., Mech. Syst. Signal Process. 2, 1988). `scaled` is False where the
     responses are spectra of free decays, whose size means nothing.
     """
-    figure, grid = panels((12.0, 7.0), title)
+    figure, grid = panels((12.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
     panel, data = grid[0, 0], found.data
     singular = np.linalg.svd(np.moveaxis(data.response, -1, 0), compute_uv=False).T
     for k, values in enumerate(singular):
@@ -104,11 +107,11 @@ def matrix_figure(frf: Frf, found: Identification, modal: ModalModel, title: str
     The variance E|δH|² of a complex line is shared by its two parts, so that its magnitude has
     the standard deviation √(variance/2) and its phase that over |H|.
     """
-    columns = np.flatnonzero(frf.measured)
+    columns = np.flatnonzero(frf.measured).tolist()
     layout = {"height_ratios": [3, 1.2] * 3}
-    figure, grid = panels((13.0, 10.0), title, 6, columns.size, gridspec_kw=layout)
+    figure, grid = panels((13.0, 10.0), title, 6, len(columns), gridspec_kw=layout)
     fitted = model(found.data, found.fit.refined)
-    for i, k in np.ndindex(3, columns.size):
+    for i, k in np.ndindex(3, len(columns)):
         size, phase = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
         for panel in (size, phase):
@@ -122,8 +125,10 @@ def matrix_figure(frf: Frf, found: Identification, modal: ModalModel, title: str
         if k == 0:
             size.set_ylabel("|H| (m/s²/N)", fontsize=8)
             phase.set_ylabel("phase (°)", fontsize=8)
-    measured = [Line2D([], [], **POINTS, label="measured"), Patch(**SPREAD, label="± 2 sd")]
-    _legend(figure, grid, [*measured, Line2D([], [], **FITTED, label="fit")])
+    handles: list = [Line2D([], [], **POINTS, label="measured")]
+    if np.any(np.isfinite(frf.variance)):
+        handles.append(Patch(**SPREAD, label="± 2 sd"))
+    _legend(figure, grid, [*handles, Line2D([], [], **FITTED, label="fit")])
     return figure
 
 
@@ -155,17 +160,18 @@ def _phase(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, sd: np.ndarray)
     panel.set_yticks([-180, 0, 180])
 
 
-def _wrapped(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, **style: object) -> None:
+def _wrapped(panel: Axes, frequency_hz: np.ndarray, h: np.ndarray, **style: Any) -> None:
     """Phase without strokes from −180° to 180°."""
     angle = np.angle(h, deg=True)
     jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180) + 1
     panel.plot(np.insert(frequency_hz, jumps, np.nan), np.insert(angle, jumps, np.nan), **style)
 
 
-def _legend(figure: Figure, grid: np.ndarray, handles: list) -> None:
+def _legend(figure: Figure, grid: Any, handles: list) -> None:
     for panel in grid[-1]:
         panel.set_xlabel("frequency (Hz)", fontsize=9)
-    handles += [
+    handles = [
+        *handles,
         Patch(color=USABLE, alpha=0.15, label="usable band"),
         Line2D([], [], color=MODE, ls=":", label="mode"),
     ]
@@ -174,15 +180,16 @@ def _legend(figure: Figure, grid: np.ndarray, handles: list) -> None:
 
 def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     """Coherence of every response with every hit axis."""
-    columns = np.flatnonzero(frf.measured)
-    figure, grid = panels((13.0, 7.5), title, 3, columns.size)
-    for i, k in np.ndindex(3, columns.size):
+    columns = np.flatnonzero(frf.measured).tolist()
+    figure, grid = panels((13.0, 7.5), title, 3, len(columns))
+    for i, k in np.ndindex(3, len(columns)):
         panel, values = grid[i, k], frf.coherence[i, columns[k]]
         mark_band(panel, frf)
         if np.any(np.isfinite(values)):
             panel.plot(frf.frequency_hz, values, color=MEASURED, lw=1.0)
         else:
-            panel.text(0.5, 0.5, "not known", transform=panel.transAxes, ha="center", fontsize=9)
+            why = "unknown: it takes two hits" if frf.hits[columns[k]] < 2 else "unknown"
+            panel.text(0.5, 0.5, why, transform=panel.transAxes, ha="center", fontsize=9)
         hits = frf.hits[columns[k]]
         panel.set_ylim(0, 1.18)  # room for the modes' numbers
         panel.set_yticks([0, 0.25, 0.5, 0.75, 1])
@@ -244,12 +251,11 @@ def campbell_figure(
         panel.set_xticks(x, place, rotation=90 if len(place) > 12 else 0)
     panel.set_xlabel(axis)
     panel.set_ylabel("natural frequency (Hz)")
-    panel.set_ylim(bottom=0)
     panel.grid(True, alpha=0.25)
     names = [f"mode {k + 1}" for k in range(frequency_hz.shape[1])]
     label_ends(panel, x[order], frequency_hz[order], names)
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
-        handles.append(Line2D([], [], color="0.3", ls="--", label="simulated"))
+        handles.append(Line2D([], [], color="0.3", ls="--", label="simulation"))
     figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
     return figure
