@@ -12,6 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun.urdf as rru
 from matplotlib import colormaps
+from matplotlib.figure import Figure
 
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
@@ -19,6 +20,7 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.modes.measure import MeasuredPose
 from planner.show import plots
+from planner.show.modal_plots import campbell_figure
 from planner.show.rerun_stream import open_stream
 
 TIMELINE = "measurement"
@@ -33,6 +35,7 @@ class RerunView:
         self._cell = cell
         identity = f"{cell.robot.name}|{cell.config}"
         self._stream = open_stream(identity, cell.robot.name, _blueprint(cell), rrd, viewer)
+        self._simulated = False
         self._tree = self._robot()
         self._obstacles()
         if simulated:
@@ -40,6 +43,7 @@ class RerunView:
 
     def label_simulated(self) -> None:
         """Say on screen that the recordings are simulated."""
+        self._simulated = True
         text = "# SIMULATED RECORDINGS\nNothing in this campaign was measured on a real robot."
         self._stream.log("note", rr.TextDocument(text, media_type="text/markdown"), static=True)
 
@@ -108,6 +112,7 @@ class RerunView:
         if measured is not None:
             self._hits(pose, measured)
         self._frf(model, pose, measured)
+        self._campbell(model.labelled)
         self._measured_poses(model)
         self.workspace(number, model)
         for k, mode in enumerate(pose.modes):
@@ -161,8 +166,30 @@ class RerunView:
             frf.coherence[:, :, inside] if frf else None,
             f"Pose {pose.pose}: FRF measured, and fused with its band",
         )
+        self._picture("frf/picture", figure)
+
+    def _campbell(self, poses: tuple[LabelledPose, ...]) -> None:
+        """Measured and simulated natural frequencies, by label, over the measured poses."""
+        nothing = (np.nan, np.nan)
+        rows = [
+            [nothing if m is None else (m.frequency_hz, m.frequency_sd_hz) for m in pose.modes]
+            for pose in poses
+        ]
+        frequency, sd = np.moveaxis(np.array(rows), -1, 0)
+        simulated = np.array([pose.simulated_hz for pose in poses])
+        mark = "SIMULATED recordings · " if self._simulated else ""
+        figure = campbell_figure(
+            tuple(pose.pose for pose in poses),
+            frequency,
+            sd,
+            simulated if np.any(np.isfinite(simulated)) else None,
+            title=f"{mark}Natural frequencies over the measured poses",
+        )
+        self._picture("campbell/picture", figure)
+
+    def _picture(self, path: str, figure: Figure) -> None:
         image = rr.EncodedImage(contents=plots.png(figure), media_type="image/png")
-        self._stream.log("frf/picture", image)
+        self._stream.log(path, image)
 
     def _measured_poses(self, model: Model) -> None:
         q = np.array([p.q for p in model.labelled])
@@ -219,7 +246,10 @@ def _blueprint(cell: Cell) -> rrb.Blueprint:
                     origin="/", contents=["/robot/**", "/cell/**"], name=cell.robot.name
                 ),
                 rrb.Vertical(
-                    rrb.Spatial2DView(origin="/frf/picture", name="FRF with band"),
+                    rrb.Tabs(
+                        rrb.Spatial2DView(origin="/frf/picture", name="FRF with band"),
+                        rrb.Spatial2DView(origin="/campbell/picture", name="Campbell diagram"),
+                    ),
                     rrb.TimeSeriesView(origin="/learning", name="sd of frequencies (%)"),
                     row_shares=[3, 2],
                 ),
