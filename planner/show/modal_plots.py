@@ -243,7 +243,8 @@ def campbell_figure(
     for k in range(frequency_hz.shape[1]):
         colour = f"C{k % 10}"
         if simulated_hz is not None:
-            panel.plot(x[order], simulated_hz[order, k], "--", color=colour, lw=1.0)
+            style = {"color": colour, "lw": 1.0, "marker": "D", "ms": 3.5, "mfc": "none"}
+            panel.plot(x[order], simulated_hz[order, k], "--", **style)
         error = np.where(np.isfinite(sd_hz[order, k]), 2 * sd_hz[order, k], 0.0)
         style = {"color": colour, "lw": 1.4, "marker": "o", "ms": 4, "capsize": 3}
         panel.errorbar(x[order], frequency_hz[order, k], error, **style)
@@ -256,6 +257,8 @@ def campbell_figure(
     label_ends(panel, x[order], frequency_hz[order], names)
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
-        handles.append(Line2D([], [], color="0.3", ls="--", label="simulation"))
+        handles.append(
+            Line2D([], [], color="0.3", ls="--", marker="D", mfc="none", label="simulation")
+        )
     figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=9)
     return figure
