@@ -89,7 +89,7 @@ def _labelled_modes(report: ImportReport) -> list[dict[str, Any]]:
         answer.append(
             {
                 "label": None if k is None else k + 1,
-                "label_probability": sure.get(k),
+                "label_probability": None if k is None else sure[k],
                 "frequency_hz": mode.frequency_hz,
                 "frequency_sd_hz": mode.frequency_sd_hz,
                 "damping_ratio": mode.damping_ratio,

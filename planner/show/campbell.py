@@ -10,7 +10,7 @@ FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn al
 DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
 
-def campbell_figure(
+def campbell_map(
     pose_axis: np.ndarray,
     measured: np.ndarray | None,
     simulated: np.ndarray | None,

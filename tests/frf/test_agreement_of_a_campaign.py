@@ -13,7 +13,7 @@ from planner.frf.types import Frf
 from planner.modes.measure import Source, measure
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from planner.show.campbell import campbell_figure
+from planner.show.campbell import campbell_map
 from planner.show.plots import save
 
 BAND_HZ = (4.0, 60.0)
@@ -70,7 +70,7 @@ def campbell(name: str, frfs: list[Frf], simulated: list[np.ndarray]) -> Figure:
         )
     ]
     number = np.arange(1, len(frfs) + 1)
-    return campbell_figure(number, pair[0], pair[1], lines, "pose", f"SIMULATED, {name}, yy")
+    return campbell_map(number, pair[0], pair[1], lines, "pose", f"SIMULATED, {name}, yy")
 
 
 def figures(found: Agreement) -> list[float]:
