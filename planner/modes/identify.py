@@ -9,6 +9,7 @@ from planner.modes.fit import Fit, fit, model, scales, strongest, weakness
 from planner.modes.plscf import PoleSet, plscf
 from planner.modes.refine import Refined
 from planner.modes.residues import unit
+from planner.modes.specification import inflation
 from planner.modes.stabilisation import Diagram, diagram, stable
 
 MAX_ORDER = 40
@@ -77,6 +78,8 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
     refined = fitted.refined
     m = refined.poles.size
     scale = scales(data, fitted)
+    if data.step_s is None:
+        scale = scale * inflation(data, fitted)
     weak = weakness(data, fitted)
     modes = []
     for k in range(m):
