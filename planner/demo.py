@@ -13,7 +13,8 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
-from planner.campaign.labels import from_modal, label
+from planner.campaign.labels import label
+from planner.campaign.logged import from_modal
 from planner.campaign.state import Measurement
 from planner.errors import InputError, NoPoseLeftError
 from planner.modes.measure import Source, measure

@@ -14,7 +14,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.events import Configured, Entry, Imported, MeasuredMode, Proposed
-from planner.campaign.labels import from_modal
+from planner.campaign.logged import from_modal
 from planner.campaign.model import Model, build, propose
 from planner.campaign.state import CampaignState, fold
 from planner.errors import InputError, PlannerError

@@ -36,7 +36,7 @@ from planner.campaign.importing import (
 )
 from planner.campaign.intake import Delivery, sort_paths
 from planner.campaign.journal import Journal
-from planner.campaign.labels import from_modal
+from planner.campaign.logged import from_homogeneity, from_modal
 from planner.campaign.model import Model, build, propose
 from planner.campaign.state import CampaignState, fold, last_act
 from planner.errors import InputError
@@ -222,6 +222,7 @@ class Campaign:
             hits=hits,
             modes=from_modal(measured.modal),
             remarks=measured.remarks,
+            amplitude=from_homogeneity(measured.homogeneity),
         )
         self._append(event)
         model = self.model

@@ -71,6 +71,26 @@ class MeasuredMode(msgspec.Struct, frozen=True):
         return self.probability >= LEAST_PROBABILITY
 
 
+class ForceLevel(msgspec.Struct, frozen=True):
+    """Hits of about one strength, and the pose's modes by them alone (null: not found)."""
+
+    peak_force_n: float
+    hits: int
+    frequency_hz: tuple[float | None, ...]
+    frequency_sd_hz: tuple[float | None, ...]
+    damping_ratio: tuple[float | None, ...]
+    damping_sd: tuple[float | None, ...]
+
+
+class Amplitude(msgspec.Struct, frozen=True):
+    """Whether the response is proportional to the force, over the levels that were hit."""
+
+    levels: tuple[ForceLevel, ...]
+    difference: float  # of the FRFs of two levels beyond their scatter, relative
+    p_value: float
+    homogeneous: bool
+
+
 class Imported(Event, frozen=True, tag="imported"):
     """Hits at one pose were imported; `modes` are those of all its accepted hits so far."""
 
@@ -79,6 +99,7 @@ class Imported(Event, frozen=True, tag="imported"):
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
+    amplitude: Amplitude | None = None  # null: all hits of one strength
 
 
 class Withdrawn(Event, frozen=True, tag="withdrawn"):

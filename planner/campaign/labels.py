@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.campaign.cell import Cell
-from planner.campaign.events import MeasuredMode
+from planner.campaign.logged import to_mode
 from planner.campaign.state import Measurement
 from planner.fusion.surrogate import ModalObservations
 from planner.modes.track import Guide, track
-from planner.modes.types import ModalModel, Mode
+from planner.modes.types import Mode
 from planner.physics.dynamics import SimulatedModes
 
 # Simulated modes above those modelled that a measured mode may be instead: where one of the
@@ -27,51 +27,6 @@ class LabelledPose:
     modes: tuple[Mode | None, ...]
     probability: np.ndarray  # (count,) that the label is right
     simulated_hz: np.ndarray  # (count,), NaN where the simulation has no such mode
-
-
-def to_mode(measured: MeasuredMode) -> Mode:
-    """A mode as the numerics want it, from how the log keeps it."""
-    cells = np.array(
-        [[np.nan if v is None else v for v in cell] for cell in measured.residue], dtype=float
-    )
-    residue = (cells[:, 0] + 1j * cells[:, 1]).reshape(3, 3)
-    shape = np.array([complex(re, im) for re, im in measured.shape])
-    return Mode(
-        measured.frequency_hz,
-        measured.frequency_sd_hz,
-        measured.damping_ratio,
-        measured.damping_sd,
-        residue,
-        cells[:, 2].reshape(3, 3),
-        shape,
-        measured.probability,
-    )
-
-
-def from_mode(mode: Mode) -> MeasuredMode:
-    """A mode as the log keeps it."""
-
-    def number(value: float) -> float | None:
-        return float(value) if np.isfinite(value) else None
-
-    cells = zip(mode.residue.ravel(), mode.residue_sd.ravel(), strict=True)
-    return MeasuredMode(
-        frequency_hz=float(mode.frequency_hz),
-        frequency_sd_hz=float(mode.frequency_sd_hz),
-        damping_ratio=float(mode.damping_ratio),
-        damping_sd=float(mode.damping_sd),
-        shape=tuple((float(s.real), float(s.imag)) for s in mode.shape),
-        residue=tuple((number(r.real), number(r.imag), number(sd)) for r, sd in cells),
-        probability=float(mode.probability),
-    )
-
-
-def from_modal(modal: ModalModel | None) -> tuple[MeasuredMode, ...]:
-    """All modes of a pose as the log keeps them, doubtful ones too, in order of frequency."""
-    if modal is None:
-        return ()
-    every = sorted((*modal.modes, *modal.doubtful), key=lambda mode: mode.frequency_hz)
-    return tuple(from_mode(mode) for mode in every)
 
 
 def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPose, ...]:

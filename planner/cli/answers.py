@@ -69,6 +69,9 @@ def _imported(report: ImportReport) -> dict[str, Any]:
         "frequency_sd_percent_before": report.model_before.frequency_sd_percent,
         "frequency_sd_percent": report.model.frequency_sd_percent,
         "remarks": list(report.remarks),
+        "amplitude": msgspec.to_builtins(report.measurement.amplitude)
+        if report.measurement
+        else None,
         "simulated": bool(report.measurement and report.measurement.simulated),
     }
 

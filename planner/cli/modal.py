@@ -3,6 +3,9 @@
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from planner.campaign.logged import from_homogeneity
 from planner.errors import InputError, RefusedError
 from planner.frf.types import Frf
 from planner.modes.estimate import identification
@@ -52,6 +55,7 @@ def analyse(
         "hits": list(measured.frf.hits),
         "usable_band_hz": list(measured.frf.usable_band_hz),
         "remarks": list(measured.remarks),
+        "amplitude": msgspec.to_builtins(from_homogeneity(measured.homogeneity)),
         "simulated": simulated,
         **_draw(pictures, measured.frf, found, measured.modal, accepted, simulated),
     }
