@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import RefusedError
+from planner.frf.quantities import convert
 from planner.frf.types import Frf
 from planner.recording.types import AXES, FrfRecord, Hit
 
@@ -235,8 +236,7 @@ def from_records(records: tuple[FrfRecord, ...]) -> Frf:
             record.frequency_hz, frequency
         ):
             raise RefusedError(f"{record.source} has other frequency lines; export one grid.")
-        power = {"accelerance": 0, "mobility": 1, "receptance": 2}[record.quantity]
-        values = record.values * (2j * np.pi * frequency) ** power
+        values = convert(frequency, record.values, record.quantity, "accelerance")
         for k, (i, j) in enumerate(
             zip(record.response_direction, record.reference_direction, strict=True)
         ):
