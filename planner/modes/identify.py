@@ -98,15 +98,16 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
 
 def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
     """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
+    slope = natural_slope(pole)
+    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
+    return abs(pole) / (2 * np.pi), -pole.real / abs(pole), sd
+
+
+def natural_slope(pole: complex) -> np.ndarray:
+    """(2, 2) change of natural frequency (Hz) and damping ratio with Re λ and Im λ (rad/s)."""
     size = abs(pole)
-    slope = np.array(
-        [
-            [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)],
-            [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3],
-        ]
-    )
-    spread = slope @ covariance @ slope.T
-    return size / (2 * np.pi), -pole.real / size, np.sqrt(np.maximum(0.0, np.diag(spread)))
+    by_frequency = [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)]
+    return np.array([by_frequency, [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3]])
 
 
 def _support(pole: complex, sets: tuple[PoleSet, ...]) -> float:

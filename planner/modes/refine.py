@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.modes.descend import descend
 from planner.modes.residues import Lines, Residues, basis, basis_slope, unpack
 
 MAX_ITERATIONS = 30
@@ -61,31 +62,20 @@ def refine(
     data = response.reshape(-1, count)
     weight = 2 / variance.reshape(-1, count)
     poles = np.asarray(poles, complex)
-    m = poles.size
-    damping = 1e-3
-    point = _evaluate(lines, data, weight, poles, residual_terms)
-    converged = False
-    for _ in range(max_iterations):
-        scale = np.sqrt(np.diag(point.hessian)) + 1e-300
-        hessian = point.hessian / scale[:, None] / scale
-        step = np.linalg.solve(hessian + damping * np.eye(2 * m), point.gradient / scale)
-        step = step / scale
-        candidate = poles + step[:m] + 1j * step[m:]
-        trial = None
-        if allowed(candidate):
-            trial = _evaluate(lines, data, weight, candidate, residual_terms)
-        if trial is None or not trial.chi2 <= point.chi2:
-            damping *= 10
-            if damping > 1e8:
-                break
-            continue
-        gain = point.chi2 - trial.chi2
-        small = np.max(np.abs(step) * scale) < 1e-3 or gain < 1e-9 * point.chi2
-        poles, point, damping = candidate, trial, damping / 10
-        if small and damping < 1e-4:
-            converged = True
-            break
-    return _finish(lines, poles, point, (outputs, inputs), count, converged)
+
+    def evaluate(parts: np.ndarray) -> _Point:
+        return _evaluate(lines, data, weight, _complex(parts), residual_terms)
+
+    start = np.concatenate([poles.real, poles.imag])
+    parts, point, converged = descend(
+        evaluate, start, lambda parts: allowed(_complex(parts)), max_iterations
+    )
+    return _finish(lines, _complex(parts), point, (outputs, inputs), count, converged)
+
+
+def _complex(parts: np.ndarray) -> np.ndarray:
+    real, imag = np.split(parts, 2)
+    return real + 1j * imag
 
 
 def _evaluate(
@@ -97,7 +87,7 @@ def _evaluate(
     columns = np.concatenate([linear, slope])
     norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
     columns /= norm[:, None]
-    gram, cross, square = _products(columns, data, weight)
+    gram, cross, square = products(columns, data, weight)
     size = np.sqrt(np.einsum("ekk->ek", gram))[:, :p]
     scaled = gram[:, :p, :p] / size[:, :, None] / size[:, None, :]
     inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
@@ -105,7 +95,7 @@ def _evaluate(
     coefficients = np.einsum("ekl,el->ek", inverse, cross[:, :p])
     chi2 = float(np.sum(square) - np.einsum("ek,ek->", coefficients, cross[:, :p]))
     # Jacobian columns as combinations of the slope basis: J = slope · turn.
-    turn = _turn(coefficients / norm[:p], m) * norm[p:, None]
+    turn = slope_turn(coefficients / norm[:p], m) * norm[p:, None]
     mixed = gram[:, :p, p:] @ turn
     sensitivity = -inverse @ mixed
     gradient = np.einsum("eka,ek->a", turn, cross[:, p:])
@@ -122,7 +112,7 @@ def _evaluate(
     )
 
 
-def _products(
+def products(
     columns: np.ndarray, data: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gram matrix of the columns, their products with the data, ‖data‖², per entry."""
@@ -139,7 +129,7 @@ def _products(
     return gram, cross, square
 
 
-def _turn(coefficients: np.ndarray, m: int) -> np.ndarray:
+def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
     """(entries, 2m, 2m): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
     real, imag = coefficients[:, :m], coefficients[:, m : 2 * m]
     turn = np.zeros((coefficients.shape[0], 2 * m, 2 * m))

@@ -1,0 +1,55 @@
+"""Gauss–Newton with Levenberg–Marquardt damping, for every fit of modes."""
+
+from collections.abc import Callable
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+
+class Point(Protocol):
+    """χ² at one set of parameters and the equations of a step from there."""
+
+    @property
+    def chi2(self) -> float: ...
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """(n,) half the fall of χ² per unit of each parameter."""
+        ...
+
+    @property
+    def hessian(self) -> np.ndarray:
+        """(n, n) JᵀWJ, half the curvature of χ²."""
+        ...
+
+
+P = TypeVar("P", bound=Point)
+
+
+def descend(
+    evaluate: Callable[[np.ndarray], P],
+    start: np.ndarray,
+    allowed: Callable[[np.ndarray], bool],
+    max_iterations: int,
+) -> tuple[np.ndarray, P, bool]:
+    """Parameters (n,) at the least χ² met from `start`, the point there, and if it converged.
+
+    A step to parameters that are not `allowed` is shortened.
+    """
+    x, point, damping = start, evaluate(start), 1e-3
+    for _ in range(max_iterations):
+        scale = np.sqrt(np.diag(point.hessian)) + 1e-300
+        hessian = point.hessian / scale[:, None] / scale
+        step = np.linalg.solve(hessian + damping * np.eye(x.size), point.gradient / scale) / scale
+        trial = evaluate(x + step) if allowed(x + step) else None
+        if trial is None or not trial.chi2 <= point.chi2:
+            damping *= 10
+            if damping > 1e8:
+                break
+            continue
+        gain = point.chi2 - trial.chi2
+        small = np.max(np.abs(step) * scale) < 1e-3 or gain < 1e-9 * point.chi2
+        x, point, damping = x + step, trial, damping / 10
+        if small and damping < 1e-4:
+            return x, point, True
+    return x, point, False
