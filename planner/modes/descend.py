@@ -42,14 +42,16 @@ def descend(
         hessian = point.hessian / scale[:, None] / scale
         step = np.linalg.solve(hessian + damping * np.eye(x.size), point.gradient / scale) / scale
         trial = evaluate(x + step) if allowed(x + step) else None
-        if trial is None or not trial.chi2 <= point.chi2:
+        gain = -np.inf if trial is None else point.chi2 - trial.chi2
+        # Rounding may make a step worse that is far below any standard deviation.
+        small = np.max(np.abs(step) * scale) < 1e-3 or abs(gain) < 1e-9 * point.chi2
+        settled = small and trial is not None and damping < 1e-3
+        if trial is not None and gain >= 0:
+            x, point, damping = x + step, trial, damping / 10
+        else:
             damping *= 10
-            if damping > 1e8:
-                break
-            continue
-        gain = point.chi2 - trial.chi2
-        small = np.max(np.abs(step) * scale) < 1e-3 or gain < 1e-9 * point.chi2
-        x, point, damping = x + step, trial, damping / 10
-        if small and damping < 1e-4:
+        if settled:
             return x, point, True
+        if damping > 1e8:
+            break
     return x, point, False
