@@ -17,7 +17,6 @@ from planner.recording.types import AXES, FrfRecord, Hit
 MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
 NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
-ALIVE = 0.005  # response left at the record's end, over its peak, that counts as cut off
 SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
 RINGING = 32  # samples for which an anti-alias filter rings after the pulse
 LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
@@ -204,19 +203,19 @@ def _usable(
 
 
 def _tail(hits: tuple[Hit, ...], cuts: list[tuple[int, int]]) -> float:
-    """Time from pulse to the end of the records, ∞ if everything has decayed by then."""
-    alive, times = False, []
+    """Time from the centroid of the pulse to the end of the records, mean over the hits.
+
+    Never left out: what looks quiet beside a loud stiff mode may be a soft one that still rings.
+    """
+    times = []
     for hit, (start, stop) in zip(hits, cuts, strict=True):
-        response = hit.acceleration_m_s2[:, start:stop]
-        response = response - np.median(response, axis=1, keepdims=True)
-        end = np.sqrt(np.mean(response[:, -response.shape[1] // 12 :] ** 2, axis=1))
-        alive |= bool(np.any(end > ALIVE * np.max(np.abs(response))))
         force = hit.force_n[start:stop] - np.median(hit.force_n)
         first, last = _pulse(force, int(np.argmax(np.abs(force))))
         pulse = np.clip(force[first:last], 0.0, None)
         centroid = first + float(np.sum(np.arange(pulse.size) * pulse) / np.sum(pulse))
-        times.append((stop - start - centroid) / hit.sampling_rate_hz)
-    return float(np.mean(times)) if alive else float("inf")
+        # A sample stands for the time around it: the last one ends half a step after itself.
+        times.append((stop - start - 0.5 - centroid) / hit.sampling_rate_hz)
+    return float(np.mean(times))
 
 
 def from_records(records: tuple[FrfRecord, ...]) -> Frf:

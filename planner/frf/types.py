@@ -16,8 +16,8 @@ class Frf:
     exponential window that the records carry (0: none); poles fitted to this FRF are shifted left
     by exactly that rate and have to be shifted back. `tail_s` is the time from the pulse (its
     centroid) to the end of the transformed records, where no window but the exponential one was
-    applied to them: decays cut off at the end are then part of the fitted model. ∞ where records
-    last until all is quiet, or where it is not known.
+    applied to them: decays cut off at the end are then part of the fitted model. ∞ where it is not
+    known, as for exported FRFs.
     """
 
     frequency_hz: np.ndarray  # (F,) uniform, increasing

@@ -38,7 +38,7 @@ def descend(
     """
     x, point, damping = start, evaluate(start), 1e-3
     for _ in range(max_iterations):
-        scale = np.sqrt(np.diag(point.hessian)) + 1e-300
+        scale = np.sqrt(np.maximum(0.0, np.diag(point.hessian))) + 1e-300
         hessian = point.hessian / scale[:, None] / scale
         step = np.linalg.solve(hessian + damping * np.eye(x.size), point.gradient / scale) / scale
         trial = evaluate(x + step) if allowed(x + step) else None
