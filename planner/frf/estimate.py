@@ -24,12 +24,13 @@ LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """Transforms of one hit: force (F,), responses (3, F), noise power of the responses (3,)."""
+    """Transforms of one hit: force (F,), responses (3, F), and the power of their noise."""
 
     axis: int
     force: np.ndarray
     response: np.ndarray
-    noise_power: np.ndarray
+    force_noise_power: float
+    noise_power: np.ndarray  # (3,) of the responses
 
 
 def estimate(
@@ -66,11 +67,13 @@ def estimate(
         np.full(shape, np.nan),
     )
     counts = [0, 0, 0]
+    force_share = np.full((3, frequency.size), np.nan)
     for axis in range(3):
         group = [s for s in spectra if s.axis == axis]
         counts[axis] = len(group)
         if group:
             h[:, axis], variance[:, axis], coherence[:, axis] = _column(group, estimator)
+            force_share[axis] = _force_share(group)
     return Frf(
         frequency,
         h,
@@ -81,6 +84,7 @@ def estimate(
         exponential_rate_1_s,
         tuple(remarks),
         _tail(hits, cuts),
+        force_share,
     )
 
 
@@ -130,8 +134,14 @@ def _spectra(
         hit.axis_index,
         np.fft.rfft(sign * force * window)[chosen],
         np.fft.rfft(response, axis=1)[:, chosen],
+        _variance_after(force, last) * float(np.sum(window**2)),
         noise,
     )
+
+
+def _variance_after(force: np.ndarray, last: int) -> float:
+    """Variance of the force once the pulse is over, when it holds only noise (0: no such time)."""
+    return float(np.var(force[last:], ddof=1)) if force.size - last >= LEAST_QUIET else 0.0
 
 
 def _pulse(force: np.ndarray, peak: int) -> tuple[int, int]:
@@ -179,6 +189,13 @@ def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarr
     variance = sum(_smooth(e) * s for e, s in zip(error, share, strict=True)) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
     return h, np.asarray(variance), coherence
+
+
+def _force_share(group: list[_Spectra]) -> np.ndarray:
+    """E|δF|²/|F|² (F,) of one column: what noise of the force leaves of the scale's certainty."""
+    power = np.array([np.abs(s.force) ** 2 for s in group])
+    noise = np.array([s.force_noise_power for s in group])
+    return noise @ power / np.sum(power, axis=0) ** 2
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

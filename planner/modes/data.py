@@ -19,7 +19,8 @@ class Data:
     taken at the lines of the DFT without padding: the z-plane, where they are exactly rational
     (the end of the record only scales the residues). `rate_1_s` is that of the exponential
     window which the records carry; poles are those of the structure, without it. `tail_s` is the
-    time from the pulse to the end of the record (see `residues`).
+    time from the pulse to the end of the record (see `residues`). `force_share` is the relative
+    variance of each input's scale, an error that lines share (see `Frf`).
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -28,6 +29,7 @@ class Data:
     rate_1_s: float = 0.0
     step_s: float | None = None
     tail_s: float = np.inf
+    force_share: np.ndarray | None = None  # (inputs, F)
 
     @cached_property
     def lines(self) -> Lines:
@@ -65,6 +67,12 @@ class Data:
         """
         lines = self.rate_1_s / (self.frequency_hz[1] - self.frequency_hz[0])
         return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
+
+    def scale_variance(self, frequency_hz: float) -> np.ndarray:
+        """(inputs,) relative variance E|δF/F|² of the scale of each input's column there."""
+        if self.force_share is None:
+            return np.zeros(self.response.shape[1])
+        return np.array([np.interp(frequency_hz, self.frequency_hz, s) for s in self.force_share])
 
     @property
     def entries(self) -> int:

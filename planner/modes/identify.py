@@ -76,7 +76,9 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
         covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
         pole = complex(refined.poles[k])
         frequency, damping, sd = natural(pole, covariance)
+        residue = refined.residues.residue[..., k]
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        variance = variance + np.abs(residue) ** 2 * data.scale_variance(frequency) / 2
         presence = _presence(data, refined, k)
         support = _support(pole - data.rate_1_s, sets)
         modes.append(
@@ -86,7 +88,7 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
                 float(sd[0]),
                 damping,
                 float(sd[1]),
-                refined.residues.residue[..., k],
+                residue,
                 np.sqrt(variance),
                 presence,
                 support,
