@@ -30,6 +30,7 @@ class _Spectra:
     force: np.ndarray
     response: np.ndarray
     force_noise_power: float
+    force_window_s: float
     noise_power: np.ndarray  # (3,) of the responses
 
 
@@ -85,6 +86,7 @@ def estimate(
         tuple(remarks),
         _tail(hits, cuts),
         force_share,
+        float(np.mean([s.force_window_s for s in spectra])),
     )
 
 
@@ -135,6 +137,7 @@ def _spectra(
         np.fft.rfft(sign * force * window)[chosen],
         np.fft.rfft(response, axis=1)[:, chosen],
         _variance_after(force, last) * float(np.sum(window**2)),
+        (last - first) / hit.sampling_rate_hz,
         noise,
     )
 

@@ -17,9 +17,9 @@ class Frf:
     by exactly that rate and have to be shifted back. `tail_s` is the time from the pulse (its
     centroid) to the end of the transformed records, where no window but the exponential one was
     applied to them: decays cut off at the end are then part of the fitted model. ∞ where it is not
-    known, as for exported FRFs. `force_share` is E|δF/F|² from the noise of the force: one error
-    that all lines of a resonance and all responses share, since the force is taken from a short
-    pulse, so that no number of lines averages it out (`variance` holds it line by line).
+    known, as for exported FRFs. `force_share` is E|δF/F|² from the noise of the force,
+    taken from a window of `force_window_s` around the pulse: so short that neighbouring lines, and
+    all responses, share the error (`variance` holds it too, but line by line).
     """
 
     frequency_hz: np.ndarray  # (F,) uniform, increasing
@@ -32,6 +32,7 @@ class Frf:
     remarks: tuple[str, ...] = ()
     tail_s: float = float("inf")
     force_share: np.ndarray | None = None  # (3, F), NaN like accelerance, None where unknown
+    force_window_s: float = 0.0
 
     @property
     def measured(self) -> np.ndarray:

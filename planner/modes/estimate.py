@@ -71,6 +71,7 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
         frf.exponential_rate_1_s,
         tail_s=frf.tail_s,
         force_share=None if force is None else force[columns][:, chosen],
+        force_window_s=frf.force_window_s,
     )
 
 

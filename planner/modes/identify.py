@@ -7,7 +7,7 @@ import numpy as np
 from planner.modes.data import Data
 from planner.modes.fit import Fit, fit, model, scales, strongest, weakness
 from planner.modes.plscf import PoleSet, plscf
-from planner.modes.refine import Refined
+from planner.modes.refine import Refined, shared_error
 from planner.modes.residues import unit
 from planner.modes.stabilisation import Diagram, diagram, stable
 
@@ -68,17 +68,20 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
     m = refined.poles.size
     scale = scales(data, fitted)
     weak = weakness(data, fitted)
+    errors = data.force_errors(model(data, refined))
+    shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
     modes = []
     for k in range(m):
         if weak[k] > 1:
             continue
         index = [k, m + k]
         covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        covariance = covariance + shared_pole[np.ix_(index, index)]
         pole = complex(refined.poles[k])
         frequency, damping, sd = natural(pole, covariance)
         residue = refined.residues.residue[..., k]
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
-        variance = variance + np.abs(residue) ** 2 * data.scale_variance(frequency) / 2
+        variance = variance + np.mean(shared_residue[..., k], axis=-1)
         presence = _presence(data, refined, k)
         support = _support(pole - data.rate_1_s, sets)
         modes.append(

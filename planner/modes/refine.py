@@ -19,6 +19,18 @@ MAX_ITERATIONS = 30
 
 
 @dataclass(frozen=True, eq=False)
+class Point:
+    """The problem at one set of poles: χ², step equations and what they rest on."""
+
+    chi2: float
+    coefficients: np.ndarray  # (entries, columns)
+    gradient: np.ndarray  # (2m,)
+    hessian: np.ndarray  # (2m, 2m)
+    inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
+    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+
+
+@dataclass(frozen=True, eq=False)
 class Refined:
     """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance."""
 
@@ -30,18 +42,7 @@ class Refined:
     residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
     significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
     converged: bool
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """The problem at one set of poles: χ², step equations and what they rest on."""
-
-    chi2: float
-    coefficients: np.ndarray  # (entries, columns)
-    gradient: np.ndarray  # (2m,)
-    hessian: np.ndarray  # (2m, 2m)
-    inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
-    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+    point: Point
 
 
 def refine(
@@ -63,7 +64,7 @@ def refine(
     weight = 2 / variance.reshape(-1, count)
     poles = np.asarray(poles, complex)
 
-    def evaluate(parts: np.ndarray) -> _Point:
+    def evaluate(parts: np.ndarray) -> Point:
         return _evaluate(lines, data, weight, _complex(parts), residual_terms)
 
     start = np.concatenate([poles.real, poles.imag])
@@ -73,6 +74,33 @@ def refine(
     return _finish(lines, _complex(parts), point, (outputs, inputs), count, converged)
 
 
+def shared_error(
+    lines: Lines, variance: np.ndarray, refined: Refined, errors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
+
+    errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
+    adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
+    imaginary part.
+    """
+    m, count = refined.poles.size, variance.shape[-1]
+    point, shape = refined.point, variance.shape[:2]
+    p = point.coefficients.shape[1]
+    poles = refined.poles
+    columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
+    both = np.concatenate([columns.real, columns.imag], axis=1)
+    weighted = (errors * 2 / variance).reshape(len(errors), -1, count)
+    cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
+    turn = slope_turn(point.coefficients, m)
+    gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
+    gradient += np.einsum("eka,nek->na", point.sensitivity, cross[..., :p])
+    change = gradient @ refined.pole_covariance
+    moved = np.einsum("ekl,nel->nek", point.inverse, cross[..., :p])
+    moved += np.einsum("eka,na->nek", point.sensitivity, change)
+    residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
+    return change.T @ change, residue.reshape(*shape, 2, m)
+
+
 def _complex(parts: np.ndarray) -> np.ndarray:
     real, imag = np.split(parts, 2)
     return real + 1j * imag
@@ -80,7 +108,7 @@ def _complex(parts: np.ndarray) -> np.ndarray:
 
 def _evaluate(
     lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
-) -> _Point:
+) -> Point:
     m = poles.size
     linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
     p = linear.shape[0]
@@ -102,7 +130,7 @@ def _evaluate(
     gradient -= np.einsum("eka,ek->a", mixed, coefficients)
     jtj = turn.transpose(0, 2, 1) @ gram[:, p:, p:] @ turn
     hessian = np.sum(jtj + mixed.transpose(0, 2, 1) @ sensitivity, axis=0)
-    return _Point(
+    return Point(
         max(chi2, 0.0),
         coefficients / norm[:p],
         gradient,
@@ -144,7 +172,7 @@ def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
 def _finish(
     lines: Lines,
     poles: np.ndarray,
-    point: _Point,
+    point: Point,
     shape: tuple[int, int],
     count: int,
     converged: bool,
@@ -164,10 +192,11 @@ def _finish(
         variance[:, : 2 * m].reshape(*shape, 2, m),
         _significance(point, m),
         converged,
+        point,
     )
 
 
-def _significance(point: _Point, m: int) -> np.ndarray:
+def _significance(point: Point, m: int) -> np.ndarray:
     """Wald statistic of each mode's residues: 2 · entries degrees of freedom without a mode."""
     index = np.stack([np.arange(m), m + np.arange(m)], axis=1)
     value = point.coefficients[:, index]
