@@ -10,7 +10,7 @@ All poles and eigenvectors are fitted at once by Gauss–Newton to the acceleran
 variance; the out-of-band terms of each entry enter linearly and are eliminated.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,15 +91,17 @@ def fit_mdof(
     variance: np.ndarray | None = None,
     symmetric: bool = False,
     reference: int = -1,
+    rate_1_s: float = 0.0,
+    tail_s: float = np.inf,
 ) -> MdofFit:
     """Modes of an FRF matrix (outputs, inputs, F) of the kind `quantity`, in SI units.
 
     frequency_hz (F,) uniform, above 0; variance like frf, E|δH|² of each line, taken from the
     error of the fit where it is None. With `symmetric` outputs and inputs are the same points and
-    directions, and ψ ∝ φ. Raises InputError for what cannot be fitted, RefusedError where no mode
-    is found.
+    directions, and ψ ∝ φ. `rate_1_s` and `tail_s` are those of the records (see `Frf`).
+    Raises InputError for what cannot be fitted, RefusedError where no mode is found.
     """
-    data = _data(frequency_hz, frf, quantity, variance)
+    data = replace(_data(frequency_hz, frf, quantity, variance), rate_1_s=rate_1_s, tail_s=tail_s)
     outputs, inputs, _ = data.response.shape
     if symmetric and outputs != inputs:
         raise InputError(

@@ -85,6 +85,8 @@ def shared_error(
     """
     m, count = refined.poles.size, variance.shape[-1]
     point, shape = refined.point, variance.shape[:2]
+    if not len(errors):
+        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
     p = point.coefficients.shape[1]
     poles = refined.poles
     columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])

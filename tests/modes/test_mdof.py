@@ -182,6 +182,22 @@ def test_the_reference_changes_nothing_but_the_scale():
         np.testing.assert_allclose(a.residue_sd, b.residue_sd, rtol=1e-6)
 
 
+def test_records_under_a_window_that_end_early():
+    """Transforms of the impulse responses, windowed and cut, of two rows and all columns."""
+    rng = np.random.default_rng(8)
+    structure = Structure(rng, 0.1, outside=False)
+    rate, tail_s = 1.5, 1.2
+    s = 2j * np.pi * LINES + rate
+    h = np.zeros((4, 4, LINES.size), complex)
+    for pole, residue in zip(structure.poles, structure.residue, strict=True):
+        for p, r in ((pole, residue), (pole.conj(), residue.conj())):
+            cut = p**2 * (1 - np.exp((p - s) * tail_s)) / (s - p) + s + p
+            h += r[..., None] * cut
+    found = fit_mdof(LINES, h[:2], rate_1_s=rate, tail_s=tail_s)
+    for mode, pole, residue in zip(found.modes, structure.poles, structure.residue, strict=True):
+        np.testing.assert_allclose(mode.parameters, parameters(pole, residue[:2]), rtol=1e-5)
+
+
 def test_bad_matrices_are_refused_in_words():
     h = np.ones((2, 3, LINES.size), complex)
     with pytest.raises(InputError, match="as many outputs as inputs"):
