@@ -60,6 +60,7 @@ def test_intervals_from_hits_cover_the_truth(settings):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("record_s", [3.0, 10.0])
 @pytest.mark.parametrize("force_noise", [0.0, 1e-3])
 @pytest.mark.parametrize("noise", [0.003, 0.02])
