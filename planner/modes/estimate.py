@@ -64,12 +64,15 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
         )
     variance = frf.variance[:, columns][..., chosen]
     known = np.all(np.isfinite(variance) & (variance > 0))
+    force = frf.force_share
     return Data(
         frf.frequency_hz[chosen],
         h[..., chosen],
         variance if known else None,
         frf.exponential_rate_1_s,
         tail_s=frf.tail_s,
+        force_share=None if force is None else force[columns][:, chosen],
+        force_window_s=frf.force_window_s,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from planner.modes.data import Data
 from planner.modes.fit import Fit, fit, model, scales, strongest, weakness
 from planner.modes.plscf import PoleSet, plscf
-from planner.modes.refine import Refined
+from planner.modes.refine import Refined, shared_error
 from planner.modes.residues import unit
 from planner.modes.specification import inflation
 from planner.modes.stabilisation import Diagram, diagram, stable
@@ -81,15 +81,20 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
     if data.step_s is None:
         scale = scale * inflation(data, fitted)
     weak = weakness(data, fitted)
+    errors = data.force_errors(model(data, refined))
+    shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
     modes = []
     for k in range(m):
         if weak[k] > 1:
             continue
         index = [k, m + k]
         covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        covariance = covariance + shared_pole[np.ix_(index, index)]
         pole = complex(refined.poles[k])
         frequency, damping, sd = natural(pole, covariance)
+        residue = refined.residues.residue[..., k]
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        variance = variance + np.mean(shared_residue[..., k], axis=-1)
         presence = _presence(data, refined, k)
         support = _support(pole - data.rate_1_s, sets)
         modes.append(
@@ -99,7 +104,7 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
                 float(sd[0]),
                 damping,
                 float(sd[1]),
-                refined.residues.residue[..., k],
+                residue,
                 np.sqrt(variance),
                 presence,
                 support,
@@ -111,15 +116,16 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
 
 def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
     """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
+    slope = natural_slope(pole)
+    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
+    return abs(pole) / (2 * np.pi), -pole.real / abs(pole), sd
+
+
+def natural_slope(pole: complex) -> np.ndarray:
+    """(2, 2) change of natural frequency (Hz) and damping ratio with Re λ and Im λ (rad/s)."""
     size = abs(pole)
-    slope = np.array(
-        [
-            [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)],
-            [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3],
-        ]
-    )
-    spread = slope @ covariance @ slope.T
-    return size / (2 * np.pi), -pole.real / size, np.sqrt(np.maximum(0.0, np.diag(spread)))
+    by_frequency = [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)]
+    return np.array([by_frequency, [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3]])
 
 
 def _support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
