@@ -164,7 +164,8 @@ def _measured_hz(
     for i, pose in enumerate(poses):
         progress(f"checking on unused pose {i + 1} of {len(poses)}")
         sources = tuple(Source(r.file, str(r.file), r.hit) for r in pool.rows[pose] if r.file)
-        measured = measure(sources, cell.config.modes.band_hz)
+        table = cell.config.modes
+        measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
         modes = from_modal(measured.modal)
         found.append(Measurement(pose, pool.rows[pose][0].joints_deg, (), modes))
     labelled = label(cell, tuple(found))

@@ -101,7 +101,8 @@ def _check_import(
             raise InputError(
                 f"{source.path} is not what was imported as {hit.file}; restore it from a copy."
             )
-    measured = measure(sources, model.cell.config.modes.band_hz)
+    table = model.cell.config.modes
+    measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
     modes = from_modal(measured.modal)
     accepted = [v.accepted for v in measured.verdicts[len(hits) - len(event.hits) :]]
     if accepted != [hit.accepted for hit in event.hits]:

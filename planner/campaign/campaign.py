@@ -214,8 +214,7 @@ class Campaign:
             return ImportReport(delivery.pose, (), (), already, known, None, before, before, 0.0)
         started = time.perf_counter()
         old = tuple(self.source_of(hit) for hit in known.accepted) if known else ()
-        band_hz = self.cell.config.modes.band_hz
-        hits, measured = measure_files(self.directory, old, fresh, band_hz)
+        hits, measured = measure_files(self.directory, old, fresh, self.cell.config.modes)
         event = Imported(
             pose=delivery.pose,
             joints_deg=known.joints_deg if known else joints_deg,

@@ -19,10 +19,14 @@ class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ModesTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which modes: how many from the lowest, within which band (Hz)."""
+    """Which modes: how many from the lowest, within which band (Hz).
+
+    `window_rate_1_s` is that of the analyser's exponential window on all channels, 0 for none.
+    """
 
     count: int = 4
     band_hz: tuple[float, float] = (4.0, 60.0)
+    window_rate_1_s: float = 0.0
 
 
 class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -93,6 +97,7 @@ def _check(config: CampaignConfig, path: Path) -> None:
         raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
     limits = [
         ("[modes] count", config.modes.count, 1, 20),
+        ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
         ("[acquisition] candidates", config.acquisition.candidates, 10, 20_000),
         ("[stop] measurements_max", config.stop.measurements_max, 1, 1000),
     ]

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.campaign import store
 from planner.campaign.cell import Cell
+from planner.campaign.config import ModesTable
 from planner.campaign.events import HitRecord
 from planner.campaign.intake import Delivery
 from planner.campaign.model import Model
@@ -85,14 +86,14 @@ def keep_files(
 
 
 def measure_files(
-    directory: Path, old: tuple[Source, ...], fresh: tuple[Kept, ...], band_hz: tuple[float, float]
+    directory: Path, old: tuple[Source, ...], fresh: tuple[Kept, ...], table: ModesTable
 ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
     """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
     new = tuple(
         Source(store.recording_path(directory, digest, suffix), s.name, s.hit, s.repeat)
         for s, digest, suffix in fresh
     )
-    measured = measure((*old, *new), band_hz)
+    measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
     records = tuple(
         HitRecord(
             file=source.name,

@@ -214,6 +214,10 @@ def modes(
         ),
     ] = None,
     estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
+    window_rate_1_s: Annotated[
+        float,
+        typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
+    ] = 0.0,
     plot: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw the analysis into this folder.")
     ] = None,
@@ -226,7 +230,9 @@ def modes(
     from planner.show.pictures import Pictures
 
     pictures = Pictures(plot, format_, rrd)
-    answer = modal.analyse(tuple(paths), band_hz, force, estimator, pictures, quantity)
+    answer = modal.analyse(
+        tuple(paths), band_hz, force, estimator, pictures, quantity, window_rate_1_s
+    )
     refused = answer["refused"]
     for entry in refused:
         warn(f"Refused {entry['file']}: {entry['reason']}")

@@ -29,12 +29,15 @@ def analyse(
     estimator: str = "h1",
     pictures: Pictures = NONE,
     quantity: str | None = None,
+    window_rate_1_s: float = 0.0,
 ) -> dict[str, Any]:
     """Answer of `modes`. Raises RefusedError if no file could be used."""
     if estimator not in ("h1", "h2", "hv"):
         raise InputError(f"--estimator {estimator} is not known; give h1, h2 or hv.")
     if quantity is not None and quantity not in DERIVATIVE:
         raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
+    if not 0 <= window_rate_1_s < 1e3:
+        raise InputError(f"--window-rate {window_rate_1_s:g}: give a rate in 1/s, 0 for none.")
     if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
         raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
     sources = _sources(paths)
@@ -44,7 +47,7 @@ def analyse(
     if unlabelled is not None:
         return _by_transfer(unlabelled, band_hz, quantity, pictures)
     band = band_hz or DEFAULT_BAND_HZ
-    measured = measure(sources, band, estimator)
+    measured = measure(sources, band, estimator, window_rate_1_s)
     refused = [
         {"file": v.source.name, "reason": v.reason} for v in measured.verdicts if not v.accepted
     ]

@@ -5,7 +5,7 @@ Nonlinearity in Structural Dynamics, 2001, section 2.3). Friction, play and hard
 frequencies and damping depend on the level.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -82,14 +82,21 @@ class Homogeneity:
 
 
 def homogeneity(
-    hits: tuple[Hit, ...], modal: ModalModel, band_hz: tuple[float, float]
+    hits: tuple[Hit, ...],
+    modal: ModalModel,
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
 ) -> Homogeneity | None:
-    """Compare the force levels among the hits of one pose; None if there is only one level."""
+    """Compare the force levels among the hits of one pose; None if there is only one level.
+
+    `window_rate_1_s` is that of an exponential window that the records carry.
+    """
     groups = by_level(hits)
     if len(groups) < 2:
         return None
     try:
-        frfs = [estimate(group, band_hz) for group in groups]
+        estimated = [estimate(group, band_hz) for group in groups]
+        frfs = [replace(frf, exponential_rate_1_s=window_rate_1_s) for frf in estimated]
     except RefusedError:
         return None
     levels = tuple(

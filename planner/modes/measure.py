@@ -45,11 +45,16 @@ class MeasuredPose:
 
 
 def measure(
-    sources: tuple[Source, ...], band_hz: tuple[float, float], estimator: str = "h1"
+    sources: tuple[Source, ...],
+    band_hz: tuple[float, float],
+    estimator: str = "h1",
+    window_rate_1_s: float = 0.0,
 ) -> MeasuredPose:
     """Read and screen every file, estimate the FRF from the good hits and the modes from it.
 
     A file that cannot be used is refused with its reason, never dropped in silence.
+    `window_rate_1_s` is that of an exponential window e^(−rate·t) that the analyser has laid over
+    all channels: it is part of what is fitted, so that damping comes out without it.
     """
     verdicts: list[Verdict] = []
     hits: list[tuple[int, Hit]] = []
@@ -61,8 +66,8 @@ def measure(
         verdicts.append(verdict)
     hits = _drop_inconsistent(hits, verdicts, band_hz)
     used = tuple(hit for _, hit in hits)
-    frf, modal, remarks = _identify(used, frfs, band_hz, estimator)
-    levels = homogeneity(used, modal, band_hz) if used and modal else None
+    frf, modal, remarks = _identify(used, frfs, band_hz, estimator, window_rate_1_s)
+    levels = homogeneity(used, modal, band_hz, window_rate_1_s) if used and modal else None
     if levels is not None and levels.remark:
         remarks = (*remarks, levels.remark)
     return MeasuredPose(tuple(verdicts), used, frf, modal, remarks, levels)
@@ -122,7 +127,11 @@ def _drop_inconsistent(
 
 
 def _identify(
-    hits: tuple[Hit, ...], frfs: list[FrfRecord], band_hz: tuple[float, float], estimator: str
+    hits: tuple[Hit, ...],
+    frfs: list[FrfRecord],
+    band_hz: tuple[float, float],
+    estimator: str,
+    window_rate_1_s: float,
 ) -> tuple[Frf | None, ModalModel | None, tuple[str, ...]]:
     from planner.frf.estimate import estimate, from_records
     from planner.modes.estimate import estimate_modes
@@ -137,6 +146,7 @@ def _identify(
         frf = estimate(hits, band_hz, estimator) if hits else from_records(tuple(frfs))
     except RefusedError as error:
         return None, None, (str(error),)
+    frf = replace(frf, exponential_rate_1_s=window_rate_1_s)
     try:
         modal = estimate_modes(frf, band_hz)
     except RefusedError as error:

@@ -1,0 +1,67 @@
+"""Force levels: grouping, proportional structures, and structures that soften."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from planner.frf.estimate import estimate
+from planner.modes.amplitude import homogeneity
+from planner.modes.estimate import estimate_modes
+from planner.recording.levels import by_level, peak_n
+from planner.recording.types import Hit
+from simulated_hits import POLES, make_hit
+
+BAND = (4.0, 60.0)
+LEVELS_N = (100.0, 400.0, 1600.0)
+
+
+def struck(seed: int, softening: float = 0.0, levels: tuple[float, ...] = LEVELS_N):
+    """Two hits per level and axis; `softening` lowers mode 1 by that share per factor of four."""
+    rng = np.random.default_rng(seed)
+    hits: list[Hit] = []
+    for number, level in enumerate(levels):
+        poles = POLES.copy()
+        poles[0] *= 1 - softening * number
+        for axis in ("+x", "+y", "+z"):
+            for _ in range(2):
+                peak = level * rng.uniform(0.8, 1.2)
+                hits.append(make_hit(rng, axis, 0.01, peak_n=peak, poles=poles))
+    return tuple(hits)
+
+
+def judged(hits: tuple[Hit, ...]):
+    return homogeneity(hits, estimate_modes(estimate(hits, BAND), BAND), BAND)
+
+
+def test_hits_are_grouped_by_strength():
+    hits = struck(0)
+    groups = by_level(hits)
+    assert [len(group) for group in groups] == [6, 6, 6]
+    assert all(max(map(peak_n, a)) < min(map(peak_n, b)) for a, b in pairwise(groups))
+
+
+def test_one_level_has_nothing_to_compare():
+    assert judged(struck(0, levels=(500.0,))) is None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_linear_structure_is_homogeneous(seed):
+    found = judged(struck(seed))
+    assert found is not None
+    assert found.homogeneous
+    assert found.remark == ""
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_mode_that_softens_is_told(seed):
+    found = judged(struck(seed, softening=0.02))
+    assert found is not None
+    assert not found.homogeneous
+    assert found.p_value < 1e-3
+    assert "not proportional" in found.remark
+    assert "mode 1 moves" in found.remark
+    low, high = found.levels[0], found.levels[-1]
+    assert high.frequency_hz[0] / low.frequency_hz[0] == pytest.approx(0.96, abs=0.005)
+    assert high.frequency_hz[1] / low.frequency_hz[1] == pytest.approx(1.0, abs=0.003)
+    assert [level.hits for level in found.levels] == [6, 6, 6]
