@@ -14,18 +14,19 @@ from planner.robot.elastic import Matrices
 
 
 @dataclass(frozen=True, eq=False)
-class Gradient:
-    """Accelerance (3s, 3h, n, F) in m/s²/N, its derivatives with the parameter's axis first.
+class Inertias:
+    """How p inertial parameters of each of B bodies move the mass matrix: Σ Jᵀ basis J.
 
-    With respect to the natural logarithm of `stiffness` and `damping` (e, ...), to `loss_factor`
-    (e, ...) itself, and to the weights of `inertia` (r, ...).
+    `jacobians` (n, B, 6, e) of the bodies at n poses, `basis` (B, p, 6, 6) per unit of parameter.
     """
 
-    accelerance: np.ndarray
-    stiffness: np.ndarray
-    damping: np.ndarray
-    loss_factor: np.ndarray
-    inertia: np.ndarray
+    jacobians: np.ndarray
+    basis: np.ndarray
+
+    def mass_change(self, values: np.ndarray) -> np.ndarray:
+        """Change (n, e, e) of M for values (B · p,) of the parameters."""
+        weighted = np.einsum("bpij,bp->bij", self.basis, values.reshape(self.basis.shape[:2]))
+        return np.sum(np.swapaxes(self.jacobians, 2, 3) @ weighted @ self.jacobians, axis=1)
 
 
 def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:
@@ -36,11 +37,8 @@ def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.
 def response(
     matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
 ) -> np.ndarray:
-    """Accelerance (3s, 3h, n, F) at s (n, F); `mass` (n, e, e) takes the place of M."""
-    mass = matrices.mass if mass is None else mass
-    _, x_hit = _solutions(matrices, elasticity, s, mass, matrices.hit)
-    sensor = np.swapaxes(matrices.sensor, 0, 1)  # (3s, n, e)
-    return s**2 * np.einsum("ane,ebnf->abnf", sensor, x_hit, optimize=True)
+    """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
+    return _synthesis(matrices, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
 
 
 def response_gradient(
@@ -48,55 +46,84 @@ def response_gradient(
     elasticity: Elasticity,
     s: np.ndarray,
     mass: np.ndarray | None = None,
-    mass_gradient: np.ndarray | None = None,
-) -> Gradient:
-    """Accelerance at s (n, F) and derivatives; mass_gradient (n, r, e, e) is dM per weight."""
-    mass = matrices.mass if mass is None else mass
-    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
+    inertias: Inertias | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives (n, P, 3s, 3h, F).
+
+    The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
+    and those of `inertias` (B · p, only if given).
+    """
     points = matrices.hit.shape[1]
-    _, x = _solutions(matrices, elasticity, s, mass, both)
-    x_hit, x_sensor = x[:, None, :points], x[:, points:, None]  # (e, ., ., n, F)
-    sensor = np.swapaxes(matrices.sensor, 0, 1)
-    h = s**2 * np.einsum("ane,ebnf->abnf", sensor, x_hit[:, 0], optimize=True)
-    each = x_sensor * x_hit
-    each *= -(s**2)
-    k, c, eta = (
-        v.reshape(-1, 1, 1, 1, 1)
-        for v in (elasticity.stiffness, elasticity.damping, elasticity.loss_factor)
-    )
-    by_mass = np.empty((0, *h.shape), dtype=complex)
-    if mass_gradient is not None:
-        by_mass = _by_mass(mass_gradient, x[:, :points], x[:, points:], s)
-    stiffness = k * each if not eta.any() else k * (1 + 1j * eta) * each
-    return Gradient(h, stiffness, c * (s * each), 1j * k * each, by_mass)
+    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
+    x = _solutions(matrices, elasticity, s, mass, both)
+    x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
+    e, lossy = x.shape[1], bool(elasticity.loss_factor.any())
+    springs = (3 if lossy else 2) * e
+    extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
+    shape = len(s), springs + extra, x_sensor.shape[2], points, s.shape[1]
+    out = np.empty(shape, dtype=complex)
+    minus = -(s**2)[:, None, None, None]
+    each = out[:, :e]
+    np.multiply(x_sensor[:, :, :, None], x_hit[:, :, None] * minus, out=each)
+    k = elasticity.stiffness[:, None, None, None]
+    slope = s[:, None, None, None] * elasticity.damping[:, None, None, None]
+    np.multiply(each, slope, out=out[:, e : 2 * e])
+    if lossy:
+        lost = 1j * elasticity.loss_factor[:, None, None, None]
+        np.multiply(each, k * lost, out=out[:, 2 * e : springs])
+        each *= k * (1 + lost)
+    else:
+        each *= k
+    if inertias is not None:
+        _by_inertia(inertias, x_hit, x_sensor, s, out[:, springs:])
+    return _synthesis(matrices, x_hit, s), out
+
+
+def _synthesis(matrices: Matrices, x_hit: np.ndarray, s: np.ndarray) -> np.ndarray:
+    n, e, points, lines = x_hit.shape
+    flat = np.ascontiguousarray(x_hit).reshape(n, e, -1).view(float)
+    receptance = (matrices.sensor @ flat).view(complex).reshape(n, -1, points, lines)
+    return (s**2)[:, None, None] * receptance
 
 
 def _solutions(
-    matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray, rows: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Z (n, F, e, e) and X = Z⁻¹ rowsᵀ (e, rows, n, F)."""
-    square = s[..., None, None] ** 2
-    z = square * mass[:, None]
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None,
+    rows: np.ndarray,
+) -> np.ndarray:
+    """X = Z⁻¹ rowsᵀ as (n, e, rows, F)."""
+    mass = matrices.mass if mass is None else mass
+    z = (s**2)[..., None, None] * mass[:, None]
+    z += matrices.geometric[:, None]
     diagonal = np.einsum("...ii->...i", z)
     diagonal += elasticity.stiffness * (1 + 1j * elasticity.loss_factor)
     diagonal += s[..., None] * elasticity.damping
-    if matrices.geometric.any():
-        z += matrices.geometric[:, None]
     x = np.linalg.solve(z, np.swapaxes(rows, 1, 2)[:, None].astype(complex))
-    return z, np.ascontiguousarray(np.moveaxis(x, (2, 3), (0, 1)))
+    return np.ascontiguousarray(np.moveaxis(x, 1, 3))
 
 
-def _by_mass(
-    mass_gradient: np.ndarray, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray
-) -> np.ndarray:
-    """−s⁴ X_sᵀ dM X_h, (r, 3s, 3h, n, F)."""
-    e, b, n, f = x_hit.shape
-    r = mass_gradient.shape[1]
-    out = np.empty((r, x_sensor.shape[1], b, n, f), dtype=complex)
+def _by_inertia(
+    inertias: Inertias, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray, out: np.ndarray
+) -> None:
+    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F)."""
+    n, bodies, _, e = inertias.jacobians.shape
+    p, lines = inertias.basis.shape[1], s.shape[1]
+    weights = inertias.basis.reshape(bodies, p * 6, 6)
     for i in range(n):
-        # One real product for the real and imaginary parts of all columns.
-        columns = np.ascontiguousarray(x_hit[:, :, i]).reshape(e, -1)
-        moved = mass_gradient[i].reshape(r * e, e) @ columns.view(float)
-        moved = moved.view(complex).reshape(r, e, b, f)
-        out[:, :, :, i] = np.einsum("eaf,rebf->rabf", x_sensor[:, :, i] * -(s[i] ** 4), moved)
-    return out
+        jacobian = inertias.jacobians[i].reshape(-1, e)
+        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, -1, lines)
+        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, lines)
+        for b in range(bodies):
+            momentum = _times(weights[b], hit[b]).reshape(p, 6, 1, -1, lines)
+            part = out[i, b * p : (b + 1) * p]
+            np.multiply(sensor[b, 0][:, None], momentum[:, 0], out=part)
+            for axis in range(1, 6):
+                part += sensor[b, axis][:, None] * momentum[:, axis]
+
+
+def _times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Real matrix (r, e) times complex columns (e, ..., F): one real product of both parts."""
+    flat = np.ascontiguousarray(columns).reshape(columns.shape[0], -1)
+    return (matrix @ flat.view(float)).view(complex).reshape(-1, *columns.shape[1:])

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.robot import Robot
-from planner.robot.virtual import inertia_basis, virtual_model
+from planner.robot.virtual import virtual_model
 
 SINGULAR = 1e-12  # smallest eigenvalue of the mass matrix scaled to ones on its diagonal
 SAG_STEPS = 4  # each gains three digits or more where sagging is small at all
@@ -106,9 +106,8 @@ class ElasticModel:
         mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
         out = [np.empty((n, len(group), 3, e)) for group in ids]
         for i, row in enumerate(q):
-            full = self._full(row)
+            full = self._standing(row)
             if robot.config.geometric_stiffness:
-                full = self._sagged(full)
                 geometric[i] = self._gravity_stiffness(full)
             crba = pin.crba(self._model, self._data, full)
             upper = np.triu(crba)
@@ -122,29 +121,29 @@ class ElasticModel:
         hit, sensor = (jacobians.reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric)
 
-    def mass_gradient(self, q: np.ndarray) -> np.ndarray:
-        """(n, bodies, 10, e, e): derivative of M at q (n, dof) in rad with respect to `inertia`."""
-        q, basis = np.atleast_2d(q), inertia_basis()
-        out = np.empty((len(q), len(self.bodies), 10, self.size, self.size))
+    def body_jacobians(self, q: np.ndarray) -> np.ndarray:
+        """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
+
+        In the frame of the joint that carries the body, linear part (m/rad) first. With the
+        spatial inertias I of the bodies (`virtual.inertia_basis`), M = Σ Jᵀ I J.
+        """
+        q = np.atleast_2d(q)
+        out = np.empty((len(q), len(self.bodies), 6, self.size))
         for i, row in enumerate(q):
-            full = self._full(row)
-            if self.robot.config.geometric_stiffness:
-                full = self._sagged(full)
-            pin.computeJointJacobians(self._model, self._data, full)
+            pin.computeJointJacobians(self._model, self._data, self._standing(row))
             for b, joint in enumerate(self._virtual.carriers):
                 jacobian = pin.getJointJacobian(self._model, self._data, joint, pin.LOCAL)
-                moved = jacobian[:, self._elastic]
-                out[i, b] = moved.T @ basis @ moved
+                out[i, b] = jacobian[:, self._elastic]
         return out
 
-    def _full(self, q: np.ndarray) -> np.ndarray:
+    def _standing(self, q: np.ndarray) -> np.ndarray:
+        """Coordinates of the virtual model at q (dof,), sagged if robot.toml asks for it."""
         full = np.zeros(self._model.nq)
         full[self._virtual.rigid] = q
-        return full
+        return self._sagged(full) if self.robot.config.geometric_stiffness else full
 
     def _sagged(self, full: np.ndarray) -> np.ndarray:
         """Where springs of the stated stiffness carry the weight: K δ = −g(q + δ)."""
-        full = full.copy()
         for _ in range(SAG_STEPS):
             weight = pin.computeGeneralizedGravity(self._model, self._data, full)
             full[self._elastic] = -weight[self._elastic] / self.stiffness
