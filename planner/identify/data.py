@@ -18,13 +18,15 @@ class Measured:
     """FRFs of n poses at F lines each, lines being the pose's own.
 
     `s` (n, F) is the Laplace variable at which they hold, `accelerance` (n, 3, 3, F) in m/s²/N,
-    `sd` (n, 3, 3, F) the root of E|δH|², ∞ where nothing was measured (accelerance is 1 there).
+    `sd` (n, 3, 3, F) the root of E|δH|², ∞ where nothing was measured (accelerance is 1 there),
+    `tail_s` (n,) as in `Frf`.
     """
 
     frequency_hz: np.ndarray
     s: np.ndarray
     accelerance: np.ndarray
     sd: np.ndarray
+    tail_s: np.ndarray
 
     @property
     def used(self) -> np.ndarray:
@@ -75,7 +77,8 @@ def stack(
         h[i, ..., :count] = np.where(given, values, 1.0)
         sd[i, ..., :count] = np.where(given, total, np.inf)
     rates = np.array([frf.exponential_rate_1_s for frf in frfs])
-    return Measured(frequency, laplace(frequency, rates), h, sd)
+    tails = np.array([frf.tail_s for frf in frfs])
+    return Measured(frequency, laplace(frequency, rates), h, sd, tails)
 
 
 def _lines(frf: Frf, band_hz: tuple[float, float], most: int) -> np.ndarray:

@@ -15,6 +15,7 @@ from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import Identification, estimates, undetermined
 from planner.identify.solver import Minimum, minimise
+from planner.identify.tail import cut_off
 from planner.physics.gradient import Inertias, response
 from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
@@ -22,6 +23,8 @@ from planner.robot.elastic import Matrices
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 LOG_LINES, LINES, MOST_LINES = 64, 160, 512  # a pose: logarithmic stages, starts, the last fit
 LOG_STEPS, STEPS = 40, 80
+COMPLETIONS = 5
+SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE, TOLERANCE = 1e-4, 1e-8
 MODEL_ERROR = 0.003
 SAME = 1e-3  # relative difference of two starts that found the same minimum
@@ -49,6 +52,11 @@ class _Problem:
     inertias: Inertias
     parametrisation: Parametrisation
     progress: Callable[[Progress], None] | None
+
+    @property
+    def inertial(self) -> bool:
+        """Whether inertias are identified too."""
+        return bool(self.parametrisation.nuisances)
 
     def objective(
         self, share: float, lines: int, logarithmic: bool = False, inertia: bool = False
@@ -114,7 +122,7 @@ def identify(
         best = _warm(problem, warm)
     if best is None:
         x, misfits = _search(problem, _starting_points(parametrisation, starts, seed))
-        best = _refine(problem, np.concatenate([x, np.zeros(len(parametrisation.nuisances))]))
+        best = _refine(problem, x)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
 
@@ -130,6 +138,7 @@ def fit_similarity(
     measured = stack(frfs, band, MOST_LINES, MODEL_ERROR)
     matrices = simulation.elastic.matrices(q)
     simulated = response(matrices, simulation.elasticity, measured.s)
+    simulated -= cut_off(simulation.poles(q), measured.s, measured.tail_s)
     return similarity(np.where(measured.used, measured.accelerance, np.nan), simulated)
 
 
@@ -153,17 +162,12 @@ def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) ->
 
 
 def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Best θ (P,) of all starts, and the misfit of each."""
+    """Best (θ, φ) of all starts, and the misfit of each."""
     found: list[Minimum] = []
     misfits: list[float] = []
-    for number, x in enumerate(points, 1):
-        for share in STAGES:
-            top = problem.band_hz[0] + share * (problem.band_hz[1] - problem.band_hz[0])
-            stage = f"logarithm, up to {top:.0f} Hz"
-            logarithmic = problem.objective(share, LOG_LINES, logarithmic=True)
-            x = problem.minimise(logarithmic, x, number, stage, LOG_STEPS).x
-        objective = problem.objective(1.0, LINES)
-        end = problem.minimise(objective, x, number, "FRFs in units of their noise", STEPS)
+    for number, point in enumerate(points, 1):
+        x = _approach(problem, point, number)
+        end, objective = _plain(problem, x, number, LINES, "FRFs in units of their noise")
         found.append(end)
         misfits.append(end.at.chi2 / max(objective.count, 1))
         values = sorted(m.at.value for m in found)
@@ -174,12 +178,38 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
     return best.x, tuple(misfits)
 
 
+def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
+    """(θ, φ) from where the plain residual leads home: logarithms in bands that widen."""
+    low, high = problem.band_hz
+    for share in STAGES:
+        stage = f"logarithms up to {low + share * (high - low):.0f} Hz"
+        objective = problem.objective(share, LOG_LINES, logarithmic=True)
+        theta = problem.minimise(objective, theta, number, stage, LOG_STEPS).x
+    x = np.concatenate([theta, np.zeros(len(problem.parametrisation.nuisances))])
+    if problem.inertial:
+        objective = problem.objective(1.0, LOG_LINES, logarithmic=True, inertia=True)
+        x = problem.minimise(objective, x, number, "logarithms, inertias free", LOG_STEPS).x
+    return x
+
+
+def _plain(
+    problem: _Problem, x: np.ndarray, number: int, lines: int, stage: str
+) -> tuple[Minimum, Objective]:
+    """Least plain residual from x; what the records lack is filled in again and again."""
+    objective = problem.objective(1.0, lines, inertia=problem.inertial)
+    tail = bool(np.isfinite(objective.measured.tail_s).any())
+    for _ in range(COMPLETIONS if tail else 1):
+        objective = objective.completed(x) if tail else objective
+        end = problem.minimise(objective, x, number, stage, STEPS)
+        moved, x = end.x - x, end.x
+        if moved @ end.at.normal @ moved < SETTLED:
+            break
+    return end, objective
+
+
 def _refine(problem: _Problem, x: np.ndarray) -> tuple[Minimum, float]:
     """Minimum over springs and inertias on all lines from (θ, φ), and its misfit."""
-    inertial = bool(problem.parametrisation.nuisances)
-    objective = problem.objective(1.0, MOST_LINES, inertia=inertial)
-    stage = "springs and inertias" if inertial else "all lines"
-    end = problem.minimise(objective, x, 0, stage, STEPS)
+    end, objective = _plain(problem, x, 0, MOST_LINES, "all lines")
     return end, end.at.chi2 / max(objective.count, 1)
 
 

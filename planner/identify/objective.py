@@ -6,12 +6,13 @@ right one from afar; the plain one, in units of the noise, is what has the least
 end.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.identify.data import Measured
 from planner.identify.parameters import Parametrisation
+from planner.identify.tail import Completion, completion
 from planner.physics.gradient import Inertias, response_gradient
 from planner.robot.elastic import Matrices
 
@@ -39,6 +40,21 @@ class Objective:
     parametrisation: Parametrisation
     logarithmic: bool
     free_inertia: bool
+    completion: Completion | None = None  # what the records lack, around θ = `completed_at`
+    completed_at: np.ndarray | None = None
+
+    def completed(self, x: np.ndarray) -> "Objective":
+        """With the decays that the records cut off, as they are at x and to first order near."""
+        count = len(self.parametrisation.parameters)
+        springs, mass = self.parametrisation.elasticity(x[:count]), self._mass(x[count:])
+        m = self.measured
+        made = completion(self.matrices, springs, mass, m.s, m.tail_s)
+        return replace(self, completion=made, completed_at=x[:count])
+
+    def _mass(self, phi: np.ndarray) -> np.ndarray:
+        if not self.free_inertia:
+            return self.matrices.mass
+        return self.matrices.mass + self.inertias.mass_change(phi)
 
     @property
     def count(self) -> int:
@@ -55,17 +71,21 @@ class Objective:
         return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
 
     def __call__(self, x: np.ndarray) -> Quadratic:
-        """At x = (θ, φ) or, where inertias are not free, at x = θ."""
+        """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where no body is like that."""
         p = self.parametrisation
         count = len(p.parameters)
         theta, phi = x[:count], x[count:]
-        mass, inertias = self.matrices.mass, None
-        if self.free_inertia:
-            inertias = self.inertias
-            mass = mass + inertias.mass_change(phi)
+        mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
+        if self.free_inertia and np.linalg.eigvalsh(mass)[:, 0].min() <= 0:
+            nothing = np.zeros(len(x))
+            return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
         h, slope = response_gradient(
             self.matrices, p.elasticity(theta), self.measured.s, mass, inertias
         )
+        if self.completion is not None:
+            lost, springs = self.completion, p.spread @ (theta - self.completed_at)
+            h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, springs)
+            slope[:, : len(springs)] -= lost.slope
         residual, slope = self._residual(h, slope)
         gradient, normal = _normal_equations(residual, slope)
         spread = np.zeros((len(gradient), len(x)))

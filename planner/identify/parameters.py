@@ -13,7 +13,8 @@ from planner.robot.virtual import inertia_basis
 
 KINDS = ("stiffness", "damping", "loss_factor")
 UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
-INERTIAL = ("mass", "inertia", "com_x", "com_y", "com_z")
+MOMENTS = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of inertia, in Pinocchio's order
+INERTIAL = ("mass", "com_x", "com_y", "com_z", *(f"i_{'xyz'[i]}{'xyz'[j]}" for i, j in MOMENTS))
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,8 @@ class Parametrisation:
     spread: np.ndarray  # (2e or 3e, P) of 0 and 1
     size: int
     nuisances: tuple[str, ...]
-    inertia: np.ndarray  # (bodies, 5, 10): change of the inertia by one sd
-    basis: np.ndarray  # (bodies, 5, 6, 6): the same as spatial inertias
+    inertia: np.ndarray  # (bodies, 10, 10): change of the inertia by one sd
+    basis: np.ndarray  # (bodies, 10, 6, 6): the same as spatial inertias
 
     @property
     def mean(self) -> np.ndarray:
@@ -155,7 +156,9 @@ def _parameter(
     if name in priors.bounds:
         low, high = priors.bounds[name]
         if not 0 < low < high < float("inf"):
-            raise InputError(f"Bounds {low}, {high} of {name} must rise from above 0; correct them.")
+            raise InputError(
+                f"Bounds {low}, {high} of {name} must rise from above 0; correct them."
+            )
         log_sd = float(np.log(high / low) / np.sqrt(12))
         return Parameter(name, kind, blocks, float(np.sqrt(low * high)), log_sd, low, high)
     factor = getattr(priors, f"{kind}_factor")
@@ -164,9 +167,10 @@ def _parameter(
 
 
 def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...], np.ndarray]:
-    """Per body: mass at a fixed gyration radius, inertia about the COM, and the COM's place.
+    """Per body: mass at a fixed gyration radius, the COM's place, and moments about the COM.
 
-    The COM moves the moments by a term of second order too, which is left out: it keeps M linear.
+    The COM moves the moments by a term of second order too, which keeps M from being linear: it is
+    left to the moments, whose sds are widened by as much.
     """
     bodies = simulation.elastic.bodies
     change = np.zeros((len(bodies), len(INERTIAL), 10))
@@ -175,20 +179,20 @@ def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...],
     for b, nominal in enumerate(simulation.elastic.inertia):
         m = nominal[0]
         com = nominal[1:4] / m if m > 0 else np.zeros(3)
-        central = nominal.copy()
-        central[:4] = 0.0
-        central[4:] -= _point(m, com)
+        central = nominal[4:] - _point(m, com)
+        size = np.sqrt(np.abs(central[[0, 2, 5]]))
         change[b, 0] = priors.mass * nominal
-        change[b, 1] = priors.inertia * central
         for axis in range(3):
             step = np.eye(3)[axis]
-            change[b, 2 + axis, 1 + axis] = priors.com_m * m
+            change[b, 1 + axis, 1 + axis] = priors.com_m * m
             slope = _point(m, com + step) - _point(m, com) - _point(m, step)
-            change[b, 2 + axis, 4:] = priors.com_m * slope
+            change[b, 1 + axis, 4:] = priors.com_m * slope
+        for k, (i, j) in enumerate(MOMENTS, 4):
+            change[b, k, k] = priors.inertia * size[i] * size[j] + m * priors.com_m**2
     return tuple(f"{what} of {body}" for body in bodies for what in INERTIAL), change
 
 
 def _point(mass: float, at: np.ndarray) -> np.ndarray:
-    """Moments (xx, xy, yy, xz, yz, zz) about the origin of a point mass."""
+    """Moments about the origin of a point mass, as MOMENTS lists them."""
     moments = mass * (at @ at * np.eye(3) - np.outer(at, at))
-    return np.array([moments[i, j] for i, j in [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]])
+    return np.array([moments[i, j] for i, j in MOMENTS])

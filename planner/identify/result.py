@@ -101,9 +101,7 @@ def estimates(
     )
 
 
-def undetermined(
-    parametrisation: Parametrisation, covariance: np.ndarray
-) -> tuple[Direction, ...]:
+def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tuple[Direction, ...]:
     """Directions of the springs' parameters of which the data told little, least told first.
 
     They are the eigenvectors of the posterior covariance in units of the prior's sds whose
@@ -117,9 +115,7 @@ def undetermined(
     for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda v: -v[0]):
         if value > TOLD**2:
             ratio = float(np.sqrt(value))
-            found.append(
-                Direction(ratio, tuple(map(float, vector)), _words(names, vector, ratio))
-            )
+            found.append(Direction(ratio, tuple(map(float, vector)), _words(names, vector, ratio)))
     return tuple(found)
 
 

@@ -88,7 +88,9 @@ def test_window_shifts_the_laplace_variable(tmp_path):
     """H at iω + rate is the transform of e^(−rate·t) h(t): checked through the poles."""
     simulation, matrices, _, s = everything(tmp_path, 0.0, 7.0)
     solved = simulation.poles(KR10.poses(3))
-    expected = np.einsum("nkij,nkf->nijf", solved.residues, 1 / (s[:, None] - solved.poles[..., None]))
+    expected = np.einsum(
+        "nkij,nkf->nijf", solved.residues, 1 / (s[:, None] - solved.poles[..., None])
+    )
     expected = expected * (s**2)[:, None, None]
     found = response(matrices, simulation.elasticity, s)
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(found).max())
