@@ -23,7 +23,7 @@ from planner.robot.elastic import Matrices
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 LOG_LINES, LINES, MOST_LINES = 64, 160, 512  # a pose: logarithmic stages, starts, the last fit
 LOG_STEPS, STEPS = 40, 80
-COMPLETIONS = 5
+COMPLETIONS = 4  # at most, after the first; each is exact to second order
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE, TOLERANCE = 1e-4, 1e-8
 MODEL_ERROR = 0.003
@@ -198,10 +198,12 @@ def _plain(
     """Least plain residual from x; what the records lack is filled in again and again."""
     objective = problem.objective(1.0, lines, inertia=problem.inertial)
     tail = bool(np.isfinite(objective.measured.tail_s).any())
-    for _ in range(COMPLETIONS if tail else 1):
-        objective = objective.completed(x) if tail else objective
-        end = problem.minimise(objective, x, number, stage, STEPS)
-        moved, x = end.x - x, end.x
+    objective = objective.completed(x) if tail else objective
+    end = problem.minimise(objective, x, number, stage, STEPS)
+    for _ in range(COMPLETIONS if tail else 0):
+        objective = objective.completed(end.x)
+        before, end = end.x, problem.minimise(objective, end.x, number, stage, STEPS)
+        moved = end.x - before
         if moved @ end.at.normal @ moved < SETTLED:
             break
     return end, objective
