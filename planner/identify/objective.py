@@ -17,6 +17,7 @@ from planner.physics.gradient import Inertias, response_gradient
 from planner.robot.elastic import Matrices
 
 LOG_FLOOR = 0.3  # relative sd that no logarithmic residual falls below: far-off models err by more
+FARTHEST = 8.0  # sds of the prior beyond which nothing is looked for
 LOG_DROP = 0.3  # relative noise above which a value has no logarithm worth fitting
 
 
@@ -71,12 +72,14 @@ class Objective:
         return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
 
     def __call__(self, x: np.ndarray) -> Quadratic:
-        """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where no body is like that."""
+        """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where that cannot be."""
         p = self.parametrisation
         count = len(p.parameters)
         theta, phi = x[:count], x[count:]
         mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
-        if self.free_inertia and np.linalg.eigvalsh(mass)[:, 0].min() <= 0:
+        away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
+        possible = not self.free_inertia or np.linalg.eigvalsh(mass)[:, 0].min() > 0
+        if not possible or np.abs(away).max() > FARTHEST:
             nothing = np.zeros(len(x))
             return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
         h, slope = response_gradient(
@@ -92,7 +95,6 @@ class Objective:
         springs = len(p.held)
         spread[:springs, :count] = p.spread
         spread[springs:, count:] = np.eye(len(phi))
-        away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
         scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
         chi2 = float(np.sum(residual.real**2 + residual.imag**2))
         return Quadratic(
