@@ -18,6 +18,9 @@ from planner.robot.elastic import Matrices
 
 LOG_FLOOR = 0.3  # relative sd that no logarithmic residual falls below: far-off models err by more
 FARTHEST = 8.0  # sds of the prior beyond which nothing is looked for
+# Far from the truth the data err by bias, not noise, and neighbouring lines alike: the prior counts
+# for more. Without this, dampers that lock a joint where a spring should give are traps.
+LOG_PRIOR = 10.0
 LOG_DROP = 0.3  # relative noise above which a value has no logarithm worth fitting
 
 
@@ -33,7 +36,10 @@ class Quadratic:
 
 @dataclass(frozen=True, eq=False)
 class Objective:
-    """χ²/2 of the data plus that of the prior, over θ (P springs), then φ (R nuisances in sds)."""
+    """χ²/2 of the data plus that of the prior, over θ (P springs), then φ (R nuisances in sds).
+
+    The prior weighs LOG_PRIOR times as much beside logarithms.
+    """
 
     measured: Measured
     matrices: Matrices
@@ -78,6 +84,7 @@ class Objective:
         theta, phi = x[:count], x[count:]
         mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
         away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
+        scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
         possible = not self.free_inertia or np.linalg.eigvalsh(mass)[:, 0].min() > 0
         if not possible or np.abs(away).max() > FARTHEST:
             nothing = np.zeros(len(x))
@@ -95,7 +102,8 @@ class Objective:
         springs = len(p.held)
         spread[:springs, :count] = p.spread
         spread[springs:, count:] = np.eye(len(phi))
-        scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
+        if self.logarithmic:
+            away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
         chi2 = float(np.sum(residual.real**2 + residual.imag**2))
         return Quadratic(
             (chi2 + float(away @ away)) / 2,
