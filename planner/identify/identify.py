@@ -98,7 +98,8 @@ def identify(
     FRFs is fitted in a band that widens in stages, then the FRFs themselves in units of their
     noise; the best is refined on all lines. The first start is the prior's median, the others are
     quasi-random between the bounds; starts (k, P) as an array, in the parameters' own units, are
-    taken as they are. No more are tried once one has reached the noise or two have met. A `warm`
+    taken as they are. No more are tried once one has reached the noise, or the best two of three
+    or more have met. A `warm`
     identification of the same parameters is refined alone where it still fits. `band_hz` is
     robot.toml's unless given. Raises InputError where FRFs and poses do not fit together.
     """
@@ -171,7 +172,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
         found.append(end)
         misfits.append(end.at.chi2 / max(objective.count, 1))
         values = sorted(m.at.value for m in found)
-        met = len(values) > 1 and values[1] - values[0] < SAME * values[0]
+        met = len(values) > 2 and values[1] - values[0] < SAME * values[0]
         if met or min(misfits) < AT_NOISE:
             break
     best = min(found, key=lambda m: m.at.value)

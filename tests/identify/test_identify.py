@@ -15,6 +15,7 @@ from planner.identify.identify import fit_similarity, identify
 from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import undetermined
+from planner.identify.write import updated_toml
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot
@@ -279,6 +280,17 @@ def test_progress_is_told(frfs, simulation):
     assert told[0].stage.startswith("logarithms up to 20 Hz")
     assert told[-1].stage == "all lines"
     assert told[-1].misfit < told[0].misfit
+
+
+def test_a_robot_toml_takes_the_springs_and_keeps_its_words(found, folder, tmp_path):
+    commented = "# tuned in spring\n" + folder.read_text()
+    (tmp_path / "robot.urdf").write_text(folder.with_name("robot.urdf").read_text())
+    (tmp_path / "robot.toml").write_text(updated_toml(commented, found))
+    assert (tmp_path / "robot.toml").read_text().startswith("# tuned in spring\n")
+    written = Simulation(Robot.load(tmp_path / "robot.toml")).elasticity
+    expected = found.simulation.elasticity
+    np.testing.assert_allclose(written.stiffness, expected.stiffness, rtol=1e-5)
+    np.testing.assert_allclose(written.damping, expected.damping, rtol=1e-5)
 
 
 def test_bad_input_in_one_sentence(frfs, simulation):
