@@ -8,25 +8,23 @@ import numpy as np
 from scipy.stats import qmc
 
 from planner.errors import InputError
-from planner.frf.similarity import Similarity, similarity
 from planner.frf.types import Frf
+from planner.identify.check import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
 from planner.identify.data import common_band, stack
 from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import Identification, estimates, undetermined
 from planner.identify.solver import Minimum, minimise
-from planner.identify.tail import cut_off
-from planner.physics.gradient import Inertias, response
+from planner.physics.gradient import Inertias
 from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-LOG_LINES, LINES, MOST_LINES = 64, 160, 512  # a pose: logarithmic stages, starts, the last fit
+LOG_LINES, LINES = 64, 160  # a pose: in the logarithmic stages, in the fit of every start
 LOG_STEPS, STEPS = 40, 80
 COMPLETIONS = 4  # at most, after the first; each is exact to second order
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE, TOLERANCE = 1e-4, 1e-8
-MODEL_ERROR = 0.003
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
@@ -126,21 +124,6 @@ def identify(
         best = _refine(problem, x)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
-
-
-def fit_similarity(
-    simulation: Simulation,
-    frfs: Sequence[Frf],
-    q: np.ndarray,
-    band_hz: tuple[float, float] | None = None,
-) -> Similarity:
-    """Global FRAC and Frobenius similarity of a simulation to FRFs at q (n, dof) in rad."""
-    band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
-    measured = stack(frfs, band, MOST_LINES, MODEL_ERROR)
-    matrices = simulation.elastic.matrices(q)
-    simulated = response(matrices, simulation.elasticity, measured.s)
-    simulated -= cut_off(simulation.poles(q), measured.s, measured.tail_s)
-    return similarity(np.where(measured.used, measured.accelerance, np.nan), simulated)
 
 
 def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
@@ -250,6 +233,7 @@ def _result(
         end.x,
         covariance,
         misfit,
+        residuals(fitted, problem.frfs, q, problem.band_hz).by_pose,
         fit_similarity(fitted, problem.frfs, q, problem.band_hz),
         undetermined(p, covariance),
         starts,

@@ -70,6 +70,7 @@ class Identification:
     mean: np.ndarray
     covariance: np.ndarray
     misfit: float
+    misfit_by_pose: np.ndarray  # (n,)
     fit: Similarity
     undetermined: tuple[Direction, ...]
     starts: tuple[float, ...]

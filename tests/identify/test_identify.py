@@ -10,8 +10,9 @@ from known_robots import KR10
 from measured_frfs import measured_frfs
 from planner.errors import InputError
 from planner.frf.estimate import estimate
+from planner.identify.check import fit_similarity, residuals
 from planner.identify.data import stack
-from planner.identify.identify import fit_similarity, identify
+from planner.identify.identify import identify
 from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import undetermined
@@ -271,6 +272,16 @@ def test_an_axis_that_was_not_hit_and_a_noise_that_is_not_known(frfs, simulation
     result = identify(partly, POSES, simulation)
     error = np.log([e.value for e in result.estimates]) - np.log(true_values(truth, result))
     assert np.max(np.abs(error[:5])) < 0.03
+
+
+def test_a_pose_with_wrong_angles_stands_out(frfs, simulation):
+    q = POSES.copy()
+    q[2, 1] += np.deg2rad(2.0)
+    result = identify(frfs, q, simulation, starts=2)
+    assert int(np.argmax(result.misfit_by_pose)) == 2
+    left = residuals(result.simulation, frfs, q)
+    assert left.values.shape == (4, 3, 3, LINES.size)
+    np.testing.assert_allclose(left.by_pose, result.misfit_by_pose)
 
 
 def test_progress_is_told(frfs, simulation):

@@ -10,7 +10,8 @@ import pytest
 
 from known_robots import KR10
 from measured_frfs import birk_bounds, birk_folder, measured_frfs
-from planner.identify.identify import fit_similarity, identify
+from planner.identify.check import fit_similarity
+from planner.identify.identify import identify
 from planner.identify.parameters import Priors, parametrise
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot

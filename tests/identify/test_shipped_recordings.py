@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from planner.demo import Pool, shipped
-from planner.identify.identify import fit_similarity, identify
+from planner.identify.check import fit_similarity
+from planner.identify.identify import identify
 from planner.identify.parameters import Priors
 from planner.modes.measure import Source, measure
 from planner.physics.simulation import Simulation

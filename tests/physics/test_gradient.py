@@ -1,14 +1,13 @@
-"""Derivatives of FRFs against finite differences, and how long they take."""
+"""Derivatives of FRFs against finite differences."""
 
 import dataclasses
-import time
 
 import numpy as np
 import pytest
 
 from known_robots import KR10
 from planner.physics.gradient import Inertias, laplace, response, response_gradient
-from planner.physics.simulation import Elasticity, Simulation
+from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.virtual import inertia_basis
 
@@ -94,33 +93,3 @@ def test_window_shifts_the_laplace_variable(tmp_path):
     expected = expected * (s**2)[:, None, None]
     found = response(matrices, simulation.elasticity, s)
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(found).max())
-
-
-@pytest.mark.slow
-def test_nine_poses_127_lines_36_parameters_in_20_ms(tmp_path):
-    simulation = simulated(tmp_path, per_joint=3)
-    q, s = KR10.poses(9), laplace(np.tile(np.linspace(5, 200, 127), (9, 1)))
-    matrices = simulation.elastic.matrices(q)
-    elasticity: Elasticity = simulation.elasticity
-    basis = np.tile(inertia_basis()[:5], (6, 1, 1, 1))
-    inertias = Inertias(simulation.elastic.body_jacobians(q), basis)
-
-    def best(action):
-        action()
-        taken = []
-        for _ in range(15):
-            started = time.perf_counter()
-            action()
-            taken.append(1e3 * (time.perf_counter() - started))
-        return min(taken), float(np.median(taken))
-
-    plain = best(lambda: response(matrices, elasticity, s))
-    springs = best(lambda: response_gradient(matrices, elasticity, s))
-    both = best(lambda: response_gradient(matrices, elasticity, s, inertias=inertias))
-    assert response_gradient(matrices, elasticity, s)[1].shape == (9, 36, 3, 3, 127)
-    print(
-        f"\n9 poses × 127 lines, least (median) ms: FRFs alone {plain[0]:.1f} ({plain[1]:.1f}), "
-        f"with 36 derivatives {springs[0]:.1f} ({springs[1]:.1f}), "
-        f"with 66 {both[0]:.1f} ({both[1]:.1f})"
-    )
-    assert springs[0] < 20
