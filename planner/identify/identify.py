@@ -104,23 +104,14 @@ def identify(
     started = time.perf_counter()
     q = np.atleast_2d(np.asarray(q, dtype=float))
     _check(frfs, q, simulation)
-    priors = priors or Priors()
-    parametrisation = parametrise(simulation, priors)
-    elastic = simulation.elastic
-    problem = _Problem(
-        tuple(frfs),
-        common_band(frfs, band_hz or simulation.robot.config.band_hz),
-        elastic.matrices(q),
-        parametrisation.inertias(elastic.body_jacobians(q)),
-        parametrisation,
-        progress,
-    )
-    best: tuple[Minimum, float] | None = None
+    band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
+    p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
+    inertias = p.inertias(elastic.body_jacobians(q))
+    problem = _Problem(tuple(frfs), band, elastic.matrices(q), inertias, p, progress)
+    best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
-    if warm is not None:
-        best = _warm(problem, warm)
     if best is None:
-        x, misfits = _search(problem, _starting_points(parametrisation, starts, seed))
+        x, misfits = _search(problem, _starting_points(p, starts, seed))
         best = _refine(problem, x)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
@@ -138,7 +129,7 @@ def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
 def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) -> np.ndarray:
     """θ (k, P): the prior's median, then quasi-random between the bounds; or those given."""
     if not isinstance(starts, int):
-        return np.log(np.atleast_2d(starts))
+        return p.near(np.log(np.atleast_2d(starts)))
     lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
     sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
     unit = sampler.random_base2(max(1, int(np.ceil(np.log2(max(starts, 2))))))[: starts - 1]
@@ -206,7 +197,7 @@ def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | No
     known |= dict(zip(warm.nuisances, warm.mean[len(warm.estimates) :], strict=True))
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
-    end, misfit = _refine(problem, np.array([*theta, *phi]))
+    end, misfit = _refine(problem, np.array([*p.near(np.array(theta)), *phi]))
     return (end, misfit) if misfit < STILL_GOOD * max(warm.misfit, 1.0) else None
 
 

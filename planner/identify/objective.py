@@ -93,9 +93,9 @@ class Objective:
             self.matrices, p.elasticity(theta), self.measured.s, mass, inertias
         )
         if self.completion is not None:
-            lost, springs = self.completion, p.spread @ (theta - self.completed_at)
-            h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, springs)
-            slope[:, : len(springs)] -= lost.slope
+            lost, moved = self.completion, p.spread @ (theta - self.completed_at)
+            h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, moved)
+            slope[:, : len(moved)] -= lost.slope
         residual, slope = self._residual(h, slope)
         gradient, normal = _normal_equations(residual, slope)
         spread = np.zeros((len(gradient), len(x)))

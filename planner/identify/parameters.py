@@ -11,6 +11,7 @@ from planner.physics.gradient import Inertias
 from planner.physics.simulation import Elasticity, Simulation
 from planner.robot.virtual import inertia_basis
 
+NEAR = 6.0
 KINDS = ("stiffness", "damping", "loss_factor")
 UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
 MOMENTS = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of inertia, in Pinocchio's order
@@ -83,6 +84,10 @@ class Parametrisation:
     def log_sd(self) -> np.ndarray:
         """Prior sd of θ (P,)."""
         return np.array([p.log_sd for p in self.parameters])
+
+    def near(self, theta: np.ndarray) -> np.ndarray:
+        """θ (P,) brought within NEAR sds of the prior's mean."""
+        return np.clip(theta, self.mean - NEAR * self.log_sd, self.mean + NEAR * self.log_sd)
 
     def elasticity(self, theta: np.ndarray) -> Elasticity:
         """Springs at θ (P,)."""

@@ -30,56 +30,58 @@ class VirtualModel:
 
 def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> VirtualModel:
     """The virtual model; inertia_change (bodies, 10) is added to the inertias of its bodies."""
-    source, config = robot.model, robot.config
-    model = pin.Model()
-    model.gravity = pin.Motion(np.array([*config.gravity, 0.0, 0.0, 0.0]))
-    place: dict[int, int] = {}  # number of the compliance -> its place in q
-    last: dict[int, int] = {}  # joint of the source -> outermost joint that stands for it here
-    rigid: list[int] = []
-    for joint in range(source.njoints):
-        name = str(source.names[joint]) if joint else BASE
-        outer = 0
-        if joint:
-            outer = model.addJoint(
-                last[source.parents[joint]],
-                pin.JointModelRevoluteUnaligned(robot.joint_axes[joint - 1]),
-                source.jointPlacements[joint],
-                name,
-            )
-            rigid.append(model.joints[outer].idx_q)
-        for number, block in enumerate(config.compliance):
-            if block.joint == name and (joint or BASE not in robot.joint_names):
-                outer = _elastic_joint(model, outer, block.axis, f"{name}/elastic_{number}")
-                place[number] = model.joints[outer].idx_q
-        last[joint] = outer
+    source, model = robot.model, pin.Model()
+    model.gravity = pin.Motion(np.array([*robot.config.gravity, 0.0, 0.0, 0.0]))
+    last, rigid, elastic = _add_joints(robot, model)
     moving = [joint for joint in range(source.njoints) if last[joint]]
     inertia = np.array([_inertia(robot, joint) for joint in moving])
     if inertia_change is not None:
         inertia = inertia + inertia_change
     for joint, values in zip(moving, inertia, strict=True):
-        body = pin.Inertia.FromDynamicParameters(values) if values[0] else pin.Inertia.Zero()
-        model.appendBodyToJoint(last[joint], body, pin.SE3.Identity())
+        model.appendBodyToJoint(last[joint], _body(values), pin.SE3.Identity())
     frames = tuple(
         model.addFrame(pin.Frame(f.name, last[f.parentJoint], 0, f.placement, f.type))
         for f in source.frames
     )
-    return VirtualModel(
-        model,
-        np.array(rigid),
-        np.array([place[number] for number in range(len(config.compliance))]),
-        tuple(str(source.names[joint]) if joint else BASE for joint in moving),
-        tuple(last[joint] for joint in moving),
-        inertia,
-        frames,
-    )
+    names = tuple(str(source.names[joint]) if joint else BASE for joint in moving)
+    carriers = tuple(last[joint] for joint in moving)
+    return VirtualModel(model, rigid, elastic, names, carriers, inertia, frames)
 
 
-def _elastic_joint(
-    model: pin.Model, parent: int, axis: tuple[float, float, float], name: str
+def _add_joints(robot: Robot, model: pin.Model) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """Outermost joint that stands for each of the robot's; places of its own and of the elastic."""
+    source, blocks = robot.model, robot.config.compliance
+    last: list[int] = []
+    rigid: list[int] = []
+    elastic = np.zeros(len(blocks), dtype=int)
+    for joint in range(source.njoints):
+        name, outer = (str(source.names[joint]) if joint else BASE), 0
+        if joint:
+            axis, place = robot.joint_axes[joint - 1], source.jointPlacements[joint]
+            outer = _add_joint(model, last[source.parents[joint]], axis, place, name)
+            rigid.append(model.joints[outer].idx_q)
+        for number, block in enumerate(blocks):
+            if block.joint == name and (joint or BASE not in robot.joint_names):
+                axis, place = np.array(block.axis, dtype=float), pin.SE3.Identity()
+                outer = _add_joint(model, outer, axis, place, f"{name}/elastic_{number}")
+                elastic[number] = model.joints[outer].idx_q
+        last.append(outer)
+    return last, np.array(rigid), elastic
+
+
+def _add_joint(
+    model: pin.Model, parent: int, axis: np.ndarray, placement: pin.SE3, name: str
 ) -> int:
-    direction = np.array(axis, dtype=float)
-    kind = pin.JointModelRevoluteUnaligned(direction / np.linalg.norm(direction))
-    return model.addJoint(parent, kind, pin.SE3.Identity(), name)
+    kind = pin.JointModelRevoluteUnaligned(axis / np.linalg.norm(axis))
+    return model.addJoint(parent, kind, placement, name)
+
+
+def _body(values: np.ndarray) -> pin.Inertia:
+    if values[0] != 0:
+        return pin.Inertia.FromDynamicParameters(values)
+    xx, xy, yy, xz, yz, zz = values[4:]
+    moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return pin.Inertia(0.0, np.zeros(3), moments)
 
 
 def _inertia(robot: Robot, joint: int) -> np.ndarray:
