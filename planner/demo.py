@@ -13,7 +13,8 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
-from planner.campaign.labels import from_mode, label
+from planner.campaign.labels import label
+from planner.campaign.logged import from_modal
 from planner.campaign.state import Measurement
 from planner.errors import InputError, NoPoseLeftError
 from planner.modes.measure import Source, measure
@@ -106,7 +107,7 @@ def _step(report: ImportReport, proposal: Proposal, seconds: float) -> dict[str,
     return {
         "pose": report.pose,
         "proposed": proposal.pose,
-        "frequency_hz": [m.frequency_hz for m in report.measurement.modes]
+        "frequency_hz": [m.frequency_hz for m in report.measurement.modes if m.likely]
         if report.measurement
         else [],
         "refused": len(report.refused),
@@ -164,7 +165,7 @@ def _measured_hz(
         progress(f"checking on unused pose {i + 1} of {len(poses)}")
         sources = tuple(Source(r.file, str(r.file), r.hit) for r in pool.rows[pose] if r.file)
         measured = measure(sources, cell.config.modes.band_hz)
-        modes = tuple(from_mode(m) for m in measured.modal.modes) if measured.modal else ()
+        modes = from_modal(measured.modal)
         found.append(Measurement(pose, pool.rows[pose][0].joints_deg, (), modes))
     labelled = label(cell, tuple(found))
     return np.array([[m.frequency_hz if m else np.nan for m in p.modes] for p in labelled])

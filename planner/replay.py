@@ -14,7 +14,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.events import Configured, Entry, Imported, MeasuredMode, Proposed
-from planner.campaign.labels import from_mode
+from planner.campaign.logged import from_modal
 from planner.campaign.model import Model, build, propose
 from planner.campaign.state import CampaignState, fold
 from planner.errors import InputError, PlannerError
@@ -102,12 +102,12 @@ def _check_import(
                 f"{source.path} is not what was imported as {hit.file}; restore it from a copy."
             )
     measured = measure(sources, model.cell.config.modes.band_hz)
-    modes = [from_mode(mode) for mode in measured.modal.modes] if measured.modal else []
+    modes = from_modal(measured.modal)
     accepted = [v.accepted for v in measured.verdicts[len(hits) - len(event.hits) :]]
     if accepted != [hit.accepted for hit in event.hits]:
         return "differs", f"{event.pose}: other hits are refused than before", measured
     detail = f"{event.pose}: {sum(accepted)} hits, {len(modes)} modes"
-    check, detail = _compare(_numbers(event.modes), _numbers(tuple(modes)), detail)
+    check, detail = _compare(_numbers(event.modes), _numbers(modes), detail)
     return check, detail, measured
 
 

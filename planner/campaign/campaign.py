@@ -36,7 +36,7 @@ from planner.campaign.importing import (
 )
 from planner.campaign.intake import Delivery, sort_paths
 from planner.campaign.journal import Journal
-from planner.campaign.labels import from_mode
+from planner.campaign.logged import from_homogeneity, from_modal
 from planner.campaign.model import Model, build, propose
 from planner.campaign.state import CampaignState, fold, last_act
 from planner.errors import InputError
@@ -220,8 +220,9 @@ class Campaign:
             pose=delivery.pose,
             joints_deg=known.joints_deg if known else joints_deg,
             hits=hits,
-            modes=tuple(from_mode(m) for m in measured.modal.modes) if measured.modal else (),
+            modes=from_modal(measured.modal),
             remarks=measured.remarks,
+            amplitude=from_homogeneity(measured.homogeneity),
         )
         self._append(event)
         model = self.model

@@ -2,6 +2,8 @@
 
 import msgspec
 
+from planner.modes.types import LEAST_PROBABILITY
+
 
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):
     """Base of every entry of the log."""
@@ -63,6 +65,31 @@ class MeasuredMode(msgspec.Struct, frozen=True):
     residue: tuple[tuple[float | None, float | None, float | None], ...]
     probability: float = 1.0
 
+    @property
+    def likely(self) -> bool:
+        """Whether it is a mode by its own pose's recordings, not only where others vouch."""
+        return self.probability >= LEAST_PROBABILITY
+
+
+class ForceLevel(msgspec.Struct, frozen=True):
+    """Hits of about one strength, and the pose's modes by them alone (null: not found)."""
+
+    peak_force_n: float
+    hits: int
+    frequency_hz: tuple[float | None, ...]
+    frequency_sd_hz: tuple[float | None, ...]
+    damping_ratio: tuple[float | None, ...]
+    damping_sd: tuple[float | None, ...]
+
+
+class Amplitude(msgspec.Struct, frozen=True):
+    """Whether the response is proportional to the force, over the levels that were hit."""
+
+    levels: tuple[ForceLevel, ...]
+    difference: float  # of the FRFs of two levels beyond their scatter, relative
+    p_value: float
+    homogeneous: bool
+
 
 class Imported(Event, frozen=True, tag="imported"):
     """Hits at one pose were imported; `modes` are those of all its accepted hits so far."""
@@ -72,6 +99,7 @@ class Imported(Event, frozen=True, tag="imported"):
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
+    amplitude: Amplitude | None = None  # null: all hits of one strength
 
 
 class Withdrawn(Event, frozen=True, tag="withdrawn"):

@@ -52,6 +52,9 @@ def encode_line(previous_check: str, entry: Entry) -> tuple[bytes, str]:
     return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
 
 
+START = b'{"check":"'  # of a line; within one, quotes are escaped
+
+
 def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
     """Read a log; JournalError where it is damaged before its last line."""
     entries: list[Entry] = []
@@ -61,7 +64,8 @@ def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
         stop = len(data) if end < 0 else end + 1
         entry, new_check = _read_line(data[position:stop], check, len(entries) + 1)
         if entry is None:
-            if stop < len(data):
+            # A write that was cut short leaves the beginning of one line, never two.
+            if stop < len(data) or START in data[position + 1 :]:
                 raise JournalError(
                     f"{name}, line {len(entries) + 1}, is damaged and whole lines follow it; "
                     f"restore the file from a copy (the lines before it are intact)."

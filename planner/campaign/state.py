@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 from planner.campaign.events import (
+    Amplitude,
     AnyEvent,
     Configured,
     Entry,
@@ -30,6 +31,7 @@ class Measurement:
     hits: tuple[HitRecord, ...]
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
+    amplitude: Amplitude | None = None
     withdrawn: bool = False
     time: str = ""
 
@@ -126,6 +128,7 @@ def _imported(state: CampaignState, event: Imported, entry: Entry) -> CampaignSt
         hits=(*(before.hits if before else ()), *event.hits),
         modes=event.modes,
         remarks=event.remarks,
+        amplitude=event.amplitude,
         time=before.time if before else entry.time,
     )
     left = state.open

@@ -69,6 +69,9 @@ def _imported(report: ImportReport) -> dict[str, Any]:
         "frequency_sd_percent_before": report.model_before.frequency_sd_percent,
         "frequency_sd_percent": report.model.frequency_sd_percent,
         "remarks": list(report.remarks),
+        "amplitude": msgspec.to_builtins(report.measurement.amplitude)
+        if report.measurement
+        else None,
         "simulated": bool(report.measurement and report.measurement.simulated),
     }
 
@@ -80,12 +83,16 @@ def _labelled_modes(report: ImportReport) -> list[dict[str, Any]]:
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
     expected = report.model_before.predict(np.deg2rad([report.measurement.joints_deg]))
     labels = {m.frequency_hz: k for k, m in enumerate(labelled.modes) if m} if labelled else {}
+    sure = dict(enumerate(labelled.probability)) if labelled else {}
     answer = []
     for mode in report.measurement.modes:
         k = labels.get(mode.frequency_hz)
+        if k is None and not mode.likely:
+            continue
         answer.append(
             {
                 "label": None if k is None else k + 1,
+                "label_probability": None if k is None else sure[k],
                 "frequency_hz": mode.frequency_hz,
                 "frequency_sd_hz": mode.frequency_sd_hz,
                 "damping_ratio": mode.damping_ratio,
@@ -135,7 +142,7 @@ def _measurement(measurement, starred: frozenset[str]) -> dict[str, Any]:
         "joints_deg": measurement.joints_deg,
         "hits": len(measurement.accepted),
         "refused": len(measurement.hits) - len(measurement.accepted),
-        "frequency_hz": [mode.frequency_hz for mode in measurement.modes],
+        "frequency_hz": [mode.frequency_hz for mode in measurement.modes if mode.likely],
         "withdrawn": measurement.withdrawn,
         "starred": measurement.pose in starred,
         "simulated": measurement.simulated,

@@ -208,12 +208,19 @@ def modes(
         str | None, typer.Option(metavar="CHANNEL", help="Force channel, if not labelled.")
     ] = None,
     estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Draw the analysis into this folder.")
+    ] = None,
+    format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
+    rrd: Rrd = None,
     as_json: AsJson = False,
 ) -> int:
     """Experimental modal analysis of one pose's hits."""
     from planner.cli import modal, render
+    from planner.show.pictures import Pictures
 
-    answer = modal.analyse(tuple(paths), band_hz, force, estimator)
+    pictures = Pictures(plot, format_, rrd)
+    answer = modal.analyse(tuple(paths), band_hz, force, estimator, pictures)
     refused = answer["refused"]
     for entry in refused:
         warn(f"Refused {entry['file']}: {entry['reason']}")

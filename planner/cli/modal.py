@@ -3,12 +3,21 @@
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
+from planner.campaign.logged import from_homogeneity
 from planner.errors import InputError, RefusedError
+from planner.frf.types import Frf
+from planner.modes.estimate import identification
+from planner.modes.identify import Identification
 from planner.modes.measure import Source, measure
 from planner.modes.types import ModalModel
 from planner.recording.folder import files_in
+from planner.show.pictures import Pictures
 
 DEFAULT_BAND_HZ = (4.0, 60.0)
+LONGEST_NAME = 40  # characters of a file's name in a title
+NONE = Pictures()
 
 
 def analyse(
@@ -16,6 +25,7 @@ def analyse(
     band_hz: tuple[float, float] | None,
     force: str | None,
     estimator: str = "h1",
+    pictures: Pictures = NONE,
 ) -> dict[str, Any]:
     """Answer of `modes`. Raises RefusedError if no file could be used."""
     if estimator not in ("h1", "h2", "hv"):
@@ -24,8 +34,9 @@ def analyse(
         raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
     sources = _sources(paths)
     if force is not None:
-        return _by_channel(sources, band_hz, force)
-    measured = measure(sources, band_hz or DEFAULT_BAND_HZ, estimator)
+        return _by_channel(sources, band_hz, force, pictures)
+    band = band_hz or DEFAULT_BAND_HZ
+    measured = measure(sources, band, estimator)
     refused = [
         {"file": v.source.name, "reason": v.reason} for v in measured.verdicts if not v.accepted
     ]
@@ -34,15 +45,38 @@ def analyse(
         raise RefusedError(f"No modes could be identified: {reasons[0]}")
     answer = _answer(measured.modal)
     assert measured.frf is not None
+    simulated = any(v.simulated for v in measured.verdicts)
+    accepted = [v.source.name for v in measured.verdicts if v.accepted]
+    found = identification(measured.frf, band) if pictures.wanted else None
     return {
         **answer,
         "refused": refused,
-        "accepted": [v.source.name for v in measured.verdicts if v.accepted],
+        "accepted": accepted,
         "hits": list(measured.frf.hits),
         "usable_band_hz": list(measured.frf.usable_band_hz),
         "remarks": list(measured.remarks),
-        "simulated": any(v.simulated for v in measured.verdicts),
+        "amplitude": msgspec.to_builtins(from_homogeneity(measured.homogeneity)),
+        "simulated": simulated,
+        **_draw(pictures, measured.frf, found, measured.modal, accepted, simulated),
     }
+
+
+def _draw(
+    pictures: Pictures,
+    frf: Frf | None,
+    found: Identification | None,
+    modal: ModalModel,
+    accepted: list[str],
+    simulated: bool,
+) -> dict[str, Any]:
+    """Draw what is wanted; part of the answer."""
+    if found is None or not pictures.wanted:
+        return {"plots": [], "rrd": None}
+    from planner.show.modal_plots import modal_figures
+
+    more = f" and {len(accepted) - 1} more" if len(accepted) > 1 else ""
+    name = f"{Path(accepted[0]).name[-LONGEST_NAME:]}{more}"
+    return pictures.write(modal_figures(frf, found, modal, name, simulated), name)
 
 
 def _sources(paths: tuple[Path, ...]) -> tuple[Source, ...]:
@@ -58,10 +92,13 @@ def _sources(paths: tuple[Path, ...]) -> tuple[Source, ...]:
 
 
 def _by_channel(
-    sources: tuple[Source, ...], band_hz: tuple[float, float] | None, force: str
+    sources: tuple[Source, ...],
+    band_hz: tuple[float, float] | None,
+    force: str,
+    pictures: Pictures,
 ) -> dict[str, Any]:
     """Long records with unlabelled channels: the user names the force channel."""
-    from planner.modes.record import modes_from_record
+    from planner.modes.record import analyse_record
     from planner.recording.read import read
     from planner.recording.types import TimeRecord
 
@@ -70,13 +107,14 @@ def _by_channel(
     records = [r for r in read(sources[0].path) if isinstance(r, TimeRecord)]
     if not records:
         raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
-    modal = modes_from_record(records[0], force_channel=force, band_hz=band_hz)
+    modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
     return {
         **_answer(modal),
         "refused": [],
         "accepted": [sources[0].name],
         "remarks": list(modal.remarks),
         "simulated": records[0].simulated,
+        **_draw(pictures, None, found, modal, [sources[0].name], records[0].simulated),
     }
 
 

@@ -186,6 +186,10 @@ def modes(answer: dict[str, Any]) -> RenderableType:
         )
     parts: list[RenderableType] = [made]
     parts += [Text(f"  {remark}", style="yellow") for remark in answer["remarks"]]
+    if answer["plots"]:
+        parts.append(Text("\n  ".join(["Pictures:", *answer["plots"]])))
+    if answer["rrd"]:
+        parts.append(Text(f"Rerun recording: {answer['rrd']}"))
     return Group(*parts, SIMULATED) if answer["simulated"] else Group(*parts)
 
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import RefusedError
+from planner.frf.quantities import convert
 from planner.frf.types import Frf
 from planner.recording.types import AXES, FrfRecord, Hit
 
 MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
 NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
-ALIVE = 0.005  # response left at the record's end, over its peak, that counts as cut off
 SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
 RINGING = 32  # samples for which an anti-alias filter rings after the pulse
 LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
@@ -24,12 +24,14 @@ LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """Transforms of one hit: force (F,), responses (3, F), noise power of the responses (3,)."""
+    """Transforms of one hit: force (F,), responses (3, F), and the power of their noise."""
 
     axis: int
     force: np.ndarray
     response: np.ndarray
-    noise_power: np.ndarray
+    force_noise_power: float
+    force_window_s: float
+    noise_power: np.ndarray  # (3,) of the responses
 
 
 def estimate(
@@ -66,11 +68,13 @@ def estimate(
         np.full(shape, np.nan),
     )
     counts = [0, 0, 0]
+    force_share = np.full((3, frequency.size), np.nan)
     for axis in range(3):
         group = [s for s in spectra if s.axis == axis]
         counts[axis] = len(group)
         if group:
             h[:, axis], variance[:, axis], coherence[:, axis] = _column(group, estimator)
+            force_share[axis] = _force_share(group)
     return Frf(
         frequency,
         h,
@@ -81,6 +85,8 @@ def estimate(
         exponential_rate_1_s,
         tuple(remarks),
         _tail(hits, cuts),
+        force_share,
+        float(np.mean([s.force_window_s for s in spectra])),
     )
 
 
@@ -130,8 +136,15 @@ def _spectra(
         hit.axis_index,
         np.fft.rfft(sign * force * window)[chosen],
         np.fft.rfft(response, axis=1)[:, chosen],
+        _variance_after(force, last) * float(np.sum(window**2)),
+        (last - first) / hit.sampling_rate_hz,
         noise,
     )
+
+
+def _variance_after(force: np.ndarray, last: int) -> float:
+    """Variance of the force once the pulse is over, when it holds only noise (0: no such time)."""
+    return float(np.var(force[last:], ddof=1)) if force.size - last >= LEAST_QUIET else 0.0
 
 
 def _pulse(force: np.ndarray, peak: int) -> tuple[int, int]:
@@ -181,6 +194,13 @@ def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarr
     return h, np.asarray(variance), coherence
 
 
+def _force_share(group: list[_Spectra]) -> np.ndarray:
+    """E|δF|²/|F|² (F,) of one column: what noise of the force leaves of the scale's certainty."""
+    power = np.array([np.abs(s.force) ** 2 for s in group])
+    noise = np.array([s.force_noise_power for s in group])
+    return noise @ power / np.sum(power, axis=0) ** 2
+
+
 def _smooth(values: np.ndarray) -> np.ndarray:
     """Running mean over SMOOTH lines, shorter at the ends; (k, F)."""
     width = min(SMOOTH, values.shape[1])
@@ -203,19 +223,19 @@ def _usable(
 
 
 def _tail(hits: tuple[Hit, ...], cuts: list[tuple[int, int]]) -> float:
-    """Time from pulse to the end of the records, ∞ if everything has decayed by then."""
-    alive, times = False, []
+    """Time from the centroid of the pulse to the end of the records, mean over the hits.
+
+    Never left out: what looks quiet beside a loud stiff mode may be a soft one that still rings.
+    """
+    times = []
     for hit, (start, stop) in zip(hits, cuts, strict=True):
-        response = hit.acceleration_m_s2[:, start:stop]
-        response = response - np.median(response, axis=1, keepdims=True)
-        end = np.sqrt(np.mean(response[:, -response.shape[1] // 12 :] ** 2, axis=1))
-        alive |= bool(np.any(end > ALIVE * np.max(np.abs(response))))
         force = hit.force_n[start:stop] - np.median(hit.force_n)
         first, last = _pulse(force, int(np.argmax(np.abs(force))))
         pulse = np.clip(force[first:last], 0.0, None)
         centroid = first + float(np.sum(np.arange(pulse.size) * pulse) / np.sum(pulse))
-        times.append((stop - start - centroid) / hit.sampling_rate_hz)
-    return float(np.mean(times)) if alive else float("inf")
+        # A sample stands for the time around it: the last one ends half a step after itself.
+        times.append((stop - start - 0.5 - centroid) / hit.sampling_rate_hz)
+    return float(np.mean(times))
 
 
 def from_records(records: tuple[FrfRecord, ...]) -> Frf:
@@ -235,8 +255,7 @@ def from_records(records: tuple[FrfRecord, ...]) -> Frf:
             record.frequency_hz, frequency
         ):
             raise RefusedError(f"{record.source} has other frequency lines; export one grid.")
-        power = {"accelerance": 0, "mobility": 1, "receptance": 2}[record.quantity]
-        values = record.values * (2j * np.pi * frequency) ** power
+        values = convert(frequency, record.values, record.quantity, "accelerance")
         for k, (i, j) in enumerate(
             zip(record.response_direction, record.reference_direction, strict=True)
         ):

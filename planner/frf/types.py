@@ -16,8 +16,10 @@ class Frf:
     exponential window that the records carry (0: none); poles fitted to this FRF are shifted left
     by exactly that rate and have to be shifted back. `tail_s` is the time from the pulse (its
     centroid) to the end of the transformed records, where no window but the exponential one was
-    applied to them: decays cut off at the end are then part of the fitted model. ∞ where records
-    last until all is quiet, or where it is not known.
+    applied to them: decays cut off at the end are then part of the fitted model. ∞ where it is not
+    known, as for exported FRFs. `force_share` is E|δF/F|² from the noise of the force,
+    taken from a window of `force_window_s` around the pulse: so short that neighbouring lines, and
+    all responses, share the error (`variance` holds it too, but line by line).
     """
 
     frequency_hz: np.ndarray  # (F,) uniform, increasing
@@ -29,6 +31,8 @@ class Frf:
     exponential_rate_1_s: float = 0.0
     remarks: tuple[str, ...] = ()
     tail_s: float = float("inf")
+    force_share: np.ndarray | None = None  # (3, F), NaN like accelerance, None where unknown
+    force_window_s: float = 0.0
 
     @property
     def measured(self) -> np.ndarray:

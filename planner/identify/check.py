@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.frf.similarity import Similarity, similarity
+from planner.frf import metrics
 from planner.frf.types import Frf
 from planner.identify.data import Measured, common_band, stack
 from planner.identify.tail import cut_off
@@ -14,6 +14,14 @@ from planner.physics.simulation import Simulation
 
 MODEL_ERROR = 0.003  # relative sd of all that no simulation follows: calibration, angles
 MOST_LINES = 512  # a pose
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """Global FRAC and Frobenius similarity, means over the direct FRFs (`planner.frf.metrics`)."""
+
+    frac: float
+    frobenius: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +52,13 @@ def fit_similarity(
 ) -> Similarity:
     """Global FRAC and Frobenius similarity of a simulation to FRFs at q (n, dof) in rad."""
     measured = _stacked(simulation, frfs, band_hz)
+    h, parts = _simulated(simulation, measured, q), []
     given = np.where(measured.used, measured.accelerance, np.nan)
-    return similarity(given, _simulated(simulation, measured, q))
+    for i, used in enumerate(measured.used):
+        lines = used.any(axis=(0, 1))
+        parts.append(metrics.agreement(given[i : i + 1, ..., lines], h[i : i + 1, ..., lines]))
+    whole = metrics.stack(parts)
+    return Similarity(metrics.direct_mean(whole.global_frac), metrics.direct_mean(whole.frobenius))
 
 
 def residuals(

@@ -179,7 +179,7 @@ def _plain(
         objective = objective.completed(end.x)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, STEPS)
         moved = end.x - before
-        if moved @ end.at.normal @ moved < SETTLED:
+        if objective.completion is None or moved @ end.at.normal @ moved < SETTLED:
             break
     return end, objective
 

@@ -55,7 +55,7 @@ class Objective:
         count = len(self.parametrisation.parameters)
         springs, mass = self.parametrisation.elasticity(x[:count]), self._mass(x[count:])
         m = self.measured
-        made = completion(self.matrices, springs, mass, m.s, m.tail_s)
+        made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd)
         return replace(self, completion=made, completed_at=x[:count])
 
     def _mass(self, phi: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.frf.similarity import Similarity
+from planner.identify.check import Similarity
 from planner.identify.parameters import Parametrisation
 from planner.physics.simulation import Simulation
 

@@ -13,6 +13,7 @@ from planner.physics.simulation import Elasticity
 from planner.robot.elastic import Matrices
 
 OVER = -12.0  # Re λ T below which a decay is over: less than 1e-5 of it is left
+NEGLIGIBLE = 0.02
 STEP = 1e-4  # of a logarithm
 
 
@@ -45,8 +46,12 @@ def completion(
     mass: np.ndarray,
     s: np.ndarray,
     tail_s: np.ndarray,
-) -> Completion:
-    """Completion at springs and mass matrices (n, e, e); its slope by differences."""
+    sd: np.ndarray,
+) -> Completion | None:
+    """Completion at springs and mass matrices (n, e, e); its slope by differences.
+
+    None where what is cut off is lost in the noise of sd (n, 3, 3, F).
+    """
 
     def lost(springs: Elasticity) -> np.ndarray:
         stiffness = np.diag(springs.stiffness * (1 + 1j * springs.loss_factor))
@@ -61,6 +66,8 @@ def completion(
 
     kinds = ("stiffness", "damping", "loss_factor")[: 3 if elasticity.loss_factor.any() else 2]
     values, slopes = lost(elasticity), []
+    if np.all(np.abs(values) < NEGLIGIBLE * sd):
+        return None
     for kind in kinds:
         for j, value in enumerate(getattr(elasticity, kind)):
             moved = getattr(elasticity, kind).copy()

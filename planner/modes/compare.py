@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.modes.matching import best, chances
 from planner.modes.types import ModalModel, Mode
 
 # Odds, in units of −2 log likelihood, of an expected mode that was not found and of a measured
@@ -57,9 +58,10 @@ def align(
     sd = np.broadcast_to(np.asarray(expected_sd, float), expected.shape)
     modes = sorted(measured.modes, key=lambda mode: mode.frequency_hz)
     cost = _match_cost(modes, expected, expected_shape, sd)
-    spurious = np.array([_spurious_cost(mode) for mode in modes])
-    choice = _best(cost, spurious)
-    chance = _chances(cost, spurious)
+    spurious = np.array([unexpected_cost(mode) for mode in modes])
+    gain = MISSING_COST + spurious - cost
+    choice = best(gain, ordered=True)
+    chance = chances(gain, ordered=True)
     labelled = tuple(None if j < 0 else modes[j] for j in choice)
     column = np.where(choice < 0, len(modes), choice)
     return Alignment(labelled, chance[np.arange(len(expected)), column])
@@ -81,60 +83,6 @@ def _match_cost(
     return cost
 
 
-def _spurious_cost(mode: Mode) -> float:
+def unexpected_cost(mode: Mode) -> float:
     chance = float(np.clip(mode.probability, 1e-3, 1 - 1e-3))
     return SPURIOUS_COST + 2 * float(np.log(chance / 0.9))
-
-
-def _best(cost: np.ndarray, spurious: np.ndarray) -> np.ndarray:
-    """Cheapest order-preserving alignment: for each label the measured mode, −1 for none."""
-    k, n = cost.shape
-    total = np.zeros((k + 1, n + 1))
-    total[1:, 0] = MISSING_COST * np.arange(1, k + 1)
-    total[0, 1:] = np.cumsum(spurious)
-    for i in range(1, k + 1):
-        for j in range(1, n + 1):
-            total[i, j] = min(
-                total[i - 1, j - 1] + cost[i - 1, j - 1],
-                total[i - 1, j] + MISSING_COST,
-                total[i, j - 1] + spurious[j - 1],
-            )
-    choice = np.full(k, -1)
-    i, j = k, n
-    while i > 0 and j > 0:
-        if total[i, j] == total[i - 1, j - 1] + cost[i - 1, j - 1]:
-            i, j = i - 1, j - 1
-            choice[i] = j
-        elif total[i, j] == total[i - 1, j] + MISSING_COST:
-            i -= 1
-        else:
-            j -= 1
-    return choice
-
-
-def _chances(cost: np.ndarray, spurious: np.ndarray) -> np.ndarray:
-    """(k, n + 1): probability of each label being each measured mode, or none (last column)."""
-    k, n = cost.shape
-    ahead = _log_sums(cost, spurious)
-    back = _log_sums(cost[::-1, ::-1], spurious[::-1])[::-1, ::-1]
-    chance = np.zeros((k, n + 1))
-    chance[:, :n] = np.exp(ahead[:-1, :-1] + back[1:, 1:] - cost / 2 - ahead[-1, -1])
-    chance[:, n] = 1 - chance[:, :n].sum(axis=1)
-    return np.clip(chance, 0.0, 1.0)
-
-
-def _log_sums(cost: np.ndarray, spurious: np.ndarray) -> np.ndarray:
-    """Log of the summed weights exp(−cost/2) of all alignments of leading parts.
-
-    An alignment is its set of matches: each trades a missing and an unexpected mode for its own
-    cost. Sets are counted once, by inclusion and exclusion.
-    """
-    k, n = cost.shape
-    gain = np.exp(-(cost - MISSING_COST - spurious) / 2)
-    total = np.ones((k + 1, n + 1))
-    for i in range(1, k + 1):
-        for j in range(1, n + 1):
-            total[i, j] = total[i - 1, j] + total[i, j - 1] - total[i - 1, j - 1]
-            total[i, j] += total[i - 1, j - 1] * gain[i - 1, j - 1]
-    missing = MISSING_COST * np.arange(k + 1)[:, None]
-    return np.log(total) - (missing + np.concatenate([[0.0], np.cumsum(spurious)])) / 2

@@ -19,7 +19,8 @@ class Data:
     taken at the lines of the DFT without padding: the z-plane, where they are exactly rational
     (the end of the record only scales the residues). `rate_1_s` is that of the exponential
     window which the records carry; poles are those of the structure, without it. `tail_s` is the
-    time from the pulse to the end of the record (see `residues`).
+    time from the pulse to the end of the record (see `residues`). `force_share` and
+    `force_window_s` say how the noise of the force spoils whole columns (see `Frf`).
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -28,6 +29,8 @@ class Data:
     rate_1_s: float = 0.0
     step_s: float | None = None
     tail_s: float = np.inf
+    force_share: np.ndarray | None = None  # (inputs, F)
+    force_window_s: float = 0.0
 
     @cached_property
     def lines(self) -> Lines:
@@ -65,6 +68,24 @@ class Data:
         """
         lines = self.rate_1_s / (self.frequency_hz[1] - self.frequency_hz[0])
         return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
+
+    def force_errors(self, response: np.ndarray) -> np.ndarray:
+        """What noise of the force adds to responses (outputs, inputs, F), one sd of each source.
+
+        Returns (n, outputs, inputs, F): white noise of the window is a sum of independent pulses,
+        as many as tell its spectra apart in the band, each of which scales one input's column.
+        """
+        if self.force_share is None:
+            return np.zeros((0, *response.shape), complex)
+        count = int(np.ceil(2 * self.force_window_s * self.frequency_hz[-1])) + 4
+        times = self.force_window_s * ((np.arange(count) + 0.5) / count - 0.5)
+        pulses = np.exp(-2j * np.pi * times[:, None] * self.frequency_hz) / np.sqrt(count)
+        inputs = response.shape[1]
+        errors = np.zeros((inputs, count, *response.shape), complex)
+        for j, share in enumerate(self.force_share):
+            scale = np.sqrt(share) * pulses
+            errors[j, :, :, j] = -scale[:, None] * response[:, j]
+        return errors.reshape(-1, *response.shape)
 
     @property
     def entries(self) -> int:

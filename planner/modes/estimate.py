@@ -7,12 +7,10 @@ from planner.frf.types import Frf
 from planner.modes.data import Data
 from planner.modes.identify import MAX_ORDER, Identification, Identified, identify
 from planner.modes.residues import rank_one
-from planner.modes.types import ModalModel, Mode
+from planner.modes.types import LEAST_PROBABILITY, ModalModel, Mode
 
 # Lines beyond the band that are fitted too, so that modes at its edges are met from both sides.
 MARGIN = 0.15
-# Poles less likely than this to be a mode are named in a remark only.
-LEAST_PROBABILITY = 0.2
 
 
 def estimate_modes(
@@ -27,15 +25,18 @@ def estimate_modes(
     """
     found = identification(frf, band_hz, max_order)
     columns = np.flatnonzero(frf.measured)
-    modes = tuple(
-        _mode(mode, columns) for mode in (found.modes if found else ()) if _reported(mode, band_hz)
-    )
+    inside = [
+        m for m in (found.modes if found else ()) if band_hz[0] <= m.frequency_hz <= band_hz[1]
+    ]
+    modes = tuple(_mode(m, columns) for m in inside if m.probability >= LEAST_PROBABILITY)
+    doubtful = tuple(_mode(m, columns) for m in inside if m.probability < LEAST_PROBABILITY)
     if found is None or not modes:
         raise RefusedError(
             f"No mode could be found between {band_hz[0]:g} and {band_hz[1]:g} Hz: hit harder or"
             " with another tip, or check that the band holds a resonance."
         )
-    return ModalModel(modes, band_hz, found.fit_error, found.order, _remarks(found, band_hz))
+    remarks = _remarks(found, doubtful)
+    return ModalModel(modes, band_hz, found.fit_error, found.order, remarks, doubtful)
 
 
 def identification(
@@ -63,12 +64,15 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
         )
     variance = frf.variance[:, columns][..., chosen]
     known = np.all(np.isfinite(variance) & (variance > 0))
+    force = frf.force_share
     return Data(
         frf.frequency_hz[chosen],
         h[..., chosen],
         variance if known else None,
         frf.exponential_rate_1_s,
         tail_s=frf.tail_s,
+        force_share=None if force is None else force[columns][:, chosen],
+        force_window_s=frf.force_window_s,
     )
 
 
@@ -89,12 +93,7 @@ def _mode(mode: Identified, columns: np.ndarray) -> Mode:
     )
 
 
-def _reported(mode: Identified, band_hz: tuple[float, float]) -> bool:
-    inside = band_hz[0] <= mode.frequency_hz <= band_hz[1]
-    return inside and mode.probability >= LEAST_PROBABILITY
-
-
-def _remarks(found: Identification, band_hz: tuple[float, float]) -> tuple[str, ...]:
+def _remarks(found: Identification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:
     remarks = []
     excess = float(np.median(found.fit.excess)) / found.data.correlated
     if found.data.variance is not None and excess >= 4:
@@ -102,12 +101,8 @@ def _remarks(found: Identification, band_hz: tuple[float, float]) -> tuple[str, 
             f"The fit misses the FRFs by {np.sqrt(excess):.1f} times their scatter between hits:"
             " standard deviations were enlarged accordingly."
         )
-    left_out = [
-        f"{mode.frequency_hz:.4g}"
-        for mode in found.modes
-        if band_hz[0] <= mode.frequency_hz <= band_hz[1] and not _reported(mode, band_hz)
-    ]
-    if left_out:
+    if doubtful:
+        left_out = [f"{mode.frequency_hz:.4g}" for mode in doubtful]
         remarks.append(
             f"Left out as artefacts (probability below {LEAST_PROBABILITY:g}): poles at"
             f" {', '.join(left_out)} Hz."

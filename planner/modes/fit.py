@@ -66,7 +66,8 @@ def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
         if data.variance is None and k < rounds - 1:
             variance = _scatter(data, refined, power)
     assert refined is not None
-    return Fit(refined, variance, _excess(data, refined, variance))
+    error = _error(data, refined)
+    return Fit(refined, variance, excess(data, error, variance, refined.degrees))
 
 
 def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
@@ -108,11 +109,14 @@ def _in_rad_s(data: Data, refined: Refined) -> Refined:
     return replace(refined, poles=data.to_poles(refined.poles), pole_covariance=covariance)
 
 
-def _excess(data: Data, refined: Refined, variance: np.ndarray) -> np.ndarray:
-    """χ² per degree of freedom in a window of lines, at least 1 and at least the overall one."""
-    error = np.mean(np.abs(_error(data, refined)) ** 2 / variance, axis=(0, 1))
+def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) -> np.ndarray:
+    """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one.
+
+    error and variance (outputs, inputs, F); `degrees` of freedom that the fit left.
+    """
+    error = np.mean(np.abs(error) ** 2 / variance, axis=(0, 1))
     lines = error.size
-    freedom = refined.degrees / (2 * lines * data.entries)
+    freedom = degrees / (2 * lines * data.entries)
     low, high = _windows(lines, max(5, lines // 40))
     total = np.concatenate([[0.0], np.cumsum(error)])
     local = (total[high] - total[low]) / (high - low) / max(freedom, 0.1)

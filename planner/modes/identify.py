@@ -7,8 +7,9 @@ import numpy as np
 from planner.modes.data import Data
 from planner.modes.fit import Fit, fit, model, scales, strongest, weakness
 from planner.modes.plscf import PoleSet, plscf
-from planner.modes.refine import Refined
+from planner.modes.refine import Refined, shared_error
 from planner.modes.residues import unit
+from planner.modes.specification import inflation
 from planner.modes.stabilisation import Diagram, diagram, stable
 
 MAX_ORDER = 40
@@ -46,7 +47,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
     """All modes that the lines of `data` carry, None where there is none."""
     # At least as many lines as half the unknowns of one column need, and once that to spare.
     top = max(2, min(max_order, data.frequency_hz.size // 3))
-    orders = tuple(range(2, top + 1))
+    orders = ladder(top)
     weight = None if data.variance is None else 1 / np.mean(data.variance, axis=1)
     sets = plscf(data.frequency_hz, data.response, orders, weight)
     reach = (data.frequency_hz[0] * 0.95, data.frequency_hz[-1] * 1.05)
@@ -63,20 +64,37 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
     return Identification(modes, data, found, fitted, relative, top) if modes else None
 
 
+def ladder(top: int) -> tuple[int, ...]:
+    """Model orders of the diagram: all at first, then every second, then every fourth.
+
+    High orders cost most (their cube) and differ least from their neighbours.
+    """
+    steps = ((2, 20, 1), (20, 40, 2), (40, top, 4))
+    orders = {n for low, high, step in steps for n in range(low, min(high, top) + 1, step)}
+    return tuple(sorted(orders | {top}))
+
+
 def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
     refined = fitted.refined
     m = refined.poles.size
     scale = scales(data, fitted)
+    if data.step_s is None:
+        scale = scale * inflation(data, fitted)
     weak = weakness(data, fitted)
+    errors = data.force_errors(model(data, refined))
+    shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
     modes = []
     for k in range(m):
         if weak[k] > 1:
             continue
         index = [k, m + k]
         covariance = scale[k] * refined.pole_covariance[np.ix_(index, index)]
+        covariance = covariance + shared_pole[np.ix_(index, index)]
         pole = complex(refined.poles[k])
         frequency, damping, sd = natural(pole, covariance)
+        residue = refined.residues.residue[..., k]
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
+        variance = variance + np.mean(shared_residue[..., k], axis=-1)
         presence = _presence(data, refined, k)
         support = _support(pole - data.rate_1_s, sets)
         modes.append(
@@ -86,7 +104,7 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
                 float(sd[0]),
                 damping,
                 float(sd[1]),
-                refined.residues.residue[..., k],
+                residue,
                 np.sqrt(variance),
                 presence,
                 support,
@@ -98,15 +116,16 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
 
 def natural(pole: complex, covariance: np.ndarray) -> tuple[float, float, np.ndarray]:
     """Natural frequency (Hz), damping ratio and their standard deviations (linearised)."""
+    slope = natural_slope(pole)
+    sd = np.sqrt(np.maximum(0.0, np.diag(slope @ covariance @ slope.T)))
+    return abs(pole) / (2 * np.pi), -pole.real / abs(pole), sd
+
+
+def natural_slope(pole: complex) -> np.ndarray:
+    """(2, 2) change of natural frequency (Hz) and damping ratio with Re λ and Im λ (rad/s)."""
     size = abs(pole)
-    slope = np.array(
-        [
-            [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)],
-            [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3],
-        ]
-    )
-    spread = slope @ covariance @ slope.T
-    return size / (2 * np.pi), -pole.real / size, np.sqrt(np.maximum(0.0, np.diag(spread)))
+    by_frequency = [pole.real / size / (2 * np.pi), pole.imag / size / (2 * np.pi)]
+    return np.array([by_frequency, [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3]])
 
 
 def _support(pole: complex, sets: tuple[PoleSet, ...]) -> float:

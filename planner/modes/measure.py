@@ -5,6 +5,7 @@ from pathlib import Path
 
 from planner.errors import InputError, PlannerError, RefusedError
 from planner.frf.types import Frf
+from planner.modes.amplitude import Homogeneity, homogeneity
 from planner.modes.types import ModalModel
 from planner.recording.types import FrfRecord, Hit, Record
 
@@ -40,6 +41,7 @@ class MeasuredPose:
     frf: Frf | None
     modal: ModalModel | None
     remarks: tuple[str, ...] = ()
+    homogeneity: Homogeneity | None = None  # None: one force level only
 
 
 def measure(
@@ -58,8 +60,12 @@ def measure(
         frfs += records
         verdicts.append(verdict)
     hits = _drop_inconsistent(hits, verdicts, band_hz)
-    frf, modal, remarks = _identify(tuple(hit for _, hit in hits), frfs, band_hz, estimator)
-    return MeasuredPose(tuple(verdicts), tuple(h for _, h in hits), frf, modal, remarks)
+    used = tuple(hit for _, hit in hits)
+    frf, modal, remarks = _identify(used, frfs, band_hz, estimator)
+    levels = homogeneity(used, modal, band_hz) if used and modal else None
+    if levels is not None and levels.remark:
+        remarks = (*remarks, levels.remark)
+    return MeasuredPose(tuple(verdicts), used, frf, modal, remarks, levels)
 
 
 def _read_one(

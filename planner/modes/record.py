@@ -56,16 +56,20 @@ def modes_from_record(
     nothing scales them. Remarks say which channels and pulses are faulty. Raises InputError for
     an unknown force channel and RefusedError where no mode can be found.
     """
+    return analyse_record(record, force_channel, band_hz)[0]
+
+
+def analyse_record(
+    record: TimeRecord, force_channel: str | None, band_hz: tuple[float, float] | None
+) -> tuple[ModalModel, Identification]:
+    """The same with everything in between (stabilisation diagram, fit)."""
     remarks = list(record.remarks)
     force = _force(record, force_channel)
     decays = _decays(record, force, remarks)
     band = band_hz or _band(decays)
     decays, found = _identify_sound(record, decays, band, remarks)
-    kept = [
-        mode
-        for mode in found.modes
-        if band[0] <= mode.frequency_hz <= band[1] and mode.probability >= LEAST_PROBABILITY
-    ]
+    sure = [mode for mode in found.modes if mode.probability >= LEAST_PROBABILITY]
+    kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
     modes = _merge(kept, remarks)
     if not modes:
         raise RefusedError(_nothing(record, band))
@@ -74,7 +78,7 @@ def modes_from_record(
         + ", ".join(decays.names)
         + "; without a usable force they are not scaled."
     )
-    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks))
+    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks)), found
 
 
 def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:

@@ -12,9 +12,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.modes.descend import descend
 from planner.modes.residues import Lines, Residues, basis, basis_slope, unpack
 
 MAX_ITERATIONS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """The problem at one set of poles: χ², step equations and what they rest on."""
+
+    chi2: float
+    coefficients: np.ndarray  # (entries, columns)
+    gradient: np.ndarray  # (2m,)
+    hessian: np.ndarray  # (2m, 2m)
+    inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
+    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,18 +42,7 @@ class Refined:
     residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
     significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
     converged: bool
-
-
-@dataclass(frozen=True, eq=False)
-class _Point:
-    """The problem at one set of poles: χ², step equations and what they rest on."""
-
-    chi2: float
-    coefficients: np.ndarray  # (entries, columns)
-    gradient: np.ndarray  # (2m,)
-    hessian: np.ndarray  # (2m, 2m)
-    inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
-    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+    point: Point
 
 
 def refine(
@@ -61,43 +63,61 @@ def refine(
     data = response.reshape(-1, count)
     weight = 2 / variance.reshape(-1, count)
     poles = np.asarray(poles, complex)
-    m = poles.size
-    damping = 1e-3
-    point = _evaluate(lines, data, weight, poles, residual_terms)
-    converged = False
-    for _ in range(max_iterations):
-        scale = np.sqrt(np.diag(point.hessian)) + 1e-300
-        hessian = point.hessian / scale[:, None] / scale
-        step = np.linalg.solve(hessian + damping * np.eye(2 * m), point.gradient / scale)
-        step = step / scale
-        candidate = poles + step[:m] + 1j * step[m:]
-        trial = None
-        if allowed(candidate):
-            trial = _evaluate(lines, data, weight, candidate, residual_terms)
-        if trial is None or not trial.chi2 <= point.chi2:
-            damping *= 10
-            if damping > 1e8:
-                break
-            continue
-        gain = point.chi2 - trial.chi2
-        small = np.max(np.abs(step) * scale) < 1e-3 or gain < 1e-9 * point.chi2
-        poles, point, damping = candidate, trial, damping / 10
-        if small and damping < 1e-4:
-            converged = True
-            break
-    return _finish(lines, poles, point, (outputs, inputs), count, converged)
+
+    def evaluate(parts: np.ndarray) -> Point:
+        return _evaluate(lines, data, weight, _complex(parts), residual_terms)
+
+    start = np.concatenate([poles.real, poles.imag])
+    parts, point, converged = descend(
+        evaluate, start, lambda parts: allowed(_complex(parts)), max_iterations
+    )
+    return _finish(lines, _complex(parts), point, (outputs, inputs), count, converged)
+
+
+def shared_error(
+    lines: Lines, variance: np.ndarray, refined: Refined, errors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
+
+    errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
+    adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
+    imaginary part.
+    """
+    m, count = refined.poles.size, variance.shape[-1]
+    point, shape = refined.point, variance.shape[:2]
+    if not len(errors):
+        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
+    p = point.coefficients.shape[1]
+    poles = refined.poles
+    columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
+    both = np.concatenate([columns.real, columns.imag], axis=1)
+    weighted = (errors * 2 / variance).reshape(len(errors), -1, count)
+    cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
+    turn = slope_turn(point.coefficients, m)
+    gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
+    gradient += np.einsum("eka,nek->na", point.sensitivity, cross[..., :p])
+    change = gradient @ refined.pole_covariance
+    moved = np.einsum("ekl,nel->nek", point.inverse, cross[..., :p])
+    moved += np.einsum("eka,na->nek", point.sensitivity, change)
+    residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
+    return change.T @ change, residue.reshape(*shape, 2, m)
+
+
+def _complex(parts: np.ndarray) -> np.ndarray:
+    real, imag = np.split(parts, 2)
+    return real + 1j * imag
 
 
 def _evaluate(
     lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
-) -> _Point:
+) -> Point:
     m = poles.size
     linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
     p = linear.shape[0]
     columns = np.concatenate([linear, slope])
     norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
     columns /= norm[:, None]
-    gram, cross, square = _products(columns, data, weight)
+    gram, cross, square = products(columns, data, weight)
     size = np.sqrt(np.einsum("ekk->ek", gram))[:, :p]
     scaled = gram[:, :p, :p] / size[:, :, None] / size[:, None, :]
     inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
@@ -105,14 +125,14 @@ def _evaluate(
     coefficients = np.einsum("ekl,el->ek", inverse, cross[:, :p])
     chi2 = float(np.sum(square) - np.einsum("ek,ek->", coefficients, cross[:, :p]))
     # Jacobian columns as combinations of the slope basis: J = slope · turn.
-    turn = _turn(coefficients / norm[:p], m) * norm[p:, None]
+    turn = slope_turn(coefficients / norm[:p], m) * norm[p:, None]
     mixed = gram[:, :p, p:] @ turn
     sensitivity = -inverse @ mixed
     gradient = np.einsum("eka,ek->a", turn, cross[:, p:])
     gradient -= np.einsum("eka,ek->a", mixed, coefficients)
     jtj = turn.transpose(0, 2, 1) @ gram[:, p:, p:] @ turn
     hessian = np.sum(jtj + mixed.transpose(0, 2, 1) @ sensitivity, axis=0)
-    return _Point(
+    return Point(
         max(chi2, 0.0),
         coefficients / norm[:p],
         gradient,
@@ -122,7 +142,7 @@ def _evaluate(
     )
 
 
-def _products(
+def products(
     columns: np.ndarray, data: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Gram matrix of the columns, their products with the data, ‖data‖², per entry."""
@@ -139,7 +159,7 @@ def _products(
     return gram, cross, square
 
 
-def _turn(coefficients: np.ndarray, m: int) -> np.ndarray:
+def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
     """(entries, 2m, 2m): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
     real, imag = coefficients[:, :m], coefficients[:, m : 2 * m]
     turn = np.zeros((coefficients.shape[0], 2 * m, 2 * m))
@@ -154,7 +174,7 @@ def _turn(coefficients: np.ndarray, m: int) -> np.ndarray:
 def _finish(
     lines: Lines,
     poles: np.ndarray,
-    point: _Point,
+    point: Point,
     shape: tuple[int, int],
     count: int,
     converged: bool,
@@ -174,10 +194,11 @@ def _finish(
         variance[:, : 2 * m].reshape(*shape, 2, m),
         _significance(point, m),
         converged,
+        point,
     )
 
 
-def _significance(point: _Point, m: int) -> np.ndarray:
+def _significance(point: Point, m: int) -> np.ndarray:
     """Wald statistic of each mode's residues: 2 · entries degrees of freedom without a mode."""
     index = np.stack([np.arange(m), m + np.arange(m)], axis=1)
     value = point.coefficients[:, index]

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# Less likely poles are not reported as modes.
+LEAST_PROBABILITY = 0.2
+
 
 @dataclass(frozen=True, eq=False)
 class Mode:
@@ -33,10 +36,15 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class ModalModel:
-    """All modes found at one pose, increasing in frequency, and how well they fit."""
+    """All modes found at one pose, increasing in frequency, and how well they fit.
+
+    `doubtful` are poles less likely than `LEAST_PROBABILITY` to be a mode by this pose alone;
+    other poses may speak for them (a mode near a nodal point is weak).
+    """
 
     modes: tuple[Mode, ...]
     band_hz: tuple[float, float]
     fit_error: float  # ‖H − fit‖/‖H‖ over measured columns and band
     order: int  # model order from which the poles were taken
     remarks: tuple[str, ...] = ()
+    doubtful: tuple[Mode, ...] = ()

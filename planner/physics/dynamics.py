@@ -42,6 +42,13 @@ class SimulatedModes:
     damping_ratio: np.ndarray
     residue: np.ndarray
 
+    @property
+    def shape(self) -> np.ndarray:
+        """Response shapes (n, count, 3) of unit length; NaN where there is no mode."""
+        known = np.all(np.isfinite(self.residue), axis=(2, 3))
+        left = np.linalg.svd(np.where(known[..., None, None], self.residue, 0.0))[0][..., 0]
+        return np.where(known[..., None], left, np.nan)
+
 
 def solve_poles(
     mass: np.ndarray,

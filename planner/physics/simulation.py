@@ -15,6 +15,7 @@ from planner.physics.dynamics import (
     receptance,
     solve_poles,
 )
+from planner.physics.families import Families, rearranged, undamped_modes
 from planner.robot.elastic import ElasticModel, Matrices
 from planner.robot.robot import Robot
 
@@ -77,6 +78,22 @@ class Simulation:
     def modes(self, q: np.ndarray, count: int) -> SimulatedModes:
         """The `count` lowest oscillatory modes at q (n, dof) in rad, NaN where there are fewer."""
         return oscillatory(self.poles(q), count)
+
+    def families(self, reference: np.ndarray, poses: np.ndarray) -> Families:
+        """Families of modes followed from `reference` (dof,) over `poses` (n, dof), in rad."""
+        return Families(reference, poses, self._undamped)
+
+    def followed(self, q: np.ndarray, count: int, followed: Families) -> SimulatedModes:
+        """Modes at q (n, dof) by family: they keep their column where they cross.
+
+        NaN where a family's mode is overdamped.
+        """
+        everything = self.modes(q, self.elastic.size)
+        return rearranged(everything, followed.places(q), self._undamped(q)[0], count)
+
+    def _undamped(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        m = self.elastic.matrices(q)
+        return undamped_modes(m.mass, self.stiffness.real + m.geometric)
 
     def accelerance(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
         """Accelerance (n, 3, 3, F) in m/s²/N: sensor frame by tcp frame, at frequency_hz (F,)."""

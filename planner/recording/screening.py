@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.recording.levels import SAME_LEVEL, peak_n
 from planner.recording.types import AXES, Fault, Hit
 
 
@@ -220,6 +221,8 @@ def screen_repeats(
                 continue
             if _likeness(-frf, centre) > 0.8:
                 text, kind = "has the opposite sign of the others", "wrong_axis"
+            elif _seconded(i, group, frfs, hits):
+                continue
             else:
                 text, kind = "does not agree with the others of its axis", "incoherent"
             faults[i] = (
@@ -230,6 +233,24 @@ def screen_repeats(
                 ),
             )
     return tuple(faults)
+
+
+def _seconded(number: int, group: list[int], frfs: np.ndarray, hits: tuple[Hit, ...]) -> bool:
+    """Whether it is of another strength than most and another hit of that strength agrees.
+
+    A nonlinear structure answers each force level differently.
+    """
+    own = peak_n(hits[number])
+    usual = float(np.median([peak_n(hits[i]) for i in group]))
+    if 1 / SAME_LEVEL < own / usual < SAME_LEVEL:
+        return False
+    same = [
+        frf
+        for i, frf in zip(group, frfs, strict=True)
+        if i != number and 1 / SAME_LEVEL < peak_n(hits[i]) / own < SAME_LEVEL
+    ]
+    mine = frfs[group.index(number)]
+    return any(_likeness(mine, other) > 0.8 for other in same)
 
 
 def _frf(hit: Hit, band_hz: tuple[float, float]) -> np.ndarray:

@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -82,5 +83,8 @@ def png(figure: Figure, dpi: int = 80) -> bytes:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG or SVG, by the file's name."""
-    figure.savefig(path, dpi=150)
+    """Write a figure as PNG or SVG, by the file's name; the same file for the same figure."""
+    # Without a salt the SVG's ids are random, without this entry it holds the time.
+    stamp = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+    with rc_context({"svg.hashsalt": "planner"}):
+        figure.savefig(path, dpi=150, metadata=stamp)

@@ -1,15 +1,10 @@
-"""The Rerun view of a campaign; the only module that imports Rerun.
+"""The Rerun view of a campaign.
 
 Timeline "measurement" counts measured poses. The recording holds nothing but what the campaign
 determines (no clock), so the same campaign gives the same recording.
 """
 
 import contextlib
-import hashlib
-import socket
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -17,19 +12,18 @@ import rerun as rr
 import rerun.blueprint as rrb
 import rerun.urdf as rru
 from matplotlib import colormaps
+from matplotlib.figure import Figure
 
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
-from planner.errors import InputError
 from planner.modes.measure import MeasuredPose
 from planner.show import plots
+from planner.show.modal_plots import campbell_figure
+from planner.show.rerun_stream import open_stream
 
 TIMELINE = "measurement"
-PORT = 9876
-VIEWER = f"rerun+http://127.0.0.1:{PORT}/proxy"
-VIEWER_START_S = 15.0
 COLOURS = {"proposed": (255, 140, 0), "measured": (220, 30, 30), "hit": (30, 90, 255)}
 LINES = 300  # frequency lines of the pictures
 
@@ -39,13 +33,9 @@ class RerunView:
 
     def __init__(self, cell: Cell, rrd: Path | None, viewer: bool = False, simulated: bool = False):
         self._cell = cell
-        name = hashlib.sha256(f"{cell.robot.name}|{cell.config}".encode()).hexdigest()[:32]
-        self._stream = rr.RecordingStream("planner", recording_id=name, send_properties=False)
-        # The clock would make two recordings of one campaign differ.
-        self._stream.set_log_time_enabled(False)
-        self._stream.set_log_tick_enabled(False)
-        self._stream.set_sinks(*_sinks(rrd, viewer), default_blueprint=_blueprint(cell))
-        self._stream.send_recording_name(cell.robot.name)
+        identity = f"{cell.robot.name}|{cell.config}"
+        self._stream = open_stream(identity, cell.robot.name, _blueprint(cell), rrd, viewer)
+        self._simulated = False
         self._tree = self._robot()
         self._obstacles()
         if simulated:
@@ -53,6 +43,7 @@ class RerunView:
 
     def label_simulated(self) -> None:
         """Say on screen that the recordings are simulated."""
+        self._simulated = True
         text = "# SIMULATED RECORDINGS\nNothing in this campaign was measured on a real robot."
         self._stream.log("note", rr.TextDocument(text, media_type="text/markdown"), static=True)
 
@@ -121,6 +112,7 @@ class RerunView:
         if measured is not None:
             self._hits(pose, measured)
         self._frf(model, pose, measured)
+        self._campbell(model.labelled)
         self._measured_poses(model)
         self.workspace(number, model)
         for k, mode in enumerate(pose.modes):
@@ -174,8 +166,30 @@ class RerunView:
             frf.coherence[:, :, inside] if frf else None,
             f"Pose {pose.pose}: FRF measured, and fused with its band",
         )
+        self._picture("frf/picture", figure)
+
+    def _campbell(self, poses: tuple[LabelledPose, ...]) -> None:
+        """Measured and simulated natural frequencies, by label, over the measured poses."""
+        nothing = (np.nan, np.nan)
+        rows = [
+            [nothing if m is None else (m.frequency_hz, m.frequency_sd_hz) for m in pose.modes]
+            for pose in poses
+        ]
+        frequency, sd = np.moveaxis(np.array(rows), -1, 0)
+        simulated = np.array([pose.simulated_hz for pose in poses])
+        mark = "SIMULATED recordings · " if self._simulated else ""
+        figure = campbell_figure(
+            tuple(pose.pose for pose in poses),
+            frequency,
+            sd,
+            simulated if np.any(np.isfinite(simulated)) else None,
+            title=f"{mark}Natural frequencies over the measured poses",
+        )
+        self._picture("campbell/picture", figure)
+
+    def _picture(self, path: str, figure: Figure) -> None:
         image = rr.EncodedImage(contents=plots.png(figure), media_type="image/png")
-        self._stream.log("frf/picture", image)
+        self._stream.log(path, image)
 
     def _measured_poses(self, model: Model) -> None:
         q = np.array([p.q for p in model.labelled])
@@ -224,51 +238,6 @@ def hit_sign(axis: str) -> float:
     return -1.0 if axis[0] == "-" else 1.0
 
 
-def _sinks(rrd: Path | None, viewer: bool) -> list:
-    sinks = []
-    if rrd is not None:
-        try:
-            rrd.parent.mkdir(parents=True, exist_ok=True)
-            rrd.write_bytes(b"")
-        except OSError as error:
-            raise InputError(f"{rrd} cannot be written ({error.strerror}); name another.") from None
-        sinks.append(rr.FileSink(str(rrd)))
-    if viewer and _start_viewer():
-        sinks.append(rr.GrpcSink(VIEWER))
-    return sinks
-
-
-def _start_viewer() -> bool:
-    """Open the viewer unless one listens already; False, with a word, if there can be none."""
-    if _listens():
-        return True
-    # The viewer listens on every network interface unless told otherwise.
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", str(PORT)],
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    until = time.monotonic() + VIEWER_START_S
-    while time.monotonic() < until and process.poll() is None:
-        if _listens():
-            # Without a display it listens first and ends then.
-            time.sleep(0.5)
-            if process.poll() is None:
-                return True
-        time.sleep(0.1)
-    if process.poll() is None:
-        process.kill()
-    print("The Rerun viewer did not open here; going on without it.", file=sys.stderr)
-    return False
-
-
-def _listens() -> bool:
-    with socket.socket() as probe:
-        probe.settimeout(0.2)
-        return probe.connect_ex(("127.0.0.1", PORT)) == 0
-
-
 def _blueprint(cell: Cell) -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Vertical(
@@ -277,7 +246,10 @@ def _blueprint(cell: Cell) -> rrb.Blueprint:
                     origin="/", contents=["/robot/**", "/cell/**"], name=cell.robot.name
                 ),
                 rrb.Vertical(
-                    rrb.Spatial2DView(origin="/frf/picture", name="FRF with band"),
+                    rrb.Tabs(
+                        rrb.Spatial2DView(origin="/frf/picture", name="FRF with band"),
+                        rrb.Spatial2DView(origin="/campbell/picture", name="Campbell diagram"),
+                    ),
                     rrb.TimeSeriesView(origin="/learning", name="sd of frequencies (%)"),
                     row_shares=[3, 2],
                 ),

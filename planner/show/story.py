@@ -61,7 +61,7 @@ class Story:
         assert self._view is not None
         number = len(model.labelled)
         pose = next((p for p in model.labelled if p.pose == event.pose), None)
-        found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes)
+        found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes if m.likely)
         text = f"Imported {event.pose}: {found or 'no usable modes'}"
         if any(hit.simulated for hit in event.hits):
             self._view.label_simulated()

@@ -49,14 +49,18 @@ def proposal_panel(proposal: Proposal, model: Model, number: int) -> RenderableT
 
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     """What came out against what was expected."""
-    table = _table("mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)")
+    table = _table(
+        "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "label (%)"
+    )
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
     if labelled is not None:
         before = report.model_before.predict(np.deg2rad([labelled.joints_deg]))
         for k, mode in enumerate(labelled.modes):
             expected, sd = before.frequency_hz[0, k], before.frequency_sd_hz[0, k]
+            certain = labelled.probability[k]
+            sure = Text(f"{100 * certain:.0f}", style="bold yellow" if certain < 0.9 else "")
             if mode is None:
-                table.add_row(str(k + 1), "not found", f"{expected:.2f} ± {sd:.2f}", "–", "–")
+                table.add_row(str(k + 1), "not found", f"{expected:.2f} ± {sd:.2f}", "–", "–", sure)
                 continue
             off = (mode.frequency_hz - expected) / np.hypot(sd, mode.frequency_sd_hz)
             table.add_row(
@@ -65,6 +69,7 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
                 f"{expected:.2f} ± {sd:.2f}",
                 Text(f"{off:+.1f}", style="bold yellow" if abs(off) > 3 else ""),
                 f"{100 * mode.damping_ratio:.2f} ± {100 * mode.damping_sd:.2f}",
+                sure,
             )
     parts: list[RenderableType] = [table]
     for hit in report.refused:

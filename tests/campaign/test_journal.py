@@ -43,6 +43,13 @@ def test_every_truncation_keeps_every_whole_line_and_no_half_one():
         assert len(content.torn) == cut - content.whole_bytes
 
 
+def test_a_newline_lost_before_the_last_line_is_damage_not_a_torn_line():
+    log = log_of(EVENTS)
+    at = log[:-1].rfind(b"\n")
+    with pytest.raises(JournalError, match="damaged"):
+        parse(log[:at] + b"\0" + log[at + 1 :])
+
+
 @settings(deadline=None)
 @given(st.data())
 def test_a_changed_byte_is_found(data):

@@ -35,7 +35,7 @@ def check_recording(path):
     """Opened with the SDK: entities, timeline and blueprint are there."""
     contents = recording_contents(path)
     wanted = ("/robot", "/cell/workspace", "/cell/measured", "/cell/proposed", "/frf/picture",
-              "/hits", "/learning", "/log", "/note", "/modes")  # fmt: skip
+              "/campbell/picture", "/hits", "/learning", "/log", "/note", "/modes")  # fmt: skip
     for entity in wanted:
         assert any(e.startswith(entity) for e in contents["entities"]), entity
     assert contents["timelines"] == {"measurement"}

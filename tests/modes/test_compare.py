@@ -104,25 +104,3 @@ def test_nothing_measured_labels_nothing():
     found = align(model([]), EXPECTED)
     assert found.modes == (None,) * 5
     np.testing.assert_allclose(found.probability, 1.0)
-
-
-def test_probabilities_agree_with_counting_all_alignments():
-    from itertools import combinations
-
-    from planner.modes import compare
-
-    rng = np.random.default_rng(0)
-    cost, spurious = rng.uniform(0, 20, (3, 4)), rng.uniform(5, 12, 4)
-    weights = np.zeros((3, 5))
-    total = 0.0
-    for size in range(4):
-        for rows in combinations(range(3), size):
-            for columns in combinations(range(4), size):
-                pairs = list(zip(rows, columns, strict=True))
-                left = set(range(4)) - set(columns)
-                whole = sum(cost[p] for p in pairs) + sum(spurious[j] for j in left)
-                weight = np.exp(-(whole + compare.MISSING_COST * (3 - size)) / 2)
-                total += weight
-                for i in range(3):
-                    weights[i, dict(pairs).get(i, 4)] += weight
-    np.testing.assert_allclose(compare._chances(cost, spurious), weights / total, atol=1e-12)

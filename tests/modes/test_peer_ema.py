@@ -15,7 +15,9 @@ LINES = np.arange(2.0, 80.0, 0.1)
 BAND = (4.0, 60.0)
 
 
-def peer_poles(h: np.ndarray, guesses: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def peer_poles(
+    h: np.ndarray, guesses: np.ndarray, lines: np.ndarray = LINES, order: int = 40
+) -> tuple[np.ndarray, np.ndarray, float]:
     """Frequencies and damping ratios that its user would pick nearest the guesses, and seconds."""
     from sdypy import EMA
 
@@ -24,10 +26,10 @@ def peer_poles(h: np.ndarray, guesses: np.ndarray) -> tuple[np.ndarray, np.ndarr
         warnings.simplefilter("ignore")
         model = EMA.Model(
             h.reshape(9, -1),
-            LINES,
-            lower=LINES[0],
-            upper=LINES[-1],
-            pol_order_high=40,
+            lines,
+            lower=lines[0],
+            upper=lines[-1],
+            pol_order_high=order,
             frf_form="accelerance",
         )
         model.get_poles(show_progress=False)

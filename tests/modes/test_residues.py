@@ -6,7 +6,7 @@ import pytest
 from modal_systems import exact_frf, random_system
 from planner.frf.modal import accelerance
 from planner.modes.data import Data
-from planner.modes.refine import refine
+from planner.modes.refine import refine, shared_error
 from planner.modes.residues import (
     Residues,
     basis,
@@ -133,3 +133,27 @@ def test_collinearity_of_real_and_circular_shapes():
     assert collinearity(rng.normal(size=3) * np.exp(0.7j)) == pytest.approx(1.0)
     assert collinearity(np.array([1.0, 1j])) == pytest.approx(0.0)
     assert collinearity(np.zeros(3)) == 0.0
+
+
+def test_errors_that_lines_share_are_those_of_refitted_data():
+    rng = np.random.default_rng(8)
+    system = random_system(rng, 3, damping=(0.01, 0.05))
+    h = exact_frf(system, LINES)
+    variance = np.full(h.shape, (0.02 * np.std(h)) ** 2) * rng.uniform(0.5, 2, h.shape)
+    data = Data(LINES, h, variance, force_share=np.full((3, LINES.size), 1e-8), force_window_s=0.2)
+    found = refine(data.lines, h, variance, system.poles, data.allowed)
+    errors = data.force_errors(h)
+    # Every line of every column gets the stated share.
+    total = np.sum(np.abs(errors) ** 2, axis=0)
+    np.testing.assert_allclose(total, 1e-8 * np.abs(h) ** 2, rtol=1e-9)
+    poles, residues = np.zeros((6, 6)), np.zeros((3, 3, 2, 3))
+    for error in errors:
+        moved = refine(data.lines, h + error, variance, found.poles, data.allowed)
+        change = moved.poles - found.poles
+        change = np.concatenate([change.real, change.imag])
+        poles += np.outer(change, change)
+        change = moved.residues.residue - found.residues.residue
+        residues += np.stack([change.real, change.imag], axis=2) ** 2
+    shared_poles, shared_residues = shared_error(data.lines, variance, found, errors)
+    np.testing.assert_allclose(np.diag(shared_poles), np.diag(poles), rtol=0.02)
+    np.testing.assert_allclose(shared_residues, residues, rtol=0.02, atol=1e-3 * residues.max())

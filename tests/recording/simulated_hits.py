@@ -10,14 +10,14 @@ from planner.recording.types import Hit
 RATE_HZ = 512.0
 POLES = 2j * np.pi * np.array([11.0, 27.0]) - 2 * np.pi * np.array([11.0, 27.0]) * 0.025
 SHAPES = np.array([[1.0, 0.4, -0.2], [-0.3, 0.8, 0.5]]) / 12.0
+RESIDUES = np.einsum("mi,mj->mij", SHAPES, SHAPES) / (2j * POLES.imag)[:, None, None]
 
 
 def exact_accelerance(frequency_hz: np.ndarray) -> np.ndarray:
     """(3, 3, F) of the structure."""
     iw = 2j * np.pi * frequency_hz
     total = np.zeros((3, 3, frequency_hz.size), complex)
-    for pole, shape in zip(POLES, SHAPES, strict=True):
-        residue = np.outer(shape, shape) / (2j * pole.imag)
+    for pole, residue in zip(POLES, RESIDUES, strict=True):
         total += residue[..., None] / (iw - pole) + residue.conj()[..., None] / (iw - pole.conj())
     return iw**2 * total
 
@@ -30,8 +30,15 @@ def make_hit(
     record_s: float = 4.0,
     second: float = 0.0,
     peak_n: float | None = None,
+    poles: np.ndarray = POLES,
+    residues: np.ndarray = RESIDUES,
+    force_noise: float = 1e-3,
 ) -> Hit:
-    """A hit; `second` is the size of a bounce relative to the first pulse."""
+    """A hit; `second` is the size of a bounce relative to the first pulse.
+
+    The noise of the responses is relative to the largest rms, that of the force to its peak.
+    Residues (m, 3, 3) are those of real modes.
+    """
     fine = RATE_HZ * 16
     t = np.arange(round(record_s * fine)) / fine
     start = 0.05 + rng.uniform(0, 0.004)
@@ -42,8 +49,7 @@ def make_hit(
     force += second * peak * np.sin(np.pi * np.clip((t - bounce) / width, 0, 1)) ** 1.5
     sense, j = (-1.0 if axis[0] == "-" else 1.0), "xyz".index(axis[1])
     response = np.zeros((3, t.size))
-    for pole, shape in zip(POLES, SHAPES, strict=True):
-        residue = shape * shape[j] / (2j * pole.imag)
+    for pole, residue in zip(poles, residues[:, :, j], strict=True):
         kernel = signal.lfilter(
             [1 / fine], [1, -np.exp(pole / fine)], sense * force.astype(complex)
         )
@@ -53,5 +59,5 @@ def make_hit(
     both = np.asarray(signal.sosfilt(sos, np.vstack([force, response])))[:, ::16]
     scale = np.max(np.sqrt(np.mean(both[1:] ** 2, axis=1)))
     samples = both[1:] + noise * scale * rng.standard_normal(both[1:].shape)
-    pulse = both[0] + 1e-3 * peak * rng.standard_normal(both[0].size)
+    pulse = both[0] + force_noise * peak * rng.standard_normal(both[0].size)
     return Hit(Path("simulated"), axis, RATE_HZ, pulse, samples, simulated=True)

@@ -1,0 +1,202 @@
+"""How well simulated FRFs and modes agree with measured ones (seed 004, appendix B).
+
+FRFs have the shape (pose, response, hit, F), accelerance in m/s²/N. Columns that were never hit
+are NaN in the measured FRFs and in every figure made from them; averages leave them out. Two FRFs
+that are zero on every line agree (1); a zero FRF and any other do not (0). Every pair of response
+and hit has its own figures. The paper's direction d is taken as the direct FRF, response = hit:
+cross FRFs that vanish by symmetry hold noise alone, on which every model, the true one included,
+fails.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+
+def frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    """FRAC over magnitudes, (..., F) and (..., F) to (...), in [0, 1].
+
+    (|a|ᵀ|b|)² / (|a|ᵀ|a| · |b|ᵀ|b|): appendix B.1 of seed 004. It sees the shape only: neither
+    scale nor phase counts.
+    """
+    return complex_frac(np.abs(measured), np.abs(simulated))
+
+
+def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    """FRAC with phase, |aᴴb|² / (aᴴa · bᴴb), (..., F) and (..., F) to (...), in [0, 1].
+
+    The criterion as it is used elsewhere (reference 25 of seed 004): one complex factor for all
+    lines does not count.
+    """
+    a, b = np.broadcast_arrays(measured, simulated)
+    _check(a, b)
+    a, b = _unit_and_length(a)[0], _unit_and_length(b)[0]
+    inner = np.abs(np.sum(a.conj() * b, axis=-1)) ** 2
+    both_zero = ~(np.any(a != 0, axis=-1) | np.any(b != 0, axis=-1))
+    return np.where(both_zero, 1.0, np.minimum(inner, 1.0))
+
+
+def global_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    """Global FRAC G_d, (pose, ..., F) to (...): the mean of the poses' FRAC (appendix B.1)."""
+    return mean_known(frac(measured, simulated), axis=0)
+
+
+def frobenius_similarity(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    """Frobenius similarity S_d over magnitudes, (pose, ..., F) to (...), in [0, 1].
+
+    max(0, 1 − ‖|M_meas| − |M_sim|‖ / ‖|M_meas|‖), the norms over poses and lines (appendix B.2).
+    """
+    return _similarity(*_norms(measured, simulated))
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """Agreement of n poses in one band, per pose and direction: all (n, response, hit).
+
+    `frac` and `complex_frac` are in [0, 1]; `error` and `size` (m/s²/N) are the Euclidean norms
+    over lines of |H_meas| − |H_sim| and of |H_meas|. `agreement[poses]` is that of some poses (one
+    path, one pose): an index array, a mask or a slice.
+    """
+
+    frac: np.ndarray
+    complex_frac: np.ndarray
+    error: np.ndarray
+    size: np.ndarray
+
+    def __getitem__(self, poses: np.ndarray | slice) -> "Agreement":
+        parts = (self.frac, self.complex_frac, self.error, self.size)
+        return Agreement(*(part[poses] for part in parts))
+
+    @property
+    def global_frac(self) -> np.ndarray:
+        """Global FRAC (response, hit) over magnitudes (seed 004, appendix B.1)."""
+        return mean_known(self.frac, axis=0)
+
+    @property
+    def global_complex_frac(self) -> np.ndarray:
+        """The same (response, hit) with phase."""
+        return mean_known(self.complex_frac, axis=0)
+
+    @property
+    def frobenius(self) -> np.ndarray:
+        """Frobenius similarity (response, hit) over magnitudes (seed 004, appendix B.2)."""
+        return _similarity(self.error, self.size)
+
+
+def agreement(
+    measured: np.ndarray,
+    simulated: np.ndarray,
+    frequency_hz: np.ndarray | None = None,
+    band_hz: tuple[float, float] | None = None,
+) -> Agreement:
+    """Agreement of FRFs (n, response, hit, F) on the lines of a band (edges included), or on all.
+
+    Raises ValueError where the band holds no line, or the simulation no number where one was
+    measured.
+    """
+    if band_hz is not None:
+        if frequency_hz is None:
+            raise ValueError("a band needs frequency_hz")
+        inside = (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
+        measured, simulated = measured[..., inside], simulated[..., inside]
+    error, size = _norms(measured, simulated)
+    return Agreement(frac(measured, simulated), complex_frac(measured, simulated), error, size)
+
+
+def stack(parts: Sequence[Agreement]) -> Agreement:
+    """All poses of several agreements: how poses with frequency lines of their own are joined."""
+    columns = zip(*((p.frac, p.complex_frac, p.error, p.size) for p in parts), strict=True)
+    return Agreement(*(np.concatenate(column) for column in columns))
+
+
+def direct_mean(values: np.ndarray) -> float:
+    """Mean of a figure (response, hit) over the direct FRFs xx, yy, zz, as seed 004 reports it."""
+    return float(mean_known(np.diagonal(values), axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class ModalError:
+    """Errors of simulated modes, (n, k) in % of the measured value; NaN where one is missing."""
+
+    frequency_percent: np.ndarray
+    damping_percent: np.ndarray
+
+    @property
+    def frequency_rmse_percent(self) -> np.ndarray:
+        """Root mean square over poses (k,)."""
+        return np.sqrt(mean_known(self.frequency_percent**2, axis=0))
+
+    @property
+    def damping_rmse_percent(self) -> np.ndarray:
+        """Root mean square over poses (k,)."""
+        return np.sqrt(mean_known(self.damping_percent**2, axis=0))
+
+
+def modal_error(
+    measured_hz: np.ndarray,
+    measured_damping: np.ndarray,
+    simulated_hz: np.ndarray,
+    simulated_damping: np.ndarray,
+) -> ModalError:
+    """Errors of natural frequencies (Hz) and damping ratios, all (n, k), column k the same mode.
+
+    NaN where a mode was not found (labels come from `planner.modes.compare.align`). A measured
+    damping ratio of 0 has no relative error: NaN.
+    """
+    return ModalError(
+        _relative_percent(measured_hz, simulated_hz),
+        _relative_percent(measured_damping, simulated_damping),
+    )
+
+
+def mean_known(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> np.ndarray:
+    """Mean over an axis of the entries that are not NaN; NaN where there are none."""
+    known = ~np.isnan(values)
+    count = np.sum(known, axis=axis)
+    total = np.sum(np.where(known, values, 0.0), axis=axis)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
+def _check(measured: np.ndarray, simulated: np.ndarray) -> None:
+    if measured.shape[-1] == 0:
+        raise ValueError("no frequency line to compare on")
+    if np.any(np.isfinite(measured) & ~np.isfinite(simulated)):
+        raise ValueError("the simulated FRF has no number where one was measured")
+
+
+def _unit_and_length(frf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Scaled to length 1 over the lines (..., F), and the length (...).
+
+    The largest entry goes first, so that no square overflows; zero stays zero.
+    """
+    unit, length = np.array(frf, np.result_type(frf, 1.0)), np.ones((*frf.shape[:-1], 1))
+    for ord_ in (np.inf, 2):
+        size = np.linalg.norm(unit, ord_, axis=-1, keepdims=True)
+        np.divide(unit, size, out=unit, where=size > 0)
+        length = length * size
+    return unit, length[..., 0]
+
+
+def _norms(measured: np.ndarray, simulated: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Norms over lines of |measured| − |simulated| and |measured|, (..., F) to (...) each."""
+    a, b = np.broadcast_arrays(np.abs(measured), np.abs(simulated))
+    _check(a, b)
+    return _unit_and_length(a - b)[1], _unit_and_length(a)[1]
+
+
+def _similarity(error: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """max(0, 1 − E_rel) of norms per pose (n, ...), the poses' squares summed: (...)."""
+    unknown = np.isnan(size)
+    whole = np.sqrt(np.sum(np.where(unknown, 0.0, error) ** 2, axis=0))
+    measured = np.sqrt(np.sum(np.where(unknown, 0.0, size) ** 2, axis=0))
+    relative = np.divide(whole, measured, out=np.ones_like(whole), where=measured > 0)
+    relative = np.where((measured == 0) & (whole == 0), 0.0, relative)
+    similarity = np.maximum(0.0, 1 - relative)
+    return np.where(np.all(unknown, axis=0), np.nan, similarity)
+
+
+def _relative_percent(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
+    measured, simulated = np.broadcast_arrays(measured, simulated)
+    nothing = np.full(measured.shape, np.nan)
+    return 100 * np.divide(simulated - measured, measured, out=nothing, where=measured != 0)

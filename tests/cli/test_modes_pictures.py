@@ -1,0 +1,119 @@
+"""`planner modes` draws what it found: files, a Rerun recording, and sentences for bad folders."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from outside import make_cell, record
+from planner.cli.run import run
+
+NAMES = ["stabilisation", "frf", "coherence", "mac"]
+
+
+@pytest.fixture(scope="module")
+def hits(tmp_path_factory):
+    """Simulated hits at one pose."""
+    root = tmp_path_factory.mktemp("pictures")
+    _, _, truth = make_cell(root)
+    folder = record(truth, root / "good", "G1", [10.0, -70.0, 90.0, 0.0, 60.0, 0.0])
+    return sorted((folder / "data").iterdir())
+
+
+def modes(capsys, *arguments):
+    code = run(["modes", *(str(a) for a in arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_pictures_are_written_and_named_on_screen(hits, tmp_path, capsys):
+    code, out, err = modes(capsys, *hits, "--plot", tmp_path / "new" / "folder")
+    assert code == 0, err
+    flat = "".join(out.split())
+    for name in NAMES:
+        path = tmp_path / "new" / "folder" / f"{name}.png"
+        assert path.read_bytes().startswith(b"\x89PNG")
+        assert str(path) in flat
+
+
+def test_pictures_are_listed_and_told_to_rerun(hits, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    options = ("--plot", "here", "--format", "svg", "--rrd", "sub/modes.rrd", "--json")
+    code, out, err = modes(capsys, *hits, *options)
+    assert code == 0, err
+    answer, expected = json.loads(out), [tmp_path / "here" / f"{name}.svg" for name in NAMES]
+    assert answer["plots"] == [str(path) for path in expected]
+    assert answer["rrd"] == str(tmp_path / "sub" / "modes.rrd")
+    for path in expected:  # titles stand in an SVG as comments
+        assert "SIMULATED recordings" in path.read_text()
+        assert hits[0].name in path.read_text()
+    blobs = pictures_in(answer["rrd"])
+    assert set(blobs) == {f"/modes/{name}" for name in NAMES}
+    assert all(blob.startswith(b"\x89PNG") for blob in blobs.values())
+
+
+def pictures_in(rrd):
+    reader, found = RrdReader(rrd), {}
+    for chunk in reader.stream(store=reader.recordings()[0]):
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if name.endswith("blob"):
+                blob = np.asarray(batch.column(name).to_pylist()[0][0], np.uint8)
+                found[str(chunk.entity_path)] = blob.tobytes()
+    return found
+
+
+def test_without_a_wish_nothing_is_drawn(hits, capsys):
+    code, out, _ = modes(capsys, *hits, "--json")
+    answer = json.loads(out)
+    assert (code, answer["plots"], answer["rrd"]) == (0, [], None)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--plot", "taken"), "taken is a file; name a folder"),
+        (("--plot", "taken/below"), "taken/below"),
+        (("--plot", "blocked"), "blocked"),
+        (("--plot", ".", "--format", "pdf"), "give png or svg"),
+        (("--rrd", "taken/below.rrd"), "taken/below.rrd"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_said(
+    hits, tmp_path, monkeypatch, capsys, options, words
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").write_text("a file")
+    (tmp_path / "blocked" / "stabilisation.png").mkdir(parents=True)
+    code, out, err = modes(capsys, *hits, "--json", *options)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert len(err.strip().splitlines()) == 1
+    assert "failed inside" not in err
+
+
+def test_free_decays_are_drawn_without_frfs(shared_data, tmp_path, capsys):
+    path = shared_data / "imphammer_mit" / "imp_ham_set1_nomass.CSV"
+    options = ("--force", "CH8", "--json", "--plot", tmp_path, "--format", "svg")
+    code, out, _ = modes(capsys, path, *options)
+    assert code == 0
+    names = [tmp_path / f"{name}.svg" for name in ("stabilisation", "mac")]
+    assert json.loads(out)["plots"] == [str(name) for name in names]
+    assert all("SIMULATED" not in name.read_text() for name in names)
+
+
+def test_matplotlib_and_rerun_are_only_imported_for_pictures(hits):
+    program = (
+        "import sys; from planner.cli.run import run\n"
+        "code = run(sys.argv[1:])\n"
+        "loaded = {'matplotlib', 'rerun'} & set(sys.modules)\n"
+        "sys.exit(f'{code}, {loaded}' if code or loaded else 0)"
+    )
+    for arguments in (["--help"], ["modes", *map(str, hits), "--json"]):
+        done = subprocess.run(
+            [sys.executable, "-c", program, *arguments], capture_output=True, text=True, timeout=60
+        )
+        assert done.returncode == 0, done.stderr

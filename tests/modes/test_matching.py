@@ -1,0 +1,52 @@
+"""Matchings of labels and modes against counting them all."""
+
+from itertools import combinations, permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.modes.matching import best, chances
+
+
+def every_matching(labels: int, modes: int, ordered: bool):
+    """All sets of pairs, one to one."""
+    for size in range(min(labels, modes) + 1):
+        for rows in combinations(range(labels), size):
+            columns = combinations if ordered else permutations
+            for chosen in columns(range(modes), size):
+                yield dict(zip(rows, chosen, strict=True))
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+@pytest.mark.parametrize("shape", [(1, 1), (3, 4), (4, 2), (2, 0)])
+def test_probabilities_are_those_of_counting(shape, ordered):
+    gain = np.random.default_rng(0).uniform(-10, 10, shape)
+    weights, total = np.zeros((shape[0], shape[1] + 1)), 0.0
+    for pairs in every_matching(*shape, ordered):
+        weight = np.exp(sum(gain[p] for p in pairs.items()) / 2)
+        total += weight
+        for label in range(shape[0]):
+            weights[label, pairs.get(label, shape[1])] += weight
+    np.testing.assert_allclose(chances(gain, ordered), weights / total, atol=1e-12)
+
+
+@pytest.mark.parametrize("ordered", [True, False])
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), labels=st.integers(1, 4), modes=st.integers(1, 4))
+def test_the_best_matching_has_the_largest_gain(seed, labels, modes, ordered):
+    gain = np.random.default_rng(seed).uniform(-10, 10, (labels, modes))
+    chosen = best(gain, ordered)
+    mine = sum(gain[k, j] for k, j in enumerate(chosen) if j >= 0)
+    largest = max(
+        sum(gain[p] for p in pairs.items()) for pairs in every_matching(labels, modes, ordered)
+    )
+    assert mine == pytest.approx(largest)
+
+
+def test_many_modes_keep_the_likely_ones():
+    gain = np.full((2, 15), -60.0)
+    gain[0, 14], gain[1, 3] = 8.0, 6.0
+    assert best(gain).tolist() == [14, 3]
+    np.testing.assert_allclose(chances(gain)[[0, 1], [14, 3]], [0.982, 0.953], atol=1e-3)
