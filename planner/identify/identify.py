@@ -22,7 +22,7 @@ from planner.robot.elastic import Matrices
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 LOG_LINES, LINES = 64, 160  # a pose: in the logarithmic stages, in the fit of every start
 LOG_STEPS, STEPS = 40, 80
-COMPLETIONS = 4  # at most, after the first; each is exact to second order
+FEW, COMPLETIONS = 2, 6  # after the first, of a start and of the last fit: exact to second order
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE, TOLERANCE = 1e-4, 1e-8
 SAME = 1e-3  # relative difference of two starts that found the same minimum
@@ -142,7 +142,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
     misfits: list[float] = []
     for number, point in enumerate(points, 1):
         x = _approach(problem, point, number)
-        end, objective = _plain(problem, x, number, LINES, "FRFs in units of their noise")
+        end, objective = _plain(problem, x, number, LINES, "FRFs in units of their noise", FEW)
         found.append(end)
         misfits.append(end.at.chi2 / max(objective.count, 1))
         values = sorted(m.at.value for m in found)
@@ -168,14 +168,14 @@ def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
 
 
 def _plain(
-    problem: _Problem, x: np.ndarray, number: int, lines: int, stage: str
+    problem: _Problem, x: np.ndarray, number: int, lines: int, stage: str, completions: int
 ) -> tuple[Minimum, Objective]:
     """Least plain residual from x; what the records lack is filled in again and again."""
     objective = problem.objective(1.0, lines, inertia=problem.inertial)
     tail = bool(np.isfinite(objective.measured.tail_s).any())
     objective = objective.completed(x) if tail else objective
     end = problem.minimise(objective, x, number, stage, STEPS)
-    for _ in range(COMPLETIONS if tail else 0):
+    for _ in range(completions if tail else 0):
         objective = objective.completed(end.x)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, STEPS)
         moved = end.x - before
@@ -186,7 +186,7 @@ def _plain(
 
 def _refine(problem: _Problem, x: np.ndarray) -> tuple[Minimum, float]:
     """Minimum over springs and inertias on all lines from (θ, φ), and its misfit."""
-    end, objective = _plain(problem, x, 0, MOST_LINES, "all lines")
+    end, objective = _plain(problem, x, 0, MOST_LINES, "all lines", COMPLETIONS)
     return end, end.at.chi2 / max(objective.count, 1)
 
 
