@@ -207,6 +207,12 @@ def modes(
     force: Annotated[
         str | None, typer.Option(metavar="CHANNEL", help="Force channel, if not labelled.")
     ] = None,
+    quantity: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help="Of unlabelled FRFs: accelerance, mobility or receptance."
+        ),
+    ] = None,
     estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
     plot: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw the analysis into this folder.")
@@ -220,7 +226,7 @@ def modes(
     from planner.show.pictures import Pictures
 
     pictures = Pictures(plot, format_, rrd)
-    answer = modal.analyse(tuple(paths), band_hz, force, estimator, pictures)
+    answer = modal.analyse(tuple(paths), band_hz, force, estimator, pictures, quantity)
     refused = answer["refused"]
     for entry in refused:
         warn(f"Refused {entry['file']}: {entry['reason']}")

@@ -6,13 +6,15 @@ from typing import Any
 import msgspec
 
 from planner.campaign.logged import from_homogeneity
-from planner.errors import InputError, RefusedError
+from planner.errors import InputError, PlannerError, RefusedError
+from planner.frf.quantities import DERIVATIVE
 from planner.frf.types import Frf
 from planner.modes.estimate import identification
 from planner.modes.identify import Identification
 from planner.modes.measure import Source, measure
 from planner.modes.types import ModalModel
 from planner.recording.folder import files_in
+from planner.recording.types import FrfRecord
 from planner.show.pictures import Pictures
 
 DEFAULT_BAND_HZ = (4.0, 60.0)
@@ -26,15 +28,21 @@ def analyse(
     force: str | None,
     estimator: str = "h1",
     pictures: Pictures = NONE,
+    quantity: str | None = None,
 ) -> dict[str, Any]:
     """Answer of `modes`. Raises RefusedError if no file could be used."""
     if estimator not in ("h1", "h2", "hv"):
         raise InputError(f"--estimator {estimator} is not known; give h1, h2 or hv.")
+    if quantity is not None and quantity not in DERIVATIVE:
+        raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
     if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
         raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
     sources = _sources(paths)
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)
+    unlabelled = _unlabelled(sources, quantity)
+    if unlabelled is not None:
+        return _by_transfer(unlabelled, band_hz, quantity, pictures)
     band = band_hz or DEFAULT_BAND_HZ
     measured = measure(sources, band, estimator)
     refused = [
@@ -115,6 +123,51 @@ def _by_channel(
         "remarks": list(modal.remarks),
         "simulated": records[0].simulated,
         **_draw(pictures, None, found, modal, [sources[0].name], records[0].simulated),
+    }
+
+
+def _unlabelled(sources: tuple[Source, ...], quantity: str | None) -> FrfRecord | None:
+    """The FRFs of a single file that states no directions."""
+    from planner.recording.read import read
+
+    if len(sources) != 1:
+        return None
+    try:
+        records = read(sources[0].path)
+    except PlannerError:
+        return None  # said again, with the file's name, where it is read in earnest
+    frfs = [r for r in records if isinstance(r, FrfRecord) and not any(r.response_direction)]
+    return frfs[0] if frfs else None
+
+
+def _by_transfer(
+    record: FrfRecord,
+    band_hz: tuple[float, float] | None,
+    quantity: str | None,
+    pictures: Pictures,
+) -> dict[str, Any]:
+    """FRFs without directions: poles and unscaled shapes."""
+    from planner.modes.transfer import modes_from_transfer_functions
+
+    modal = modes_from_transfer_functions(record, quantity, band_hz)
+    drawn: dict[str, Any] = {"plots": [], "rrd": None}
+    if pictures.wanted:
+        from planner.show.modal_plots import cmif_figure, mac_figure
+
+        name = record.source.name[-LONGEST_NAME:]
+        figures = {
+            "cmif": cmif_figure(record.frequency_hz, record.values, modal, f"CMIF · {name}"),
+            "mac": mac_figure(modal, f"AutoMAC · {name}"),
+        }
+        drawn = pictures.write(figures, name)
+    return {
+        **_answer(modal),
+        "fit_error": None,
+        "refused": [],
+        "accepted": [str(record.source)],
+        "remarks": list(modal.remarks),
+        "simulated": record.simulated,
+        **drawn,
     }
 
 

@@ -171,12 +171,16 @@ def replayed(answer: dict[str, Any]) -> RenderableType:
 def modes(answer: dict[str, Any]) -> RenderableType:
     """Text of `modes`."""
     low, high = answer["band_hz"]
+    error = answer["fit_error"]
+    fitted = "" if error is None else f" (fit error {100 * error:.1f} %)"
     made = table(
-        f"Modes between {low:g} and {high:g} Hz (fit error {100 * answer['fit_error']:.1f} %)",
+        f"Modes between {low:g} and {high:g} Hz{fitted}",
         *("mode", "frequency (Hz)", "damping (%)", "shape x, y, z", "physical (%)"),
     )
     for k, mode in enumerate(answer["modes"]):
-        shape = "  ".join(f"{re:+.2f}{im:+.2f}i" for re, im in mode["shape"])
+        parts_of_shape = [f"{re:+.2f}{im:+.2f}i" for re, im in mode["shape"]]
+        more = f"  and {len(parts_of_shape) - 3} more" if len(parts_of_shape) > 4 else ""
+        shape = "  ".join(parts_of_shape[:3] if more else parts_of_shape) + more
         made.add_row(
             str(k + 1),
             _with_sd(mode["frequency_hz"], mode["frequency_sd_hz"], ".3f"),

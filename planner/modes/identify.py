@@ -78,11 +78,11 @@ def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identifi
     refined = fitted.refined
     m = refined.poles.size
     scale = scales(data, fitted)
-    if data.step_s is None:
-        scale = scale * inflation(data, fitted)
     weak = weakness(data, fitted)
     errors = data.force_errors(model(data, refined))
     shared_pole, shared_residue = shared_error(data.lines, fitted.variance, refined, errors)
+    if data.step_s is None:
+        scale = scale * inflation(data, fitted, shared_pole)
     modes = []
     for k in range(m):
         if weak[k] > 1:

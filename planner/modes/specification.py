@@ -17,13 +17,15 @@ LEAST_LINES = 32
 MAX_ITERATIONS = 8  # the start is next to the answer
 
 
-def inflation(data: Data, fitted: Fit) -> np.ndarray:
+def inflation(data: Data, fitted: Fit, shared: np.ndarray) -> np.ndarray:
     """(m,) factors ≥ 1 on the covariance of each mode for what noise does not explain.
 
-    For poles in the s-plane (accelerance).
+    For poles in the s-plane (accelerance). `shared` (2m, 2m) is the covariance of the poles from
+    errors that lines have in common: it moves the poles of parts of the band too.
     """
     refined, scale = fitted.refined, scales(data, fitted)
     m = refined.poles.size
+    common = np.diag(shared).reshape(2, m).T
     own = _variance(refined) * scale[:, None]
     extra = np.zeros((m, 2))
     for part in _parts(data):
@@ -31,7 +33,7 @@ def inflation(data: Data, fitted: Fit) -> np.ndarray:
         apart = other.poles - refined.poles
         square = np.stack([apart.real**2, apart.imag**2], axis=1)
         by_chance = np.maximum(_variance(other) * scale[:, None] - own, 0.0)
-        extra = np.maximum(extra, square - by_chance)
+        extra = np.maximum(extra, square - by_chance - common)
     # One factor a mode: real and imaginary parts suffer from the same cause.
     return 1 + np.max(np.maximum(extra, 0.0) / np.maximum(own, 1e-300), axis=1)
 

@@ -9,7 +9,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording.tables import Named, to_records
 from planner.recording.text import read_text
-from planner.recording.types import Record
+from planner.recording.types import FrfRecord, Record
 from planner.recording.uff import read_uff
 
 MAX_BYTES = 512 * 1024 * 1024
@@ -48,7 +48,37 @@ def read_mat(path: Path) -> tuple[Record, ...]:
             f"{path} is not a readable MAT file ({type(error).__name__}); export it again."
         ) from None
     visible = {name: value for name, value in entries.items() if not name.startswith("__")}
+    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
+        return (_logged_spectra(path, visible),)
     return to_records(path, _columns(path, visible))
+
+
+def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
+    """Transfer functions as the Cambridge data logger (now pydvma) saves them.
+
+    `yspec` (lines, channels) is the half spectrum of `npts` samples at `freq` Hz; `tfun` tells
+    that it is a transfer function. The format knows no units, directions or coherence.
+    """
+    values = np.atleast_2d(np.asarray(entries["yspec"]).T).astype(complex)
+    samples, rate_hz = (float(np.asarray(entries[name])) for name in ("npts", "freq"))
+    whole = values.shape[1] == int(samples) // 2 + 1 and rate_hz > 0 and np.isfinite(values).all()
+    if not (np.all(np.asarray(entries["tfun"]) == 1) and whole):
+        raise InputError(
+            f"{path} holds spectra of {values.shape[1]} lines that are not the transfer functions "
+            f"of {samples:g} samples at {rate_hz:g} Hz; export transfer functions."
+        )
+    unknown = (0,) * len(values)
+    return FrfRecord(
+        path,
+        np.arange(values.shape[1]) * rate_hz / samples,
+        values,
+        unknown,
+        unknown,
+        "unknown",
+        "",
+        np.full(values.shape, np.nan),
+        ("The file states no units, directions or coherence.",),
+    )
 
 
 def read_hdf5(path: Path) -> tuple[Record, ...]:

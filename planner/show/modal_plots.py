@@ -87,6 +87,23 @@ def stabilisation_figure(
     return figure
 
 
+def cmif_figure(
+    frequency_hz: np.ndarray, values: np.ndarray, modal: ModalModel, title: str = ""
+) -> Figure:
+    """CMIF of FRFs (k, F) of one hit point, of unknown scale, with the modes found."""
+    figure, grid = panels((14.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
+    panel = grid[0, 0]
+    low, high = modal.band_hz
+    lines = (frequency_hz >= low) & (frequency_hz <= high)
+    panel.semilogy(frequency_hz[lines], np.linalg.norm(values[:, lines], axis=0), color="black")
+    panel.set_xlim(low, high)
+    panel.set_xlabel("frequency (Hz)")
+    panel.set_ylabel("singular value of the FRFs (as in the file)")
+    panel.grid(True, alpha=0.25)
+    label_modes(panel, modal)
+    return figure
+
+
 def _poles(found: Identification) -> tuple[np.ndarray, np.ndarray]:
     """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others."""
     lines = stable(found.diagram)
