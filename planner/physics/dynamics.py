@@ -1,7 +1,8 @@
 """Linear vibration of M ẍ + C ẋ + K x = Jᵀ f: modes and FRFs, batched over poses.
 
 Everything is exact for any viscous C: the state-space eigenproblem is solved in the coordinates
-of the undamped modes, real (overdamped) poles included (Géradin & Rixen 2015, chapter 3).
+of the undamped modes, real (overdamped) poles included (Géradin & Rixen 2015, chapter 3). With
+structural damping K is complex; FRFs then hold for positive frequencies, as they are measured.
 """
 
 from dataclasses import dataclass
@@ -13,17 +14,21 @@ PROPORTIONAL = 1e-10  # off-diagonal modal damping below this is rounding
 # A critically damped mode has a double pole, for which there is no residue: split by this share
 # of |λ|, it errs by SPLIT² and its two large residues cancel to rounding / SPLIT, both ~ 1e-11.
 SPLIT = 5e-6
+# Structural damping turns the real poles of overdamped motion by less than η/4: not oscillations.
+STRUCTURAL = 0.05  # |Im λ| / |λ| that makes an oscillation then
 
 
 @dataclass(frozen=True, eq=False)
 class Poles:
-    """All 2e poles λ (n, 2e) in rad/s of n poses and their receptance residues (n, 2e, 3, 3).
+    """All 2e poles λ (n, 2e) in rad/s of n poses and their receptance residues (n, 2e, 3s, 3h).
 
-    Receptance = Σ R/(iω−λ), in m/N; conjugate poles are both listed.
+    Receptance = Σ R/(iω−λ), in m/N; conjugate poles are both listed. With structural damping
+    there are no conjugates, and the sum holds for ω > 0.
     """
 
     poles: np.ndarray
     residues: np.ndarray
+    structural: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,18 +57,27 @@ def solve_poles(
     hit: np.ndarray,
     sensor: np.ndarray,
 ) -> Poles:
-    """Poles and residues from M (n, e, e), C (e, e), K (e, e), hit and sensor (n, 3, e)."""
+    """Poles and residues of n poses.
+
+    M (n, e, e); C (e, e); K (e, e) or (n, e, e), complex where damping is structural; Jacobians
+    of hit (n, 3h, e) and sensor (n, 3s, e).
+    """
     lower = np.linalg.cholesky(mass)
-    scaled = _whiten(lower, stiffness)
+    scaled = _whiten(lower, stiffness.real)
     square, vectors = np.linalg.eigh(scaled)
     phi = np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)  # mass-normalised modes
     gamma = np.swapaxes(phi, 1, 2) @ damping @ phi
     off = gamma - gamma * np.eye(gamma.shape[1])
     scale = np.max(np.abs(gamma), axis=(1, 2)) + 1e-300
-    proportional = np.all(np.max(np.abs(off), axis=(1, 2)) <= PROPORTIONAL * scale)
-    solve = _proportional if proportional else _state_space
-    poles, output, entry = solve(square, gamma, hit @ phi, sensor @ phi)
-    return Poles(poles, np.einsum("nik,nkj->nkij", output, entry))
+    structural = np.iscomplexobj(stiffness) and bool(np.any(stiffness.imag))
+    if structural:
+        loss = np.swapaxes(phi, 1, 2) @ stiffness.imag @ phi
+        poles, output, entry = _state_space(square, gamma, hit @ phi, sensor @ phi, loss)
+    else:
+        proportional = np.all(np.max(np.abs(off), axis=(1, 2)) <= PROPORTIONAL * scale)
+        solve = _proportional if proportional else _state_space
+        poles, output, entry = solve(square, gamma, hit @ phi, sensor @ phi)
+    return Poles(poles, np.einsum("nik,nkj->nkij", output, entry), structural)
 
 
 def _whiten(lower: np.ndarray, matrix: np.ndarray) -> np.ndarray:
@@ -91,7 +105,11 @@ def _proportional(
 
 
 def _state_space(
-    square: np.ndarray, gamma: np.ndarray, hit: np.ndarray, sensor: np.ndarray
+    square: np.ndarray,
+    gamma: np.ndarray,
+    hit: np.ndarray,
+    sensor: np.ndarray,
+    loss: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The same for any damping, from V⁻¹ rather than orthogonality, which coincident poles lack.
 
@@ -100,12 +118,14 @@ def _state_space(
     """
     n, e = square.shape
     omega = np.sqrt(square)
-    state = np.zeros((n, 2 * e, 2 * e))
+    state = np.zeros((n, 2 * e, 2 * e), dtype=float if loss is None else complex)
     state[:, :e, e:] = omega[:, :, None] * np.eye(e)
     state[:, e:, :e] = -state[:, :e, e:]
     state[:, e:, e:] = -gamma
+    if loss is not None:
+        state[:, e:, :e] -= 1j * loss / omega[:, None, :]
     poles, vectors = np.linalg.eig(state)
-    force = np.concatenate([np.zeros((n, e, 3)), np.swapaxes(hit, 1, 2)], axis=1)
+    force = np.concatenate([np.zeros((n, e, hit.shape[1])), np.swapaxes(hit, 1, 2)], axis=1)
     output = (sensor / omega[:, None, :]) @ vectors[:, :e]
     return poles.astype(complex), output, np.linalg.solve(vectors, force.astype(vectors.dtype))
 
@@ -113,12 +133,13 @@ def _state_space(
 def oscillatory(solved: Poles, count: int) -> SimulatedModes:
     """The `count` lowest oscillatory modes, by natural frequency |λ|."""
     poles, n = solved.poles, len(solved.poles)
-    natural = np.where(poles.imag > 1e-9 * np.abs(poles), np.abs(poles), np.inf)
+    least = STRUCTURAL if solved.structural else 1e-9
+    natural = np.where(poles.imag > least * np.abs(poles), np.abs(poles), np.inf)
     order = np.argsort(natural, axis=1, kind="stable")[:, :count]
     chosen = np.take_along_axis(natural, order, axis=1)
     frequency = np.full((n, count), np.nan)
     damping = np.full((n, count), np.nan)
-    residue = np.full((n, count, 3, 3), np.nan + 1j * np.nan)
+    residue = np.full((n, count, *solved.residues.shape[2:]), np.nan + 1j * np.nan)
     row, column = np.nonzero(np.isfinite(chosen))
     source = order[row, column]
     frequency[row, column] = chosen[row, column] / (2 * np.pi)
@@ -127,13 +148,17 @@ def oscillatory(solved: Poles, count: int) -> SimulatedModes:
     return SimulatedModes(frequency, damping, residue)
 
 
+def receptance(solved: Poles, frequency_hz: np.ndarray) -> np.ndarray:
+    """Receptance (n, 3s, 3h, F) in m/N at frequency_hz (F,)."""
+    basis = 1 / (2j * np.pi * np.asarray(frequency_hz) - solved.poles[..., None])  # (n, 2e, F)
+    n, m, *points = solved.residues.shape
+    flat = solved.residues.reshape(n, m, -1)
+    return (np.swapaxes(flat, 1, 2) @ basis).reshape(n, *points, -1)
+
+
 def accelerance(solved: Poles, frequency_hz: np.ndarray) -> np.ndarray:
-    """Accelerance (n, 3, 3, F) in m/s²/N at frequency_hz (F,)."""
-    iw = 2j * np.pi * np.asarray(frequency_hz)
-    basis = 1 / (iw - solved.poles[..., None])  # (n, 2e, F)
-    n, m = solved.poles.shape
-    flat = solved.residues.reshape(n, m, 9)
-    return (iw**2 * (np.swapaxes(flat, 1, 2) @ basis)).reshape(n, 3, 3, -1)
+    """Accelerance (n, 3s, 3h, F) in m/s²/N at frequency_hz (F,)."""
+    return (2j * np.pi * np.asarray(frequency_hz)) ** 2 * receptance(solved, frequency_hz)
 
 
 def direct_accelerance(
@@ -144,7 +169,7 @@ def direct_accelerance(
     sensor: np.ndarray,
     frequency_hz: np.ndarray,
 ) -> np.ndarray:
-    """The same (3, 3, F) for one pose by solving at each line: slow, the reference for tests."""
+    """The same (3s, 3h, F) for one pose by solving at each line: slow, the reference of tests."""
     lines = []
     for w in 2 * np.pi * np.asarray(frequency_hz):
         dynamic = stiffness - w**2 * mass + 1j * w * damping

@@ -131,8 +131,8 @@ def _partners(damped_hz: np.ndarray, undamped_hz: np.ndarray) -> np.ndarray:
 def undamped_modes(
     mass: np.ndarray, stiffness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of M (n, e, e) and K (e, e): frequencies (n, e), mass-normalised shapes, and M again."""
-    out = [scipy.linalg.eigh(stiffness, m) for m in mass]
+    """Of M and K (n, e, e): frequencies (n, e), mass-normalised shapes, and M again."""
+    out = [scipy.linalg.eigh(k, m) for k, m in zip(stiffness, mass, strict=True)]
     square = np.array([values for values, _ in out])
     shapes = np.array([vectors for _, vectors in out])
     return np.sqrt(np.maximum(square, 0.0)) / (2 * np.pi), shapes, mass

@@ -3,18 +3,39 @@
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from planner.errors import InputError
 from planner.tomlfile import load_toml
 
 
 class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One elastic rotation: axis in the joint's child frame, N·m/rad, N·m·s/rad."""
+    """One elastic rotation: axis in the joint's child frame, N·m/rad, N·m·s/rad.
+
+    `joint` may be "base": between floor and robot, about an axis of the world, through the URDF's
+    origin. `loss_factor` η makes the stiffness K(1+iη) (structural damping). Blocks with the same
+    `tie` share their stiffness, damping and loss factor, also when those are identified.
+    """
 
     joint: str
     axis: tuple[float, float, float]
     stiffness: float
     damping: float
+    loss_factor: float = 0.0
+    tie: str = ""
+
+
+class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A body carried by a link of the URDF that does not list it.
+
+    Mass in kg, centre of mass in the link's frame, moments (xx, yy, zz, xy, xz, yz) in kg·m² about
+    that centre along the link's axes; without moments it is a point.
+    """
+
+    link: str
+    mass: float
+    com_m: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Obstacle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -34,7 +55,11 @@ class CollisionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of robot.toml."""
+    """The whole of robot.toml.
+
+    With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
+    own stiffness, of the size of weight times height, is added.
+    """
 
     name: str
     urdf: str
@@ -42,7 +67,9 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor_frame: str
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
+    geometric_stiffness: bool = False
     compliance: tuple[Compliance, ...] = ()
+    payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     collision: CollisionTable = CollisionTable()
 
@@ -55,6 +82,23 @@ def load_config(path: Path) -> RobotConfig:
 
 
 def _check(config: RobotConfig, path: Path) -> None:
+    _check_compliances(config, path)
+    _check_payloads(config, path)
+    _check_obstacles(config, path)
+    margin = config.collision.margin_m
+    if not 0 <= margin < 1:
+        raise InputError(
+            f"{path}: [collision] margin_m is {margin}; it must be at least 0 m and below 1 m."
+        )
+    low, high = config.band_hz
+    if not 0 < low < high < float("inf"):
+        raise InputError(f"{path}: band_hz {[low, high]} must rise from above 0 Hz; correct it.")
+    if not all(abs(g) < 100 for g in config.gravity):
+        raise InputError(f"{path}: gravity {list(config.gravity)} is not in m/s²; correct it.")
+
+
+def _check_compliances(config: RobotConfig, path: Path) -> None:
+    first: dict[str, Compliance] = {}
     for number, block in enumerate(config.compliance, 1):
         entry = f"{path}: [[compliance]] number {number} ({block.joint})"
         if not 0 < block.stiffness < float("inf"):
@@ -68,17 +112,34 @@ def _check(config: RobotConfig, path: Path) -> None:
         length = sum(a * a for a in block.axis) ** 0.5
         if not abs(length - 1) < 1e-3:
             raise InputError(f"{entry} has an axis of length {length:.4g}; give a unit vector.")
-    _check_obstacles(config, path)
-    margin = config.collision.margin_m
-    if not 0 <= margin < 1:
-        raise InputError(
-            f"{path}: [collision] margin_m is {margin}; it must be at least 0 m and below 1 m."
-        )
-    low, high = config.band_hz
-    if not 0 < low < high < float("inf"):
-        raise InputError(f"{path}: band_hz {[low, high]} must rise from above 0 Hz; correct it.")
-    if not all(abs(g) < 100 for g in config.gravity):
-        raise InputError(f"{path}: gravity {list(config.gravity)} is not in m/s²; correct it.")
+        if not 0 <= block.loss_factor < 2:
+            raise InputError(
+                f"{entry} has loss_factor {block.loss_factor}; it must be at least 0 and below 2."
+            )
+        same = first.setdefault(block.tie or f"\0{number}", block)
+        for key in ("stiffness", "damping", "loss_factor"):
+            if getattr(same, key) != getattr(block, key):
+                raise InputError(
+                    f'{entry} is tied to "{block.tie}" but has another {key} '
+                    f"({getattr(block, key)}, not {getattr(same, key)}); give tied blocks the same."
+                )
+
+
+def _check_payloads(config: RobotConfig, path: Path) -> None:
+    for number, block in enumerate(config.payload, 1):
+        entry = f"{path}: [[payload]] number {number} ({block.link})"
+        if not 0 < block.mass < 1e5:
+            raise InputError(f"{entry} has mass {block.mass}; it must be above 0 kg.")
+        if not all(abs(value) < 1e2 for value in block.com_m):
+            raise InputError(f"{entry} has com_m {list(block.com_m)}; give 3 lengths in m.")
+        xx, yy, zz, xy, xz, yz = block.inertia
+        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        finite = bool(np.all(np.isfinite(moments)))
+        if not finite or np.linalg.eigvalsh(moments)[0] < -1e-9 * np.abs(moments).max():
+            raise InputError(
+                f"{entry} has inertia {list(block.inertia)}, which no body can have; give "
+                f"xx, yy, zz, xy, xz, yz in kg·m² about its centre of mass."
+            )
 
 
 def _check_obstacles(config: RobotConfig, path: Path) -> None:

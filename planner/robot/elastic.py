@@ -2,9 +2,11 @@
 
 Each [[compliance]] of robot.toml is a small rotation right after (outboard of) its joint's own,
 about an axis of the joint's child frame; joints themselves are held by their brakes. The mass
-matrix does not depend on stiffness or damping (seed 004, section 2; seed 001, section 2.1).
+matrix does not depend on stiffness or damping (seed 004, section 2; seed 001, section 2.1), and
+is linear in the inertias of the bodies.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,37 +14,48 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.robot import Robot
+from planner.robot.virtual import virtual_model
 
 SINGULAR = 1e-12  # smallest eigenvalue of the mass matrix scaled to ones on its diagonal
+SAG_STEPS = 4  # each gains three digits or more where sagging is small at all
 
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
     """Of n poses and e elastic degrees of freedom: M (n, e, e) in kg·m²; Jacobians in m/rad.
 
-    `hit` (n, 3, e) moves the tcp, in the tcp frame; `sensor` (n, 3, e) the sensor, in its frame.
+    `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
+    s sensors; unless others were named, that is the tcp and the sensor. `geometric` (n, e, e) in
+    N·m/rad is gravity's own stiffness, 0 unless robot.toml asks for it.
     """
 
     mass: np.ndarray
     hit: np.ndarray
     sensor: np.ndarray
+    geometric: np.ndarray
 
 
 class ElasticModel:
-    """A robot with its elastic degrees of freedom. Raises InputError if there are none."""
+    """A robot with its elastic degrees of freedom. Raises InputError if there are none.
 
-    def __init__(self, robot: Robot):
-        if not robot.config.compliance:
+    `inertia_change` (bodies, 10) is added to the inertias (see `inertia`).
+    """
+
+    def __init__(self, robot: Robot, inertia_change: np.ndarray | None = None):
+        blocks = robot.config.compliance
+        if not blocks:
             raise InputError(
                 f"{robot.path} has no [[compliance]] block, so there is nothing to simulate; add "
                 f'the elastic joints, or set [fidelity] simulation = "none" in campaign.toml.'
             )
         self.robot = robot
-        self.stiffness = np.array([c.stiffness for c in robot.config.compliance])
-        self.damping = np.array([c.damping for c in robot.config.compliance])
-        self._model, rigid, elastic, (self._tcp, self._sensor) = _with_virtual_joints(robot)
+        self.stiffness = np.array([c.stiffness for c in blocks])
+        self.damping = np.array([c.damping for c in blocks])
+        self.loss_factor = np.array([c.loss_factor for c in blocks])
+        self._virtual = virtual_model(robot, inertia_change)
+        self._model = self._virtual.model
         self._data = self._model.createData()
-        self._rigid, self._elastic = np.array(rigid), np.array(elastic)
+        self._elastic = self._virtual.elastic
         self._grid = np.ix_(self._elastic, self._elastic)
         self._check_mass()
 
@@ -66,65 +79,78 @@ class ElasticModel:
         """Number e of elastic degrees of freedom, in the order of robot.toml."""
         return len(self.stiffness)
 
-    def matrices(self, q: np.ndarray) -> Matrices:
-        """Matrices of poses q (n, dof) in rad."""
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """What moves: all links that turn with a joint, by the joint's name; "base" if elastic."""
+        return self._virtual.bodies
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(bodies, 10): m in kg, m·c in kg·m, moments xx xy yy xz yz zz in kg·m² about the joint.
+
+        In the frame of the joint that carries the body, payloads included.
+        """
+        return self._virtual.inertia
+
+    def matrices(
+        self, q: np.ndarray, hits: Sequence[str] = (), sensors: Sequence[str] = ()
+    ) -> Matrices:
+        """Matrices of poses q (n, dof) in rad, between named frames of the URDF.
+
+        Raises InputError where a frame does not exist.
+        """
         q = np.atleast_2d(q)
-        n, e = len(q), self.size
-        mass, hit, sensor = np.empty((n, e, e)), np.empty((n, 3, e)), np.empty((n, 3, e))
-        full = np.zeros(self._model.nq)
+        n, e, robot = len(q), self.size, self.robot
+        ids = [[robot.frame_id("hit frame", name) for name in hits] or [robot.tcp_id]]
+        ids += [[robot.frame_id("sensor frame", name) for name in sensors] or [robot.sensor_id]]
+        mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
+        out = [np.empty((n, len(group), 3, e)) for group in ids]
         for i, row in enumerate(q):
-            full[self._rigid] = row
+            full = self._standing(row)
+            if robot.config.geometric_stiffness:
+                geometric[i] = self._gravity_stiffness(full)
             crba = pin.crba(self._model, self._data, full)
             upper = np.triu(crba)
-            symmetric = upper + np.triu(crba, 1).T
-            mass[i] = symmetric[self._grid]
-            for frame, out in ((self._tcp, hit), (self._sensor, sensor)):
-                jacobian = pin.computeFrameJacobian(self._model, self._data, full, frame, pin.LOCAL)
-                out[i] = jacobian[:3, self._elastic]
-        return Matrices(mass, hit, sensor)
+            mass[i] = (upper + np.triu(crba, 1).T)[self._grid]
+            for group, jacobians in zip(ids, out, strict=True):
+                for k, number in enumerate(group):
+                    frame = self._virtual.frames[number]
+                    jacobians[i, k] = pin.computeFrameJacobian(
+                        self._model, self._data, full, frame, pin.LOCAL
+                    )[:3, self._elastic]
+        hit, sensor = (jacobians.reshape(n, -1, e) for jacobians in out)
+        return Matrices(mass, hit, sensor, geometric)
 
+    def body_jacobians(self, q: np.ndarray) -> np.ndarray:
+        """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
 
-def _with_virtual_joints(
-    robot: Robot,
-) -> tuple[pin.Model, list[int], list[int], tuple[int, int]]:
-    """The robot's model with virtual joints, where its own and they stand in q, tcp and sensor.
+        In the frame of the joint that carries the body, linear part (m/rad) first. With the
+        spatial inertias I of the bodies (`virtual.inertia_basis`), M = Σ Jᵀ I J.
+        """
+        q = np.atleast_2d(q)
+        out = np.empty((len(q), len(self.bodies), 6, self.size))
+        for i, row in enumerate(q):
+            pin.computeJointJacobians(self._model, self._data, self._standing(row))
+            for b, joint in enumerate(self._virtual.carriers):
+                jacobian = pin.getJointJacobian(self._model, self._data, joint, pin.LOCAL)
+                out[i, b] = jacobian[:, self._elastic]
+        return out
 
-    The virtual joints are listed in the order of robot.toml.
-    """
-    source, config = robot.model, robot.config
-    model = pin.Model()
-    model.gravity = pin.Motion(np.array([*config.gravity, 0.0, 0.0, 0.0]))
-    last = {0: 0}  # joint of the source -> outermost joint that stands for it here
-    rigid: list[int] = []
-    place: dict[int, int] = {}  # number of the compliance -> its place in q
-    for joint in range(1, source.njoints):
-        name = str(source.names[joint])
-        own = model.addJoint(
-            last[source.parents[joint]],
-            pin.JointModelRevoluteUnaligned(robot.joint_axes[joint - 1]),
-            source.jointPlacements[joint],
-            name,
-        )
-        rigid.append(model.joints[own].idx_q)
-        outer = own
-        for number, block in enumerate(config.compliance):
-            if block.joint == name:
-                axis = np.array(block.axis, dtype=float)
-                outer = model.addJoint(
-                    outer,
-                    pin.JointModelRevoluteUnaligned(axis / np.linalg.norm(axis)),
-                    pin.SE3.Identity(),
-                    f"{name}/elastic_{number}",
-                )
-                place[number] = model.joints[outer].idx_q
-        model.appendBodyToJoint(outer, source.inertias[joint], pin.SE3.Identity())
-        last[joint] = outer
-    frames = []
-    for name, index in (("tcp", robot.tcp_id), ("sensor", robot.sensor_id)):
-        frame = source.frames[index]
-        parent = last[frame.parentJoint]
-        frames.append(
-            model.addFrame(pin.Frame(name, parent, 0, frame.placement, pin.FrameType.OP_FRAME))
-        )
-    elastic = [place[number] for number in range(len(config.compliance))]
-    return model, rigid, elastic, (frames[0], frames[1])
+    def _standing(self, q: np.ndarray) -> np.ndarray:
+        """Coordinates of the virtual model at q (dof,), sagged if robot.toml asks for it."""
+        full = np.zeros(self._model.nq)
+        full[self._virtual.rigid] = q
+        return self._sagged(full) if self.robot.config.geometric_stiffness else full
+
+    def _sagged(self, full: np.ndarray) -> np.ndarray:
+        """Where springs of the stated stiffness carry the weight: K δ = −g(q + δ)."""
+        for _ in range(SAG_STEPS):
+            weight = pin.computeGeneralizedGravity(self._model, self._data, full)
+            full[self._elastic] = -weight[self._elastic] / self.stiffness
+        return full
+
+    def _gravity_stiffness(self, full: np.ndarray) -> np.ndarray:
+        """Second derivative of the potential energy of the weight, (e, e)."""
+        gradient = pin.computeGeneralizedGravityDerivatives(self._model, self._data, full)
+        part = np.array(gradient)[self._grid]
+        return (part + part.T) / 2

@@ -12,6 +12,7 @@ from planner.errors import InputError
 from planner.robot.config import RobotConfig, load_config
 from planner.robot.urdf import build_model, joint_axes, read_urdf
 
+BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 # A link and the joint that carries it may share a name; the link is meant.
 FRAME_TYPES = (
     pin.FrameType.BODY,
@@ -50,17 +51,19 @@ class Robot:
             ("tcp_frame", self.config.tcp_frame),
             ("sensor_frame", self.config.sensor_frame),
         ):
-            if self.model.frames[self._frame_id(entry, name)].parentJoint == 0:
+            if self.model.frames[self.frame_id(entry, name)].parentJoint == 0:
                 raise InputError(
                     f'{self.path}: {entry} "{name}" is fixed to the base and never moves; name a '
                     f"frame on the tool."
                 )
         for block in self.config.compliance:
-            if block.joint not in self.joint_names:
+            if block.joint not in (*self.joint_names, BASE):
                 raise InputError(
                     f'{self.path}: [[compliance]] joint "{block.joint}" is no actuated joint of '
                     f"{self.urdf_path.name}; it has {', '.join(self.joint_names)}."
                 )
+        for block in self.config.payload:
+            self.frame_id("[[payload]] link", block.link)
         bad = np.flatnonzero(~(self.lower_rad < self.upper_rad))
         if bad.size:
             raise InputError(
@@ -100,14 +103,15 @@ class Robot:
     @cached_property
     def tcp_id(self) -> int:
         """Pinocchio's frame number of the tcp."""
-        return self._frame_id("tcp_frame", self.config.tcp_frame)
+        return self.frame_id("tcp_frame", self.config.tcp_frame)
 
     @cached_property
     def sensor_id(self) -> int:
         """Pinocchio's frame number of the sensor."""
-        return self._frame_id("sensor_frame", self.config.sensor_frame)
+        return self.frame_id("sensor_frame", self.config.sensor_frame)
 
-    def _frame_id(self, entry: str, name: str) -> int:
+    def frame_id(self, entry: str, name: str) -> int:
+        """Pinocchio's number of a frame that robot.toml names at `entry`; InputError if none."""
         for kind in FRAME_TYPES:
             if name != "universe" and self.model.existFrame(name, kind):
                 return self.model.getFrameId(name, kind)

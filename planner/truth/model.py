@@ -183,7 +183,7 @@ def _check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_t
     joints = {j.get("name") for j in root.findall("joint") if j.get("type") != "fixed"}
     links = {link.get("name") for link in root.findall("link")}
     stated = [c["joint"] for c in table.get("compliance", ())]
-    wrong = [name for name in stated if name not in joints]
+    wrong = [name for name in stated if name not in joints | {"base"}]
     wrong += [s.joint for s in deviation.extra if s.joint not in joints | {"base"}]
     wrong += [a.link for a in deviation.added if a.link not in links]
     wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]

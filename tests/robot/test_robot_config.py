@@ -14,6 +14,15 @@ NO_RANGE = f"""<robot name="one"><link name="base"/><link name="tool"/><link nam
 <joint name="turn" type="revolute"><parent link="base"/><child link="tool"/>{LIMIT}</joint>
 <joint name="end" type="fixed"><parent link="tool"/><child link="accelerometer"/></joint></robot>"""
 SIZES = "size_m = [4, 4, 0.1]"
+PAYLOAD = '[[payload]]\nlink = "tool"\nmass = {}\ncom_m = [0, 0, {}]\n'
+TIED = """[[compliance]]
+joint = "joint_a{}"
+axis = [1, 0, 0]
+stiffness = {}
+damping = 1.0
+tie = "all"
+"""
+INERTIA = "inertia = [0.01, 0.01, {}, 0, 0, 0]\n"
 
 # What is wrong: (old text, new text, words that the sentence has to hold).
 WRONG_TOML = {
@@ -39,6 +48,37 @@ WRONG_TOML = {
     "no axis": ("axis = [0, 0, 1]", "axis = [0, 0, 0]", ["length 0", "unit vector"]),
     "an axis in the plane": ("axis = [0, 0, 1]", "axis = [0, 1]", ["axis"]),
     "an elastic joint unknown": ('joint = "joint_a3"', 'joint = "elbow"', ["elbow", "joint_a3"]),
+    "a loss factor below 0": (
+        "damping = 18.0",
+        "damping = 18.0\nloss_factor = -0.1",
+        ["loss_factor"],
+    ),
+    "a huge loss factor": ("damping = 18.0", "damping = 18.0\nloss_factor = 5.0", ["below 2"]),
+    "ties of unequals": (
+        "[[obstacle]]",
+        TIED.format(1, 2.0e4) + TIED.format(2, 3.0e4) + "[[obstacle]]",
+        ["number 8", "joint_a2", '"all"', "stiffness", "30000"],
+    ),
+    "a payload without mass": (
+        "[[obstacle]]",
+        PAYLOAD.format(0.0, 0.1) + "[[obstacle]]",
+        ["[[payload]]", "above 0 kg"],
+    ),
+    "a payload in mm": (
+        "[[obstacle]]",
+        PAYLOAD.format(2.0, 150.0) + "[[obstacle]]",
+        ["number 1", "com_m", "in m"],
+    ),
+    "an impossible payload": (
+        "[[obstacle]]",
+        PAYLOAD.format(2.0, 0.1) + INERTIA.format(-1.0) + "[[obstacle]]",
+        ["inertia", "no body can have"],
+    ),
+    "a payload on nothing": (
+        "[[obstacle]]",
+        PAYLOAD.format(2.0, 0.1).replace("tool", "hook") + "[[obstacle]]",
+        ["[[payload]]", '"hook"'],
+    ),
     "a flat obstacle": (SIZES, "size_m = [4, 4, 0]", ["floor", "above 0 m"]),
     "a tool unknown": ('tcp_frame = "tool"', 'tcp_frame = "tol"', ["tcp_frame", '"tol"']),
     "a sensor unknown": ('"accelerometer"', '"adxl"', ["sensor_frame", '"adxl"']),

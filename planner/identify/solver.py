@@ -1,0 +1,56 @@
+"""Levenberg-Marquardt on an objective that gives its own Gauss-Newton matrix."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from planner.identify.objective import Quadratic
+
+LONGEST = 1.5  # no parameter moves farther in one step: a factor of 4.5 for a logarithm
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where the iteration ended, and whether it had come to rest."""
+
+    x: np.ndarray
+    at: Quadratic
+    iterations: int
+    converged: bool
+
+
+def minimise(
+    objective: Callable[[np.ndarray], Quadratic],
+    start: np.ndarray,
+    tolerance: float,
+    most: int,
+    progress: Callable[[int, float], None] | None = None,
+) -> Minimum:
+    """Least value from `start`, until a step would gain less than `tolerance` of it.
+
+    Damping follows Nielsen 1999; each step is shortened so that no entry moves by over LONGEST.
+    """
+    x, at = start, objective(start)
+    damping, grow = 1e-2, 2.0
+    for iteration in range(1, most + 1):
+        if progress:
+            progress(iteration, at.value)
+        scale = np.diagonal(at.normal)
+        damped = at.normal + damping * np.diag(scale)
+        step = -scipy.linalg.solve(damped, at.gradient, assume_a="pos", check_finite=False)
+        step *= min(1.0, LONGEST / max(float(np.max(np.abs(step))), 1e-300))
+        expected = -(at.gradient @ step + step @ at.normal @ step / 2)
+        if expected <= tolerance * at.value:
+            return Minimum(x, at, iteration, True)
+        trial = objective(x + step)
+        gain = (at.value - trial.value) / expected if np.isfinite(trial.value) else -1.0
+        if gain > 0:
+            x, at = x + step, trial
+            damping, grow = max(damping * max(1 / 5, 1 - (2 * gain - 1) ** 3), 1e-9), 2.0
+        else:
+            damping, grow = damping * grow, grow * 2
+            if damping > 1e12:
+                return Minimum(x, at, iteration, False)
+    return Minimum(x, at, most, False)

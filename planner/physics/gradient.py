@@ -1,0 +1,129 @@
+"""FRFs of many poses with their derivatives with respect to springs and inertias.
+
+At s = iω (or iω + rate under an exponential window) the receptance is J_s Z⁻¹ J_hᵀ with
+Z = K(1+iη) + s C + s² M. Z is symmetric, so that with X = Z⁻¹ Jᵀ any change dZ changes it by
+−X_sᵀ dZ X_h: two solutions serve all parameters.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.physics.simulation import Elasticity
+from planner.robot.elastic import Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Inertias:
+    """How p inertial parameters of each of B bodies move the mass matrix: Σ Jᵀ basis J.
+
+    `jacobians` (n, B, 6, e) of the bodies at n poses, `basis` (B, p, 6, 6) per unit of parameter.
+    """
+
+    jacobians: np.ndarray
+    basis: np.ndarray
+
+    def mass_change(self, values: np.ndarray) -> np.ndarray:
+        """Change (n, e, e) of M for values (B · p,) of the parameters."""
+        weighted = np.einsum("bpij,bp->bij", self.basis, values.reshape(self.basis.shape[:2]))
+        return np.sum(np.swapaxes(self.jacobians, 2, 3) @ weighted @ self.jacobians, axis=1)
+
+
+def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:
+    """s (n, F) in rad/s from frequency_hz (n, F) and the window's decay rate (n,)."""
+    return 2j * np.pi * np.atleast_2d(frequency_hz) + np.reshape(rate_1_s, (-1, 1))
+
+
+def response(
+    matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
+) -> np.ndarray:
+    """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
+    return _synthesis(matrices, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
+
+
+def response_gradient(
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None = None,
+    inertias: Inertias | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives (n, P, 3s, 3h, F).
+
+    The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
+    and those of `inertias` (B · p, only if given).
+    """
+    points = matrices.hit.shape[1]
+    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
+    x = _solutions(matrices, elasticity, s, mass, both)
+    x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
+    e, lossy = x.shape[1], bool(elasticity.loss_factor.any())
+    springs = (3 if lossy else 2) * e
+    extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
+    shape = len(s), springs + extra, x_sensor.shape[2], points, s.shape[1]
+    out = np.empty(shape, dtype=complex)
+    minus = -(s**2)[:, None, None, None]
+    each = out[:, :e]
+    np.multiply(x_sensor[:, :, :, None], x_hit[:, :, None] * minus, out=each)
+    k = elasticity.stiffness[:, None, None, None]
+    slope = s[:, None, None, None] * elasticity.damping[:, None, None, None]
+    np.multiply(each, slope, out=out[:, e : 2 * e])
+    if lossy:
+        lost = 1j * elasticity.loss_factor[:, None, None, None]
+        np.multiply(each, k * lost, out=out[:, 2 * e : springs])
+        each *= k * (1 + lost)
+    else:
+        each *= k
+    if inertias is not None:
+        _by_inertia(inertias, x_hit, x_sensor, s, out[:, springs:])
+    return _synthesis(matrices, x_hit, s), out
+
+
+def _synthesis(matrices: Matrices, x_hit: np.ndarray, s: np.ndarray) -> np.ndarray:
+    n, e, points, lines = x_hit.shape
+    flat = np.ascontiguousarray(x_hit).reshape(n, e, -1).view(float)
+    receptance = (matrices.sensor @ flat).view(complex).reshape(n, -1, points, lines)
+    return (s**2)[:, None, None] * receptance
+
+
+def _solutions(
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None,
+    rows: np.ndarray,
+) -> np.ndarray:
+    """X = Z⁻¹ rowsᵀ as (n, e, rows, F)."""
+    mass = matrices.mass if mass is None else mass
+    z = (s**2)[..., None, None] * mass[:, None]
+    z += matrices.geometric[:, None]
+    diagonal = np.einsum("...ii->...i", z)
+    diagonal += elasticity.stiffness * (1 + 1j * elasticity.loss_factor)
+    diagonal += s[..., None] * elasticity.damping
+    x = np.linalg.solve(z, np.swapaxes(rows, 1, 2)[:, None].astype(complex))
+    return np.ascontiguousarray(np.moveaxis(x, 1, 3))
+
+
+def _by_inertia(
+    inertias: Inertias, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray, out: np.ndarray
+) -> None:
+    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F)."""
+    n, bodies, _, e = inertias.jacobians.shape
+    p, lines = inertias.basis.shape[1], s.shape[1]
+    weights = inertias.basis.reshape(bodies, p * 6, 6)
+    for i in range(n):
+        jacobian = inertias.jacobians[i].reshape(-1, e)
+        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, -1, lines)
+        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, lines)
+        for b in range(bodies):
+            momentum = _times(weights[b], hit[b]).reshape(p, 6, 1, -1, lines)
+            part = out[i, b * p : (b + 1) * p]
+            np.multiply(sensor[b, 0][:, None], momentum[:, 0], out=part)
+            for axis in range(1, 6):
+                part += sensor[b, axis][:, None] * momentum[:, axis]
+
+
+def _times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Real matrix (r, e) times complex columns (e, ..., F): one real product of both parts."""
+    flat = np.ascontiguousarray(columns).reshape(columns.shape[0], -1)
+    return (matrix @ flat.view(float)).view(complex).reshape(-1, *columns.shape[1:])

@@ -1,0 +1,147 @@
+"""One description, many families: ties, payloads, elastic base, structural damping, gravity.
+
+The other engine (MuJoCo) or a closed form is the judge of each.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from known_robots import KR10
+from planner.errors import InputError
+from planner.physics import dynamics
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.truth.deviation import AddedMass, Deviation, Spring
+from planner.truth.model import load_truth
+
+LINES = np.linspace(5, 150, 50)
+MASS, RADIUS, MOMENT, STIFFNESS = 3.0, 0.4, 0.05, 60.0
+
+PENDULUM = f"""<robot name="one"><link name="base_link"/><link name="arm"><inertial>
+<origin xyz="0 0 {-RADIUS}" rpy="0 0 0"/><mass value="{MASS}"/>
+<inertia ixx="{MOMENT}" iyy="{MOMENT}" izz="{MOMENT}" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="tip"/><joint name="turn" type="revolute"><parent link="base_link"/><child link="arm"/>
+<origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-4" upper="4" velocity="1" effort="0"/></joint><joint name="end" type="fixed">
+<parent link="arm"/><child link="tip"/><origin xyz="0 0 -0.7" rpy="0 0 0"/></joint></robot>"""
+
+
+def edited(path: Path, *pairs: tuple[str, str], more: str = "") -> Path:
+    text = path.read_text()
+    for old, new in pairs:
+        assert old in text
+        text = text.replace(old, new)
+    path.write_text(text + "\n" + more)
+    return path
+
+
+def assert_same_frfs(path: Path, judge_path: Path, deviation: Deviation) -> None:
+    simulation, truth = Simulation(Robot.load(path)), load_truth(judge_path, deviation)
+    for q in KR10.poses(3, seed=4):
+        ours, theirs = simulation.accelerance(q, LINES)[0], truth.accelerance(q, LINES)
+        assert np.abs(ours - theirs).max() < 1e-7 * np.abs(theirs).max()
+
+
+def pendulum(folder: Path, **entries: object) -> Simulation:
+    (folder / "one.urdf").write_text(PENDULUM)
+    more = "".join(f"{key} = {value}\n" for key, value in entries.items())
+    (folder / "robot.toml").write_text(
+        'name = "one"\nurdf = "one.urdf"\ntcp_frame = "tip"\nsensor_frame = "tip"\n'
+        "geometric_stiffness = true\n"
+        '[[compliance]]\njoint = "turn"\naxis = [0, 1, 0]\n'
+        f"stiffness = {STIFFNESS}\n{more}"
+    )
+    return Simulation(Robot.load(folder / "robot.toml"))
+
+
+def test_a_payload_is_the_mass_that_the_other_engine_adds(tmp_path):
+    plain, place = KR10.write(tmp_path / "plain", 2), (0.02, -0.03, -0.2)
+    # The other engine's lump has a gyration radius of 1 cm.
+    more = (
+        f'[[payload]]\nlink = "spindle"\nmass = 2.5\ncom_m = {list(place)}\n'
+        f"inertia = [2.5e-4, 2.5e-4, 2.5e-4, 0, 0, 0]\n"
+    )
+    loaded = edited(KR10.write(tmp_path / "loaded", 2), more=more)
+    assert_same_frfs(loaded, plain, Deviation(added=(AddedMass("spindle", place, 2.5),)))
+
+
+def test_an_elastic_base_is_the_one_of_the_other_engine(tmp_path):
+    plain = KR10.write(tmp_path / "plain", 2)
+    axes, more, extra = np.eye(3), "", ()
+    for axis in axes:
+        more += f'[[compliance]]\njoint = "base"\naxis = {axis.tolist()}\n'
+        more += "stiffness = 2.0e5\ndamping = 60.0\n"
+        extra = (*extra, Spring("base", tuple(axis), 2.0e5, 60.0))
+    tilting = edited(KR10.write(tmp_path / "tilting", 2), more=more)
+    assert_same_frfs(tilting, plain, Deviation(extra=extra))
+    assert_same_frfs(tilting, tilting, Deviation())  # both read it from robot.toml too
+    assert Simulation(Robot.load(tilting)).elastic.bodies[0] == "base"
+
+
+def test_loss_factors_against_a_direct_solution(tmp_path):
+    path = edited(KR10.write(tmp_path, 2), ("damping =", "loss_factor = 0.07\ndamping ="))
+    simulation, q = Simulation(Robot.load(path)), KR10.poses(2)
+    m = simulation.elastic.matrices(q)
+    for i in range(2):
+        matrices = m.mass[i], simulation.damping, simulation.stiffness, m.hit[i], m.sensor[i]
+        direct = dynamics.direct_accelerance(*matrices, LINES)
+        found = simulation.accelerance(q, LINES)[i]
+        assert np.abs(found - direct).max() < 1e-9 * np.abs(direct).max()
+
+
+def test_structural_damping_of_one_oscillator_in_closed_form():
+    m, k, eta = np.array([[[2.0]]]), 5.0e4, 0.08
+    j, k_complex = np.array([[[1.0], [0.0], [0.0]]]), np.array([[k * (1 + 1j * eta)]])
+    modes = dynamics.oscillatory(dynamics.solve_poles(m, np.zeros((1, 1)), k_complex, j, j), 2)
+    pole = 1j * np.sqrt(k / 2.0 * (1 + 1j * eta))
+    assert modes.frequency_hz[0, 0] == pytest.approx(abs(pole) / (2 * np.pi), rel=1e-12)
+    assert modes.damping_ratio[0, 0] == pytest.approx(-pole.real / abs(pole), rel=1e-10)
+    assert np.isnan(modes.frequency_hz[0, 1])
+    overdamped = dynamics.solve_poles(m, np.array([[2e3]]), k_complex, j, j)
+    assert np.isnan(dynamics.oscillatory(overdamped, 2).frequency_hz).all()
+
+
+def test_gravity_stiffens_what_hangs_and_softens_what_stands(tmp_path):
+    inertia, weight = MOMENT + MASS * RADIUS**2, MASS * 9.81 * RADIUS
+    simulation = pendulum(tmp_path, damping=0.1)
+    for angle, sign in ((0.0, 1.0), (np.pi, -1.0)):
+        frequency = simulation.modes(np.array([angle]), 1).frequency_hz[0, 0]
+        expected = np.sqrt((STIFFNESS + sign * weight) / inertia) / (2 * np.pi)
+        assert frequency == pytest.approx(expected, rel=1e-9)
+
+
+def test_gravity_is_taken_where_the_robot_sags_to(tmp_path):
+    """A pendulum held horizontal: K δ = m g r cos δ, and m g r sin δ is the stiffness there."""
+    simulation = pendulum(tmp_path, damping=0.1)
+    weight, sag = MASS * 9.81 * RADIUS, 0.0
+    for _ in range(200):
+        sag += 0.5 * (weight * np.cos(sag) / STIFFNESS - sag)
+    found = simulation.elastic.matrices(np.array([np.pi / 2])).geometric[0, 0, 0]
+    assert found == pytest.approx(weight * np.sin(sag), rel=2e-3)
+    assert sag > 0.1  # far more than a robot would
+
+
+def test_frfs_between_named_frames(tmp_path):
+    simulation, q = Simulation(Robot.load(KR10.write(tmp_path, 2))), KR10.poses(2)
+    frames = ("tcp", "link_3", "sensor")
+    frfs = simulation.frfs(q, LINES, hits=frames, sensors=frames)
+    assert frfs.shape == (2, 3, 3, 3, 3, LINES.size)
+    swapped = np.moveaxis(frfs, (1, 2, 3, 4), (3, 4, 1, 2))
+    np.testing.assert_allclose(frfs, swapped, atol=1e-9 * np.abs(frfs).max())  # Maxwell, Betti
+    usual = simulation.accelerance(q, LINES)
+    np.testing.assert_allclose(frfs[:, 2, :, 0], usual, atol=1e-12 * np.abs(usual).max())
+    receptance = simulation.frfs(q, LINES, frames, frames, "receptance")
+    np.testing.assert_allclose(frfs, -((2 * np.pi * LINES) ** 2) * receptance, rtol=1e-12)
+    with pytest.raises(InputError, match="elbow"):
+        simulation.frfs(q, LINES, hits=("elbow",))
+
+
+def test_other_springs_leave_the_original_alone(tmp_path):
+    simulation, q = Simulation(Robot.load(KR10.write(tmp_path, 2))), KR10.poses(2)
+    before = simulation.modes(q, 3).frequency_hz
+    springs = simulation.elasticity
+    softer = type(springs)(springs.stiffness / 4, springs.damping / 2, springs.loss_factor)
+    np.testing.assert_allclose(simulation.changed(softer).modes(q, 3).frequency_hz, before / 2)
+    np.testing.assert_array_equal(simulation.modes(q, 3).frequency_hz, before)

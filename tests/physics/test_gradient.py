@@ -1,0 +1,95 @@
+"""Derivatives of FRFs against finite differences."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from known_robots import KR10
+from planner.physics.gradient import Inertias, laplace, response, response_gradient
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.robot.virtual import inertia_basis
+
+LINES = np.linspace(6, 180, 25)
+STEP = 1e-5
+
+
+def simulated(tmp_path, per_joint=2, loss=0.0):
+    path = KR10.write(tmp_path, per_joint)
+    text = path.read_text().replace("damping =", f"loss_factor = {loss}\ndamping =")
+    path.write_text(text)
+    return Simulation(Robot.load(path))
+
+
+def everything(tmp_path, loss, rate):
+    simulation = simulated(tmp_path, loss=loss)
+    q = KR10.poses(3)
+    elastic = simulation.elastic
+    basis = np.tile(inertia_basis(), (len(elastic.bodies), 1, 1, 1))
+    inertias = Inertias(elastic.body_jacobians(q), basis)
+    s = laplace(np.tile(LINES, (3, 1)), np.full(3, rate))
+    return simulation, elastic.matrices(q), inertias, s
+
+
+@pytest.mark.parametrize(("loss", "rate"), [(0.0, 0.0), (0.08, 0.0), (0.0, 7.0)])
+def test_springs_against_finite_differences(tmp_path, loss, rate):
+    simulation, matrices, _, s = everything(tmp_path, loss, rate)
+    elasticity = simulation.elasticity
+    h, gradient = response_gradient(matrices, elasticity, s)
+    assert np.array_equal(h, response(matrices, elasticity, s))
+    kinds = ("stiffness", "damping", "loss_factor")[: 3 if loss else 2]
+    assert gradient.shape == (3, 12 * len(kinds), 3, 3, LINES.size)
+    for k, kind in enumerate(kinds):
+        for j in range(12):
+            sides = []
+            for step in (STEP, -STEP):
+                values = getattr(elasticity, kind).copy()
+                values[j] *= np.exp(step)
+                sides.append(
+                    response(matrices, dataclasses.replace(elasticity, **{kind: values}), s)
+                )
+            expected = (sides[0] - sides[1]) / (2 * STEP)
+            found = gradient[:, 12 * k + j]
+            assert np.abs(found - expected).max() < 1e-6 * np.abs(h).max()
+            assert np.abs(found - expected).max() < 1e-3 * np.abs(found).max()
+
+
+def test_inertias_against_finite_differences(tmp_path):
+    """All ten parameters of every body; the mass matrix is linear in them, exactly."""
+    simulation, matrices, inertias, s = everything(tmp_path, 0.0, 0.0)
+    elasticity, nominal = simulation.elasticity, simulation.elastic.inertia
+    h, gradient = response_gradient(matrices, elasticity, s, inertias=inertias)
+    whole = inertias.mass_change(nominal.ravel())
+    np.testing.assert_allclose(whole, matrices.mass, atol=1e-12 * np.abs(matrices.mass).max())
+    for j in range(nominal.size):
+        step = np.zeros(nominal.size)
+        step[j] = 1e-4 * (1e-2 + abs(nominal.flat[j]))
+        sides = [
+            response(matrices, elasticity, s, matrices.mass + inertias.mass_change(sign * step))
+            for sign in (1, -1)
+        ]
+        expected = (sides[0] - sides[1]) / (2 * step[j])
+        found = gradient[:, 24 + j]
+        assert np.abs(found - expected).max() < 1e-6 * max(np.abs(h).max(), np.abs(found).max())
+
+
+def test_changed_inertia_is_the_linear_change(tmp_path):
+    simulation, matrices, inertias, _ = everything(tmp_path, 0.0, 0.0)
+    change = 0.05 * np.random.default_rng(1).standard_normal((6, 10)) * simulation.elastic.inertia
+    other = simulation.changed(simulation.elasticity, change)
+    mass = other.elastic.matrices(KR10.poses(3)).mass
+    expected = matrices.mass + inertias.mass_change(change.ravel())
+    np.testing.assert_allclose(mass, expected, atol=1e-12 * np.abs(mass).max())
+
+
+def test_window_shifts_the_laplace_variable(tmp_path):
+    """H at iω + rate is the transform of e^(−rate·t) h(t): checked through the poles."""
+    simulation, matrices, _, s = everything(tmp_path, 0.0, 7.0)
+    solved = simulation.poles(KR10.poses(3))
+    expected = np.einsum(
+        "nkij,nkf->nijf", solved.residues, 1 / (s[:, None] - solved.poles[..., None])
+    )
+    expected = expected * (s**2)[:, None, None]
+    found = response(matrices, simulation.elasticity, s)
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(found).max())
