@@ -11,7 +11,12 @@ from planner.campaign.config import load_campaign_config
 from planner.demo import Pool, shipped
 from planner.fusion.surrogate import fit_surrogate
 from planner.modes.measure import Source, measure
+from planner.modes.track import Guide, track
+from planner.modes.types import Mode
 from planner.physics.dynamics import direct_accelerance
+from planner.truth.deviation import Deviation
+from planner.truth.hits import Hammer, record_poses
+from planner.truth.model import load_truth
 from test_fusion import observed, simulated
 
 pytestmark = pytest.mark.slow
@@ -54,6 +59,32 @@ def test_files_to_modes(cell):
     rows = Pool.load(folder, cell.robot.joint_names).rows["A34"]
     sources = tuple(Source(r.file, r.file.name, r.hit) for r in rows)
     print(f"\n12 hits from files to modes: {seconds(lambda: measure(sources, (4.0, 60.0))):.2f} s")
+
+
+def test_files_to_labelled_modes(cell, tmp_path):
+    """Twelve new hits of 2 s at 1 kHz, labelled beside ten poses measured before."""
+    truth = load_truth(cell.robot.path, Deviation(3, stiffness=0.1, damping=0.1, inertia=0.04))
+    poses = [(f"P{i}", q) for i, q in enumerate(cell.candidates.q[::45][:11])]
+    hammer = Hammer(sampling_rate_hz=1000.0, record_s=2.0)
+    record_poses(truth, poses, tmp_path, hammer=hammer)
+    q = np.array([q for _, q in poses])
+    simulated = cell.simulate(q, 2)
+    guide = Guide(simulated.frequency_hz, simulated.shape)
+    files = [sorted((tmp_path / "data").glob(f"{name}_*.uff")) for name, _ in poses]
+
+    def modes_of(number: int) -> tuple[Mode, ...]:
+        sources = tuple(Source(file, file.name) for file in files[number])
+        found = measure(sources, (4.0, 60.0)).modal
+        assert found is not None
+        return found.modes
+
+    earlier = [modes_of(number) for number in range(10)]
+
+    def act() -> None:
+        tracks = track([*earlier, modes_of(10)], guide, cell.features(q), ordered=True)
+        assert sum(mode is not None for mode in tracks.modes[10][:4]) == 4
+
+    print(f"\n12 hits of 2 s at 1 kHz from files to labelled modes: {seconds(act):.2f} s")
 
 
 @pytest.mark.filterwarnings("ignore")  # the peer's optimiser meets its bounds
