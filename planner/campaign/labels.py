@@ -43,7 +43,7 @@ def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPo
     simulated = cell.simulate(q, ABOVE)
     guide = Guide(simulated.frequency_hz, simulated.shape)
     if not np.any(np.isfinite(simulated.frequency_hz)):
-        guide = _by_example(modes, count + ABOVE)
+        guide = Guide.by_example(modes, count + ABOVE)
     tracks = track(modes, guide, cell.features(q), ordered=True)
     return tuple(
         LabelledPose(
@@ -56,16 +56,6 @@ def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPo
         )
         for i, m in enumerate(measurements)
     )
-
-
-def _by_example(poses: list[tuple[Mode, ...]], labels: int) -> Guide:
-    """Without a simulation the pose with the most modes says what there is."""
-    example = max(poses, key=len)[:labels]
-    frequency, shape = np.full(labels, np.nan), np.full((labels, 3), np.nan + 0j)
-    frequency[: len(example)] = [mode.frequency_hz for mode in example]
-    shape[: len(example)] = [mode.shape for mode in example]
-    n = len(poses)
-    return Guide(np.tile(frequency, (n, 1)), np.tile(shape, (n, 1, 1)))
 
 
 def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:

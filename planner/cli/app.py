@@ -218,6 +218,10 @@ def modes(
         float,
         typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
     ] = 0.0,
+    robot: Annotated[
+        Path | None,
+        typer.Option(metavar="ROBOT_TOML", help="Whose simulation guides labels over poses."),
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw the analysis into this folder.")
     ] = None,
@@ -225,11 +229,22 @@ def modes(
     rrd: Rrd = None,
     as_json: AsJson = False,
 ) -> int:
-    """Experimental modal analysis of one pose's hits."""
-    from planner.cli import modal, render
+    """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv."""
+    from planner.cli import modal, render, survey
+    from planner.cli.progress import reporting
     from planner.show.pictures import Pictures
 
     pictures = Pictures(plot, format_, rrd)
+    if modal.several_poses(paths):
+        modal.check(band_hz, estimator, quantity, window_rate_1_s)
+        band = band_hz or modal.DEFAULT_BAND_HZ
+        with reporting("identifying", quiet=as_json) as progress:
+            answer = survey.analyse(
+                paths[0], band, robot, estimator, window_rate_1_s, pictures, progress
+            )
+        for entry in answer["refused"]:
+            warn(f"Refused {entry['file']}: {entry['reason']}")
+        return respond(answer, as_json, render.survey, 3 if answer["refused"] else 0)
     answer = modal.analyse(
         tuple(paths), band_hz, force, estimator, pictures, quantity, window_rate_1_s
     )

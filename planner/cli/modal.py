@@ -13,13 +13,35 @@ from planner.modes.estimate import identification
 from planner.modes.identify import Identification
 from planner.modes.measure import Source, measure
 from planner.modes.types import ModalModel
-from planner.recording.folder import files_in
+from planner.recording.folder import TABLE, files_in
 from planner.recording.types import FrfRecord
 from planner.show.pictures import Pictures
 
 DEFAULT_BAND_HZ = (4.0, 60.0)
 LONGEST_NAME = 40  # characters of a file's name in a title
 NONE = Pictures()
+
+
+def several_poses(paths: list[Path]) -> bool:
+    """Whether a single folder with recordings.csv is named."""
+    return len(paths) == 1 and (paths[0] / TABLE).is_file()
+
+
+def check(
+    band_hz: tuple[float, float] | None,
+    estimator: str,
+    quantity: str | None,
+    window_rate_1_s: float,
+) -> None:
+    """InputError for options that make no sense."""
+    if estimator not in ("h1", "h2", "hv"):
+        raise InputError(f"--estimator {estimator} is not known; give h1, h2 or hv.")
+    if quantity is not None and quantity not in DERIVATIVE:
+        raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
+    if not 0 <= window_rate_1_s < 1e3:
+        raise InputError(f"--window-rate {window_rate_1_s:g}: give a rate in 1/s, 0 for none.")
+    if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
+        raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
 
 
 def analyse(
@@ -32,14 +54,7 @@ def analyse(
     window_rate_1_s: float = 0.0,
 ) -> dict[str, Any]:
     """Answer of `modes`. Raises RefusedError if no file could be used."""
-    if estimator not in ("h1", "h2", "hv"):
-        raise InputError(f"--estimator {estimator} is not known; give h1, h2 or hv.")
-    if quantity is not None and quantity not in DERIVATIVE:
-        raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
-    if not 0 <= window_rate_1_s < 1e3:
-        raise InputError(f"--window-rate {window_rate_1_s:g}: give a rate in 1/s, 0 for none.")
-    if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
-        raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
+    check(band_hz, estimator, quantity, window_rate_1_s)
     sources = _sources(paths)
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)

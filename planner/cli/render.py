@@ -197,6 +197,32 @@ def modes(answer: dict[str, Any]) -> RenderableType:
     return Group(*parts, SIMULATED) if answer["simulated"] else Group(*parts)
 
 
+def survey(answer: dict[str, Any]) -> RenderableType:
+    """Text of `modes` of several poses."""
+    labels = sorted({mode["label"] for pose in answer["poses"] for mode in pose["modes"]})
+    low, high = answer["band_hz"]
+    made = table(
+        f"Modes of {len(answer['poses'])} poses between {low:g} and {high:g} Hz",
+        *("pose", *(f"mode {label} (Hz)" for label in labels), "without label (Hz)"),
+    )
+    for pose in answer["poses"]:
+        by_label = {mode["label"]: mode for mode in pose["modes"]}
+        cells = [_labelled(by_label.get(label)) for label in labels]
+        others = "  ".join(f"{mode['frequency_hz']:.2f}" for mode in pose["unlabelled"])
+        made.add_row(pose["pose"], *cells, others)
+    parts: list[RenderableType] = [made, Text("  ?: the label is less than 90 % sure.")]
+    if answer["plots"]:
+        parts.append(Text("\n  ".join(["Pictures:", *answer["plots"]])))
+    return Group(*parts, SIMULATED) if answer["simulated"] else Group(*parts)
+
+
+def _labelled(mode: dict[str, Any] | None) -> str:
+    if mode is None:
+        return "–"
+    doubt = " ?" if mode["label_probability"] < 0.9 else ""
+    return f"{mode['frequency_hz']:.2f}{doubt}"
+
+
 def demo(answer: dict[str, Any]) -> RenderableType:
     """Text of `demo`."""
     course = table("Course", "measurement", "pose", "measured (Hz)", "sd of frequencies (%)")

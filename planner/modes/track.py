@@ -38,6 +38,17 @@ class Guide:
     frequency_hz: np.ndarray
     shape: np.ndarray
 
+    @classmethod
+    def by_example(cls, poses: Sequence[Sequence[Mode]], labels: int | None = None) -> "Guide":
+        """Without a simulation the pose with the most modes says what there is everywhere."""
+        example = max(poses, key=len)[:labels]
+        count = len(example) if labels is None else labels
+        frequency, shape = np.full(count, np.nan), np.full((count, 3), np.nan + 0j)
+        frequency[: len(example)] = [mode.frequency_hz for mode in example]
+        shape[: len(example)] = [mode.shape for mode in example]
+        n = len(poses)
+        return cls(np.tile(frequency, (n, 1)), np.tile(shape, (n, 1, 1)))
+
 
 @dataclass(frozen=True, eq=False)
 class Tracks:

@@ -15,6 +15,12 @@ MAX_ROWS = 200_000
 SAME_POSE_DEG = 0.5  # readback of one pose may scatter by less
 
 
+def joint_columns(folder: Path) -> tuple[str, ...]:
+    """Names of the joints in the order of the table's columns `…_deg`, where no robot is named."""
+    header, _ = _table(folder / TABLE)
+    return tuple(name.removesuffix("_deg") for name in header if name.endswith("_deg"))
+
+
 def read_recordings(folder: Path, joint_names: tuple[str, ...]) -> RecordingsFolder:
     """The table of a recordings folder. Raises InputError naming file, row and remedy."""
     path = folder / TABLE

@@ -1,0 +1,55 @@
+"""`planner modes FOLDER`: every pose of recordings.csv, labelled over poses, with its Campbell."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from outside import answer as planner_json
+from outside import planner
+from planner.demo import shipped
+from robots import make_arm
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Five poses of the shipped recordings."""
+    source = shipped("kr240_plane") / "recordings"
+    copy = tmp_path_factory.mktemp("some") / "recordings"
+    (copy / "data").mkdir(parents=True)
+    lines = (source / "recordings.csv").read_text().splitlines()
+    kept = [line for line in lines[1:] if line.split(",")[0] in ("A21", "A22", "A23", "A24", "A25")]
+    (copy / "recordings.csv").write_text("\n".join([lines[0], *kept]) + "\n")
+    for line in kept:
+        name = line.split(",")[-1]
+        shutil.copy(source / name, copy / name)
+    return copy
+
+
+@pytest.mark.parametrize("robot", [True, False])
+def test_every_pose_and_its_labels(folder, tmp_path, robot):
+    toml = shipped("kr240_plane") / "robot" / "robot.toml"
+    options = ["--robot", str(toml)] if robot else []
+    answer = planner_json("modes", str(folder), "--plot", str(tmp_path / "plots"), *options)
+    assert [pose["pose"] for pose in answer["poses"]] == ["A21", "A22", "A23", "A24", "A25"]
+    rows = [{m["label"]: m["frequency_hz"] for m in pose["modes"]} for pose in answer["poses"]]
+    table = np.array([[row[label] for label in (1, 2, 3, 4)] for row in rows])
+    assert np.all(np.ptp(table, axis=0) / table.mean(axis=0) < 0.2)
+    assert answer["plots"] == [str(tmp_path / "plots" / "campbell.png")]
+    assert answer["simulated"]
+    assert answer["modes"] == answer["poses"][0]["modes"]
+
+
+def test_text(folder):
+    run = planner("modes", str(folder))
+    assert run.returncode == 0
+    assert "Modes of 5 poses" in run.stdout
+    assert "SIMULATED" in run.stdout.upper()
+
+
+def test_a_robot_with_other_joints_is_refused(folder, tmp_path):
+    toml = make_arm(tmp_path)
+    run = planner("modes", folder, "--robot", toml, check=False)
+    assert run.returncode == 2
+    assert "joint_a1" in run.stderr
+    assert "Traceback" not in run.stderr
