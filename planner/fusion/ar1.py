@@ -20,7 +20,8 @@ class OutputPrior:
     """Weakly informative prior of one kind of output, in the output's own unit.
 
     Medians of amplitude σ of δ and of the nugget τ, with log-sd `spread` each; length scales have
-    median `length`·√d in coordinates scaled to [0, 1]. `mean` applies without simulation only.
+    median `length`·√d, log-sd `length_spread`, in coordinates scaled to [0, 1]. `mean` applies
+    without simulation only.
     """
 
     bias_sd: float
@@ -30,6 +31,7 @@ class OutputPrior:
     mean: float = 0.0
     length: float = 0.8
     spread: float = 1.0
+    length_spread: float = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +111,9 @@ def _unknown_sd(low: np.ndarray, priors: tuple[OutputPrior, ...]) -> np.ndarray:
 
 
 def _stack(priors: list[OutputPrior], uses_low: np.ndarray, kernel: Kernel) -> Prior:
-    theta = [kernel.prior(p.amplitude, p.nugget, p.length, p.spread) for p in priors]
+    theta = [
+        kernel.prior(p.amplitude, p.nugget, p.length, p.spread, p.length_spread) for p in priors
+    ]
     return Prior(
         mean=np.array([p.mean for p in priors]) * ~uses_low,
         bias_sd=np.array([p.bias_sd for p in priors]),

@@ -137,7 +137,8 @@ def fit(
     def attempt(jitter: float) -> tuple[Array, Array, Array, Array]:
         return _fit(
             kernel, kept, padded.x, padded.low, padded.mask, y, padded.variance,
-            prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, moved, jitter, start,
+            prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, moved, jitter,
+            start,
         )  # fmt: skip
 
     for jitter in JITTERS:

@@ -145,20 +145,17 @@ class Kernel:
         return total
 
     def prior(
-        self, amplitude: float, nugget: float, length: float, spread: float
+        self, amplitude: float, nugget: float, length: float, spread: float, length_spread: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (p,) of θ: medians of σ, τ with log-sd `spread`; lengths `length`·√width."""
+        """Mean and sd (p,) of θ: medians of σ, τ with log-sd `spread`, of ℓ `length`·√width."""
         mean, sd = np.full(self.size, np.log(amplitude)), np.full(self.size, spread)
         mean[1] = np.log(nugget)
         for term in self.terms:
             for f in term:
                 width = f.scales.stop - f.scales.start
                 mean[f.scales] = np.log(length * np.sqrt(max(width, 1)))
-                sd[f.scales] = LENGTH_SPREAD
+                sd[f.scales] = length_spread
         return mean, sd
-
-
-LENGTH_SPREAD = 0.8  # log-sd of a length scale: within a factor of five of its median
 
 
 @lru_cache(maxsize=256)

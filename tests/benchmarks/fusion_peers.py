@@ -108,7 +108,9 @@ def predict(peer, x_low, y_low, x_high, y_high, x_test):
     centre, scale = y_low.mean(), y_low.std()
     np.random.seed(0)  # noqa: NPY002 (GPy's restarts draw from the global generator)
     start = time.perf_counter()
-    mean, sd = PEERS[peer](x_low, (y_low - centre) / scale, x_high, (y_high - centre) / scale, x_test)
+    mean, sd = PEERS[peer](
+        x_low, (y_low - centre) / scale, x_high, (y_high - centre) / scale, x_test
+    )
     return mean * scale + centre, sd * scale, time.perf_counter() - start
 
 
