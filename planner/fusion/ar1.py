@@ -46,12 +46,19 @@ class AR1:
     centre: np.ndarray
     unknown_sd: np.ndarray
 
-    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there).
+
+        `outputs` (indices) asks for some of the columns only.
+        """
         base, offset = self.split(low)
-        mean, sd = self.posterior.predict(x, offset)
-        blind = self.uses_low[None, :] & ~np.isfinite(low)
-        return mean + base, np.hypot(sd, blind * self.unknown_sd[None, :])
+        blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
+        if outputs is not None:
+            base, blind = base[:, outputs], blind[:, outputs]
+        mean, sd = self.posterior.predict(x, offset, outputs)
+        return mean + base, np.hypot(sd, blind)
 
     def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""

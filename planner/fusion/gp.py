@@ -56,16 +56,21 @@ class Posterior:
     log_evidence: np.ndarray  # (m,) log p(y | model), θ averaged out
     remarks: tuple[str, ...] = ()
 
-    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m)."""
-        m = self.mask.shape[0]
-        mean, variance = np.empty((len(x), m)), np.empty((len(x), m))
-        for j in range(m):
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m).
+
+        `outputs` (indices) asks for some of them only.
+        """
+        asked = np.arange(len(self.mask)) if outputs is None else outputs
+        mean, variance = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
+        for i, j in enumerate(asked):
             cross, white = self._cross(j, x, low[:, j])
             means = (self.weights[j][:, None, :] @ cross)[:, 0]
             own = self._own(j, x, low[:, j]) - np.sum(white**2, axis=1)
-            mean[:, j] = self.prior.mean[j] + np.mean(means, axis=0)
-            variance[:, j] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
+            mean[:, i] = self.prior.mean[j] + np.mean(means, axis=0)
+            variance[:, i] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
         return mean, np.sqrt(variance)
 
     def covariance(

@@ -13,7 +13,7 @@ from planner.fusion.ar1 import AR1, OutputPrior, fit_ar1
 from planner.fusion.data import TrainingData
 from planner.fusion.levels import LowLevel, Samples, spread
 
-PRIOR = OutputPrior(bias_sd=0.5, slope_sd=1.0, amplitude=0.3, nugget=1e-3, spread=1.2)
+PRIOR = OutputPrior(bias_sd=0.5, slope_sd=1.0, amplitude=0.1, nugget=1e-3, spread=1.5)
 TRUST = 2.0  # measurements' worth of belief that both levels vary by the same amount
 
 

@@ -119,8 +119,8 @@ def _borehole(x: np.ndarray, factor: float, one: float) -> np.ndarray:
     return factor * tu * (hu - hl) / (log * (one + 2 * length * tu / (log * rw**2 * kw) + tu / tl))
 
 
-def _arm_hz(x: np.ndarray, stiffness: tuple[float, float], base: float | None) -> np.ndarray:
-    """Second natural frequency in Hz of two links of 1.2 and 1.0 m at joint angles (q2, q3)."""
+def arm_hz(x: np.ndarray, stiffness: tuple[float, float], base: float | None) -> np.ndarray:
+    """Natural frequencies (n, 2) in Hz of two links of 1.2 and 1.0 m at joint angles (q2, q3)."""
     q2, q3 = 0.3 + 1.2 * x[:, 0], -2.2 + 1.6 * x[:, 1]
     l1, l2, m1, m2 = 1.2, 1.0, 160.0, 90.0
     c = m2 * l1 * l2 / 2 * np.cos(q3)
@@ -137,7 +137,7 @@ def _arm_hz(x: np.ndarray, stiffness: tuple[float, float], base: float | None) -
     k = np.diag([*stiffness, base or 0.0])
     size = 2 if base is None else 3
     values = np.linalg.eigvals(np.linalg.solve(m[:, :size, :size], k[None, :size, :size]))
-    return np.sqrt(np.sort(values.real, axis=1)[:, 1]) / (2 * np.pi)
+    return np.sqrt(np.sort(values.real, axis=1)[:, :2]) / (2 * np.pi)
 
 
 PROBLEMS: dict[str, Problem] = {
@@ -155,7 +155,7 @@ PROBLEMS: dict[str, Problem] = {
     ),
     "pose": Problem(
         2,
-        lambda x: _arm_hz(x, (9e5, 4e5), 2e7),
-        lambda x: _arm_hz(x, (1.2e6, 3.4e5), None),
+        lambda x: arm_hz(x, (9e5, 4e5), 2e7)[:, 1],
+        lambda x: arm_hz(x, (1.2e6, 3.4e5), None)[:, 1],
     ),
 }
