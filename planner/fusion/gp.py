@@ -63,7 +63,7 @@ class Posterior:
 
         `outputs` (indices) asks for some of them only.
         """
-        asked = np.arange(len(self.mask)) if outputs is None else outputs
+        asked = range(len(self.mask)) if outputs is None else outputs.tolist()
         mean, variance = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
             cross, white = self._cross(j, x, low[:, j])
