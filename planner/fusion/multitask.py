@@ -123,25 +123,25 @@ class Solved:
         )
 
 
-def solve_kronecker(y: np.ndarray, k: np.ndarray, h: Hyperparameters) -> Solved:
-    """For y (n, t) without gaps, k (n, n): O(n³ + t³)."""
+def solve_kronecker(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarray) -> Solved:
+    """For y (n, t) without gaps, k (n, n), b (t, t), noise variances (t,): O(n³ + t³)."""
     n, t = y.shape
-    root = np.sqrt(h.noise)
+    root = np.sqrt(noise)
     scaled = y / root
     values, v = np.linalg.eigh(k)
-    tasks, u = np.linalg.eigh(h.task_covariance / np.outer(root, root))
+    tasks, u = np.linalg.eigh(b / np.outer(root, root))
     values, tasks = np.maximum(values, 0.0), np.maximum(tasks, 0.0)
     w = np.outer(values, tasks) + 1
     rotated = v.T @ scaled @ u
     a = rotated / w
-    value = -0.5 * np.sum(rotated * a) - 0.5 * np.sum(np.log(w)) - n * np.sum(h.log_noise)
+    value = -0.5 * np.sum(rotated * a) - 0.5 * np.sum(np.log(w)) - 0.5 * n * np.sum(np.log(noise))
     inner_b = a.T @ (values[:, None] * a) - np.diag(np.sum(values[:, None] / w, axis=0))
     inner_k = (a * tasks) @ a.T - np.diag(np.sum(tasks / w, axis=1))
     slope_b = 0.5 * u @ inner_b @ u.T
     alpha = v @ a @ u.T
     in_noise = np.sum(alpha * scaled, axis=0) - n
     in_noise = in_noise - 2 * np.sum(
-        slope_b * h.task_covariance / np.outer(root, root), axis=1
+        slope_b * b / np.outer(root, root), axis=1
     )  # fmt: skip
     return Solved(
         value - 0.5 * n * t * np.log(2 * np.pi),
@@ -153,13 +153,12 @@ def solve_kronecker(y: np.ndarray, k: np.ndarray, h: Hyperparameters) -> Solved:
     )
 
 
-def solve_dense(y: np.ndarray, k: np.ndarray, h: Hyperparameters) -> Solved:
+def solve_dense(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarray) -> Solved:
     """For y (n, t) with NaN where missing: O((n t)³)."""
     n, t = y.shape
     pose, task = np.nonzero(np.isfinite(y))
     seen = y[pose, task]
-    b = h.task_covariance
-    full = b[np.ix_(task, task)] * k[np.ix_(pose, pose)] + np.diag(h.noise[task])
+    full = b[np.ix_(task, task)] * k[np.ix_(pose, pose)] + np.diag(noise[task])
     factor = cho_factor(full, lower=True)
     alpha, inverse = cho_solve(factor, seen), cho_solve(factor, np.eye(len(seen)))
     log_det = 2 * np.sum(np.log(np.diag(factor[0])))
@@ -177,7 +176,7 @@ def solve_dense(y: np.ndarray, k: np.ndarray, h: Hyperparameters) -> Solved:
         laid,
         np.einsum("iajb,ij->ab", wide, k),
         np.einsum("iajb,ab->ij", wide, b),
-        2 * h.noise * diagonal,
+        2 * noise * diagonal,
         None,
         kept,
     )
@@ -221,7 +220,7 @@ def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
     """Log marginal likelihood and its slope in `h.flat()`."""
     solved = _solve(tasks, h)
     slope_root = (solved.slope_b + solved.slope_b.T) @ h.root
-    slope_theta = np.array(_pull(tasks.kernel, h.theta, tasks.x, solved.slope_k))
+    slope_theta = np.array(pull(tasks.kernel, h.theta, tasks.x, solved.slope_k))
     return solved.value, np.concatenate(
         [slope_root[_lower(h.root)], solved.slope_log_noise, slope_theta]
     )
@@ -230,11 +229,13 @@ def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
 def _solve(tasks: Tasks, h: Hyperparameters) -> Solved:
     k = parse(tasks.kernel, tasks.x.shape[1]).covariance(np, h.theta, tasks.x, tasks.x)
     k = k + RELATIVE_JITTER * np.mean(np.diag(k)) * np.eye(len(k))
-    return (solve_kronecker if tasks.complete else solve_dense)(tasks.y, k, h)
+    return (solve_kronecker if tasks.complete else solve_dense)(
+        tasks.y, k, h.task_covariance, h.noise
+    )
 
 
 @partial(jax.jit, static_argnums=0)
-def _pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
+def pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
     """Slope in θ from the slope (n, n) in the kernel's matrix."""
     k = parse(kernel, x.shape[1])
     return jax.grad(lambda t: jnp.sum(k.covariance(jnp, t, x, x) * slope))(theta)
