@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from planner.fusion import recursive, single
 from planner.fusion.levels import LowLevel, Model, Samples
 from planner.fusion.mixture import Mixture, mix
@@ -10,6 +12,7 @@ from planner.fusion.recursive import fit_recursive, scales
 from planner.fusion.single import GRID_PRIOR, fit_gp
 
 SHAPES = ("rbf", "matern52")
+SOME, UNLIKELY = 128, 1e-6
 DISCREPANCIES = (*SHAPES, "linear")
 BENDS = ("product", "rbf")
 # Before any data: the simulation is as likely to be of use as not.
@@ -17,8 +20,17 @@ BELIEF = {"AR1": 0.4, "NARGP": 0.1, "GP": 0.5}
 
 
 def fit_low(samples: Samples) -> Mixture:
-    """The cheap level from its samples; fit it once, and keep it while measurements come in."""
-    return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in SHAPES})
+    """The cheap level from its samples; fit it once, and keep it while measurements come in.
+
+    Of many samples some tell which shapes of kernel are worth fitting to all of them.
+    """
+    shapes = SHAPES
+    if len(samples.y) > SOME:
+        rows = np.linspace(0, len(samples.y) - 1, SOME).astype(int)
+        some = Samples(samples.x[rows], samples.y[rows], samples.sd[rows])
+        weights = mix({shape: fit_gp(some, shape, GRID_PRIOR) for shape in SHAPES}).weights
+        shapes = tuple(shape for shape in SHAPES if weights[shape] > UNLIKELY)
+    return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in shapes})
 
 
 def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float = 1e-3) -> Mixture:

@@ -21,6 +21,7 @@ from fusion_problems import PROBLEMS, Design, design
 from planner.fusion.fused import fit_fused, fit_low
 from planner.fusion.levels import Samples
 from planner.fusion.recursive import fit_recursive
+from robot_problems import ROBOT_PROBLEMS
 
 COUNTS = (3, 5, 8, 11, 15)
 SEEDS = int(os.environ.get("FUSION_SEEDS", "20"))
@@ -67,19 +68,17 @@ def score(d: Design, mean, sd, seconds):
     return inside, -np.mean(norm.logpdf(off, scale=sd)), np.sqrt(np.mean(off**2)), float(seconds)
 
 
-@pytest.fixture(scope="module")
-def scores(tmp_path_factory):
+def run(problems, name, seeds, folder):
     """{(problem, n, method): (seeds, 4)}."""
-    folder = Path(os.environ.get("FUSION_ANSWERS", tmp_path_factory.mktemp("answers")))
     out: dict[tuple[str, int, str], list] = {}
     ours(design(PROBLEMS["forrester"], 3, 99))
-    for seed in range(SEEDS):
+    for seed in range(seeds):
         designs = {
             f"{p}/{n}/{seed}": design(problem, n, seed)
-            for p, problem in PROBLEMS.items()
+            for p, problem in problems.items()
             for n in COUNTS
         }
-        answers = ask_peers(designs, folder, str(seed))
+        answers = ask_peers(designs, folder, f"{name}{seed}")
         for key, d in designs.items():
             p, n, _ = key.split("/")
             out.setdefault((p, int(n), "ours"), []).append(score(d, *ours(d)))
@@ -90,38 +89,58 @@ def scores(tmp_path_factory):
     return {key: np.array(rows) for key, rows in out.items()}
 
 
-def test_calibration_and_error_beside_the_peers(scores):
+@pytest.fixture
+def folder(tmp_path):
+    return Path(os.environ.get("FUSION_ANSWERS", tmp_path))
+
+
+def told(scores, problems):
+    """Prints the table; (median RMSE, mean NLPD per cell, coverage) per method."""
     methods = ("ours", *PEERS)
-    print(f"\n{SEEDS} designs a cell; coverage %, mean NLPD, median RMSE / sd of the output")
-    print(" " * 14 + "".join(f"{m:>24s}" for m in methods))
-    for p in PROBLEMS:
-        for n in COUNTS:
-            cells = [scores[p, n, m] for m in methods]
-            text = "".join(
-                f"{100 * c[:, 0].mean():7.0f} {c[:, 1].mean():8.2f} {np.median(c[:, 2]):7.4f}"
-                for c in cells
-            )
-            print(f"{p:10s} {n:3d}{text}")
-    overall = {}
+    print("\ncoverage %, mean NLPD, median RMSE / sd of the output")
+    print(" " * 18 + "".join(f"{m:>24s}" for m in methods))
+    cells = [(p, n) for p in problems for n in COUNTS]
+    for p, n in cells:
+        rows = [scores[p, n, m] for m in methods]
+        text = "".join(
+            f"{100 * c[:, 0].mean():7.0f} {c[:, 1].mean():8.2f} {np.median(c[:, 2]):7.4f}"
+            for c in rows
+        )
+        print(f"{p:14s} {n:3d}{text}")
+    out = {}
     for m in methods:
-        rows = np.concatenate([scores[p, n, m] for p in PROBLEMS for n in COUNTS])
-        nlpd = {(p, n): scores[p, n, m][:, 1].mean() for p in PROBLEMS for n in COUNTS}
-        overall[m] = (rows, nlpd)
+        rows = np.concatenate([scores[cell + (m,)] for cell in cells])
+        nlpd = np.array([scores[cell + (m,)][:, 1].mean() for cell in cells])
+        out[m] = np.median(rows[:, 2]), nlpd, rows[:, 0].mean()
         good = np.mean(rows[:, 2] < np.sqrt(0.1))
         print(
-            f"{m:13s} coverage {100 * rows[:, 0].mean():5.1f} %  NLPD median "
-            f"{np.median(rows[:, 1]):6.2f} mean {rows[:, 1].mean():9.2f}  median RMSE "
-            f"{np.median(rows[:, 2]):.4f}  R² ≥ 0.9: {100 * good:.0f} %  {rows[:, 3].mean():.2f} s"
+            f"{m:13s} coverage {100 * out[m][2]:5.1f} %  NLPD median {np.median(rows[:, 1]):6.2f} "
+            f"mean {rows[:, 1].mean():9.2f}  median RMSE {out[m][0]:.4f}  "
+            f"R² ≥ 0.9: {100 * good:.0f} %  {rows[:, 3].mean():.2f} s"
         )
-    own, own_nlpd = overall["ours"]
+    own = out["ours"][1]
     for peer in PEERS:
-        wins = np.mean([own_nlpd[c] < overall[peer][1][c] for c in own_nlpd])
-        print(f"NLPD below {peer} in {100 * wins:.0f} % of the cells")
-        assert wins >= 0.75
-    every = np.mean([v < min(overall[p][1][c] for p in PEERS) for c, v in own_nlpd.items()])
-    print(f"NLPD below all of them at once in {100 * every:.0f} % of the cells")
-    assert 0.90 <= own[:, 0].mean() <= 0.97
-    assert np.median(own[:, 2]) <= min(np.median(overall[p][0][:, 2]) for p in PEERS)
+        print(f"NLPD below {peer} in {100 * np.mean(own < out[peer][1]):.0f} % of the cells")
+    least = np.min([out[p][1] for p in PEERS], axis=0)
+    print(f"NLPD below all of them at once in {100 * np.mean(own < least):.0f} % of the cells")
+    return out
+
+
+def test_calibration_and_error_beside_the_peers(folder):
+    out = told(run(PROBLEMS, "", SEEDS, folder), PROBLEMS)
+    rmse, nlpd, coverage = out["ours"]
+    assert 0.90 <= coverage <= 0.97
+    assert rmse <= min(out[p][0] for p in PEERS)
+    assert min(np.mean(nlpd < out[p][1]) for p in PEERS) >= 0.75
+
+
+def test_robots_beside_the_peers(folder):
+    problems = {name: make() for name, make in ROBOT_PROBLEMS.items()}
+    out = told(run(problems, "robots", min(SEEDS, 5), folder), problems)
+    rmse, nlpd, coverage = out["ours"]
+    assert 0.88 <= coverage <= 0.99
+    assert rmse <= 1.05 * min(out[p][0] for p in PEERS)
+    assert min(np.mean(nlpd < out[p][1]) for p in PEERS) >= 0.75
 
 
 def test_times_of_a_refit_with_500_simulated_and_30_measured_points(tmp_path):
