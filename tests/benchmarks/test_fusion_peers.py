@@ -109,8 +109,8 @@ def told(scores, problems):
         print(f"{p:14s} {n:3d}{text}")
     out = {}
     for m in methods:
-        rows = np.concatenate([scores[cell + (m,)] for cell in cells])
-        nlpd = np.array([scores[cell + (m,)][:, 1].mean() for cell in cells])
+        rows = np.concatenate([scores[(*cell, m)] for cell in cells])
+        nlpd = np.array([scores[(*cell, m)][:, 1].mean() for cell in cells])
         out[m] = np.median(rows[:, 2]), nlpd, rows[:, 0].mean()
         good = np.mean(rows[:, 2] < np.sqrt(0.1))
         print(
