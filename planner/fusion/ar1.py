@@ -11,6 +11,8 @@ import numpy as np
 
 from planner.fusion.data import TrainingData, pad
 from planner.fusion.gp import Posterior, Prior, fit
+from planner.fusion.kernels import Kernel, parse
+from planner.fusion.marginal import laplace
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,8 @@ class OutputPrior:
     """Weakly informative prior of one kind of output, in the output's own unit.
 
     Medians of amplitude σ of δ and of the nugget τ, with log-sd `spread` each; length scales have
-    median `length`·√d in coordinates scaled to [0, 1]. `mean` applies without simulation only.
+    median `length`·√d, log-sd `length_spread`, in coordinates scaled to [0, 1]. `mean` applies
+    without simulation only.
     """
 
     bias_sd: float
@@ -28,6 +31,7 @@ class OutputPrior:
     mean: float = 0.0
     length: float = 0.8
     spread: float = 1.0
+    length_spread: float = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +46,19 @@ class AR1:
     centre: np.ndarray
     unknown_sd: np.ndarray
 
-    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there).
+
+        `outputs` (indices) asks for some of the columns only.
+        """
         base, offset = self.split(low)
-        mean, sd = self.posterior.predict(x, offset)
-        blind = self.uses_low[None, :] & ~np.isfinite(low)
-        return mean + base, np.hypot(sd, blind * self.unknown_sd[None, :])
+        blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
+        if outputs is not None:
+            base, blind = base[:, outputs], blind[:, outputs]
+        mean, sd = self.posterior.predict(x, offset, outputs)
+        return mean + base, np.hypot(sd, blind)
 
     def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""
@@ -64,8 +75,13 @@ def fit_ar1(
     samples: int = 256,
     kept: int = 32,
     kernel: str = "matern52",
+    thorough: bool = False,
 ) -> AR1:
-    """Fit m outputs; per output its prior with and without simulation, and y_L's `centre` (m,)."""
+    """Fit m outputs; per output its prior with and without simulation, and y_L's `centre` (m,).
+
+    `thorough` looks for each output's most probable hyperparameters first: tens of milliseconds
+    an output, which pays where there are many hyperparameters or many points.
+    """
     uses_low = _uses_low(data, centre)
     centre = np.where(uses_low, np.nan_to_num(centre), 0.0)
     unknown_sd = _unknown_sd(data.low, without_low)
@@ -74,7 +90,9 @@ def fit_ar1(
     low = np.where(uses_low[None, :], np.where(blind, centre[None, :], data.low), 0.0)
     sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
     padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
-    posterior = fit(padded, _stack(priors, uses_low, data.x.shape[1]), samples, kept, kernel)
+    prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1]))
+    start = laplace(kernel, padded, prior) if thorough else None
+    posterior = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start)
     return AR1(posterior, uses_low, centre, unknown_sd)
 
 
@@ -99,17 +117,14 @@ def _unknown_sd(low: np.ndarray, priors: tuple[OutputPrior, ...]) -> np.ndarray:
     return np.where(known.sum(axis=0) > 1, np.maximum(scatter, amplitude), never_seen)
 
 
-def _stack(priors: list[OutputPrior], uses_low: np.ndarray, d: int) -> Prior:
-    logs = np.array([[np.log(p.amplitude), np.log(p.nugget)] for p in priors])
-    length = np.array([np.log(p.length * np.sqrt(max(d, 1))) for p in priors])
-    spread = np.array([p.spread for p in priors])
-    m = len(priors)
+def _stack(priors: list[OutputPrior], uses_low: np.ndarray, kernel: Kernel) -> Prior:
+    theta = [
+        kernel.prior(p.amplitude, p.nugget, p.length, p.spread, p.length_spread) for p in priors
+    ]
     return Prior(
         mean=np.array([p.mean for p in priors]) * ~uses_low,
         bias_sd=np.array([p.bias_sd for p in priors]),
         slope_sd=np.array([p.slope_sd for p in priors]) * uses_low,
-        theta_mean=np.concatenate([logs, np.tile(length[:, None], (1, d))], axis=1),
-        theta_sd=np.concatenate(
-            [np.tile(spread[:, None], (1, 2)), np.full((m, d), 0.8)], axis=1
-        ),
-    )  # fmt: skip
+        theta_mean=np.array([mean for mean, _ in theta]),
+        theta_sd=np.array([sd for _, sd in theta]),
+    )

@@ -2,8 +2,8 @@
 
 Per output: y = mean + ρ'·h + b + δ(x) + ε, where h is the centred low fidelity, ρ' = ρ − 1 and b
 have Gaussian priors that are marginalised exactly as kernel terms, δ is a zero-mean GP, and ε has
-the measurement's own variance plus a nugget. The hyperparameters θ = (log σ, log τ, log ℓ_1…d)
-are averaged: samples from the prior, then from a Gaussian around what the data favour, weighted
+the measurement's own variance plus a nugget τ². The hyperparameters θ (see `kernels.Kernel`) are
+averaged: samples from the prior, then from a Gaussian around what the data favour, weighted
 by prior × marginal likelihood over the mixture they came from (deterministic mixture weights,
 Owen & Zhou 2000), then resampled to a few of equal weight.
 """
@@ -21,7 +21,7 @@ from scipy.stats import norm, qmc
 from planner.errors import InputError
 from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.data import Padded
-from planner.fusion.kernels import KERNELS
+from planner.fusion.kernels import Kernel, parse
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 JITTERS = (1e-10, 1e-8, 1e-6)  # relative to the prior variance
@@ -29,7 +29,7 @@ JITTERS = (1e-10, 1e-8, 1e-6)  # relative to the prior variance
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, 2 + d)."""
+    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p)."""
 
     mean: np.ndarray
     bias_sd: np.ndarray
@@ -48,23 +48,29 @@ class Posterior:
     x: np.ndarray  # (c, d)
     low: np.ndarray  # (m, c) centred
     mask: np.ndarray  # (m, c)
-    theta: np.ndarray  # (m, k, 2 + d)
+    theta: np.ndarray  # (m, k, p)
     whiten: np.ndarray  # (m, k, c, c) inverse of the Cholesky factor
     weights: np.ndarray  # (m, k, c) K⁻¹(y − mean)
     prior: Prior
     kernel: str
+    log_evidence: np.ndarray  # (m,) log p(y | model), θ averaged out
     remarks: tuple[str, ...] = ()
 
-    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m)."""
-        m = self.mask.shape[0]
-        mean, variance = np.empty((len(x), m)), np.empty((len(x), m))
-        for j in range(m):
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m).
+
+        `outputs` (indices) asks for some of them only.
+        """
+        asked = range(len(self.mask)) if outputs is None else outputs.tolist()
+        mean, variance = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
+        for i, j in enumerate(asked):
             cross, white = self._cross(j, x, low[:, j])
             means = (self.weights[j][:, None, :] @ cross)[:, 0]
             own = self._own(j, x, low[:, j]) - np.sum(white**2, axis=1)
-            mean[:, j] = self.prior.mean[j] + np.mean(means, axis=0)
-            variance[:, j] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
+            mean[:, i] = self.prior.mean[j] + np.mean(means, axis=0)
+            variance[:, i] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
         return mean, np.sqrt(variance)
 
     def covariance(
@@ -83,22 +89,26 @@ class Posterior:
         """Mean nugget variance (m,)."""
         return np.mean(np.exp(2 * self.theta[:, :, 1]), axis=1)
 
+    def slopes(self, j: int) -> np.ndarray:
+        """Posterior mean (k,) of ρ' of output j, per sample."""
+        return self.prior.slope_sd[j] ** 2 * (self.weights[j] @ (self.low[j] * self.mask[j]))
+
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
-        theta, prior = self.theta[j], self.prior
-        scale = np.exp(theta[:, None, 2:])
-        delta = KERNELS[self.kernel](np, xa[None] / scale, xb[None] / scale)
+        prior = self.prior
         linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * np.outer(la, lb)
-        return np.exp(2 * theta[:, 0])[:, None, None] * delta + linear
+        return self._delta.covariance(np, self.theta[j], xa, xb) + linear
+
+    @property
+    def _delta(self) -> Kernel:
+        return parse(self.kernel, self.x.shape[1])
 
     def _own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
         """Prior variances (k, q)."""
-        theta, prior = self.theta[j], self.prior
-        scaled = (x[None] / np.exp(theta[:, None, 2:]))[:, :, None, :]
-        delta = KERNELS[self.kernel](np, scaled, scaled)[..., 0, 0]
+        prior = self.prior
         linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * low**2
-        return np.exp(2 * theta[:, :1]) * delta + linear
+        return self._delta.variance(np, self.theta[j], x) + linear
 
     def _cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Prior covariance (k, n, q) with the training points, and L⁻¹ times it.
@@ -113,29 +123,37 @@ class Posterior:
 
 
 def fit(
-    padded: Padded, prior: Prior, samples: int = 256, kept: int = 32, kernel: str = "matern52"
-) -> Posterior:
+    padded: Padded, prior: Prior, samples: int = 256, kept: int = 32, kernel: str = "matern52",
+    rounds: int = 1, start: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Posterior:  # fmt: skip
     """Posterior of all outputs; y and low of `padded` as they are, prior mean taken off here.
+
+    `samples` of θ from the prior and as many in each of `rounds`; `start`, centre (m, p) and root
+    (m, p, p) in units of the prior, is where the first round looks, as `marginal.laplace` finds.
 
     InputError if the covariance stays singular whatever is added to its diagonal.
     """
     p = prior.theta_mean.shape[1]
-    first, second = normal_points(samples, p)
+    first, *more = normal_points(samples, p, 1 + rounds)
+    moved = np.stack(more)
     y = (padded.y - prior.mean[:, None]) * padded.mask
     remarks: tuple[str, ...] = ()
 
-    def attempt(jitter: float) -> tuple[Array, Array, Array]:
+    def attempt(jitter: float) -> tuple[Array, Array, Array, Array]:
         return _fit(
             kernel, kept, padded.x, padded.low, padded.mask, y, padded.variance,
-            prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, second, jitter,
+            prior.bias_sd, prior.slope_sd, prior.theta_mean, prior.theta_sd, first, moved, jitter,
+            start,
         )  # fmt: skip
 
     for jitter in JITTERS:
-        theta, whiten, weights = (np.array(a) for a in attempt(jitter))
+        theta, whiten, weights, evidence = (np.array(a) for a in attempt(jitter))
         if np.isfinite(weights).all() and np.isfinite(whiten).all():
+            evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
             return Posterior(
-                padded.x, padded.low, padded.mask, theta, whiten, weights, prior, kernel, remarks
-            )
+                padded.x, padded.low, padded.mask, theta, whiten, weights, prior, kernel,
+                evidence, remarks,
+            )  # fmt: skip
         remarks = (f"The covariance was singular; more than {jitter:g} had to be added to it.",)
     raise InputError(
         "No Gaussian process fits the measured modes; set aside poses that are measured twice "
@@ -143,22 +161,21 @@ def fit(
     )
 
 
-def normal_points(samples: int, p: int) -> tuple[np.ndarray, np.ndarray]:
-    """Two sets (samples, p) of quasi-random standard normal points, the same every time."""
+def normal_points(samples: int, p: int, count: int) -> list[np.ndarray]:
+    """`count` sets (samples, p) of quasi-random standard normal points, the same every time."""
     sets = []
-    for seed in (1, 2):
+    for seed in range(1, count + 1):
         sobol = qmc.Sobol(p, scramble=True, rng=np.random.default_rng(seed))
         unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
         sets.append(norm.ppf(np.clip(unit, 1e-6, 1 - 1e-6)))
-    return sets[0], sets[1]
+    return sets
 
 
 def _covariance(
     kernel: str, xa: Array, la: Array, xb: Array, lb: Array, theta: Array, bias: Array, slope: Array
 ) -> Array:
     """Prior covariance (a, b) of one output at one θ."""
-    scale = jnp.exp(theta[2:])[None, :]
-    delta = jnp.exp(2 * theta[0]) * KERNELS[kernel](jnp, xa / scale, xb / scale)
+    delta = parse(kernel, xa.shape[1]).covariance(jnp, theta, xa, xb)
     return delta + bias**2 + slope**2 * la[:, None] * lb[None, :]
 
 
@@ -190,11 +207,12 @@ def _log_normal(z: Array) -> Array:
 @partial(jax.jit, static_argnums=(0, 1))
 def _fit(
     kernel: str, kept: int, x: Array, low: Array, mask: Array, y: Array, variance: Array,
-    bias: Array, slope: Array, mean: Array, sd: Array, first: Array, second: Array, jitter: Array,
-) -> tuple[Array, Array, Array]:  # fmt: skip
-    def one(low, mask, y, variance, bias, slope, mean, sd):
+    bias: Array, slope: Array, mean: Array, sd: Array, first: Array, rounds: Array, jitter: Array,
+    start: tuple[Array, Array] | None,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    def one(low, mask, y, variance, bias, slope, mean, sd, start):
         score = partial(_log_likelihood, kernel, x, low, mask, y, variance, bias, slope, jitter)
-        z = _sample(lambda z: score(mean + sd * z), first, second, kept)
+        z, evidence = _sample(lambda z: score(mean + sd * z), first, rounds, kept, start)
         theta = mean[None, :] + sd[None, :] * z
         factors = jax.vmap(
             lambda t: _factor(kernel, x, low, mask, variance, t, bias, slope, jitter)
@@ -202,35 +220,60 @@ def _fit(
         one = jnp.eye(y.shape[0])
         whiten = jax.vmap(lambda f: solve_triangular(f, one, lower=True))(factors)
         weights = jax.vmap(lambda f: cho_solve((f, True), y))(factors)
-        return theta, whiten, weights
+        return theta, whiten, weights, evidence
 
-    return jax.vmap(one)(low, mask, y, variance, bias, slope, mean, sd)
+    return jax.vmap(one)(low, mask, y, variance, bias, slope, mean, sd, start)
 
 
-def _sample(score, first: Array, second: Array, kept: int) -> Array:
-    """`kept` points z (kept, p) of equal weight from prior N(0, 1) × exp(score)."""
-    p = first.shape[1]
-    like1 = jax.vmap(score)(first)
-    w = jax.nn.softmax(like1)
-    centre = w @ first
-    apart = first - centre[None, :]
-    # With few effective samples their spread says little; the prior's own variance is mixed in.
-    effective = 1 / jnp.sum(w**2)
-    share = 1 / (1 + effective / p)
-    spread = (apart * w[:, None]).T @ apart * (1 - share) + 0.25 * share * jnp.eye(p)
-    root = jnp.linalg.cholesky(INFLATION**2 * spread + 1e-6 * jnp.eye(p))
-    moved = centre[None, :] + second @ root.T
-    like = jnp.concatenate([like1, jax.vmap(score)(moved)])
-    points = jnp.concatenate([first, moved])
-    white = solve_triangular(root, (points - centre[None, :]).T, lower=True).T
-    proposal = _log_normal(white) - jnp.sum(jnp.log(jnp.diagonal(root)))
-    prior = _log_normal(points)
-    log_weight = like + prior - jnp.logaddexp(prior, proposal)
+def _sample(score, first: Array, rounds: Array, kept: int, start) -> tuple[Array, Array]:
+    """`kept` points z (kept, p) of equal weight from N(0, 1) × exp(score); log of its integral.
+
+    Points from the prior, then `rounds` (t, s, p) of them from Gaussians around what weighs most
+    so far; the first of these is `start`, centre (p,) and root (p, p), if there is one.
+    """
+    points, like = first, jax.vmap(score)(first)
+    mixture = _log_normal(points)[:, None]  # log-density of every point under every proposal
+    proposals = []
+    for t, normal in enumerate(rounds):
+        if t == 0 and start is not None:
+            centre, root = start
+        else:
+            weight = jax.nn.softmax(like + _log_normal(points) - _log_mean(mixture))
+            centre, root = _around(points, weight)
+        proposals.append((centre, INFLATION * root))
+        moved = centre[None, :] + INFLATION * normal @ root.T
+        points = jnp.concatenate([points, moved])
+        like = jnp.concatenate([like, jax.vmap(score)(moved)])
+        densities = [_log_normal(points), *(_log_gaussian(points, *g) for g in proposals)]
+        mixture = jnp.stack(densities, axis=1)
+    log_weight = like + _log_normal(points) - _log_mean(mixture)
+    evidence = jax.nn.logsumexp(log_weight) - jnp.log(1.0 * points.shape[0])
     weight = jax.nn.softmax(log_weight)
     # Every 16th point of a Sobol sequence is not spread evenly; in the order of the steepness of
     # δ, on which predictions away from the data hang, every 16th is.
-    order = jnp.argsort(points[:, 0] - jnp.mean(points[:, 2:], axis=1))
+    order = jnp.argsort(points[:, 0] - jnp.sum(points[:, 2:], axis=1) / max(points.shape[1] - 2, 1))
     points, weight = points[order], weight[order]
     edges = jnp.cumsum(weight)
     picks = jnp.searchsorted(edges, (jnp.arange(kept) + 0.5) / kept * edges[-1])
-    return points[jnp.clip(picks, 0, points.shape[0] - 1)]
+    return points[jnp.clip(picks, 0, points.shape[0] - 1)], evidence
+
+
+def _around(points: Array, weight: Array) -> tuple[Array, Array]:
+    """Centre (p,) and root (p, p) of a Gaussian like the weighted points."""
+    p = points.shape[1]
+    centre = weight @ points
+    apart = points - centre[None, :]
+    # With few effective samples their spread says little; the prior's own variance is mixed in.
+    effective = 1 / jnp.sum(weight**2)
+    share = 1 / (1 + effective / p)
+    spread = (apart * weight[:, None]).T @ apart * (1 - share) + 0.25 * share * jnp.eye(p)
+    return centre, jnp.linalg.cholesky(spread + 1e-6 * jnp.eye(p))
+
+
+def _log_gaussian(points: Array, centre: Array, root: Array) -> Array:
+    white = solve_triangular(root, (points - centre[None, :]).T, lower=True).T
+    return _log_normal(white) - jnp.sum(jnp.log(jnp.diagonal(root)))
+
+
+def _log_mean(logs: Array) -> Array:
+    return jax.nn.logsumexp(logs, axis=1) - jnp.log(1.0 * logs.shape[1])

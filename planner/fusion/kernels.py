@@ -1,16 +1,22 @@
-"""Kernels as pure functions of two sets of points, with unit variance.
+"""Kernels, and sums and products of them (Rasmussen & Williams 2006, chapter 4).
 
-Each takes the array library (numpy or jax.numpy), xa (…, a, d), xb (…, b, d) already divided by
-the length scales, and returns (…, a, b). Sums and products of kernels are sums and products of
-these arrays (Rasmussen & Williams 2006, chapter 4).
+A shape is a pure function with unit variance: it takes the array library (numpy or jax.numpy),
+xa (…, a, d), xb (…, b, d) already divided by the length scales, and returns (…, a, b). A `Kernel`
+is an expression such as "matern52", "rbf+bias" or "rbf[:2]*periodic[2:3]+linear": shapes on
+columns of x, every factor with a length scale per column, every term with an amplitude.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from re import fullmatch
 from typing import Any
 
 import numpy as np
 
-Kernel = Callable[[Any, Any, Any], Any]
+from planner.errors import InputError
+
+Shape = Callable[[Any, Any, Any], Any]
 
 
 def _squared_distance(xp: Any, xa: Any, xb: Any) -> Any:
@@ -55,8 +61,9 @@ def _distance(xp: Any, xa: Any, xb: Any) -> Any:
     squared = _squared_distance(xp, xa, xb)
     if xp is np:
         return np.sqrt(squared)
-    # √ has no slope at 0, so gradients there would be undefined.
-    return xp.sqrt(xp.where(squared == 0, 1.0, squared)) * (squared != 0)  # NaN stays NaN
+    # √ has no slope at 0, so gradients there would be undefined. Asking twice whether r² is 0 will
+    # not do: XLA computes it anew in each place, by fused operations that leave 1e-33 in one.
+    return xp.sqrt(xp.maximum(squared, 1e-30))
 
 
 def matern32(xp: Any, xa: Any, xb: Any) -> Any:
@@ -71,7 +78,7 @@ def matern52(xp: Any, xa: Any, xb: Any) -> Any:
     return (1 + r * (1 + r / 3)) * xp.exp(-r)
 
 
-KERNELS: dict[str, Kernel] = {
+KERNELS: dict[str, Shape] = {
     "bias": bias,
     "linear": linear,
     "quadratic": quadratic,
@@ -79,4 +86,99 @@ KERNELS: dict[str, Kernel] = {
     "rbf": rbf,
     "matern32": matern32,
     "matern52": matern52,
+    # Of angles in rad: an RBF of points on the unit circle, exp(−2 sin²(Δ/2)/ℓ²) (MacKay 1998).
+    "periodic": rbf,
 }
+ON_CIRCLE = frozenset({"periodic"})
+SCALELESS = frozenset({"bias"})
+
+
+@dataclass(frozen=True)
+class Factor:
+    """One shape on the columns start … stop − 1 of x; its length scales are a slice of θ."""
+
+    name: str
+    columns: slice
+    scales: slice
+
+    def points(self, xp: Any, theta: Any, x: Any) -> Any:
+        """x (…, a, d) as the shape wants it, θ (…, p)."""
+        if self.name in SCALELESS:
+            return x
+        x, scale = x[..., self.columns], xp.exp(theta[..., None, self.scales])
+        if self.name in ON_CIRCLE:
+            return xp.concatenate([xp.cos(x) / scale, xp.sin(x) / scale], axis=-1)
+        return x / scale
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """Σ σ_t² Π factors over d columns; θ = (log σ_1, log τ, scales of term 1, log σ_2, …).
+
+    τ, the nugget, has its place in θ but is no part of the kernel.
+    """
+
+    terms: tuple[tuple[Factor, ...], ...]
+    amplitudes: tuple[int, ...]
+    size: int
+
+    def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
+        """(…, a, b) of xa (a, d), xb (b, d) at θ (…, p)."""
+        total = 0.0
+        for place, term in zip(self.amplitudes, self.terms, strict=True):
+            product = xp.exp(2 * theta[..., place, None, None])
+            for f in term:
+                a, b = f.points(xp, theta, xa), f.points(xp, theta, xb)
+                product = product * KERNELS[f.name](xp, a, b)
+            total = total + product
+        return total
+
+    def variance(self, xp: Any, theta: Any, x: Any) -> Any:
+        """Diagonal (…, a) of the covariance of x (a, d)."""
+        total = 0.0
+        for place, term in zip(self.amplitudes, self.terms, strict=True):
+            product = xp.exp(2 * theta[..., place, None])
+            for f in term:
+                each = f.points(xp, theta, x)[..., :, None, :]
+                product = product * KERNELS[f.name](xp, each, each)[..., 0, 0]
+            total = total + product
+        return total
+
+    def prior(
+        self, amplitude: float, nugget: float, length: float, spread: float, length_spread: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (p,) of θ: medians of σ, τ with log-sd `spread`, of ℓ `length`·√width."""
+        mean, sd = np.full(self.size, np.log(amplitude)), np.full(self.size, spread)
+        mean[1] = np.log(nugget)
+        for term in self.terms:
+            for f in term:
+                width = f.scales.stop - f.scales.start
+                mean[f.scales] = np.log(length * np.sqrt(max(width, 1)))
+                sd[f.scales] = length_spread
+        return mean, sd
+
+
+@lru_cache(maxsize=256)
+def parse(expression: str, d: int) -> Kernel:
+    """Kernel over d columns; InputError if the expression is not understood.
+
+    Factors are `name` or `name[a:b]` (columns a … b − 1), joined by `*`, terms by `+`.
+    """
+    terms, amplitudes, size = [], [], 0
+    for t, term in enumerate(expression.replace(" ", "").split("+")):
+        amplitudes.append(size)
+        size += 2 if t == 0 else 1
+        factors = []
+        for text in term.split("*"):
+            match = fullmatch(r"(\w+)(?:\[(\d*):(\d*)\])?", text)
+            if match is None or match[1] not in KERNELS:
+                raise InputError(
+                    f"Kernel {expression!r}: {text!r} is none; write sums and products of "
+                    f"{', '.join(KERNELS)}, on columns as in rbf[0:2]."
+                )
+            start, stop, _ = slice(int(match[2] or 0), int(match[3] or d)).indices(d)
+            width = 0 if match[1] in SCALELESS else max(stop - start, 0)
+            factors.append(Factor(match[1], slice(start, stop), slice(size, size + width)))
+            size += width
+        terms.append(tuple(factors))
+    return Kernel(tuple(terms), tuple(amplitudes), size)

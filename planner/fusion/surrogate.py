@@ -1,6 +1,7 @@
 """The pose-dependent modal parameters: frequencies, damping ratios and residues by label.
 
-Frequencies are modelled as log f by AR1 over the simulation (primary feature of seed 000),
+Frequencies are modelled as log f by AR1 over the simulation (primary feature of seed 000), or
+without it where the measurements speak against it,
 damping as log ζ by a GP, residues part by part (real, imaginary) by AR1 on values scaled to the
 mode's own size. Logarithms keep frequencies and damping positive.
 """
@@ -11,8 +12,9 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from planner.frf import modal
-from planner.fusion.ar1 import AR1, OutputPrior, fit_ar1
+from planner.fusion.ar1 import OutputPrior
 from planner.fusion.data import TrainingData
+from planner.fusion.hedged import HedgedAR1, fit_hedged
 from planner.physics.dynamics import SimulatedModes
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
@@ -59,8 +61,8 @@ class ModalPrediction:
 class Surrogate:
     """The fitted models; immutable."""
 
-    primary: AR1  # log f of every label, then log ζ of every label
-    residue: AR1  # real and imaginary parts, scaled
+    primary: HedgedAR1  # log f of every label, then log ζ of every label
+    residue: HedgedAR1  # real and imaginary parts, scaled
     scale: np.ndarray  # (k,) m/(N·s)
 
     @property
@@ -131,7 +133,7 @@ def fit_surrogate(
         default = _centre(_log(reference.frequency_hz), default)
     centre = np.full(2 * k, np.nan)
     centre[:k] = _centre(low[:, :k], default)
-    primary = fit_ar1(
+    primary = fit_hedged(
         TrainingData(seen.x, y, sd, low),
         (*[FREQUENCY] * k, *[DAMPING] * k),
         (*[FREQUENCY_ALONE] * k, *[DAMPING] * k),
@@ -143,7 +145,7 @@ def fit_surrogate(
     wide = np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
-    residue = fit_ar1(
+    residue = fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
         (RESIDUE,) * (18 * k),
         (RESIDUE_ALONE,) * (18 * k),

@@ -1,0 +1,53 @@
+"""One output from cheap and expensive samples: every model there is, weighted by its evidence."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from planner.fusion import recursive, single
+from planner.fusion.levels import LowLevel, Model, Samples
+from planner.fusion.mixture import Mixture, mix
+from planner.fusion.nargp import fit_nargp
+from planner.fusion.recursive import fit_recursive, scales
+from planner.fusion.single import GRID_PRIOR, fit_gp
+
+SHAPES = ("rbf", "matern52")
+SOME, UNLIKELY = 128, 1e-6
+DISCREPANCIES = (*SHAPES, "linear")
+BENDS = ("product", "rbf")
+# Before any data: the simulation is as likely to be of use as not.
+BELIEF = {"AR1": 0.4, "NARGP": 0.1, "GP": 0.5}
+
+
+def fit_low(samples: Samples) -> Mixture:
+    """The cheap level from its samples; fit it once, and keep it while measurements come in.
+
+    Of many samples some tell which shapes of kernel are worth fitting to all of them.
+    """
+    shapes = SHAPES
+    if len(samples.y) > SOME:
+        rows = np.linspace(0, len(samples.y) - 1, SOME).astype(int)
+        some = Samples(samples.x[rows], samples.y[rows], samples.sd[rows])
+        weights = mix({shape: fit_gp(some, shape, GRID_PRIOR) for shape in SHAPES}).weights
+        shapes = tuple(shape for shape in SHAPES if weights[shape] > UNLIKELY)
+    return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in shapes})
+
+
+def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float = 1e-3) -> Mixture:
+    """Mixture of AR1, NARGP and a GP that ignores the simulation.
+
+    `low_spread` is the sd of the low level over the workspace, `nugget` the median prior of noise
+    beyond the samples' sds, over the scale of the output: 1e-5 for values known to be exact.
+    """
+    fused, alone = (replace(p, nugget=nugget) for p in (recursive.PRIOR, single.PRIOR))
+    _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
+    families: dict[str, dict[str, Model]] = {
+        "AR1": {k: fit_recursive(measured, low, low_spread, k, fused) for k in DISCREPANCIES},
+        "NARGP": {k: fit_nargp(measured, low, low_spread, k, fused) for k in BENDS},
+        "GP": {k: fit_gp(measured, k, alone, scale) for k in SHAPES},
+    }
+    models = {f"{name}, {k}": m for name, family in families.items() for k, m in family.items()}
+    belief = {
+        f"{n}, {k}": BELIEF[n] / len(family) for n, family in families.items() for k in family
+    }
+    return mix(models, belief)

@@ -1,0 +1,161 @@
+"""Two-fidelity problems of the literature and one like a robot's poses, on the unit cube.
+
+Forrester et al. 2007; Perdikaris et al. 2017 (Branin); Xiong, Qian & Wu 2013 (Currin, Park,
+borehole); Kandasamy et al. 2016 (Hartmann-3). The pose-like one is the second natural frequency
+of a planar two-link arm with flexible joints, whose base gives way in truth only.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+LOW_POINTS = {1: 25, 2: 50, 3: 60, 4: 80, 8: 120}
+TEST_POINTS = 400
+
+
+@dataclass(frozen=True)
+class Problem:
+    """`high` and `low` take x (n, d) in [0, 1] and return (n,)."""
+
+    d: int
+    high: Callable[[np.ndarray], np.ndarray]
+    low: Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Nested design: x_high is the head of x_low."""
+
+    x_low: np.ndarray
+    y_low: np.ndarray
+    x_high: np.ndarray
+    y_high: np.ndarray
+    x_test: np.ndarray
+    y_test: np.ndarray
+
+
+def design(problem: Problem, n: int, seed: int) -> Design:
+    """n expensive points of a Latin hypercube; the cheap ones add a scrambled Sobol set."""
+    rng = np.random.default_rng(1000 * seed + n)
+    x_high = qmc.LatinHypercube(problem.d, rng=rng).random(n)
+    more = LOW_POINTS[problem.d] - n
+    sobol = qmc.Sobol(problem.d, scramble=True, rng=rng)
+    x_low = np.vstack([x_high, sobol.random_base2(7)[:more]])
+    test = qmc.Sobol(problem.d, scramble=True, rng=np.random.default_rng(77))
+    x_test = test.random_base2(9)[:TEST_POINTS]
+    return Design(
+        x_low, problem.low(x_low), x_high, problem.high(x_high), x_test, problem.high(x_test)
+    )
+
+
+def _forrester(x: np.ndarray) -> np.ndarray:
+    return (6 * x[:, 0] - 2) ** 2 * np.sin(12 * x[:, 0] - 4)
+
+
+def _forrester_low(x: np.ndarray) -> np.ndarray:
+    return 0.5 * _forrester(x) + 10 * (x[:, 0] - 0.5) - 5
+
+
+def _branin_raw(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    bowl = b - 5.1 / (4 * np.pi**2) * a**2 + 5 / np.pi * a - 6
+    return bowl**2 + 10 * (1 - 1 / (8 * np.pi)) * np.cos(a) + 10
+
+
+def _branin(x: np.ndarray) -> np.ndarray:
+    return _branin_raw(15 * x[:, 0] - 5, 15 * x[:, 1])
+
+
+def _branin_low(x: np.ndarray) -> np.ndarray:
+    a, b = 15 * x[:, 0] - 5, 15 * x[:, 1]
+    return 10 * np.sqrt(_branin_raw(a - 2, b - 2)) + 2 * (a - 0.5) - 3 * (3 * b - 1) - 1
+
+
+def _currin(x: np.ndarray) -> np.ndarray:
+    a, b = x[:, 0], np.maximum(x[:, 1], 1e-8)
+    top = 2300 * a**3 + 1900 * a**2 + 2092 * a + 60
+    bottom = 100 * a**3 + 500 * a**2 + 4 * a + 20
+    return (1 - np.exp(-0.5 / b)) * top / bottom
+
+
+def _currin_low(x: np.ndarray) -> np.ndarray:
+    shifts = [(0.05, 0.05), (0.05, -0.05), (-0.05, 0.05), (-0.05, -0.05)]
+    moved = [np.column_stack([x[:, 0] + a, np.maximum(x[:, 1] + b, 0)]) for a, b in shifts]
+    return np.mean([_currin(m) for m in moved], axis=0)
+
+
+def _park(x: np.ndarray) -> np.ndarray:
+    a, b, c, d = np.maximum(x, 1e-8).T
+    return a / 2 * (np.sqrt(1 + (b + c**2) * d / a**2) - 1) + (a + 3 * d) * np.exp(1 + np.sin(c))
+
+
+def _park_low(x: np.ndarray) -> np.ndarray:
+    a, b, c, _ = x.T
+    return (1 + np.sin(a) / 10) * _park(x) - 2 * a + b**2 + c**2 + 0.5
+
+
+_A = np.array([[3, 10, 30], [0.1, 10, 35], [3, 10, 30], [0.1, 10, 35]], dtype=float)
+_P = 1e-4 * np.array(
+    [[3689, 1170, 2673], [4699, 4387, 7470], [1091, 8732, 5547], [381, 5743, 8828]]
+)
+_ALPHA = np.array([1.0, 1.2, 3.0, 3.2])
+
+
+def _hartmann(x: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    r = np.sum(_A[None] * (x[:, None, :] - _P[None]) ** 2, axis=-1)
+    return -np.exp(-r) @ alpha
+
+
+_BOREHOLE = np.array(
+    [[0.05, 0.15], [100, 50000], [63070, 115600], [990, 1110],
+     [63.1, 116], [700, 820], [1120, 1680], [9855, 12045]]
+)  # fmt: skip
+
+
+def _borehole(x: np.ndarray, factor: float, one: float) -> np.ndarray:
+    rw, r, tu, hu, tl, hl, length, kw = (_BOREHOLE[:, 0] + x * np.ptp(_BOREHOLE, axis=1)).T
+    log = np.log(r / rw)
+    return factor * tu * (hu - hl) / (log * (one + 2 * length * tu / (log * rw**2 * kw) + tu / tl))
+
+
+def arm_hz(x: np.ndarray, stiffness: tuple[float, float], base: float | None) -> np.ndarray:
+    """Natural frequencies (n, 2) in Hz of two links of 1.2 and 1.0 m at joint angles (q2, q3)."""
+    q2, q3 = 0.3 + 1.2 * x[:, 0], -2.2 + 1.6 * x[:, 1]
+    l1, l2, m1, m2 = 1.2, 1.0, 160.0, 90.0
+    c = m2 * l1 * l2 / 2 * np.cos(q3)
+    inner = 18.0 + m2 * (l2 / 2) ** 2
+    m = np.empty((len(x), 3, 3))
+    m[:, 0, 0] = 25 + m1 * (l1 / 2) ** 2 + m2 * l1**2 + inner + 2 * c
+    m[:, 0, 1] = m[:, 1, 0] = inner + c
+    m[:, 1, 1] = inner
+    # The base moves sideways: the links' masses times how high they stand.
+    lever1, lever2 = (m1 / 2 + m2) * l1 * np.sin(q2), m2 / 2 * l2 * np.sin(q2 + q3)
+    m[:, 2, 2] = 600.0
+    m[:, 0, 2] = m[:, 2, 0] = -(lever1 + lever2)
+    m[:, 1, 2] = m[:, 2, 1] = -lever2
+    k = np.diag([*stiffness, base or 0.0])
+    size = 2 if base is None else 3
+    values = np.linalg.eigvals(np.linalg.solve(m[:, :size, :size], k[None, :size, :size]))
+    return np.sqrt(np.sort(values.real, axis=1)[:, :2]) / (2 * np.pi)
+
+
+PROBLEMS: dict[str, Problem] = {
+    "forrester": Problem(1, _forrester, _forrester_low),
+    "branin": Problem(2, _branin, _branin_low),
+    "currin": Problem(2, _currin, _currin_low),
+    "park": Problem(4, _park, _park_low),
+    "hartmann3": Problem(
+        3,
+        lambda x: _hartmann(x, _ALPHA),
+        lambda x: _hartmann(x, _ALPHA + 2 * np.array([0.01, -0.01, -0.1, 0.1])),
+    ),
+    "borehole": Problem(
+        8, lambda x: _borehole(x, 2 * np.pi, 1.0), lambda x: _borehole(x, 5.0, 1.5)
+    ),
+    "pose": Problem(
+        2,
+        lambda x: arm_hz(x, (9e5, 4e5), 2e7)[:, 1],
+        lambda x: arm_hz(x, (1.2e6, 3.4e5), None)[:, 1],
+    ),
+}

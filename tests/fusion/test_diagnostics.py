@@ -1,0 +1,63 @@
+"""Leave-one-out against refits, calibration, and a measurement gone wrong."""
+
+import numpy as np
+
+from planner.fusion.ar1 import OutputPrior, fit_ar1
+from planner.fusion.data import TrainingData
+from planner.fusion.diagnostics import leave_one_out, report
+
+PRIOR = OutputPrior(bias_sd=0.5, slope_sd=0.5, amplitude=0.3, nugget=0.02)
+
+
+def low(x):
+    return np.cos(2 * x[:, :1]) + x[:, 1:]
+
+
+def data(n, seed=0, wrong=None):
+    rng = np.random.default_rng(seed)
+    x = rng.random((n, 2))
+    y = 1.1 * low(x) + 0.2 * np.sin(5 * x[:, :1]) + 0.02 * rng.standard_normal((n, 1))
+    if wrong is not None:
+        y[wrong] += 1.0
+    return TrainingData(x, y, np.full((n, 1), 0.005), low(x))
+
+
+def fit(training):
+    return fit_ar1(training, (PRIOR,), (PRIOR,), np.zeros(1))
+
+
+def test_it_is_what_refits_without_the_measurement_say():
+    training = data(9)
+    found = leave_one_out(fit(training).posterior, 9)
+    for i in range(9):
+        rest = TrainingData(*(np.delete(a, i, axis=0) for a in vars(training).values()))
+        model = fit(rest)
+        mean, sd = model.predict(training.x[i : i + 1], training.low[i : i + 1])
+        noise = np.sqrt(model.posterior.nugget_variance()[0] + 0.005**2)
+        assert abs(training.y[i, 0] - mean[0, 0] - found.error[i, 0]) < 0.25 * np.hypot(sd, noise)
+        assert 0.6 < found.sd[i, 0] / np.hypot(sd[0, 0], noise) < 1.6
+
+
+def test_intervals_cover_what_they_say():
+    ranks = [leave_one_out(fit(data(n, seed)).posterior, n) for seed in range(8) for n in (6, 12)]
+    for level in (0, 3):
+        shares = np.array([r.coverage()[level] for r in ranks])
+        expected = (0.5, 0.8, 0.9, 0.95)[level]
+        assert abs(shares.mean() - expected) < 0.12
+
+
+def test_a_wrong_measurement_is_named():
+    found = leave_one_out(fit(data(15, wrong=4)).posterior, 15)
+    assert found.worst(1).tolist() == [4]
+    lines = report(found, tuple(f"P{i:03d}" for i in range(15)), ("mode 1",))
+    assert any(line.startswith("P004: mode 1 is") for line in lines)
+
+
+def test_gaps_and_nothing_at_all():
+    training = data(5)
+    training.y[2] = np.nan
+    found = leave_one_out(fit(training).posterior, 5)
+    assert np.isnan(found.error[2]).all()
+    assert np.isfinite(np.delete(found.sd, 2, axis=0)).all()
+    none = TrainingData(*(a[:0] for a in vars(training).values()))
+    assert "Nothing" in report(leave_one_out(fit(none).posterior, 0), (), ("mode 1",))[0]
