@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from test_speed import seconds
 
 from known_robots import KR10
 from measured_frfs import birk_bounds, birk_folder, measured_frfs
@@ -15,6 +14,7 @@ from planner.physics.simulation import Elasticity, Simulation
 from planner.robot.robot import Robot
 from planner.robot.virtual import inertia_basis
 from planner.truth.model import load_truth
+from test_speed import seconds
 
 pytestmark = pytest.mark.slow
 

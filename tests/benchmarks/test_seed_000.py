@@ -12,7 +12,8 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.campaign.labels import from_mode, label, observations
+from planner.campaign.labels import label, observations
+from planner.campaign.logged import from_mode
 from planner.campaign.state import Measurement
 from planner.demo import Pool, shipped
 from planner.fusion.levels import Exact, Samples
