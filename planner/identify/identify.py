@@ -20,14 +20,31 @@ from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-LOG_LINES, LINES = 64, 160  # a pose: in the logarithmic stages, in the fit of every start
+LOG_LINES = 64  # a pose, in the logarithmic stages
 LOG_STEPS, STEPS = 40, 80
-FEW, COMPLETIONS = 2, 6  # after the first, of a start and of the last fit: exact to second order
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
-LOG_TOLERANCE, TOLERANCE = 1e-4, 1e-8
+LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How exact an identification is: lines a pose and completions of cut-off records.
+
+    Each for a start and for the last fit; iterations end where a step gains less than `tolerance`.
+    """
+
+    lines: int = 160
+    last_lines: int = MOST_LINES
+    completions: int = 2  # after the first: exact to second order
+    last_completions: int = 6
+    tolerance: float = 1e-6
+
+
+THOROUGH = Effort()
+QUICK = Effort(lines=64, last_lines=96, completions=0, last_completions=1, tolerance=1e-4)
 
 
 @dataclass(frozen=True)
@@ -50,6 +67,7 @@ class _Problem:
     inertias: Inertias
     parametrisation: Parametrisation
     progress: Callable[[Progress], None] | None
+    effort: Effort
 
     @property
     def inertial(self) -> bool:
@@ -74,7 +92,7 @@ class _Problem:
             assert tell is not None
             tell(Progress(start, stage, iteration, 2 * value / count))
 
-        tolerance = LOG_TOLERANCE if objective.logarithmic else TOLERANCE
+        tolerance = LOG_TOLERANCE if objective.logarithmic else self.effort.tolerance
         return minimise(objective, x, tolerance, steps, told if tell else None)
 
 
@@ -89,6 +107,7 @@ def identify(
     seed: int = 0,
     warm: Identification | None = None,
     progress: Callable[[Progress], None] | None = None,
+    effort: Effort = THOROUGH,
 ) -> Identification:
     """Springs (and, where their priors are not 0, inertias) that explain FRFs at poses q.
 
@@ -107,7 +126,7 @@ def identify(
     band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
     p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
     inertias = p.inertias(elastic.body_jacobians(q))
-    problem = _Problem(tuple(frfs), band, elastic.matrices(q), inertias, p, progress)
+    problem = _Problem(tuple(frfs), band, elastic.matrices(q), inertias, p, progress, effort)
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
@@ -142,7 +161,8 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
     misfits: list[float] = []
     for number, point in enumerate(points, 1):
         x = _approach(problem, point, number)
-        end, objective = _plain(problem, x, number, LINES, "FRFs in units of their noise", FEW)
+        effort, stage = problem.effort, "FRFs in units of their noise"
+        end, objective = _plain(problem, x, number, effort.lines, stage, effort.completions)
         found.append(end)
         misfits.append(end.at.chi2 / max(objective.count, 1))
         values = sorted(m.at.value for m in found)
@@ -179,14 +199,17 @@ def _plain(
         objective = objective.completed(end.x)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, STEPS)
         moved = end.x - before
-        if objective.completion is None or moved @ end.at.normal @ moved < SETTLED:
+        # Where the misfit exceeds the noise, so do the sds in which a move counts.
+        settled = SETTLED * max(1.0, end.at.chi2 / max(objective.count, 1))
+        if objective.completion is None or moved @ end.at.normal @ moved < settled:
             break
     return end, objective
 
 
 def _refine(problem: _Problem, x: np.ndarray) -> tuple[Minimum, float]:
     """Minimum over springs and inertias on all lines from (θ, φ), and its misfit."""
-    end, objective = _plain(problem, x, 0, MOST_LINES, "all lines", COMPLETIONS)
+    effort = problem.effort
+    end, objective = _plain(problem, x, 0, effort.last_lines, "all lines", effort.last_completions)
     return end, end.at.chi2 / max(objective.count, 1)
 
 
