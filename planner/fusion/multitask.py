@@ -208,11 +208,13 @@ def fit_multitask(
         off = (vector - middle) / width
         return -value + 0.5 * float(off @ off), -slope + off / width
 
-    # First the poses' kernel and the noise: all at once, a long first step may end at a solution
-    # in which an output is nothing but noise.
-    tasks_only = np.arange(len(middle)) < len(_lower(start.root)[0])
-    found = _climb(negative, middle, np.where(tasks_only, 0.0, 6 * width), middle, 20)
-    found = _climb(negative, middle, 6 * width, found, iterations)
+    found = _climb(negative, middle, 6 * width, middle, iterations)
+    if np.any(start.like(found).noise > 1):
+        # More noise than the output varies at all: a long first step has ended where an output
+        # is given up. So first the poses' kernel and the noise, then the rest.
+        tasks_only = np.arange(len(middle)) < len(_lower(start.root)[0])
+        found = _climb(negative, middle, np.where(tasks_only, 0.0, 6 * width), middle, 20)
+        found = _climb(negative, middle, 6 * width, found, iterations)
     h = start.like(found)
     return MultiTaskGP(tasks, h, _solve(tasks, h), centre, scale)
 
