@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-CAPACITIES = (16, 32, 64, 128, 256, 512)
+CAPACITIES = (16, 24, 32, 48, 64, 96, 128, 256, 512)
 
 
 @dataclass(frozen=True, eq=False)

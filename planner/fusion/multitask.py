@@ -7,6 +7,7 @@ with gaps the observed entries are taken as they are. Hyperparameters: the most 
 of them cannot be averaged over.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -207,13 +208,27 @@ def fit_multitask(
         off = (vector - middle) / width
         return -value + 0.5 * float(off @ off), -slope + off / width
 
-    bounds = [(m - 6 * s, m + 6 * s) for m, s in zip(middle, width, strict=True)]
+    found = _climb(negative, middle, 6 * width, middle, iterations)
+    if np.any(start.like(found).noise > 1):
+        # More noise than the output varies at all: a long first step has ended where an output
+        # is given up. So first the poses' kernel and the noise, then the rest.
+        tasks_only = np.arange(len(middle)) < len(_lower(start.root)[0])
+        found = _climb(negative, middle, np.where(tasks_only, 0.0, 6 * width), middle, 20)
+        found = _climb(negative, middle, 6 * width, found, iterations)
+    h = start.like(found)
+    return MultiTaskGP(tasks, h, _solve(tasks, h), centre, scale)
+
+
+def _climb(
+    negative: Callable[[np.ndarray], tuple[float, np.ndarray]], middle: np.ndarray,
+    reach: np.ndarray, start: np.ndarray, iterations: int,
+) -> np.ndarray:  # fmt: skip
     done = minimize(
-        negative, middle, jac=True, method="L-BFGS-B", bounds=bounds,
+        negative, start, jac=True, method="L-BFGS-B",
+        bounds=list(zip(middle - reach, middle + reach, strict=True)),
         options={"maxiter": iterations, "ftol": 1e-9},
     )  # fmt: skip
-    h = start.like(done.x)
-    return MultiTaskGP(tasks, h, _solve(tasks, h), centre, scale)
+    return done.x
 
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:

@@ -191,3 +191,13 @@ def test_frf_of_a_certain_prediction_is_the_modal_sum():
     exact = modal.accelerance(lines, modal.pole(low.frequency_hz, low.damping_ratio), low.residue)
     np.testing.assert_allclose(mean, exact, atol=1e-6 * np.abs(exact).max())
     assert sd.max() < 1e-4 * np.abs(exact).max()
+
+
+def test_a_few_hundred_samples_of_the_frf_are_as_good_as_ten_thousand():
+    x = np.random.default_rng(0).random((2, 2))
+    p = fit_surrogate(observed(5, 0)).predict(x, simulated(x))
+    lines = np.linspace(4, 50, 60)
+    few, many = (frf_prediction(p, lines, samples) for samples in (256, 10_000))
+    size = np.sqrt(np.mean(np.abs(many[0]) ** 2, axis=-1, keepdims=True))
+    assert np.max(np.abs(few[0] - many[0]) / size) < 0.1
+    assert np.median(np.abs(few[1] / many[1] - 1)) < 0.03
