@@ -13,7 +13,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
-from planner.campaign.labels import label
+from planner.campaign.labels import frequencies, label
 from planner.campaign.logged import from_modal
 from planner.campaign.state import Measurement
 from planner.errors import InputError, NoPoseLeftError
@@ -169,7 +169,7 @@ def _measured_hz(
         modes = from_modal(measured.modal)
         found.append(Measurement(pose, pool.rows[pose][0].joints_deg, (), modes))
     labelled = label(cell, tuple(found))
-    return np.array([[m.frequency_hz if m else np.nan for m in p.modes] for p in labelled])
+    return frequencies(labelled)
 
 
 def rmse_percent(predicted: np.ndarray, truth: np.ndarray) -> float:

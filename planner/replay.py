@@ -69,7 +69,7 @@ def replay(campaign: Campaign, until: int | None = None) -> Iterator[Step]:
             assert after.configured is not None
             key = (after.model_version, id(cells.of(after.configured)))
             if model is None or key != model_key:
-                model, model_key = build(cells.of(after.configured), after), key
+                model, model_key = build(cells.of(after.configured), after, campaign.frf_of), key
             yield Step(entry, check, detail, after, model, measured)
 
 

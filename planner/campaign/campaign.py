@@ -11,6 +11,7 @@ from planner.campaign import store
 from planner.campaign.cell import Cell
 from planner.campaign.config import (
     CampaignConfig,
+    ModesTable,
     config_from_builtins,
     load_campaign_config,
 )
@@ -38,9 +39,10 @@ from planner.campaign.intake import Delivery, sort_paths
 from planner.campaign.journal import Journal
 from planner.campaign.logged import from_homogeneity, from_modal
 from planner.campaign.model import Model, build, propose
-from planner.campaign.state import CampaignState, fold, last_act
+from planner.campaign.state import CampaignState, Measurement, fold, last_act
 from planner.errors import InputError
-from planner.modes.measure import Source
+from planner.frf.types import Frf
+from planner.modes.measure import Source, frf_of
 
 
 class Campaign:
@@ -51,6 +53,7 @@ class Campaign:
         self._journal = Journal(self.directory / store.LOG)
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
+        self._frfs: dict[tuple, Frf] = {}
 
     @classmethod
     def new(cls, directory: Path, robot_toml: Path, campaign_toml: Path | None) -> "Campaign":
@@ -99,8 +102,16 @@ class Campaign:
         state = self.state
         key = (msgspec.json.encode(self._configured()).decode(), state.model_version)
         if key not in self._models:
-            self._models = {key: build(self.cell, state)}
+            self._models = {key: build(self.cell, state, self.frf_of)}
         return self._models[key]
+
+    def frf_of(self, measurement: Measurement, table: ModesTable) -> Frf:
+        """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
+        key = (*(hit.sha256 for hit in measurement.accepted), table.band_hz, table.window_rate_1_s)
+        if key not in self._frfs:
+            sources = tuple(self.source_of(hit) for hit in measurement.accepted)
+            self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
+        return self._frfs[key]
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""
@@ -235,7 +246,11 @@ class Campaign:
             model_before=before,
             model=model,
             refit_seconds=time.perf_counter() - started,
-            remarks=(*measured.remarks, *displacement(state, delivery, joints_deg)),
+            remarks=(
+                *measured.remarks,
+                *displacement(state, delivery, joints_deg),
+                *model.remarks,
+            ),
         )
 
     def source_of(self, hit: HitRecord) -> Source:

@@ -8,6 +8,7 @@ import numpy as np
 
 from planner.acquire.propose import check_name
 from planner.campaign.config import CampaignConfig
+from planner.campaign.fidelity import LowFidelity
 from planner.errors import InputError
 from planner.physics.dynamics import SimulatedModes
 from planner.physics.simulation import Simulation
@@ -42,26 +43,18 @@ class Cell:
             self.robot, self.config.acquisition.candidates, CANDIDATE_SEED
         )
 
-    @cached_property
-    def simulated_candidates(self) -> SimulatedModes:
-        """What the simulation says at the candidates."""
-        return self.simulate(self.candidates.q)
-
     def features(self, q: np.ndarray) -> np.ndarray:
         """Coordinates (n, d) of poses q (n, dof) in rad that the model uses."""
         return self.workspace.features(self.robot, q)
 
-    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
-        """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
+    @cached_property
+    def frozen(self) -> LowFidelity:
+        """The simulation as robot.toml states it."""
+        return LowFidelity(self.config.modes.count, self.simulation)
 
-        As many as the campaign models, and `more` above them.
-        """
-        count = self.config.modes.count + more
-        if self.simulation is None:
-            empty = np.full((len(q), count), np.nan)
-            residue = np.full((len(q), count, 3, 3), np.nan + 0j)
-            return SimulatedModes(empty, empty, residue)
-        return self.simulation.modes(q, count)
+    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
+        """What the simulation of robot.toml says at q (n, dof) in rad; see `LowFidelity`."""
+        return self.frozen.simulate(q, more)
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad; InputError if the robot cannot stand there."""

@@ -37,9 +37,13 @@ class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FidelityTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the simulation is used for: frozen low fidelity, or none."""
+    """What the simulation is used for.
 
-    simulation: Literal["frozen", "none"] = "frozen"
+    "updated": it is identified again from the recordings as they come; "frozen": it stays as
+    robot.toml states it; "none": it is not used.
+    """
+
+    simulation: Literal["updated", "frozen", "none"] = "updated"
 
 
 class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

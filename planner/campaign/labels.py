@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.campaign.cell import Cell
+from planner.campaign.fidelity import LowFidelity
 from planner.campaign.logged import to_mode
 from planner.campaign.state import Measurement
 from planner.fusion.surrogate import ModalObservations
@@ -29,7 +30,9 @@ class LabelledPose:
     simulated_hz: np.ndarray  # (count,), NaN where the simulation has no such mode
 
 
-def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPose, ...]:
+def label(
+    cell: Cell, measurements: tuple[Measurement, ...], low: LowFidelity | None = None
+) -> tuple[LabelledPose, ...]:
     """Label every pose's modes, guided by the simulation and by the poses labelled before.
 
     Labels are places in the order of frequency: they are continuous over any workspace, which
@@ -40,7 +43,7 @@ def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPo
     q = np.deg2rad(np.array([m.joints_deg for m in measurements]))
     modes = [tuple(to_mode(mode) for mode in m.modes) for m in measurements]
     count = cell.config.modes.count
-    simulated = cell.simulate(q, ABOVE)
+    simulated = (low or cell.frozen).simulate(q, ABOVE)
     guide = Guide(simulated.frequency_hz, simulated.shape)
     if not np.any(np.isfinite(simulated.frequency_hz)):
         guide = Guide.by_example(modes, count + ABOVE)
@@ -58,7 +61,14 @@ def label(cell: Cell, measurements: tuple[Measurement, ...]) -> tuple[LabelledPo
     )
 
 
-def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
+def frequencies(labelled: tuple[LabelledPose, ...]) -> np.ndarray:
+    """Natural frequencies (n, count) in Hz, NaN where a mode was not found."""
+    return np.array([[m.frequency_hz if m else np.nan for m in p.modes] for p in labelled])
+
+
+def observations(
+    cell: Cell, labelled: tuple[LabelledPose, ...], low: LowFidelity | None = None
+) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)
     frequency, frequency_sd = np.full((2, n, count), np.nan)
@@ -73,7 +83,7 @@ def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObserva
             damping[i, k], damping_sd[i, k] = mode.damping_ratio, mode.damping_sd
             residue[i, k], residue_sd[i, k] = mode.residue, mode.residue_sd
     q = np.array([p.q for p in labelled]).reshape(n, len(cell.robot.joint_names))
-    simulated = cell.simulate(q) if n else _none(count)
+    simulated = (low or cell.frozen).simulate(q) if n else _none(count)
     x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
     return ModalObservations(
         x, frequency, frequency_sd, damping, damping_sd, residue, residue_sd, simulated

@@ -1,17 +1,30 @@
 """The model of a campaign: a pure function of its cell and its state."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from planner.acquire.propose import propose as choose
 from planner.campaign.cell import Cell
+from planner.campaign.config import ModesTable
 from planner.campaign.events import Proposal
-from planner.campaign.labels import LabelledPose, label, observations
-from planner.campaign.state import CampaignState
+from planner.campaign.fidelity import LowFidelity, learn
+from planner.campaign.labels import LabelledPose, frequencies, label, observations
+from planner.campaign.state import CampaignState, Measurement
 from planner.errors import NoPoseLeftError
-from planner.fusion.surrogate import ModalPrediction, Surrogate, fit_surrogate, frf_prediction
+from planner.frf.types import Frf
+from planner.fusion.hedged import HedgedAR1
+from planner.fusion.surrogate import (
+    ModalObservations,
+    ModalPrediction,
+    Surrogate,
+    fit_primary,
+    fit_surrogate,
+    frf_prediction,
+)
+from planner.physics.dynamics import SimulatedModes
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,21 +33,49 @@ class Model:
 
     cell: Cell
     labelled: tuple[LabelledPose, ...]
+    low: LowFidelity
     surrogate: Surrogate
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Modes at poses q (n, dof) in rad."""
-        return self.surrogate.predict(self.cell.features(q), self.cell.simulate(q))
+        return self._predict(q, self.cell.features(q), self.low.simulate(q))
 
     @cached_property
     def workspace_prediction(self) -> ModalPrediction:
         """Modes at the candidate poses, which stand for the workspace."""
         candidates = self.cell.candidates
-        return self.surrogate.predict(candidates.features, self.cell.simulated_candidates)
+        return self._predict(candidates.q, candidates.features, self.simulated_candidates)
+
+    @cached_property
+    def simulated_candidates(self) -> SimulatedModes:
+        """What the low fidelity says at the candidates."""
+        return self.low.simulate(self.cell.candidates.q)
+
+    def _predict(
+        self, q: np.ndarray, features: np.ndarray, simulated: SimulatedModes
+    ) -> ModalPrediction:
+        """The surrogate's prediction, with what the simulation's own parameters leave open."""
+        found = self.surrogate.predict(features, simulated)
+        share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
+        sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
+        return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N."""
         return frf_prediction(self.predict(q), frequency_hz)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What the engineer should know of the model: doubts about the simulation."""
+        found = [self.low.remark] if self.low.remark else []
+        if self.labelled and self.low.simulation is not None:
+            left = [str(k + 1) for k, w in enumerate(self.surrogate.frequency_trust) if w < 0.5]
+            if left:
+                found.append(
+                    f"The measurements speak against the simulation of mode {', '.join(left)}: "
+                    f"predicted without it."
+                )
+        return tuple(found)
 
     @property
     def frequency_sd_percent(self) -> np.ndarray:
@@ -43,10 +84,45 @@ class Model:
         return 100 * np.sqrt(np.mean((p.frequency_sd_hz / p.frequency_hz) ** 2, axis=0))
 
 
-def build(cell: Cell, state: CampaignState) -> Model:
-    """Label and fit everything that the state's measurements hold."""
-    labelled = label(cell, state.used)
-    return Model(cell, labelled, fit_surrogate(observations(cell, labelled)))
+def build(
+    cell: Cell, state: CampaignState, frf_of: Callable[[Measurement, ModesTable], Frf]
+) -> Model:
+    """Label and fit everything that the state's measurements hold.
+
+    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns.
+    """
+    low, used, table = cell.frozen, state.used, cell.config.modes
+    if cell.config.fidelity.simulation == "updated" and used:
+        q = np.deg2rad(np.array([m.joints_deg for m in used]))
+        low = learn(low, [frf_of(m, table) for m in used], q, table.band_hz)
+    candidates = [_Guided.by(cell, used, low)]
+    if low.left_out is not None:
+        # What lacks physics is bent by fitting it; as it stands it may be the better guide.
+        candidates.append(_Guided.by(cell, used, replace(cell.frozen, suspect=low)))
+    best = max(candidates, key=lambda guided: guided.log_evidence)
+    return Model(cell, best.labelled, best.low, fit_surrogate(best.seen, primary=best.primary))
+
+
+@dataclass(frozen=True, eq=False)
+class _Guided:
+    """Labels and frequencies as one low fidelity makes them."""
+
+    low: LowFidelity
+    labelled: tuple[LabelledPose, ...]
+    seen: ModalObservations
+    primary: HedgedAR1
+
+    @classmethod
+    def by(cls, cell: Cell, used: tuple[Measurement, ...], low: LowFidelity) -> "_Guided":
+        labelled = label(cell, used, low)
+        seen = observations(cell, labelled, low)
+        known = low.discrepancy(frequencies(labelled)) if labelled else None
+        return cls(low, labelled, seen, fit_primary(seen, known, low.left_out))
+
+    @property
+    def log_evidence(self) -> float:
+        """How probable the measured frequencies were, all labels together."""
+        return float(np.sum(self.primary.log_evidence[: self.low.count]))
 
 
 def propose(
@@ -61,7 +137,7 @@ def propose(
         acquisition,
         model.surrogate,
         candidates.features,
-        cell.simulated_candidates,
+        model.simulated_candidates,
         count=count,
         exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
         seed=state.events,

@@ -23,6 +23,7 @@ class HedgedAR1:
     likelier: AR1
     other: AR1
     weight: np.ndarray
+    log_evidence: np.ndarray  # (m,) of the two together
 
     @property
     def posterior(self) -> Posterior:
@@ -59,19 +60,30 @@ def fit_hedged(
     centre: np.ndarray,
     samples: int = 256,
     kept: int = 32,
+    judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
 ) -> HedgedAR1:
-    """Fit m outputs; arguments as of `fit_ar1`."""
+    """Fit m outputs; arguments as of `fit_ar1`.
+
+    `judged` are low-fidelity values (n, m) and priors by which the simulation is believed, where
+    those of `data` have seen the very measurements: what it said of each pose before.
+    """
     fused = fit_ar1(data, with_low, without_low, centre, samples, kept)
+    believed = fused
+    if judged is not None:
+        low, prior = judged
+        unseen = replace(data, low=np.where(np.isfinite(low), low, data.low))
+        believed = fit_ar1(unseen, prior, without_low, centre, samples, kept)
     nothing = np.full(len(centre), np.nan)
     ignored = replace(data, low=np.full_like(data.low, np.nan))
     alone = fit_ar1(ignored, with_low, without_low, nothing, samples, kept)
-    gap = fused.posterior.log_evidence - alone.posterior.log_evidence
+    gap = believed.posterior.log_evidence - alone.posterior.log_evidence
     gap = np.where(fused.uses_low, gap + np.log(BELIEF / (1 - BELIEF)), np.inf)
     # Without a measurement there is nothing to doubt the simulation by.
     gap = np.where(fused.posterior.mask.any(axis=1), gap, np.inf)
     trust = gap >= 0
     weight = 1 / (1 + np.exp(-np.minimum(np.abs(gap), 700.0)))
-    return HedgedAR1(_choose(trust, fused, alone), _choose(~trust, fused, alone), weight)
+    evidence = np.logaddexp(believed.posterior.log_evidence, alone.posterior.log_evidence)
+    return HedgedAR1(_choose(trust, fused, alone), _choose(~trust, fused, alone), weight, evidence)
 
 
 def _choose(first: np.ndarray, a: AR1, b: AR1) -> AR1:

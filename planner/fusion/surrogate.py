@@ -6,7 +6,7 @@ damping as log ζ by a GP, residues part by part (real, imaginary) by AR1 on val
 mode's own size. Logarithms keep frequencies and damping positive.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm, qmc
@@ -24,6 +24,7 @@ DAMPING = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0
 RESIDUE = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
+NUGGET = 1e-3  # of ln f beside an identified simulation
 SAMPLES, KEPT = 256, 32
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
@@ -70,6 +71,12 @@ class Surrogate:
         """Number of labels."""
         return len(self.scale)
 
+    @property
+    def frequency_trust(self) -> np.ndarray:
+        """(k,) weight of the simulation in each label's frequency."""
+        k, uses = self.count, self.primary.uses_low
+        return np.where(uses, self.primary.weight, 1 - self.primary.weight)[:k]
+
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
         return self.primary.split(_primary_low(simulated))[1][:, : self.count]
@@ -115,13 +122,20 @@ def _parts(residue: np.ndarray) -> np.ndarray:
     return both.reshape(len(residue), 18 * residue.shape[1])
 
 
-def fit_surrogate(
-    seen: ModalObservations, has_simulation: bool = True, reference: SimulatedModes | None = None
-) -> Surrogate:
-    """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
+def fit_primary(
+    seen: ModalObservations,
+    discrepancy: np.ndarray | None = None,
+    left_out_hz: np.ndarray | None = None,
+    has_simulation: bool = True,
+    reference: SimulatedModes | None = None,
+) -> HedgedAR1:
+    """Fit log f of every label and log ζ of every label.
 
-    `reference` is the simulation over the workspace: it says how large frequencies and residues
-    are before anything is measured.
+    `discrepancy` (k,) is how far ln f of a simulation that was fitted to these very modes is off
+    elsewhere: its error at the measured poses says too little. None: it was not fitted.
+    `left_out_hz` (n, k) is what it said of each pose before it had seen it, by which it is judged.
+    `reference` is the simulation over the workspace: it says how large frequencies are before
+    anything is measured.
     """
     k = seen.frequency_hz.shape[1]
     y = np.concatenate([_log(seen.frequency_hz), _log(seen.damping_ratio)], axis=1)
@@ -133,14 +147,30 @@ def fit_surrogate(
         default = _centre(_log(reference.frequency_hz), default)
     centre = np.full(2 * k, np.nan)
     centre[:k] = _centre(low[:, :k], default)
-    primary = fit_hedged(
+    return fit_hedged(
         TrainingData(seen.x, y, sd, low),
-        (*[FREQUENCY] * k, *[DAMPING] * k),
+        (*_frequency_priors(k, discrepancy), *[DAMPING] * k),
         (*[FREQUENCY_ALONE] * k, *[DAMPING] * k),
         centre,
         SAMPLES,
         KEPT,
+        _judged(left_out_hz),
     )
+
+
+def fit_surrogate(
+    seen: ModalObservations,
+    has_simulation: bool = True,
+    reference: SimulatedModes | None = None,
+    primary: HedgedAR1 | None = None,
+) -> Surrogate:
+    """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
+
+    `reference` is as in `fit_primary`; `primary` is what that gave, where it was fitted already.
+    """
+    k = seen.frequency_hz.shape[1]
+    if primary is None:
+        primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
     scale = _scale(seen, reference)
     wide = np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
@@ -154,6 +184,25 @@ def fit_surrogate(
         RESIDUE_KEPT,
     )
     return Surrogate(primary, residue, scale)
+
+
+def _judged(
+    left_out_hz: np.ndarray | None,
+) -> tuple[np.ndarray, tuple[OutputPrior, ...]] | None:
+    if left_out_hz is None:
+        return None
+    low = np.concatenate([_log(left_out_hz), np.full_like(left_out_hz, np.nan)], axis=1)
+    k = left_out_hz.shape[1]
+    return low, (*[FREQUENCY] * k, *[DAMPING] * k)
+
+
+def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:
+    if discrepancy is None:
+        return [FREQUENCY] * k
+    return [
+        replace(FREQUENCY, bias_sd=size, slope_sd=size, amplitude=size, nugget=NUGGET, spread=0.5)
+        for size in map(float, discrepancy)
+    ]
 
 
 def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:

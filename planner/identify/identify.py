@@ -41,10 +41,11 @@ class Effort:
     completions: int = 2  # after the first: exact to second order
     last_completions: int = 6
     tolerance: float = 1e-6
+    sloped: bool = True  # a completion holds to first order, not at one point only
 
 
 THOROUGH = Effort()
-QUICK = Effort(lines=64, last_lines=96, completions=0, last_completions=1, tolerance=1e-4)
+QUICK = Effort(64, 96, 0, 2, 1e-4, sloped=False)
 
 
 @dataclass(frozen=True)
@@ -193,10 +194,11 @@ def _plain(
     """Least plain residual from x; what the records lack is filled in again and again."""
     objective = problem.objective(1.0, lines, inertia=problem.inertial)
     tail = bool(np.isfinite(objective.measured.tail_s).any())
-    objective = objective.completed(x) if tail else objective
+    sloped = problem.effort.sloped
+    objective = objective.completed(x, sloped) if tail else objective
     end = problem.minimise(objective, x, number, stage, STEPS)
     for _ in range(completions if tail else 0):
-        objective = objective.completed(end.x)
+        objective = objective.completed(end.x, sloped)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, STEPS)
         moved = end.x - before
         # Where the misfit exceeds the noise, so do the sds in which a move counts.

@@ -50,12 +50,15 @@ class Objective:
     completion: Completion | None = None  # what the records lack, around θ = `completed_at`
     completed_at: np.ndarray | None = None
 
-    def completed(self, x: np.ndarray) -> "Objective":
-        """With the decays that the records cut off, as they are at x and to first order near."""
+    def completed(self, x: np.ndarray, sloped: bool = True) -> "Objective":
+        """With the decays that the records cut off, as they are at x and to first order near.
+
+        Not `sloped`: as they are at x everywhere, which is quicker.
+        """
         count = len(self.parametrisation.parameters)
         springs, mass = self.parametrisation.elasticity(x[:count]), self._mass(x[count:])
         m = self.measured
-        made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd)
+        made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd, sloped)
         return replace(self, completion=made, completed_at=x[:count])
 
     def _mass(self, phi: np.ndarray) -> np.ndarray:

@@ -47,8 +47,9 @@ def completion(
     s: np.ndarray,
     tail_s: np.ndarray,
     sd: np.ndarray,
+    sloped: bool = True,
 ) -> Completion | None:
-    """Completion at springs and mass matrices (n, e, e); its slope by differences.
+    """Completion at springs and mass matrices (n, e, e); its slope by differences, or 0.
 
     None where what is cut off is lost in the noise of sd (n, 3, 3, F).
     """
@@ -68,6 +69,9 @@ def completion(
     values, slopes = lost(elasticity), []
     if np.all(np.abs(values) < NEGLIGIBLE * sd):
         return None
+    if not sloped:
+        size = len(kinds) * len(elasticity.stiffness)
+        return Completion(values, np.zeros((len(values), size, *values.shape[1:])))
     for kind in kinds:
         for j, value in enumerate(getattr(elasticity, kind)):
             moved = getattr(elasticity, kind).copy()

@@ -73,6 +73,24 @@ def measure(
     return MeasuredPose(tuple(verdicts), used, frf, modal, remarks, levels)
 
 
+def frf_of(
+    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
+) -> Frf:
+    """The FRF of files that were accepted before: the one that `measure` gave then."""
+    from planner.frf.estimate import estimate, from_records
+    from planner.recording.hits import hits_from
+    from planner.recording.read import read
+
+    hits, frfs = [], []
+    for source in sources:
+        records = read(source.path)
+        found = [record for record in records if isinstance(record, FrfRecord)]
+        frfs += found
+        hits += () if found else hits_from(records, axis=source.hit)
+    frf = estimate(tuple(hits), band_hz) if hits else from_records(tuple(frfs))
+    return replace(frf, exponential_rate_1_s=window_rate_1_s)
+
+
 def _read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[Verdict, list[Hit], list[FrfRecord]]:

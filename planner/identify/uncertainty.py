@@ -1,0 +1,45 @@
+"""What an identification's uncertainty means for natural frequencies elsewhere."""
+
+import numpy as np
+
+from planner.identify.parameters import Priors, parametrise
+from planner.identify.result import Identification
+from planner.physics.families import undamped_modes
+from planner.physics.simulation import Simulation
+
+
+def frequency_sensitivity(
+    identified: Identification, nominal: Simulation, priors: Priors, q: np.ndarray, count: int
+) -> np.ndarray:
+    """∂ ln f of the `count` lowest undamped modes (n, count, P + R) at q (n, dof) in rad.
+
+    By the parameters in the order of `identified.mean`: with mass-normalised shapes φ,
+    ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968).
+    """
+    simulation = identified.simulation
+    m = simulation.elastic.matrices(q)
+    stiffness = simulation.stiffness.real
+    hertz, shapes, _ = undamped_modes(m.mass, stiffness + m.geometric)
+    square = (2 * np.pi * hertz[:, :count]) ** 2
+    phi = shapes[:, :, :count]
+    springs = np.diagonal(stiffness)[None, :, None] * phi**2 / (2 * square[:, None, :])
+    out = np.zeros((len(q), count, len(identified.mean)))
+    for p, estimate in enumerate(identified.estimates):
+        if estimate.kind == "stiffness":
+            out[:, :, p] = springs[:, list(estimate.blocks)].sum(axis=1)
+    if identified.nuisances:
+        basis = parametrise(nominal, priors).basis
+        moved = np.einsum("nbie,nek->nbik", nominal.elastic.body_jacobians(q), phi, optimize=True)
+        half = np.einsum("bpij,nbjk->nbpik", basis, moved, optimize=True)
+        inertial = -0.5 * np.einsum("nbik,nbpik->nkbp", moved, half, optimize=True)
+        out[:, :, len(identified.estimates) :] = inertial.reshape(len(q), count, -1)
+    return out
+
+
+def frequency_sd(
+    identified: Identification, nominal: Simulation, priors: Priors, q: np.ndarray, count: int
+) -> np.ndarray:
+    """Standard deviation of ln f (n, count) that the parameters' covariance leaves, linearised."""
+    slope = frequency_sensitivity(identified, nominal, priors, q, count)
+    root = np.linalg.cholesky(identified.covariance + 1e-12 * np.eye(len(identified.mean)))
+    return np.sqrt(np.sum((slope @ root) ** 2, axis=-1))

@@ -1,0 +1,112 @@
+"""A low fidelity that learns: identified from recordings, uncertain where it should be, doubted."""
+
+import numpy as np
+import pytest
+
+from planner.campaign.fidelity import PRIORS, LowFidelity, learn, possible
+from planner.frf.estimate import estimate
+from planner.identify.parameters import parametrise
+from planner.identify.uncertainty import frequency_sd, frequency_sensitivity
+from planner.physics.families import undamped_modes
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.truth.deviation import Deviation
+from planner.truth.hits import Hammer
+from planner.truth.model import load_truth
+from robots import BAND_HZ, JOINTS_DEG, make_arm
+from true_modes import hits_at
+
+HAMMER = Hammer(peak_n=60.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=2.0)
+COUNT = 4
+
+
+def measured(path, n: int = 4):
+    """FRFs at n poses and true frequencies at 20 others."""
+    truth = load_truth(path, Deviation(7, 0.15, 0.15, 0.03, 0.003))
+    rng = np.random.default_rng(0)
+    low, high = np.deg2rad(np.transpose(JOINTS_DEG))
+    q, other = rng.uniform(low, high, (n, 6)), rng.uniform(low, high, (20, 6))
+    frfs = [estimate(hits_at(truth, p, HAMMER, np.random.default_rng(i)), BAND_HZ)
+            for i, p in enumerate(q)]  # fmt: skip
+    return frfs, q, other, np.array([truth.modes(p, COUNT)[0] for p in other])
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory):
+    """A simulation with all the physics, before and after it has learned."""
+    path = make_arm(tmp_path_factory.mktemp("arm"), transverse=True)
+    frfs, q, other, true_hz = measured(path)
+    before = LowFidelity(COUNT, Simulation(Robot.load(path)))
+    return before, learn(before, frfs, q, BAND_HZ), other, true_hz
+
+
+def rmse(low: LowFidelity, q: np.ndarray, true_hz: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.log(low.simulate(q).frequency_hz / true_hz) ** 2)))
+
+
+def test_with_the_right_physics_few_poses_teach_the_whole_workspace(right):
+    before, after, other, true_hz = right
+    assert rmse(before, other, true_hz) > 0.02
+    assert rmse(after, other, true_hz) < 0.005
+    assert after.left_out is None
+    assert after.remark == ""
+
+
+def test_what_the_parameters_leave_open_covers_the_error(right):
+    _, after, other, true_hz = right
+    error = np.log(after.simulate(other).frequency_hz / true_hz)
+    sd = after.frequency_sd(other)
+    assert np.mean(np.abs(error) < 2.5 * np.hypot(sd, 1e-3)) > 0.8
+    assert np.median(sd) < 0.01
+
+
+def test_sensitivities_are_the_derivatives(right):
+    before, after, other, _ = right
+    identified, nominal = after.identified, before.nominal
+    assert identified is not None
+    assert nominal is not None
+    q, p = other[:2], parametrise(nominal, PRIORS)
+    slope = frequency_sensitivity(identified, nominal, PRIORS, q, COUNT)
+    count = len(p.parameters)
+
+    def log_hz(x: np.ndarray) -> np.ndarray:
+        changed = nominal.changed(p.elasticity(x[:count]), p.inertia_change(x[count:]))
+        m = changed.elastic.matrices(q)
+        stiffness = changed.stiffness.real + m.geometric
+        return np.log(undamped_modes(m.mass, stiffness)[0][:, :COUNT])
+
+    for i in range(len(identified.mean)):
+        step = np.zeros(len(identified.mean))
+        step[i] = 1e-5
+        by_difference = (log_hz(identified.mean + step) - log_hz(identified.mean - step)) / 2e-5
+        np.testing.assert_allclose(slope[:, :, i], by_difference, atol=1e-6)
+    sd = frequency_sd(identified, nominal, PRIORS, q, COUNT)
+    np.testing.assert_allclose(sd, after.frequency_sd(q))
+
+
+def test_the_same_recordings_teach_the_same(tmp_path):
+    path = make_arm(tmp_path)
+    frfs, q, other, _ = measured(path, n=2)
+    low = LowFidelity(COUNT, Simulation(Robot.load(path)))
+    once, again = (learn(low, frfs, q, BAND_HZ).simulate(other) for _ in range(2))
+    np.testing.assert_array_equal(once.frequency_hz, again.frequency_hz)
+
+
+def test_missing_physics_is_noticed_and_said(tmp_path):
+    frfs, q, _, _ = measured(make_arm(tmp_path / "true", transverse=True), n=3)
+    path = make_arm(tmp_path / "simulated")
+    after = learn(LowFidelity(COUNT, Simulation(Robot.load(path))), frfs, q, BAND_HZ)
+    assert "lacks physics" in after.remark
+    assert after.left_out is not None
+    assert after.left_out.shape == (3, COUNT)
+    assert after.simulation is not None
+    assert possible(after.simulation)
+
+
+def test_bodies_that_cannot_exist_are_known(tmp_path):
+    simulation = Simulation(Robot.load(make_arm(tmp_path)))
+    assert possible(simulation)
+    change = np.zeros_like(simulation.elastic.inertia)
+    change[2, 4] = 50.0  # I_xx beyond I_yy + I_zz
+    changed = simulation.changed(simulation.elasticity, change)
+    assert not possible(changed)
