@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from planner.identify.result import Identification
     from planner.robot.robot import Robot
 
-NUISANCE = {"mass": 0.05, "inertia": 0.05, "com_m": 0.01}
+MASS = INERTIA = 0.05
+COM_M = 0.01
+LARGE = 2.0  # misfit that noise and calibration do not explain
 
 
 def identify(
@@ -50,6 +52,7 @@ def identify(
     from planner.cli import modal
     from planner.cli.progress import reporting
     from planner.cli.render_identification import identified
+    from planner.identify.check import fit_similarity
     from planner.identify.held_out import identify_judged
     from planner.identify.parameters import Priors
     from planner.identify.recorded import read_recorded
@@ -69,7 +72,7 @@ def identify(
             recorded.frfs,
             recorded.q,
             simulation,
-            Priors(**NUISANCE) if inertias else Priors(),
+            Priors(mass=MASS, inertia=INERTIA, com_m=COM_M) if inertias else Priors(),
             held_out,
             band_hz=band,
             starts=starts,
@@ -77,11 +80,18 @@ def identify(
             progress=_told(progress),
         )
     written = None if out is None else write_robot(out, nominal, judged.final)
-    answer = {
-        **_answer(nominal, recorded, judged),
+    answer = _answer(nominal, recorded, judged)
+    if written is not None:
+        fit = fit_similarity(
+            Simulation(Robot.load(written.robot_toml)), recorded.frfs, recorded.q, band
+        )
+        answer["remarks"] += written.remarks
+        answer["written"] = _similarity(fit)
+    answer |= {
         "band_hz": list(band),
         "inertias": inertias,
         "out": None if written is None else str(written.robot_toml),
+        "urdf": None if written is None else str(written.urdf),
         "seconds": time.perf_counter() - started,
     }
     for file, reason in recorded.refused:
@@ -101,6 +111,13 @@ def _answer(robot: "Robot", recorded: "Recorded", judged: "Judged") -> dict[str,
     final = judged.final
     aside = [recorded.poses[i] for i in judged.held_out]
     remarks = [*recorded.remarks, *final.remarks]
+    if final.misfit > LARGE:
+        remarks.append(
+            f"The misfit is {final.misfit:.1f}, 1 being the noise: the simulation lacks more than "
+            f"springs can make up for, and what it lacks is hidden in them; see planner diagnose."
+        )
+    if not final.converged:
+        remarks.append("The last fit had not come to rest; try more --starts.")
     if not aside:
         remarks.append(
             "No pose was held out, so nothing says how good the simulation is elsewhere; record "

@@ -31,7 +31,8 @@ def identified(answer: dict[str, Any]) -> RenderableType:
     parts.append(_agreement(answer))
     parts += [Text(f"  {remark}", style="yellow") for remark in answer["remarks"]]
     if answer["out"]:
-        parts.append(Text(f"Written: {answer['out']}"))
+        frac = 100 * answer["written"]["frac"]
+        parts.append(Text(f"Written: {answer['out']} (FRAC {frac:.2f} %), {answer['urdf']}"))
     if answer["simulated"]:
         parts.append(SIMULATED)
     return Group(*parts)

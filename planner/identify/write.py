@@ -1,14 +1,17 @@
 """An identified robot as a folder: robot.toml, whose comments and order stay, and its URDF."""
 
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import tomlkit
 
 from planner.errors import InputError
 from planner.identify.result import Identification
+from planner.robot.elastic import ElasticModel
+from planner.robot.inertias import urdf_with_inertias
 from planner.robot.robot import Robot
+from planner.robot.urdf import copy_meshes
 
 DIGITS = 6  # significant ones: more than any identification knows
 
@@ -27,10 +30,11 @@ def updated_toml(text: str, result: Identification, urdf: str | None = None) -> 
 
 @dataclass(frozen=True)
 class Written:
-    """Files of an identified robot, absolute."""
+    """Files of an identified robot, absolute, and what they leave out."""
 
     robot_toml: Path
     urdf: Path
+    remarks: tuple[str, ...]
 
 
 def check_target(out: Path, robot: Robot) -> None:
@@ -45,22 +49,42 @@ def check_target(out: Path, robot: Robot) -> None:
 
 
 def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
-    """Write robot.toml at `out`, and the URDF beside it where that folder is another."""
+    """Write robot.toml at `out`, and its URDF beside it where it is another.
+
+    It is another where inertias were identified too (springs alone would fit worse than before),
+    or where the folder is another. Nothing that exists is overwritten; InputError instead.
+    """
     check_target(out, robot)
-    out = out.absolute()
-    urdf, entry = robot.urdf_path, None
-    text = robot.path.read_text(encoding="utf-8")
+    out, bodies = out.absolute(), result.simulation.elastic.bodies
+    change = result.simulation.elastic.inertia - ElasticModel(robot).inertia
+    elsewhere = out.parent.resolve() != robot.path.parent.resolve()
+    urdf, name, shares = robot.urdf_path, None, {}
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
-        if out.parent.resolve() != robot.path.parent.resolve():
-            urdf, entry = out.parent / robot.urdf_path.name, robot.urdf_path.name
-            if urdf.exists() and urdf.read_bytes() != robot.urdf_path.read_bytes():
-                raise InputError(f"{urdf} is another robot's; name another folder with --out.")
-            shutil.copyfile(robot.urdf_path, urdf)
-        with open(out, "x", encoding="utf-8") as file:
-            file.write(updated_toml(text, result, entry))
+        if elsewhere or np.any(change):
+            name = robot.urdf_path.name if elsewhere else f"{out.stem}.urdf"
+            urdf = out.parent / name
+            text, shares = urdf_with_inertias(robot, bodies, change)
+            _write_new(urdf, text)
+            if elsewhere:
+                copy_meshes(robot.urdf_path, urdf)
+        _write_new(out, updated_toml(robot.path.read_text(encoding="utf-8"), result, name))
     except OSError as error:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."
         ) from None
-    return Written(out, urdf)
+    return Written(out, urdf, tuple(_impossible(body, share) for body, share in shares.items()))
+
+
+def _impossible(body: str, share: float) -> str:
+    return (
+        f"No matter can form the inertia identified for what turns with {body}; the URDF takes "
+        f"{100 * share:.0f} % of its change."
+    )
+
+
+def _write_new(path: Path, text: str) -> None:
+    if path.exists():
+        raise InputError(f"{path} exists already; name another file or folder with --out.")
+    with open(path, "x", encoding="utf-8") as file:
+        file.write(text)
