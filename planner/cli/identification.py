@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from planner.identify.identify import Progress
     from planner.identify.recorded import Recorded
     from planner.identify.result import Identification
+    from planner.physics.simulation import Simulation
     from planner.robot.robot import Robot
+    from planner.show.pictures import Pictures
 
 MASS = INERTIA = 0.05
 COM_M = 0.01
@@ -46,22 +48,28 @@ def identify(
         float,
         typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
     ] = 0.0,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Draw FRFs before and after into it.")
+    ] = None,
+    format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
     """Fit stiffness and damping of a robot's simulation to recorded hits."""
     from planner.cli import modal
     from planner.cli.progress import reporting
     from planner.cli.render_identification import identified
-    from planner.identify.check import fit_similarity
     from planner.identify.held_out import identify_judged
     from planner.identify.parameters import Priors
     from planner.identify.recorded import read_recorded
-    from planner.identify.write import check_target, write_robot
+    from planner.identify.write import check_target
     from planner.physics.simulation import Simulation
     from planner.robot.robot import Robot
+    from planner.show.pictures import Pictures
 
     started = time.perf_counter()
     modal.check(band_hz, "h1", None, window_rate_1_s)
+    pictures = Pictures(plot, format_, rrd)
     nominal = Robot.load(robot)
     if out is not None:
         check_target(out, nominal)
@@ -79,24 +87,56 @@ def identify(
             seed=seed,
             progress=_told(progress),
         )
-    written = None if out is None else write_robot(out, nominal, judged.final)
-    answer = _answer(nominal, recorded, judged)
-    if written is not None:
-        fit = fit_similarity(
-            Simulation(Robot.load(written.robot_toml)), recorded.frfs, recorded.q, band
-        )
-        answer["remarks"] += written.remarks
-        answer["written"] = _similarity(fit)
-    answer |= {
+    answer = _answer(nominal, recorded, judged) | {
         "band_hz": list(band),
         "inertias": inertias,
-        "out": None if written is None else str(written.robot_toml),
-        "urdf": None if written is None else str(written.urdf),
-        "seconds": time.perf_counter() - started,
+        "out": None,
+        **_drawn(pictures, recorded, judged, simulation, band),
     }
+    if out is not None:
+        _write(answer, out, nominal, recorded, judged)
+    answer["seconds"] = time.perf_counter() - started
     for file, reason in recorded.refused:
         warn(f"Refused {file}: {reason}")
     return respond(answer, as_json, identified, 3 if recorded.refused else 0)
+
+
+def _write(
+    answer: dict[str, Any], out: Path, robot: "Robot", recorded: "Recorded", judged: "Judged"
+) -> None:
+    """Write the identified robot, read it again, and say how well that one agrees."""
+    from planner.identify.check import fit_similarity
+    from planner.identify.write import write_robot
+    from planner.physics.simulation import Simulation
+    from planner.robot.robot import Robot
+
+    written = write_robot(out, robot, judged.final)
+    again, band = Simulation(Robot.load(written.robot_toml)), answer["band_hz"]
+    fit = fit_similarity(again, recorded.frfs, recorded.q, (band[0], band[1]))
+    answer["remarks"] += written.remarks
+    answer |= {"out": str(written.robot_toml), "urdf": str(written.urdf)}
+    answer["written"] = _similarity(fit)
+
+
+def _drawn(
+    pictures: "Pictures",
+    recorded: "Recorded",
+    judged: "Judged",
+    nominal: "Simulation",
+    band_hz: tuple[float, float],
+) -> dict[str, Any]:
+    if not pictures.wanted:
+        return {"plots": [], "rrd": None}
+    from planner.show.identification_plots import Pose, identification_figures
+
+    poses = []
+    for i, name in enumerate(recorded.poses):
+        aside = i in judged.held_out
+        shown = judged.trial if aside and judged.trial else judged.final
+        poses.append(Pose(name, recorded.q[i], recorded.frfs[i], shown.simulation, aside))
+    mark = "SIMULATED recordings · " if recorded.simulated else ""
+    figures = identification_figures(poses, nominal, band_hz, mark)
+    return pictures.write(figures, nominal.robot.name)
 
 
 def _told(progress: Callable[[str], None]) -> "Callable[[Progress], None]":

@@ -30,6 +30,10 @@ def identified(answer: dict[str, Any]) -> RenderableType:
         parts += [Text(f"  {text}") for text in answer["undetermined"]]
     parts.append(_agreement(answer))
     parts += [Text(f"  {remark}", style="yellow") for remark in answer["remarks"]]
+    if answer["plots"]:
+        parts.append(Text("\n  ".join(["Pictures:", *answer["plots"]])))
+    if answer["rrd"]:
+        parts.append(Text(f"Rerun recording: {answer['rrd']}"))
     if answer["out"]:
         frac = 100 * answer["written"]["frac"]
         parts.append(Text(f"Written: {answer['out']} (FRAC {frac:.2f} %), {answer['urdf']}"))

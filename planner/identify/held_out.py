@@ -20,12 +20,13 @@ FEWEST = 3  # poses of which one can be spared
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """Final identification on all poses, and what one without the poses `held_out` made of these.
+    """Final identification on all poses, and what `trial`, which lacked some, made of these.
 
-    `held_out` holds indices of poses; the similarities there are None where there are none.
+    `held_out` holds their indices; where there are none, trial and similarities are None.
     """
 
     final: Identification
+    trial: Identification | None
     before: Similarity
     held_out: tuple[int, ...]
     held_out_before: Similarity | None
@@ -83,4 +84,4 @@ def identify_judged(
         there = [frfs[i] for i in aside], q[list(aside)], band
         judged = fit_similarity(simulation, *there), fit_similarity(warm.simulation, *there)
     final = identify(frfs, q, simulation, priors, warm=warm, **options)
-    return Judged(final, before, aside, *judged)
+    return Judged(final, warm, before, aside, *judged)
