@@ -78,7 +78,7 @@ def direct_figure(
             panel.semilogy(lines, np.abs(h[i, i]), style, color=colour, lw=1.1, label=label)
         panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
         panel.grid(True, which="both", alpha=0.25)
-    panels[0].legend(fontsize=8, loc="upper left")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     panels[-1].set_xlabel("frequency (Hz)")
     role = "held out: identified without it" if pose.held_out else "used"
     figure.suptitle(f"{mark}Pose {pose.name} ({role})", fontsize=10)
