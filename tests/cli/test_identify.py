@@ -59,7 +59,7 @@ def test_the_answer_has_what_the_contract_names(done):
 
 def test_springs_are_found(cell, done):
     """Off by 20 % before; inertias that are off too leave a few per cent."""
-    robot, _, truth = cell
+    _, _, truth = cell
     true = np.array([spring.stiffness for spring in truth.springs])
     entries = done[0]["parameters"]
     found = np.array([entry["stiffness"] for entry in entries])

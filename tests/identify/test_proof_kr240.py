@@ -1,4 +1,4 @@
-"""Why inertias are let err by default, on the KR240 with 18 springs: pytest -m slow -s tests/identify
+"""Why inertias may err by default, on the KR240 with 18 springs: pytest -m slow -s tests/identify
 
 The truth is the other engine's (MuJoCo): stiffness and damping off by 15 %, masses and moments of
 inertia by 4 %, centres of mass by 5 mm. Hammer hits with noise at 6 or 9 poses go through files,
@@ -60,8 +60,8 @@ def one(folder: Path, n: int, seed: int, simulation: Simulation) -> dict[str, tu
 def test_uncertain_inertias_are_better_at_other_poses(tmp_path, n):
     simulation = Simulation(Robot.load(TOML))
     print(
-        f"\n{n} poses hit, {len(OTHERS)} others judged\nseed inertias   misfit  FRAC %  Frobenius %  "
-        "stiffness: median error %  95 % intervals hold  time s"
+        f"\n{n} poses hit, {len(OTHERS)} others judged\nseed inertias   misfit  FRAC %  "
+        "Frobenius %  stiffness: median error %  95 % intervals hold  time s"
     )
     runs = [one(tmp_path / str(seed), n, seed, simulation) for seed in SEEDS]
     for seed, found in zip(SEEDS, runs, strict=True):
