@@ -77,6 +77,11 @@ def test_uncertain_inertias_are_better_at_other_poses(tmp_path, n):
                 f"{text} {result.misfit:8.2f} {agreement} {stiffness:20.2f} {100 * held:24.0f} % "
                 f"{result.seconds:10.1f}"
             )
+    errors = np.concatenate([found["uncertain"][2] for found in runs])
+    sds = np.array([e.log_sd for found in runs for e in found["uncertain"][0].estimates])
+    held = np.mean(np.abs(errors) < 1.96 * sds)
+    print(f"95 % intervals hold, inertias uncertain: {100 * held:.1f} %")
+    assert held > 0.85
     for found in runs:
         known, uncertain = found["known"], found["uncertain"]
         assert uncertain[1].frac > 0.99
