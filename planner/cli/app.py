@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, respond, warn
+from planner.cli.identification import identify
 
 app = typer.Typer(
     name="planner",
@@ -252,6 +253,9 @@ def modes(
     for entry in refused:
         warn(f"Refused {entry['file']}: {entry['reason']}")
     return respond(answer, as_json, render.modes, 3 if refused else 0)
+
+
+app.command()(identify)
 
 
 @app.command()

@@ -47,7 +47,7 @@ class Objective:
     parametrisation: Parametrisation
     logarithmic: bool
     free_inertia: bool
-    completion: Completion | None = None  # what the records lack, around θ = `completed_at`
+    completion: Completion | None = None  # what the records lack, around `completed_at`
     completed_at: np.ndarray | None = None
 
     def completed(self, x: np.ndarray, sloped: bool = True) -> "Objective":
@@ -58,8 +58,11 @@ class Objective:
         count = len(self.parametrisation.parameters)
         springs, mass = self.parametrisation.elasticity(x[:count]), self._mass(x[count:])
         m = self.measured
-        made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd, sloped)
-        return replace(self, completion=made, completed_at=x[:count])
+        slope = None
+        if self.free_inertia:
+            slope = np.array([self.inertias.mass_change(one) for one in np.eye(len(x) - count)])
+        made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd, slope, sloped)
+        return replace(self, completion=made, completed_at=x)
 
     def _mass(self, phi: np.ndarray) -> np.ndarray:
         if not self.free_inertia:
@@ -96,7 +99,8 @@ class Objective:
             self.matrices, p.elasticity(theta), self.measured.s, mass, inertias
         )
         if self.completion is not None:
-            lost, moved = self.completion, p.spread @ (theta - self.completed_at)
+            lost, since = self.completion, x - self.completed_at
+            moved = np.concatenate([p.spread @ since[:count], since[count:]])
             h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, moved)
             slope[:, : len(moved)] -= lost.slope
         residual, slope = self._residual(h, slope)

@@ -15,13 +15,15 @@ from planner.robot.elastic import Matrices
 OVER = -12.0  # Re λ T below which a decay is over: less than 1e-5 of it is left
 NEGLIGIBLE = 0.02
 STEP = 1e-4  # of a logarithm
+INERTIAL_STEP = 1e-3  # of an sd
 
 
 @dataclass(frozen=True, eq=False)
 class Completion:
     """What the records lack at given springs: `values` (n, 3, 3, F) in m/s²/N.
 
-    `slope` (n, 2e or 3e, 3, 3, F) is with respect to the springs' logarithms.
+    `slope` (n, 2e or 3e, + R, 3, 3, F) is with respect to the springs' logarithms, then to R
+    inertial parameters.
     """
 
     values: np.ndarray
@@ -47,14 +49,17 @@ def completion(
     s: np.ndarray,
     tail_s: np.ndarray,
     sd: np.ndarray,
+    mass_slope: np.ndarray | None = None,
     sloped: bool = True,
 ) -> Completion | None:
     """Completion at springs and mass matrices (n, e, e); its slope by differences, or 0.
 
+    `mass_slope` (R, n, e, e): of the masses with respect to parameters that follow the springs.
+
     None where what is cut off is lost in the noise of sd (n, 3, 3, F).
     """
 
-    def lost(springs: Elasticity) -> np.ndarray:
+    def lost(springs: Elasticity, mass: np.ndarray = mass) -> np.ndarray:
         stiffness = np.diag(springs.stiffness * (1 + 1j * springs.loss_factor))
         solved = solve_poles(
             mass,
@@ -71,6 +76,7 @@ def completion(
         return None
     if not sloped:
         size = len(kinds) * len(elasticity.stiffness)
+        size += 0 if mass_slope is None else len(mass_slope)
         return Completion(values, np.zeros((len(values), size, *values.shape[1:])))
     for kind in kinds:
         for j, value in enumerate(getattr(elasticity, kind)):
@@ -79,4 +85,8 @@ def completion(
             same = value == 0
             after = values if same else lost(replace(elasticity, **{kind: moved}))
             slopes.append((after - values) / STEP)
+    for change in () if mass_slope is None else mass_slope:
+        moves = bool(np.any(change))
+        after = lost(elasticity, mass + INERTIAL_STEP * change) if moves else values
+        slopes.append((after - values) / INERTIAL_STEP)
     return Completion(values, np.stack(slopes, axis=1))

@@ -56,6 +56,29 @@ def measure(
     `window_rate_1_s` is that of an exponential window e^(−rate·t) that the analyser has laid over
     all channels: it is part of what is fitted, so that damping comes out without it.
     """
+    from planner.modes.estimate import estimate_modes
+
+    averaged = average(sources, band_hz, estimator, window_rate_1_s)
+    if averaged.frf is None:
+        return averaged
+    hits, remarks = averaged.hits, averaged.remarks
+    try:
+        modal = estimate_modes(averaged.frf, band_hz)
+    except RefusedError as error:
+        return replace(averaged, remarks=(*remarks, str(error)))
+    levels = homogeneity(hits, modal, band_hz, window_rate_1_s) if hits else None
+    told = (levels.remark,) if levels is not None and levels.remark else ()
+    remarks = (*remarks, *modal.remarks, *told)
+    return replace(averaged, modal=modal, remarks=remarks, homogeneity=levels)
+
+
+def average(
+    sources: tuple[Source, ...],
+    band_hz: tuple[float, float],
+    estimator: str = "h1",
+    window_rate_1_s: float = 0.0,
+) -> MeasuredPose:
+    """As `measure`, up to the FRF: no modes are estimated."""
     verdicts: list[Verdict] = []
     hits: list[tuple[int, Hit]] = []
     frfs: list[FrfRecord] = []
@@ -66,11 +89,10 @@ def measure(
         verdicts.append(verdict)
     hits = _drop_inconsistent(hits, verdicts, band_hz)
     used = tuple(hit for _, hit in hits)
-    frf, modal, remarks = _identify(used, frfs, band_hz, estimator, window_rate_1_s)
-    levels = homogeneity(used, modal, band_hz, window_rate_1_s) if used and modal else None
-    if levels is not None and levels.remark:
-        remarks = (*remarks, levels.remark)
-    return MeasuredPose(tuple(verdicts), used, frf, modal, remarks, levels)
+    frf, remarks = _averaged(used, frfs, band_hz, estimator)
+    if frf is not None:
+        frf = replace(frf, exponential_rate_1_s=window_rate_1_s)
+    return MeasuredPose(tuple(verdicts), used, frf, None, remarks)
 
 
 def frf_of(
@@ -144,18 +166,13 @@ def _drop_inconsistent(
     return kept
 
 
-def _identify(
-    hits: tuple[Hit, ...],
-    frfs: list[FrfRecord],
-    band_hz: tuple[float, float],
-    estimator: str,
-    window_rate_1_s: float,
-) -> tuple[Frf | None, ModalModel | None, tuple[str, ...]]:
+def _averaged(
+    hits: tuple[Hit, ...], frfs: list[FrfRecord], band_hz: tuple[float, float], estimator: str
+) -> tuple[Frf | None, tuple[str, ...]]:
     from planner.frf.estimate import estimate, from_records
-    from planner.modes.estimate import estimate_modes
 
     if not hits and not frfs:
-        return None, None, ("No usable hit: nothing was estimated.",)
+        return None, ("No usable hit: nothing was estimated.",)
     if hits and frfs:
         raise InputError(
             "The files of this pose mix time histories and exported FRFs; import one kind only."
@@ -163,10 +180,5 @@ def _identify(
     try:
         frf = estimate(hits, band_hz, estimator) if hits else from_records(tuple(frfs))
     except RefusedError as error:
-        return None, None, (str(error),)
-    frf = replace(frf, exponential_rate_1_s=window_rate_1_s)
-    try:
-        modal = estimate_modes(frf, band_hz)
-    except RefusedError as error:
-        return frf, None, (*frf.remarks, str(error))
-    return frf, modal, (*frf.remarks, *modal.remarks)
+        return None, (str(error),)
+    return frf, frf.remarks

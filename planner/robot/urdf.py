@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
@@ -69,6 +70,22 @@ def joint_axes(root: ElementTree.Element, names: tuple[str, ...]) -> tuple[np.nd
 def mesh_folders(urdf: Path) -> list[str]:
     """Where meshes (package://, relative) are looked for."""
     return [str(urdf.parent), str(urdf.parent.parent)]
+
+
+def copy_meshes(urdf: Path, target: Path) -> None:
+    """Copy the meshes that a URDF names to where the same URDF, at `target`, looks for them."""
+    names = re.findall(r"<mesh\b[^>]*\bfilename\s*=\s*[\"']([^\"']+)", urdf.read_text("utf-8"))
+    for name in names:
+        file = _mesh_file(name)
+        for folder, there in zip(mesh_folders(urdf), mesh_folders(target), strict=True):
+            found, copy = Path(folder) / file, Path(there) / file
+            if not Path(file).is_absolute() and found.is_file() and not copy.exists():
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(found, copy)
+
+
+def _mesh_file(name: str) -> str:
+    return re.sub(r"^(package|model|file)://", "", name)
 
 
 @contextmanager
@@ -174,7 +191,7 @@ def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
                     f"{numbers.tolist()}; give lengths above 0 m."
                 )
         for mesh in link.findall("collision/geometry/mesh"):
-            file = re.sub(r"^(package|model|file)://", "", mesh.get("filename", ""))
+            file = _mesh_file(mesh.get("filename", ""))
             places = [Path(folder) / file for folder in ["/", *mesh_folders(urdf)]]
             if not any(place.is_file() for place in places):
                 raise InputError(

@@ -1,0 +1,194 @@
+"""`planner identify` from outside: what it finds, writes and refuses."""
+
+import json
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+
+from outside import HAMMER, planner
+from outside import answer as planner_json
+from planner.identify.check import fit_similarity
+from planner.identify.recorded import read_recorded
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.truth.deviation import Deviation
+from planner.truth.hits import record_poses
+from planner.truth.model import load_truth
+from robots import BAND_HZ, JOINTS_DEG, make_arm
+
+POSES = 5
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    """robot.toml, a recordings folder of five poses, and the truth behind it."""
+    root = tmp_path_factory.mktemp("cell")
+    robot = make_arm(root / "robot")
+    off = Deviation(seed=5, stiffness=0.2, damping=0.3, inertia=0.04, com_m=0.003)
+    truth = load_truth(robot, off)
+    low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
+    q = np.random.default_rng(0).uniform(low, high, (POSES, 6))
+    named = [(f"P{i}", row) for i, row in enumerate(q)]
+    folder = record_poses(truth, named, root / "hits", repeats=3, hammer=HAMMER)
+    return robot, folder, truth
+
+
+@pytest.fixture(scope="module")
+def done(cell, tmp_path_factory):
+    robot, folder, _ = cell
+    out = tmp_path_factory.mktemp("found") / "cell-7" / "robot.toml"
+    before = robot.read_bytes()
+    answer = planner_json("identify", folder, "--robot", robot, "--out", out)
+    assert robot.read_bytes() == before
+    return answer, out
+
+
+def test_the_answer_has_what_the_contract_names(done):
+    answer, _ = done
+    assert {"parameters", "fit", "held_out", "seconds"} <= set(answer)
+    for entry in answer["parameters"]:
+        assert {"joint", "axis", "stiffness", "stiffness_sd", "damping", "identifiable"} <= set(
+            entry
+        )
+    assert [e["joint"] for e in answer["parameters"]] == [f"joint_a{i}" for i in range(1, 7)]
+    assert answer["held_out"]["poses"]
+    assert answer["simulated"]
+
+
+def test_springs_are_found_within_their_sds(cell, done):
+    """Off by 20 % before, with inertias that are off too, from records that cut decays off."""
+    _, _, truth = cell
+    for entry, spring in zip(done[0]["parameters"], truth.springs, strict=True):
+        assert entry["identifiable"]
+        assert entry["stiffness_sd"] < 0.01 * spring.stiffness
+        assert abs(entry["stiffness"] - spring.stiffness) < 4 * entry["stiffness_sd"]
+        assert abs(entry["damping"] - spring.damping) < 4 * entry["damping_sd"]
+
+
+def test_poses_that_were_held_out_agree(done):
+    answer, _ = done
+    assert answer["held_out"]["frac"] > 0.99 > answer["held_out"]["before"]["frac"]
+    assert answer["fit"]["frac"] > 0.99
+    assert answer["held_out"]["frobenius"] > answer["held_out"]["before"]["frobenius"]
+
+
+def test_the_robot_that_is_written_is_the_one_identified(cell, done):
+    _, folder, _ = cell
+    answer, out = done
+    assert answer["out"] == str(out)
+    assert (out.parent / tomllib.loads(out.read_text())["urdf"]).is_file()
+    robot = Robot.load(out)
+    recorded = read_recorded(folder, robot.joint_names, BAND_HZ)
+    again = fit_similarity(Simulation(robot), recorded.frfs, recorded.q)
+    assert again.frac == pytest.approx(answer["written"]["frac"], abs=1e-6)
+    assert again.frobenius == pytest.approx(answer["written"]["frobenius"], abs=1e-6)
+    # inertias that no matter can form are written in part only, which costs little
+    assert again.frac == pytest.approx(answer["fit"]["frac"], abs=1e-3)
+    assert again.frac > 0.999 > 0.9 > answer["fit"]["before"]["frac"]
+    # and the other engine, which wants bodies that matter can form, reads the same from it
+    other = load_truth(out)
+    expected = Simulation(robot).modes(recorded.q[:1], 4).frequency_hz[0]
+    np.testing.assert_allclose(other.modes(recorded.q[0], 4)[0], expected, rtol=1e-5)
+
+
+def test_text_and_pictures_beside_the_input(cell, tmp_path):
+    robot, folder, _ = cell
+    copy = tmp_path / "robot"
+    shutil.copytree(robot.parent, copy)
+    toml, out = copy / robot.name, copy / "identified.toml"
+    options = ["--starts", 1, "--held-out", 0, "--plot", tmp_path / "plots"]
+    run = planner("identify", folder, "--robot", toml, "--out", out, *options)
+    assert "joint_a1" in run.stdout
+    assert "N·m/rad" in run.stdout
+    assert "SIMULATED" in run.stdout
+    assert "No pose was held out" in " ".join(run.stdout.split())
+    assert (tmp_path / "plots" / "campbell_xx_after.png").stat().st_size > 10_000
+    assert (tmp_path / "plots" / "frf_P0.png").stat().st_size > 10_000
+    assert tomllib.loads(out.read_text())["urdf"] == "identified.urdf"
+    Robot.load(out)
+    again = planner("identify", folder, "--robot", toml, "--out", out, check=False)
+    assert again.returncode == 2
+    assert "exists already" in again.stderr
+
+
+def test_two_poses_leave_none_to_judge_by(cell, tmp_path):
+    robot, folder, _ = cell
+    few = part_of(folder, tmp_path / "few", {"P0", "P1"})
+    answer = planner_json("identify", few, "--robot", robot, "--starts", 1, "--no-inertias")
+    assert answer["held_out"]["frac"] is None
+    assert answer["held_out"]["frobenius"] is None
+    assert any("No pose was held out" in remark for remark in answer["remarks"])
+
+
+def test_a_refused_hit_is_told_and_the_rest_is_used(cell, tmp_path):
+    robot, folder, _ = cell
+    few = part_of(folder, tmp_path / "few", {"P0", "P1"})
+    victim = sorted((few / "data").iterdir())[0]
+    victim.write_bytes(b"not a recording")
+    run = planner("identify", few, "--robot", robot, "--starts", 1, "--json", check=False)
+    assert run.returncode == 3
+    assert victim.name in run.stderr
+    answer = json.loads(run.stdout)
+    assert [entry["file"] for entry in answer["refused"]] == [str(victim.resolve())]
+    assert len(answer["parameters"]) == 6
+
+
+def part_of(folder, target, poses):
+    """A recordings folder with some of the poses."""
+    shutil.copytree(folder, target)
+    lines = (folder / "recordings.csv").read_text().splitlines()
+    kept = [line for line in lines[1:] if line.split(",")[0] in poses]
+    (target / "recordings.csv").write_text("\n".join([lines[0], *kept]) + "\n")
+    for line in lines[1:]:
+        if line not in kept:
+            (target / line.split(",")[-1]).unlink()
+    return target
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--held-out", 5], "--held-out 5"),
+        (["--held-out", -1], "held-out"),
+        (["--band-hz", 40, 20], "--band-hz"),
+        (["--window-rate", -1], "--window-rate"),
+        (["--format", "gif"], "--format gif"),
+        (["--out", "IN"], "exists already"),
+        (["--out", "found.json"], ".toml"),
+        (["--robot", "nowhere.toml"], "nowhere.toml"),
+    ],
+)
+def test_bad_options_are_one_sentence(cell, tmp_path, options, says):
+    robot, folder, _ = cell
+    known = {"IN": robot, "found.json": tmp_path / "found.json"}
+    given = [known.get(o, o) for o in options]
+    run = planner("identify", folder, "--robot", robot, *given, "--json", check=False)
+    assert_one_sentence(run, says)
+    assert not (tmp_path / "found.json").exists()
+
+
+def test_bad_recordings_are_one_sentence(cell, tmp_path):
+    robot, folder, _ = cell
+    missing = planner("identify", tmp_path / "none", "--robot", robot, check=False)
+    assert_one_sentence(missing, "recordings.csv")
+    broken = part_of(folder, tmp_path / "broken", {"P0"})
+    table = broken / "recordings.csv"
+    text = table.read_text()
+    table.write_text(text.replace("joint_a2_deg", "elbow_deg"))
+    assert_one_sentence(planner("identify", broken, "--robot", robot, check=False), "joint_a2_deg")
+    table.write_text(text)
+    for file in (broken / "data").iterdir():
+        file.write_bytes(b"")
+    run = planner("identify", broken, "--robot", robot, check=False)
+    assert run.returncode == 3
+    assert "no pose has a hit that can be used" in run.stderr
+
+
+def assert_one_sentence(run, says: str) -> None:
+    assert run.returncode == 2, run.stderr
+    assert run.stdout == ""
+    assert says in run.stderr
+    assert len(run.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in run.stderr
