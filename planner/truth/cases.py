@@ -25,7 +25,7 @@ from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
 from planner.truth.model import Truth, load_truth
 from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
-from planner.truth.secret import Secret, frfs, hit_pose
+from planner.truth.secret import Secret, Visit, frfs, hit_poses, once
 
 EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
 KINDS = ("null", *EFFECTS, "pair")
@@ -140,13 +140,16 @@ def _record(
     """Three axes and three force levels a pose; the first pose is often hit again at the end."""
     visits = list(range(len(poses))) + ([0] if rng.random() < 0.5 else [])
     shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
-    rows = []
-    counts: dict[tuple[int, str], int] = {}
+    planned, readbacks = [], []
     for number, index in enumerate(visits):
         scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
-        readback = np.round(np.rad2deg(poses[index]) + scatter, 4)
-        q, progress = np.deg2rad(readback), number / (len(visits) - 1)
-        for hit in hit_pose(truth, secret, q, shots, hammer, rng, progress):
+        readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
+        planned.append(Visit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
+    rows = []
+    counts: dict[tuple[int, str], int] = {}
+    found = hit_poses(truth, secret, planned, hammer, rng)
+    for index, readback, hits in zip(visits, readbacks, found, strict=True):
+        for hit in hits:
             repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
             rows.append((f"P{index + 1:02d}", readback, repeat, hit))
     write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")
@@ -159,18 +162,15 @@ def _held_out(
     arm: Arm,
     hammer: Hammer,
 ) -> dict:
-    """True FRFs (pose, response, hit, F; real and imaginary) without noise and artefacts."""
+    """True FRFs (real and imaginary; pose, response, hit, F) without noise and artefacts."""
     quiet = replace(hammer, noise=0.0, force_noise=0.0, record_s=2 * hammer.record_s)
     plain = Secret(secret.deviation, secret.ports, secret.loss_factor)
-    frequency = np.zeros(0)
-    found = []
-    for _, q in poses:
-        frequency, H = frfs(truth, plain, q, hammer.peak_n, quiet, arm.band_hz)
-        found.append(np.stack([H.real, H.imag]))
+    visits = [once(q, hammer.peak_n) for _, q in poses]
+    frequency, H = frfs(truth, plain, visits, quiet, arm.band_hz)
     return {
         "poses": [name for name, _ in poses],
         "frequency_hz": frequency.tolist(),
-        "frf": np.moveaxis(found, 1, 0).astype(np.float32).tolist(),
+        "frf": [H.real.tolist(), H.imag.tolist()],
     }
 
 

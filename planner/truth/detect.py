@@ -7,7 +7,7 @@ import numpy as np
 from planner.truth.hits import Hammer
 from planner.truth.model import Truth
 from planner.truth.scene import Scene
-from planner.truth.secret import Secret, frfs
+from planner.truth.secret import Secret, frfs, once
 
 POSES = 3
 CLEARLY = 3.0  # times the noise of a single hit's FRF
@@ -43,41 +43,25 @@ def detectability(
 ) -> Detectability:
     """Compare noise-free hits without (`truth`, `secret`) and with the effect."""
     quiet = replace(hammer, noise=0.0, force_noise=0.0)
-    rows = []
-    for q in scene.poses[:POSES]:
-
-        def H(
-            cell: Truth,
-            what: Secret,
-            scale: float = 1.0,
-            progress: float = 0.0,
-            by: Hammer = quiet,
-            q: np.ndarray = q,
-        ) -> np.ndarray:
-            return frfs(cell, what, q, scale * scene.peak_n, by, scene.arm.band_hz, 0, progress)[1]
-
-        plain = H(truth, secret)
-        end = 1.0 if concealed.drift else 0.0
-        early, late = H(other, concealed), H(other, concealed, progress=end)
-        low, high = (
-            (H(other, concealed, k) for k in (LOW, HIGH)) if concealed.ports else (early, early)
-        )
-        noisy = H(truth, secret, by=hammer)
-        rows.append(
-            (
-                _distance(late, plain),
-                _distance(high, low),
-                _distance(late, early),
-                _distance(noisy, plain),
-                -_frac(late, plain),
-            )
-        )
-    change, levels, time, noise, frac = (float(v) for v in np.max(rows, axis=0))
-    return Detectability(change, levels, time, noise, -frac)
+    poses, band, peak = scene.poses[:POSES], scene.arm.band_hz, scene.peak_n
+    middling = [once(q, peak) for q in poses]
+    plain = frfs(truth, secret, middling, quiet, band)[1]
+    noisy = frfs(truth, secret, middling, hammer, band)[1]
+    steps = [(1.0, 0.0), (1.0, 1.0), (LOW, 0.0), (HIGH, 0.0)]
+    visits = [once(q, k * peak, progress) for k, progress in steps for q in poses]
+    early, late, low, high = np.split(frfs(other, concealed, visits, quiet, band)[1], len(steps))
+    return Detectability(
+        _distance(late, plain),
+        _distance(high, low),
+        _distance(late, early),
+        _distance(noisy, plain),
+        min(_frac(a, b) for a, b in zip(late, plain, strict=True)),
+    )
 
 
 def _distance(a: np.ndarray, b: np.ndarray) -> float:
-    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+    """Largest over the poses."""
+    return float(max(np.linalg.norm(x - y) / np.linalg.norm(y) for x, y in zip(a, b, strict=True)))
 
 
 def _frac(a: np.ndarray, b: np.ndarray) -> float:

@@ -5,10 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from planner.errors import InputError
 from planner.truth.deviation import Deviation
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, SimulatedHit, pulse, sampled
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, respond, structural
+from planner.truth.nonlinear import Port, Pose, respond, structural
 
 
 @dataclass(frozen=True)
@@ -67,45 +68,75 @@ class Secret:
     artefact: Artefact = field(default_factory=Artefact)
 
 
-def hit_pose(
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """Hits (axis "+x", peak in N) at a pose q (rad); progress 0 to 1 through the campaign."""
+
+    q: np.ndarray
+    shots: Sequence[tuple[str, float]]
+    progress: float = 0.0
+
+
+def hit_poses(
     truth: Truth,
     secret: Secret,
-    q: np.ndarray,
-    hits: Sequence[tuple[str, float]],
+    visits: Sequence[Visit],
     hammer: Hammer,
     rng: np.random.Generator,
-    progress: float = 0.0,
-) -> list[SimulatedHit]:
-    """Hits (axis "+x", peak in N) at a pose (rad); `truth` has the secret's deviation."""
+) -> list[list[SimulatedHit]]:
+    """All hits of all visits; `truth` has the secret's deviation."""
     step_s = 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
-    forces = np.array([pulse(replace(hammer, peak_n=peak), rng) for _, peak in hits])
-    senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in hits])
-    axes = [AXES.index(axis[1]) for axis, _ in hits]
-    now = truth if secret.drift is None else truth.changed(secret.drift.factor(progress))
-    signed = senses[:, None] * forces
-    if secret.loss_factor is not None:
-        responses = structural(now, secret.loss_factor, q, signed, axes, step_s)
+    pulses = [
+        np.array([pulse(replace(hammer, peak_n=peak), rng) for _, peak in visit.shots])
+        for visit in visits
+    ]
+    responses = _responses(truth, secret, visits, pulses, step_s, rng)
+    found = []
+    for visit, forces, response in zip(visits, pulses, responses, strict=True):
+        hits = [
+            sampled(axis, force, _heard(secret.artefact, a, step_s), hammer, rng)
+            for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
+        ]
+        found.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
+    return found
+
+
+def _responses(
+    truth: Truth,
+    secret: Secret,
+    visits: Sequence[Visit],
+    pulses: Sequence[np.ndarray],
+    step_s: float,
+    rng: np.random.Generator,
+) -> list[np.ndarray]:
+    """Accelerations (h, 3, n) of the sensor at each visit."""
+    poses = []
+    for visit, forces in zip(visits, pulses, strict=True):
+        now = truth if secret.drift is None else truth.changed(secret.drift.factor(visit.progress))
+        senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
+        axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
+        poses.append(Pose(now, visit.q, senses[:, None] * forces, axes))
+    if secret.loss_factor is None:
+        responses = respond(poses, secret.ports, step_s)
+    elif not secret.ports:
+        responses = [structural(pose, secret.loss_factor, step_s) for pose in poses]
     else:
-        responses = respond(now, secret.ports, q, signed, axes, step_s)
-    if secret.tone is not None:
-        phases = rng.uniform(0, 2 * np.pi, len(hits))
-        responses = responses + _hum(now, secret.tone, q, phases, step_s, forces.shape[1])
-    wrong = [_heard(secret.artefact, response, step_s) for response in responses]
+        raise InputError("Structural damping goes with no nonlinear law; leave one of them out.")
+    if secret.tone is None:
+        return responses
     return [
-        _windowed(secret.artefact, sampled(axis, force, response, hammer, rng), hammer)
-        for (axis, _), force, response in zip(hits, forces, wrong, strict=True)
+        response + _hum(pose, secret.tone, rng.uniform(0, 2 * np.pi, len(response)), step_s)
+        for pose, response in zip(poses, responses, strict=True)
     ]
 
 
-def _hum(
-    truth: Truth, tone: Tone, q: np.ndarray, phases: np.ndarray, step_s: float, n: int
-) -> np.ndarray:
+def _hum(pose: Pose, tone: Tone, phases: np.ndarray, step_s: float) -> np.ndarray:
     """Steady accelerations (h, 3, n) that a tone gives."""
-    poles, shapes, entry, _, sensor = truth.modal(q)
-    at = truth.along(q, tone.link, np.zeros(3), np.array(tone.direction))
+    poles, shapes, entry, _, sensor = pose.truth.modal(pose.q)
+    at = pose.truth.along(pose.q, tone.link, np.zeros(3), np.array(tone.direction))
     iw = 2j * np.pi * tone.frequency_hz
     steady = tone.force_n * iw**2 * (sensor @ shapes) @ ((entry @ at) / (iw - poles))
-    turning = np.exp(iw * np.arange(n) * step_s + 1j * phases[:, None])
+    turning = np.exp(iw * np.arange(pose.forces_n.shape[1]) * step_s + 1j * phases[:, None])
     return np.real(steady[None, :, None] * turning[:, None, :])
 
 
@@ -124,21 +155,23 @@ def _windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> Simulate
 def frfs(
     truth: Truth,
     secret: Secret,
-    q: np.ndarray,
-    peak_n: float,
+    visits: Sequence[Visit],
     hammer: Hammer,
     band_hz: tuple[float, float],
     seed: int = 0,
-    progress: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (F,) in Hz and FRFs (3, 3, F) in m/s²/N of one hit along each axis."""
-    rng = np.random.default_rng(seed)
-    hits = [(f"+{axis}", peak_n) for axis in AXES]
-    found = hit_pose(truth, secret, q, hits, hammer, rng, progress)
-    frequency = np.fft.rfftfreq(found[0].force_n.size, 1 / hammer.sampling_rate_hz)
+    """Frequencies (F,) in Hz and FRFs (visit, 3, 3, F) in m/s²/N of visits from `once`."""
+    found = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
+    n = found[0][0].force_n.size
+    frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
     used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     columns = [
-        np.fft.rfft(hit.acceleration_m_s2)[:, used] / np.fft.rfft(hit.force_n)[used]
-        for hit in found
+        [np.fft.rfft(h.acceleration_m_s2)[:, used] / np.fft.rfft(h.force_n)[used] for h in hits]
+        for hits in found
     ]
-    return frequency[used], np.stack(columns, axis=1)
+    return frequency[used], np.moveaxis(columns, 1, 2)
+
+
+def once(q: np.ndarray, peak_n: float, progress: float = 0.0) -> Visit:
+    """One hit along each axis."""
+    return Visit(q, [(f"+{axis}", peak_n) for axis in AXES], progress)
