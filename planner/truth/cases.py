@@ -34,7 +34,7 @@ PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
 LEVELS = (0.4, 1.0, 2.5)
 POSES, PREDICTED = 9, 4
 DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
-SCATTER = {"stiffness": 0.15, "damping": 0.15, "inertia": 0.04, "com_m": 0.005}
+SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
 ATTEMPTS = 40
 
 
@@ -59,7 +59,7 @@ def make_case(kind: str, robot: str, seed: int, folder: Path) -> Case:
     arm = replace(ARMS[robot], damping_s=DAMPING_S)
     per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
     robot_toml = arm.write(folder / "robot", per_joint)
-    plain = Secret(Deviation(int(rng.integers(2**31)), **SCATTER))
+    plain = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     poses = rng.uniform(low, high, (POSES + PREDICTED, 6))
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))

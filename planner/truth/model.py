@@ -179,7 +179,7 @@ def weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np
 def driven(pole: complex, force: np.ndarray, step_s: float) -> np.ndarray:
     """y (..., n) of y' = λy + f from rest, for f (..., n) linear between samples."""
     grow, older, newer = weights(np.asarray(pole), step_s)
-    return signal.lfilter([newer, older], [1.0, -grow], force.astype(complex))
+    return np.asarray(signal.lfilter([newer, older], [1.0, -grow], force.astype(complex)))
 
 
 def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:

@@ -131,7 +131,7 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
 
     steps = np.moveaxis(np.concatenate([pose.angles for pose in linear], axis=1), 2, 0).copy()
     torques = np.zeros_like(steps)
-    before, states = np.zeros((2, *steps.shape[1:]))
+    before, states = np.zeros_like(steps[0]), np.zeros_like(steps[0])
     y = np.zeros(grow.shape, dtype=complex)
     for i in range(1, len(steps)):
         y = grow * y - (older * torques[i - 1]).sum(axis=1)

@@ -169,7 +169,7 @@ def frfs(
         [np.fft.rfft(h.acceleration_m_s2)[:, used] / np.fft.rfft(h.force_n)[used] for h in hits]
         for hits in found
     ]
-    return frequency[used], np.moveaxis(columns, 1, 2)
+    return frequency[used], np.moveaxis(np.array(columns), 1, 2)
 
 
 def once(q: np.ndarray, peak_n: float, progress: float = 0.0) -> Visit:

@@ -63,7 +63,7 @@ def test_the_folder_is_what_the_contract_says(case):
         assert {str(row.hit)[1] for row in rows if row.pose == pose} == {"x", "y", "z"}
     with open(case.recordings / "recordings.csv", encoding="utf-8") as file:
         peaks = [
-            float(np.max(np.abs(read(case.recordings / row["file"])[0].force_n)))
+            float(np.max(np.abs(read(case.recordings / row["file"])[0].channels[0].samples)))
             for row in list(csv.DictReader(file))[:9]
         ]
     assert max(peaks) / min(peaks) > 3  # force levels
