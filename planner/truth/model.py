@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import scipy.linalg
-from scipy import signal
 
 from planner.errors import InputError
 from planner.truth.deviation import Deviation, Resonator, Spring
 from planner.truth.mjcf import Builder
+from planner.truth.propagate import driven
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,20 +166,6 @@ class Truth:
                 y = driven(pole, force_n, step_s)
                 out += twice * np.outer(residue * pole**2, y).real
         return out
-
-
-def weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """y(t + h) = grow y(t) + older f(t) + newer f(t + h), exact if f is linear between."""
-    z = pole * step_s
-    grow = np.exp(z)
-    newer = (grow - 1 - z) / (z * pole)
-    return grow, (grow - 1) / pole - newer, newer
-
-
-def driven(pole: complex, force: np.ndarray, step_s: float) -> np.ndarray:
-    """y (..., n) of y' = λy + f from rest, for f (..., n) linear between samples."""
-    grow, older, newer = weights(np.asarray(pole), step_s)
-    return np.asarray(signal.lfilter([newer, older], [1.0, -grow], force.astype(complex)))
 
 
 def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:

@@ -12,7 +12,8 @@ import scipy.linalg
 
 from planner.errors import InputError
 from planner.truth.laws import Law
-from planner.truth.model import Truth, driven, weights
+from planner.truth.model import Truth
+from planner.truth.propagate import driven, weights
 
 CONTRACTION = 0.5  # of the fixed-point iteration within a step
 ACCURACY = 1e-7  # relative to a step's change of torque
