@@ -1,20 +1,24 @@
-"""How a true robot deviates from what its folder says."""
+"""How a true robot deviates from what its folder says: scatter, and linear physics left out."""
 
 from dataclasses import dataclass
+
+Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Spring:
-    """An elastic rotation: after `joint` ("base": between floor and robot) about `axis`.
+    """An elastic rotation about `axis`, or with `slide` an elastic shift along it.
 
-    Stiffness in N·m/rad, damping in N·m·s/rad; the axis is in the joint's child frame (for the
-    base: the world's).
+    It sits after `joint`; between floor and robot if that is "base"; half-way to the next joint
+    if it is a link's name. Stiffness in N·m/rad (N/m), damping in N·m·s/rad (N·s/m); the axis is
+    in the joint's child frame, or the link's (for the base: the world's).
     """
 
     joint: str
-    axis: tuple[float, float, float]
+    axis: Vector
     stiffness: float
     damping: float
+    slide: bool = False
 
 
 @dataclass(frozen=True)
@@ -22,15 +26,60 @@ class AddedMass:
     """A compact mass (kg) on a link, at a position (m) in the link's frame."""
 
     link: str
-    position_m: tuple[float, float, float]
+    position_m: Vector
     mass_kg: float
+
+
+@dataclass(frozen=True)
+class Resonator:
+    """A small mass (kg) on a spring of its own, at a position (m) and along a direction of a link.
+
+    `frequency_hz` and `damping_ratio` are those that it has on a link that is held.
+    """
+
+    link: str
+    position_m: Vector
+    direction: Vector
+    mass_kg: float
+    frequency_hz: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """Stiffness and damping of a joint about its own axis, times a factor."""
+
+    joint: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """Stiffness of a joint about its own axis, times 1 + c cos(n q) + s sin(n q)."""
+
+    joint: str
+    order: int
+    cosine: float
+    sine: float
+
+
+@dataclass(frozen=True)
+class Feedback:
+    """A controller that breaks reciprocity: a torque on `driven`, -gain (N·m/rad) × `sensed`.
+
+    Both are joints; the twists are those about their own axes.
+    """
+
+    driven: str
+    sensed: str
+    gain: float
 
 
 @dataclass(frozen=True)
 class Deviation:
     """How truth differs from the robot folder: seeded scatter, and what the simulation lacks.
 
-    `stiffness` and `inertia` are relative standard deviations, `com_m` one in m.
+    `stiffness`, `damping` and `inertia` are relative standard deviations, `com_m` one in m.
     """
 
     seed: int = 0
@@ -40,3 +89,7 @@ class Deviation:
     com_m: float = 0.0
     extra: tuple[Spring, ...] = ()
     added: tuple[AddedMass, ...] = ()
+    resonators: tuple[Resonator, ...] = ()
+    scaled: tuple[Scaled, ...] = ()
+    harmonics: tuple[Harmonic, ...] = ()
+    feedback: tuple[Feedback, ...] = ()

@@ -63,11 +63,27 @@ def simulate_hit(
     truth: TrueRobot, q: np.ndarray, axis: str, hammer: Hammer, rng: np.random.Generator
 ) -> SimulatedHit:
     """One hit at pose q (rad) along a signed axis of the tcp frame ("+x")."""
-    fine = hammer.sampling_rate_hz * OVERSAMPLING
-    n = round(hammer.record_s * fine)
-    force = _pulse(n, fine, hammer, rng)
+    force = pulse(hammer, rng)
     sense, index = (-1.0 if axis[0] == "-" else 1.0), AXES.index(axis[1])
-    response = truth.respond(q, sense * force, index, 1 / fine)
+    step_s = 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
+    return sampled(axis, force, truth.respond(q, sense * force, index, step_s), hammer, rng)
+
+
+def pulse(hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
+    """A hammer's pulse (n,) at the fine rate, sin^1.5 over its duration; no two hits are alike."""
+    rate_hz = hammer.sampling_rate_hz * OVERSAMPLING
+    t = np.arange(round(hammer.record_s * rate_hz)) / rate_hz
+    start = hammer.pretrigger_s + rng.uniform(0, 2 / hammer.sampling_rate_hz)
+    duration = hammer.duration_s * rng.uniform(0.85, 1.15)
+    phase = np.clip((t - start) / duration, 0.0, 1.0)
+    return hammer.peak_n * rng.uniform(0.75, 1.25) * np.sin(np.pi * phase) ** 1.5
+
+
+def sampled(
+    axis: str, force: np.ndarray, response: np.ndarray, hammer: Hammer, rng: np.random.Generator
+) -> SimulatedHit:
+    """What the analyser keeps of a force (n,) and responses (3, n) at the fine rate."""
+    fine = hammer.sampling_rate_hz * OVERSAMPLING
     # The analyser's anti-alias filter, the same on all channels.
     sos = signal.butter(6, 0.4 * hammer.sampling_rate_hz, fs=fine, output="sos")
     filtered = np.asarray(signal.sosfilt(sos, np.vstack([force, response])))
@@ -76,15 +92,6 @@ def simulate_hit(
     f = f + hammer.force_noise * np.max(f) * rng.standard_normal(f.size)
     a = a + hammer.noise * largest * rng.standard_normal(a.shape)
     return SimulatedHit(axis, f, a)
-
-
-def _pulse(n: int, rate_hz: float, hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
-    """A hammer's pulse, sin^1.5 over its duration; no two hits are alike."""
-    t = np.arange(n) / rate_hz
-    start = hammer.pretrigger_s + rng.uniform(0, 2 / hammer.sampling_rate_hz)
-    duration = hammer.duration_s * rng.uniform(0.85, 1.15)
-    phase = np.clip((t - start) / duration, 0.0, 1.0)
-    return hammer.peak_n * rng.uniform(0.75, 1.25) * np.sin(np.pi * phase) ** 1.5
 
 
 def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, *text: str) -> None:
@@ -145,7 +152,6 @@ def record_poses(
     Angles in recordings.csv are the readback, and it is there that the truth is evaluated.
     """
     hammer = hammer or Hammer()
-    (folder / "data").mkdir(parents=True, exist_ok=True)
     rows = []
     for number, (pose, q) in enumerate(poses):
         rng = np.random.default_rng([seed, number])
@@ -154,14 +160,29 @@ def record_poses(
         for axis in hits:
             for repeat in range(1, repeats + 1):
                 hit = simulate_hit(truth, np.deg2rad(readback), axis, hammer, rng)
-                sign = "m" if axis[0] == "-" else "p"
-                name = f"data/{pose}_{sign}{axis[1]}_{repeat}.uff"
-                what = f"pose {pose}, hit {axis}, repeat {repeat}"
-                write_uff(folder / name, hit, hammer, truth.description, what)
-                rows.append([pose, *(f"{v:.4f}" for v in readback), axis, repeat, name])
+                rows.append((pose, readback, repeat, hit))
+    return write_recordings(folder, truth.joint_names, rows, hammer, truth.description)
+
+
+def write_recordings(
+    folder: Path,
+    joint_names: Sequence[str],
+    hits: Sequence[tuple[str, np.ndarray, int, SimulatedHit]],
+    hammer: Hammer,
+    description: str,
+) -> Path:
+    """recordings.csv and one UFF file a hit: pose, readback (dof,) in °, repeat, hit."""
+    (folder / "data").mkdir(parents=True, exist_ok=True)
+    rows = []
+    for pose, readback, repeat, hit in hits:
+        sign = "m" if hit.axis[0] == "-" else "p"
+        name = f"data/{pose}_{sign}{hit.axis[1]}_{repeat}.uff"
+        what = f"pose {pose}, hit {hit.axis}, repeat {repeat}"
+        write_uff(folder / name, hit, hammer, description, what)
+        rows.append([pose, *(f"{v:.4f}" for v in readback), hit.axis, repeat, name])
     with open(folder / "recordings.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        joints = [f"{name}_deg" for name in truth.joint_names]
+        joints = [f"{name}_deg" for name in joint_names]
         writer.writerow(["pose", *joints, "hit", "repeat", "file"])
         writer.writerows(rows)
     return folder

@@ -41,6 +41,7 @@ class Builder:
         world = ElementTree.SubElement(top, "worldbody")
         base = ElementTree.SubElement(world, "body", name=self._root)
         self._hinges(base, "base")
+        self._lumps(base, self._root)
         self._inertial(base, self._root)
         self._grow(base, self._root)
         return ElementTree.tostring(top, encoding="unicode")
@@ -48,13 +49,18 @@ class Builder:
     def _hinges(self, body: ElementTree.Element, joint: str) -> None:
         for i, spring in enumerate(self._springs):
             if spring.joint == joint:
-                axis = _text(spring.axis)
-                ElementTree.SubElement(body, "joint", name=f"spring_{i}", type="hinge", axis=axis)
+                axis, kind = _text(spring.axis), "slide" if spring.slide else "hinge"
+                ElementTree.SubElement(body, "joint", name=f"spring_{i}", type=kind, axis=axis)
 
-    def _grow(self, parent: ElementTree.Element, link: str) -> None:
+    def _grow(
+        self, parent: ElementTree.Element, link: str, shift: np.ndarray | None = None
+    ) -> None:
+        """The bodies that hang on `link`; `shift` (3,) is where `parent` sits in its frame."""
         for joint in self._children.get(link, []):
             name, child = joint.get("name"), joint.find("child").get("link")
             position, quaternion = _placement(joint.find("origin"))
+            if shift is not None:
+                position = _text(np.array([float(v) for v in position.split()]) - shift)
             body = ElementTree.SubElement(parent, "body", name=child, pos=position, quat=quaternion)
             for site in ("tcp", "sensor"):
                 if child == self._table[f"{site}_frame"]:
@@ -66,24 +72,48 @@ class Builder:
                 self.joint_names.append(name)
                 self.limits.append(_limits(joint))
                 self._hinges(body, name)
-            self._inertial(body, child)
-            self._grow(body, child)
+            self._lumps(body, child)
+            if any(s.joint == child for s in self._springs):
+                self._split(body, child)
+            else:
+                self._inertial(body, child)
+                self._grow(body, child)
 
-    def _inertial(self, body: ElementTree.Element, link: str) -> None:
+    def _split(self, body: ElementTree.Element, link: str) -> None:
+        """A link in two halves with springs between, half-way to the farthest frame it carries."""
+        places = [_placement(joint.find("origin"))[0] for joint in self._children[link]]
+        ends = [np.array([float(v) for v in place.split()]) for place in places]
+        end = max(ends, key=lambda place: float(np.linalg.norm(place)))
+        mass, centre, tensor = self._scattered(link)
+        along = end / np.linalg.norm(end)
+        # Two halves apart by ±d keep the link's mass, centre and inertia; a uniform rod has this d.
+        second = np.trace(tensor) / 2 * np.eye(3) - tensor
+        apart = np.sqrt(0.75 / (mass * (along @ np.linalg.solve(second, along))))
+        half = (tensor - mass * apart**2 * (np.eye(3) - np.outer(along, along))) / 2
+        _inertial(body, mass / 2, centre - apart * along, half)
+        outer = ElementTree.SubElement(body, "body", name=f"{link} outer", pos=_text(end / 2))
+        self._hinges(outer, link)
+        _inertial(outer, mass / 2, centre + apart * along - end / 2, half)
+        self._grow(outer, link, end / 2)
+
+    def _lumps(self, body: ElementTree.Element, link: str) -> None:
         for extra in (a for a in self._deviation.added if a.link == link):
             # A point would do for the mass, but MuJoCo wants every body to have some inertia.
             lump = ElementTree.SubElement(body, "body", pos=_text(extra.position_m))
-            small = repr(1e-4 * extra.mass_kg)
-            ElementTree.SubElement(
-                lump,
-                "inertial",
-                pos="0 0 0",
-                mass=repr(float(extra.mass_kg)),
-                diaginertia=f"{small} {small} {small}",
-            )
+            _inertial(lump, extra.mass_kg, np.zeros(3), 1e-4 * extra.mass_kg * np.eye(3))
+        for i, small in enumerate(self._deviation.resonators):
+            if small.link == link:
+                lump = ElementTree.SubElement(body, "body", pos=_text(small.position_m))
+                self._hinges(lump, f"resonator {i}")
+                _inertial(lump, small.mass_kg, np.zeros(3), 1e-4 * small.mass_kg * np.eye(3))
+
+    def _inertial(self, body: ElementTree.Element, link: str) -> None:
+        if self._links[link].find("inertial") is not None:
+            _inertial(body, *self._scattered(link))
+
+    def _scattered(self, link: str) -> tuple[float, np.ndarray, np.ndarray]:
+        """Mass, centre (3,) and inertia (3, 3) about it, both in the link's frame."""
         inertial = self._links[link].find("inertial")
-        if inertial is None:
-            return
         scale = float(np.exp(self._deviation.inertia * self._rng.standard_normal()))
         turn = float(np.exp(self._deviation.inertia * self._rng.standard_normal()))
         shift = self._deviation.com_m * self._rng.standard_normal(3)
@@ -96,14 +126,20 @@ class Builder:
         )
         rotation = _matrix(quaternion)
         tensor = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
-        order = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-        ElementTree.SubElement(
-            body,
-            "inertial",
-            pos=_text(place),
-            mass=repr(float(inertial.find("mass").get("value")) * scale),
-            fullinertia=_text([tensor[ij] for ij in order]),
-        )
+        return float(inertial.find("mass").get("value")) * scale, place, tensor
+
+
+def _inertial(
+    body: ElementTree.Element, mass_kg: float, centre: np.ndarray, tensor: np.ndarray
+) -> None:
+    order = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    ElementTree.SubElement(
+        body,
+        "inertial",
+        pos=_text(centre),
+        mass=repr(float(mass_kg)),
+        fullinertia=_text([tensor[ij] for ij in order]),
+    )
 
 
 def _text(values: Iterable[float]) -> str:

@@ -6,16 +6,16 @@ planner's own models: it reads URDF and robot.toml itself, and MuJoCo gives the 
 
 import tomllib
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import scipy.linalg
-from scipy import signal
 
 from planner.errors import InputError
-from planner.truth.deviation import Deviation, Spring
+from planner.truth.deviation import Deviation, Resonator, Spring
 from planner.truth.mjcf import Builder
+from planner.truth.propagate import driven
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +25,7 @@ class Truth:
     name: str
     joint_names: tuple[str, ...]
     springs: tuple[Spring, ...]
+    deviation: Deviation
     description: str
     lower_rad: np.ndarray  # joint limits (dof,)
     upper_rad: np.ndarray
@@ -32,6 +33,7 @@ class Truth:
     _data: object = field(repr=False)
     _held: np.ndarray = field(repr=False)  # places of the robot's own joints in q
     _elastic: np.ndarray = field(repr=False)
+    _own: dict[str, int] = field(repr=False)  # joint: its spring about its own axis
 
     def matrices(
         self, q: np.ndarray
@@ -49,9 +51,43 @@ class Truth:
             mujoco.mj_jacSite(model, data, jacobian, None, model.site(site).id)
             rotation = data.site(site).xmat.reshape(3, 3)
             jacobians.append((rotation.T @ jacobian)[:, self._elastic])
-        damping = np.diag([s.damping for s in self.springs])
-        stiffness = np.diag([s.stiffness for s in self.springs])
+        factor = self._factors(q)
+        damping = np.diag(factor * [s.damping for s in self.springs])
+        stiffness = np.diag(factor * [s.stiffness for s in self.springs])
+        for loop in self.deviation.feedback:
+            stiffness[self._own[loop.driven], self._own[loop.sensed]] += loop.gain
         return full[grid], damping, stiffness, jacobians[0], jacobians[1]
+
+    def _factors(self, q: np.ndarray) -> np.ndarray:
+        """What the stiffness of each spring (e,) is multiplied by at this pose."""
+        factors = np.ones(len(self.springs))
+        for wave in self.deviation.harmonics:
+            angle = wave.order * q[self.joint_names.index(wave.joint)]
+            change = wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
+            factors[self._own[wave.joint]] += change
+        return factors
+
+    def own(self, joint: str) -> np.ndarray:
+        """Unit vector (e,) of a joint's elastic rotation about its own axis."""
+        return np.eye(len(self.springs))[self._own[joint]]
+
+    def along(
+        self, q: np.ndarray, link: str, position_m: np.ndarray, direction: np.ndarray
+    ) -> np.ndarray:
+        """How a point of a link moves along a world direction (3,) with each spring (e,)."""
+        import mujoco
+
+        model, data = self._posed(q)
+        body = model.body(link).id
+        point = data.body(link).xpos + data.body(link).xmat.reshape(3, 3) @ position_m
+        jacobian = np.zeros((3, model.nv))
+        mujoco.mj_jac(model, data, jacobian, None, point, body)
+        return np.asarray(direction) @ jacobian[:, self._elastic]
+
+    def changed(self, factor: float) -> "Truth":
+        """The same robot with the stiffness of every spring multiplied by a factor."""
+        springs = tuple(replace(s, stiffness=factor * s.stiffness) for s in self.springs)
+        return replace(self, springs=springs)
 
     def _posed(self, q: np.ndarray) -> tuple:
         import mujoco
@@ -81,19 +117,27 @@ class Truth:
         site = data.site("tcp")
         return np.array(site.xmat).reshape(3, 3), np.array(site.xpos), jacobian
 
-    def poles(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Poles (2e,) in rad/s, receptance residues (2e, 3, 3), and Js M⁻¹ Jhᵀ (3, 3)."""
+    def modal(
+        self, q: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Poles (p,) in rad/s, shapes V (e, p), participations W (p, e), and both Jacobians (3, e).
+
+        x = V y and y' = λ y + W f for generalised forces f (e,).
+        """
         mass, damping, stiffness, hit, sensor = self.matrices(q)
         e = len(mass)
         zero, one = np.zeros((e, e)), np.eye(e)
         left = np.block([[one, zero], [zero, mass]])
         right = np.block([[zero, one], [-stiffness, -damping]])
         poles, vectors = scipy.linalg.eig(right, left)[:2]
-        inverse = np.linalg.inv(vectors)
-        entry = inverse @ np.vstack([np.zeros((e, 3)), np.linalg.solve(mass, hit.T)])
-        output = sensor @ vectors[:e]
-        residues = np.einsum("ik,kj->kij", output, entry)
-        return poles, residues, sensor @ np.linalg.solve(mass, hit.T)
+        entry = np.linalg.inv(vectors) @ np.vstack([zero, np.linalg.inv(mass)])
+        return poles, vectors[:e], entry, hit, sensor
+
+    def poles(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Poles (2e,) in rad/s, receptance residues (2e, 3, 3), and Js M⁻¹ Jhᵀ (3, 3)."""
+        poles, shapes, entry, hit, sensor = self.modal(q)
+        residues = np.einsum("ik,kj->kij", sensor @ shapes, entry @ hit.T)
+        return poles, residues, sensor @ np.linalg.solve(self.matrices(q)[0], hit.T)
 
     def modes(self, q: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Natural frequencies (m,) in Hz, damping ratios (m,), residues (m, 3, 3), lowest first."""
@@ -115,15 +159,13 @@ class Truth:
         x' = λx + f and a = Σ λ²R x + D f with D = Js M⁻¹ Jhᵀ, because Σ R = 0 and Σ λR = D.
         """
         poles, residues, direct = self.poles(q)
-        out = np.outer(direct[:, axis], force_n).astype(complex)
+        out = np.outer(direct[:, axis], force_n)
         for pole, residue in zip(poles, residues[:, :, axis], strict=True):
-            z = pole * step_s
-            grow = np.exp(z)
-            newer = (grow - 1 - z) / (z * pole)  # weight of the newer of two force samples
-            older = (grow - 1) / pole - newer
-            x = signal.lfilter([newer, older], [1.0, -grow], force_n.astype(complex))
-            out += np.outer(residue, pole**2 * x)
-        return out.real
+            if pole.imag >= 0:  # the other of a pair adds the conjugate
+                twice = 2.0 if pole.imag > 0 else 1.0
+                y = driven(pole, force_n, step_s)
+                out += twice * np.outer(residue * pole**2, y).real
+        return out
 
 
 def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
@@ -145,7 +187,17 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         Spring(c["joint"], tuple(c["axis"]), c["stiffness"], c["damping"])
         for c in table["compliance"]
     ]
-    springs = (*(_deviating(s, deviation, rng) for s in nominal), *deviation.extra)
+    own_axes = _own_axes(root)
+    factors = {change.joint: change.factor for change in deviation.scaled}
+    scattered = [
+        _times(_deviating(s, deviation, rng), factors.get(s.joint, 1.0))
+        if _parallel(s, own_axes)
+        else _deviating(s, deviation, rng)
+        for s in nominal
+    ]
+    small = [_spring(r, i) for i, r in enumerate(deviation.resonators)]
+    springs = (*scattered, *deviation.extra, *small)
+    own = {s.joint: i for i, s in reversed(list(enumerate(springs))) if _parallel(s, own_axes)}
     builder = Builder(root, table, springs, deviation, rng)
     # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
     mujoco.set_mju_user_warning(lambda text: None)
@@ -157,6 +209,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         table["name"],
         tuple(builder.joint_names),
         springs,
+        deviation,
         f"MuJoCo {mujoco.__version__}, seed {deviation.seed}",
         lower,
         upper,
@@ -164,6 +217,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         mujoco.MjData(model),
         np.array(held),
         np.array(elastic),
+        own,
     )
 
 
@@ -184,8 +238,11 @@ def _check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_t
     links = {link.get("name") for link in root.findall("link")}
     stated = [c["joint"] for c in table.get("compliance", ())]
     wrong = [name for name in stated if name not in joints | {"base"}]
-    wrong += [s.joint for s in deviation.extra if s.joint not in joints | {"base"}]
-    wrong += [a.link for a in deviation.added if a.link not in links]
+    wrong += [s.joint for s in deviation.extra if s.joint not in joints | links | {"base"}]
+    wrong += [a.link for a in (*deviation.added, *deviation.resonators) if a.link not in links]
+    named = [change.joint for change in (*deviation.scaled, *deviation.harmonics)]
+    named += [name for loop in deviation.feedback for name in (loop.driven, loop.sensed)]
+    wrong += [name for name in named if name not in stated]
     wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]
     if wrong or not stated:
         what = f"no joint or link {wrong[0]}" if wrong else "no [[compliance]]"
@@ -207,3 +264,29 @@ def _deviating(spring: Spring, deviation: Deviation, rng: np.random.Generator) -
     k = spring.stiffness * np.exp(deviation.stiffness * rng.standard_normal())
     c = spring.damping * np.exp(deviation.damping * rng.standard_normal())
     return Spring(spring.joint, spring.axis, float(k), float(c * k / spring.stiffness))
+
+
+def _own_axes(root: ElementTree.Element) -> dict[str, np.ndarray]:
+    axes = {}
+    for joint in root.findall("joint"):
+        axis = joint.find("axis")
+        text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+        if joint.get("type") != "fixed":
+            axes[joint.get("name", "")] = np.array([float(v) for v in text.split()])
+    return axes
+
+
+def _parallel(spring: Spring, own_axes: dict[str, np.ndarray]) -> bool:
+    """Whether a spring turns about the axis of its joint."""
+    own = own_axes.get(spring.joint)
+    return own is not None and bool(np.allclose(np.cross(own, spring.axis), 0, atol=1e-9))
+
+
+def _times(spring: Spring, factor: float) -> Spring:
+    return replace(spring, stiffness=factor * spring.stiffness, damping=factor * spring.damping)
+
+
+def _spring(small: Resonator, number: int) -> Spring:
+    w = 2 * np.pi * small.frequency_hz
+    damping = 2 * small.damping_ratio * small.mass_kg * w
+    return Spring(f"resonator {number}", small.direction, small.mass_kg * w**2, damping, slide=True)

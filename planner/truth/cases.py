@@ -1,0 +1,197 @@
+"""Concealed cases: recordings of robots whose folders lack something, and the sealed answers.
+
+    python -m planner.truth.cases FOLDER --cases 12 --seed 7
+
+writes FOLDER/case_001/{robot,recordings} …, prints the hash of every answer, and puts the answers
+into FOLDER/answers. Nothing in a case's folder tells what was concealed.
+"""
+
+import argparse
+import hashlib
+import json
+import secrets
+import zlib
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.truth.arms import ARMS, Arm
+from planner.truth.detect import Detectability, detectability
+from planner.truth.deviation import Deviation
+from planner.truth.effects import LINEAR, NONLINEAR, OTHER
+from planner.truth.hits import Hammer, write_predict, write_recordings
+from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
+from planner.truth.model import Truth, load_truth
+from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
+from planner.truth.secret import Secret, Visit, frfs, hit_poses, once
+
+EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
+KINDS = ("null", *EFFECTS, "pair")
+# Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
+PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
+LEVELS = (0.4, 1.0, 2.5)
+POSES, PREDICTED = 9, 4
+DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
+SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
+ATTEMPTS = 40
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case as an outsider sees it, and its answer; `seal` is the SHA-256 of the answer's text."""
+
+    recordings: Path
+    robot_toml: Path
+    answer: str
+    seal: str
+
+
+def make_case(kind: str, robot: str, seed: int, folder: Path) -> Case:
+    """Write folder/robot and folder/recordings of a kind of KINDS and a robot of ARMS.
+
+    Raises InputError for an unknown kind or robot.
+    """
+    if kind not in KINDS or robot not in ARMS:
+        raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(KINDS)}.")
+    rng = np.random.default_rng([seed, zlib.crc32(f"{kind} {robot}".encode())])
+    arm = replace(ARMS[robot], damping_s=DAMPING_S)
+    per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
+    robot_toml = arm.write(folder / "robot", per_joint)
+    plain = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    low, high = np.deg2rad(np.array(arm.joints_deg)).T
+    poses = rng.uniform(low, high, (POSES + PREDICTED, 6))
+    hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
+    truth = load_truth(robot_toml, plain.deviation)
+    scene = Scene(arm, truth, per_joint, poses, hammer.peak_n)
+    found, measures = _conceal(kind, scene, plain, robot_toml, hammer, rng)
+    secret = found[-1].secret if found else plain
+    truth = load_truth(robot_toml, secret.deviation)
+    _record(truth, secret, poses[:POSES], folder / "recordings", hammer, rng)
+    held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
+    write_predict(folder / "recordings", truth.joint_names, held_out, hammer.peak_n)
+    answer = json.dumps(
+        {
+            "kind": kind,
+            "robot": robot,
+            "seed": seed,
+            "elastic_freedoms": 6 * per_joint,
+            "noise": hammer.noise,
+            "outside_library": any(drawn.effect == "unknown" for drawn in found),
+            "effects": [
+                {"effect": d.effect, "at": d.at, "parameters": d.parameters, **asdict(m)}
+                for d, m in zip(found, measures, strict=True)
+            ],
+            "held_out": _held_out(truth, secret, held_out, arm, hammer),
+            "salt": secrets.token_hex(16),  # so that nobody can try answers against the hash
+        },
+        indent=1,
+    )
+    seal = hashlib.sha256(answer.encode()).hexdigest()
+    return Case(folder / "recordings", robot_toml, answer, seal)
+
+
+def _conceal(
+    kind: str,
+    scene: Scene,
+    secret: Secret,
+    robot_toml: Path,
+    hammer: Hammer,
+    rng: np.random.Generator,
+) -> tuple[list[Drawn], list[Detectability]]:
+    """Effects one upon the other, each drawn until the FRFs show it beyond doubt."""
+    names = [] if kind == "null" else _pair(scene, rng) if kind == "pair" else [kind]
+    found: list[Drawn] = []
+    measures: list[Detectability] = []
+    for name in names:
+        for _ in range(ATTEMPTS):
+            drawn = EFFECTS[name](scene, secret, rng)
+            with_it = load_truth(robot_toml, drawn.secret.deviation)
+            if not all(np.all(with_it.poles(q)[0].real < 0) for q in scene.poses):
+                continue  # a feedback loop that would shake by itself
+            without = load_truth(robot_toml, secret.deviation)
+            measure = detectability(without, secret, with_it, drawn.secret, scene, hammer)
+            if measure.shows(in_levels=name in NONLINEAR, in_time=name == "drift"):
+                found.append(drawn)
+                measures.append(measure)
+                secret = drawn.secret
+                break
+        else:
+            raise InputError(f"No {name} of this robot shows in the noise; take another seed.")
+    return found, measures
+
+
+def _pair(scene: Scene, rng: np.random.Generator) -> list[str]:
+    """Two different effects of the robot's own physics, at most one of them nonlinear."""
+    linear = [n for n in LINEAR if n != "transverse_compliance" or scene.per_joint == 1]
+    first, second = (str(name) for name in rng.choice(linear, 2, replace=False))
+    return [first, str(rng.choice(list(NONLINEAR)))] if rng.random() < 0.3 else [first, second]
+
+
+def _record(
+    truth: Truth,
+    secret: Secret,
+    poses: np.ndarray,
+    folder: Path,
+    hammer: Hammer,
+    rng: np.random.Generator,
+) -> None:
+    """Three axes and three force levels a pose; the first pose is often hit again at the end."""
+    visits = list(range(len(poses))) + ([0] if rng.random() < 0.5 else [])
+    shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
+    planned, readbacks = [], []
+    for number, index in enumerate(visits):
+        scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
+        readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
+        planned.append(Visit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
+    rows = []
+    counts: dict[tuple[int, str], int] = {}
+    found = hit_poses(truth, secret, planned, hammer, rng)
+    for index, readback, hits in zip(visits, readbacks, found, strict=True):
+        for hit in hits:
+            repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
+            rows.append((f"P{index + 1:02d}", readback, repeat, hit))
+    write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")
+
+
+def _held_out(
+    truth: Truth,
+    secret: Secret,
+    poses: list[tuple[str, np.ndarray]],
+    arm: Arm,
+    hammer: Hammer,
+) -> dict:
+    """True FRFs (real and imaginary; pose, response, hit, F) without noise and artefacts."""
+    quiet = replace(hammer, noise=0.0, force_noise=0.0, record_s=2 * hammer.record_s)
+    plain = Secret(secret.deviation, secret.ports, secret.loss_factor)
+    visits = [once(q, hammer.peak_n) for _, q in poses]
+    frequency, H = frfs(truth, plain, visits, quiet, arm.band_hz)
+    return {
+        "poses": [name for name, _ in poses],
+        "frequency_hz": frequency.tolist(),
+        "frf": [H.real.tolist(), H.imag.tolist()],
+    }
+
+
+def main() -> None:
+    """Make cases of all kinds in turn, robots in turn; print the seals."""
+    parser = argparse.ArgumentParser(prog="python -m planner.truth.cases", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--cases", type=int, default=len(KINDS))
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    answers = options.folder / "answers"
+    answers.mkdir(parents=True, exist_ok=True)
+    order = np.random.default_rng(options.seed).permutation(options.cases)
+    for number, kind in enumerate(order):
+        name, robot = f"case_{number + 1:03d}", sorted(ARMS)[number % len(ARMS)]
+        case = make_case(
+            KINDS[kind % len(KINDS)], robot, options.seed + number, options.folder / name
+        )
+        (answers / f"{name}.json").write_text(case.answer, encoding="utf-8")
+        print(f"{name} {case.seal}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

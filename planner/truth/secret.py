@@ -1,0 +1,177 @@
+"""A robot with something concealed, the sensor that listens to it, and the hits on it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.truth.deviation import Deviation
+from planner.truth.hits import AXES, OVERSAMPLING, Hammer, SimulatedHit, pulse, sampled
+from planner.truth.model import Truth
+from planner.truth.nonlinear import Port, Pose, respond, structural
+
+
+@dataclass(frozen=True)
+class Drift:
+    """All stiffnesses times 1 + change · course(progress), progress 0 to 1 over the campaign.
+
+    course: "linear", "warming" (1 - exp(-4 p), nearly done at the end) or "step" (at half).
+    """
+
+    change: float
+    course: str = "linear"
+
+    def factor(self, progress: float) -> float:
+        """The factor at a time of the campaign."""
+        courses = {
+            "linear": progress,
+            "warming": 1 - np.exp(-4 * progress),
+            "step": float(progress >= 0.5),
+        }
+        return float(1 + self.change * courses[self.course])
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A force (N) of one frequency on a link's origin, at any phase; direction in the world."""
+
+    link: str
+    direction: tuple[float, float, float]
+    frequency_hz: float
+    force_n: float
+
+
+@dataclass(frozen=True, eq=False)
+class Artefact:
+    """What the measuring chain does wrong, without anybody knowing.
+
+    `rotation` and `gain` make x' = gain · rotation · x of the sensor's channels; all of them come
+    late by `delay_s`; all channels are multiplied by exp(-t / window_s) from the hit on.
+    """
+
+    rotation: np.ndarray = field(default_factory=lambda: np.eye(3))
+    gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    delay_s: float = 0.0
+    window_s: float = np.inf
+
+
+@dataclass(frozen=True)
+class Secret:
+    """What is concealed: physics of the robot, disturbances, and artefacts of the measurement."""
+
+    deviation: Deviation
+    ports: tuple[Port, ...] = ()
+    loss_factor: float | None = None
+    drift: Drift | None = None
+    tone: Tone | None = None
+    artefact: Artefact = field(default_factory=Artefact)
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """Hits (axis "+x", peak in N) at a pose q (rad); progress 0 to 1 through the campaign."""
+
+    q: np.ndarray
+    shots: Sequence[tuple[str, float]]
+    progress: float = 0.0
+
+
+def hit_poses(
+    truth: Truth,
+    secret: Secret,
+    visits: Sequence[Visit],
+    hammer: Hammer,
+    rng: np.random.Generator,
+) -> list[list[SimulatedHit]]:
+    """All hits of all visits; `truth` has the secret's deviation."""
+    step_s = 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
+    pulses = [
+        np.array([pulse(replace(hammer, peak_n=peak), rng) for _, peak in visit.shots])
+        for visit in visits
+    ]
+    responses = _responses(truth, secret, visits, pulses, step_s, rng)
+    found = []
+    for visit, forces, response in zip(visits, pulses, responses, strict=True):
+        hits = [
+            sampled(axis, force, _heard(secret.artefact, a, step_s), hammer, rng)
+            for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
+        ]
+        found.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
+    return found
+
+
+def _responses(
+    truth: Truth,
+    secret: Secret,
+    visits: Sequence[Visit],
+    pulses: Sequence[np.ndarray],
+    step_s: float,
+    rng: np.random.Generator,
+) -> list[np.ndarray]:
+    """Accelerations (h, 3, n) of the sensor at each visit."""
+    poses = []
+    for visit, forces in zip(visits, pulses, strict=True):
+        now = truth if secret.drift is None else truth.changed(secret.drift.factor(visit.progress))
+        senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
+        axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
+        poses.append(Pose(now, visit.q, senses[:, None] * forces, axes))
+    if secret.loss_factor is None:
+        responses = respond(poses, secret.ports, step_s)
+    elif not secret.ports:
+        responses = [structural(pose, secret.loss_factor, step_s) for pose in poses]
+    else:
+        raise InputError("Structural damping goes with no nonlinear law; leave one of them out.")
+    if secret.tone is None:
+        return responses
+    return [
+        response + _hum(pose, secret.tone, rng.uniform(0, 2 * np.pi, len(response)), step_s)
+        for pose, response in zip(poses, responses, strict=True)
+    ]
+
+
+def _hum(pose: Pose, tone: Tone, phases: np.ndarray, step_s: float) -> np.ndarray:
+    """Steady accelerations (h, 3, n) that a tone gives."""
+    poles, shapes, entry, _, sensor = pose.truth.modal(pose.q)
+    at = pose.truth.along(pose.q, tone.link, np.zeros(3), np.array(tone.direction))
+    iw = 2j * np.pi * tone.frequency_hz
+    steady = tone.force_n * iw**2 * (sensor @ shapes) @ ((entry @ at) / (iw - poles))
+    turning = np.exp(iw * np.arange(pose.forces_n.shape[1]) * step_s + 1j * phases[:, None])
+    return np.real(steady[None, :, None] * turning[:, None, :])
+
+
+def _heard(artefact: Artefact, response: np.ndarray, step_s: float) -> np.ndarray:
+    late = round(artefact.delay_s / step_s)
+    mixed = np.array(artefact.gain)[:, None] * (artefact.rotation @ response)
+    return np.pad(mixed, ((0, 0), (late, 0)))[:, : response.shape[1]]
+
+
+def _windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> SimulatedHit:
+    t = np.arange(hit.force_n.size) / hammer.sampling_rate_hz
+    window = np.exp(-np.maximum(t - hammer.pretrigger_s, 0.0) / artefact.window_s)
+    return SimulatedHit(hit.axis, window * hit.force_n, window * hit.acceleration_m_s2)
+
+
+def frfs(
+    truth: Truth,
+    secret: Secret,
+    visits: Sequence[Visit],
+    hammer: Hammer,
+    band_hz: tuple[float, float],
+    seed: int = 0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (F,) in Hz and FRFs (visit, 3, 3, F) in m/s²/N of visits from `once`."""
+    found = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
+    n = found[0][0].force_n.size
+    frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
+    used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    columns = [
+        [np.fft.rfft(h.acceleration_m_s2)[:, used] / np.fft.rfft(h.force_n)[used] for h in hits]
+        for hits in found
+    ]
+    return frequency[used], np.moveaxis(np.array(columns), 1, 2)
+
+
+def once(q: np.ndarray, peak_n: float, progress: float = 0.0) -> Visit:
+    """One hit along each axis."""
+    return Visit(q, [(f"+{axis}", peak_n) for axis in AXES], progress)

@@ -1,0 +1,131 @@
+"""Concealed cases: readable by outsiders, sealed, repeatable, solvable, and telling nothing."""
+
+import csv
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+from planner.errors import InputError
+from planner.recording.folder import read_poses, read_recordings
+from planner.recording.read import read
+from planner.robot.robot import Robot
+from planner.truth.arms import ARMS
+from planner.truth.cases import EFFECTS, KINDS, Case, make_case
+from planner.truth.deviation import Deviation
+from planner.truth.model import load_truth
+from planner.truth.scene import Scene
+from planner.truth.secret import Secret
+
+CONTRACT = {
+    "joint_stiffness": "joint_", "transverse_compliance": "joint_", "friction": "joint_",
+    "nonlinear_stiffness": "joint_", "backlash": "joint_", "angle_dependent_stiffness": "joint_",
+    "base_compliance": "base", "link_flexibility": "link_", "added_mass": "link_",
+    "local_resonator": "link_", "structural_damping": "joints", "drift": "campaign",
+    "sensor_rotation": "sensor", "channel_delay": "sensor", "exponential_window": "sensor",
+    "sensor_gain": "sensor_", "polarity": "sensor_",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Case:
+    return make_case("added_mass", "kr210", 3, tmp_path_factory.mktemp("one"))
+
+
+def test_every_effect_of_the_contract_can_be_concealed(tmp_path):
+    arm = ARMS["kr210"]
+    truth = load_truth(arm.write(tmp_path))
+    scene = Scene(arm, truth, 1, arm.poses(4), 1000.0)
+    for name, draw in EFFECTS.items():
+        for seed in range(5):
+            drawn = draw(scene, Secret(Deviation()), np.random.default_rng(seed))
+            load_truth(tmp_path / "robot.toml", drawn.secret.deviation)  # its places exist
+            if name in CONTRACT:
+                assert drawn.effect == name
+                assert drawn.at is not None
+                assert drawn.at.startswith(CONTRACT[name])
+            else:
+                assert (drawn.effect, drawn.at) == ("unknown", None)
+            json.dumps(drawn.parameters)
+    assert CONTRACT.keys() <= EFFECTS.keys()
+    assert {"null", "pair"} <= set(KINDS)
+
+
+def test_the_folder_is_what_the_contract_says(case):
+    robot = Robot.load(case.robot_toml)
+    rows = read_recordings(case.recordings, robot.joint_names).rows
+    first = {row.pose for row in rows}
+    assert len(first) == 9
+    assert len(rows) in (81, 90)
+    assert len(read_poses(case.recordings / "predict.csv", robot.joint_names)) == 4
+    for pose in first:
+        assert {str(row.hit)[1] for row in rows if row.pose == pose} == {"x", "y", "z"}
+    with open(case.recordings / "recordings.csv", encoding="utf-8") as file:
+        peaks = [
+            float(np.max(np.abs(read(case.recordings / row["file"])[0].channels[0].samples)))
+            for row in list(csv.DictReader(file))[:9]
+        ]
+    assert max(peaks) / min(peaks) > 3  # force levels
+
+
+def test_the_seal_is_the_hash_of_the_answer_and_cannot_be_guessed(case, tmp_path):
+    assert case.seal == hashlib.sha256(case.answer.encode()).hexdigest()
+    again = make_case("added_mass", "kr210", 3, tmp_path)
+    answers = json.loads(case.answer), json.loads(again.answer)
+    assert case.seal != again.seal
+    assert answers[0].pop("salt") != answers[1].pop("salt")
+    assert answers[0] == answers[1]
+    for name in ("recordings.csv", "data/P04_py_2.uff"):
+        other = name if (case.recordings / name).exists() else name.replace("py", "my")
+        ours, theirs = ((c.recordings / other).read_bytes() for c in (case, again))
+        assert len(ours) == len(theirs)
+    table = (case.recordings / "recordings.csv").read_bytes()
+    assert table == (again.recordings / "recordings.csv").read_bytes()
+
+
+def test_nothing_in_the_folder_tells_the_answer(case):
+    text = b"".join(p.read_bytes() for p in case.recordings.parent.rglob("*") if p.is_file())
+    for word in (b"added_mass", b"mass_kg", b"seed", b"MuJoCo"):
+        assert word not in text
+    assert "answer" not in "".join(str(p) for p in case.recordings.parent.rglob("*"))
+
+
+def test_the_answer_says_how_clearly_the_effect_shows(case):
+    effect = json.loads(case.answer)["effects"][0]
+    assert effect["effect"] == "added_mass"
+    assert effect["change"] > 3 * effect["frf_noise"] > 0
+    assert 0 < effect["frac"] < 1
+
+
+def test_held_out_truth_is_that_of_its_robot(tmp_path):
+    case = make_case("null", "kr210", 5, tmp_path)
+    answer = json.loads(case.answer)
+    assert answer["effects"] == []
+    real, imaginary = np.array(answer["held_out"]["frf"])
+    assert real.shape == imaginary.shape == (4, 3, 3, len(answer["held_out"]["frequency_hz"]))
+    robot = Robot.load(case.robot_toml)
+    poses = read_poses(case.recordings / "predict.csv", robot.joint_names)
+    nominal = load_truth(case.robot_toml)
+    for pose, H in zip(poses, real + 1j * imaginary, strict=True):
+        f = np.array(answer["held_out"]["frequency_hz"])
+        expected = nominal.accelerance(np.deg2rad(pose.joints_deg), f)
+        # Scatter of ± 15 % moves the peaks, so only sizes can be alike.
+        ratio = np.linalg.norm(H, axis=2) / np.linalg.norm(expected, axis=2)
+        assert np.all((np.diag(ratio) > 0.5) & (np.diag(ratio) < 2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", sorted(ARMS))
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_every_robot(tmp_path, kind, robot):
+    case = make_case(kind, robot, 11, tmp_path)
+    effects = json.loads(case.answer)["effects"]
+    assert len(effects) == {"null": 0, "pair": 2}.get(kind, 1)
+    for effect in effects:
+        assert effect["change"] > 0.05
+
+
+def test_an_unknown_kind_is_said_in_words(tmp_path):
+    with pytest.raises(InputError, match="kinds are null"):
+        make_case("gremlins", "kr210", 0, tmp_path)

@@ -1,0 +1,182 @@
+"""Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from known_robots import KR10
+from planner.errors import InputError
+from planner.truth.deviation import Deviation
+from planner.truth.hits import Hammer
+from planner.truth.laws import Backlash, Contact, Friction, Hardening, Law
+from planner.truth.model import Truth, load_truth
+from planner.truth.nonlinear import Port, Pose, respond
+from planner.truth.secret import Secret, frfs, once
+
+STEP, N = 1 / 6400, 3200
+Q = KR10.poses(1)[0]
+ANGLE = 3e-4
+QUIET = Hammer(80.0, 0.004, record_s=2.56, noise=0.0, force_noise=0.0)
+LAWS = {
+    "hardening": Hardening(8e4, ANGLE),
+    "softening": Hardening(-4e4, ANGLE),
+    "backlash": Backlash(5e4, ANGLE / 2),
+    "friction": Friction(6e4, 6e4 * ANGLE / 3),
+    "contact": Contact(3e4, ANGLE / 3),
+}
+
+
+@pytest.fixture(scope="module")
+def truth(tmp_path_factory) -> Truth:
+    return load_truth(KR10.write(tmp_path_factory.mktemp("kr10")))
+
+
+def pulses(peaks: list[float]) -> np.ndarray:
+    t = np.arange(N) * STEP
+    return np.outer(peaks, np.sin(np.pi * np.clip((t - 0.01) / 0.006, 0, 1)) ** 2)
+
+
+def loop(law: Law, angles: np.ndarray) -> np.ndarray:
+    """Torques along a path of angles (n,)."""
+    state, torques = np.zeros(1), [0.0]
+    for before, now in itertools.pairwise(angles):
+        torque, state = law.torque(state, np.array([before]), np.array([now]))
+        torques.append(float(torque[0]))
+    return np.array(torques)
+
+
+def test_without_laws_it_is_the_linear_truth(truth):
+    forces, axes = pulses([100.0, 30.0, 60.0]), [0, 1, 2]
+    ours = respond([Pose(truth, Q, forces, axes)], (), STEP)[0]
+    theirs = [truth.respond(Q, f, a, STEP) for f, a in zip(forces, axes, strict=True)]
+    assert np.max(np.abs(ours - theirs)) < 1e-9 * np.max(np.abs(ours))
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_response_is_that_of_an_ode_solver(truth, law):
+    force = pulses([300.0])
+    port = Port(law, joint="joint_2")
+    response = respond([Pose(truth, Q, force, [1])], [port], STEP)[0][0]
+    linear = truth.respond(Q, force[0], 1, STEP)
+    mass, damping, stiffness, hit, sensor = truth.matrices(Q)
+    own, e, t = truth.own("joint_2"), len(mass), np.arange(N) * STEP
+
+    def torque(angle: float, z: float) -> float:
+        if isinstance(law, Friction):
+            return law.stiffness * z
+        return float(law.torque(np.zeros(1), np.array([angle]), np.array([angle]))[0][0])
+
+    def acceleration(y, f):
+        load = hit[1] * f - damping @ y[e:-1] - stiffness @ y[:e]
+        return np.linalg.solve(mass, load - own * torque(own @ y[:e], y[-1]))
+
+    def slope(time, y):
+        rate = own @ y[e:-1]
+        limit = law.coulomb / law.stiffness if isinstance(law, Friction) else 1.0
+        now = acceleration(y, np.interp(time, t, force[0]))
+        return np.concatenate([y[e:-1], now, [rate - np.abs(rate) * y[-1] / limit]])
+
+    found = solve_ivp(slope, (0, t[-1]), np.zeros(2 * e + 1), "DOP853", t[::20],
+                      rtol=1e-8, atol=1e-13, max_step=1e-3)  # fmt: skip
+    expected = np.transpose(
+        [sensor @ acceleration(y, f) for y, f in zip(found.y.T, force[0, ::20], strict=True)]
+    )
+    error = np.max(np.abs(response[:, ::20] - expected))
+    assert error < 3e-3 * np.max(np.abs(expected))
+    assert np.std(response - linear) > 0.05 * np.std(linear)  # it does something
+
+
+@pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+def test_hits_die_out(truth, law):
+    force = np.pad(pulses([300.0]), ((0, 0), (0, 5 * N)))
+    response = respond([Pose(truth, Q, force, [0])], [Port(law, joint="joint_1")], STEP)[0][0]
+    blocks = np.sqrt(np.mean(response[:, N:].reshape(3, 5, -1) ** 2, axis=(0, 2)))
+    assert np.all(blocks[1:] < blocks[:-1])
+
+
+def test_poses_integrated_together_do_not_meet(truth):
+    port, other = Port(LAWS["friction"], joint="joint_2"), KR10.poses(2, seed=3)[1]
+    poses = [Pose(truth, Q, pulses([300.0, 40.0]), [0, 2]), Pose(truth, other, pulses([99.0]), [1])]
+    together = respond(poses, [port], STEP)
+    alone = [respond([pose], [port], STEP)[0] for pose in poses]
+    for a, b in zip(together, alone, strict=True):
+        assert np.max(np.abs(a - b)) < 1e-5 * np.max(np.abs(b))
+
+
+def resonance(truth: Truth, law: Law, peak_n: float) -> float:
+    """Frequency of the first mode as a hit shows it, between two bins."""
+    visit = [once(Q, peak_n)]
+    f, H = frfs(
+        truth, Secret(Deviation(), (Port(law, joint="joint_2"),)), visit, QUIET, (5.0, 20.0)
+    )
+    power = np.sum(np.abs(H[0]) ** 2, axis=(0, 1))
+    near = slice(max(int(np.argmax(power)) - 3, 0), int(np.argmax(power)) + 4)
+    return float(np.sum(power[near] * f[near]) / np.sum(power[near]))
+
+
+def test_hardening_raises_and_softening_lowers_the_frequency_with_the_level(truth):
+    low, middle, high = (resonance(truth, LAWS["hardening"], p) for p in (3.0, 200.0, 600.0))
+    assert low < middle - 0.1 < high - 0.2
+    low, middle, high = (resonance(truth, LAWS["softening"], p) for p in (3.0, 200.0, 600.0))
+    assert low > middle + 0.1 > high + 0.2
+    linear = truth.modes(Q, 1)[0][0]
+    assert low == pytest.approx(linear, abs=0.3)
+
+
+def test_backlash_lowers_the_frequency_at_low_level(truth):
+    law = Backlash(3e4, ANGLE / 2)
+    assert resonance(truth, law, 3.0) < resonance(truth, law, 600.0) - 0.3
+    assert resonance(truth, law, 2000.0) == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5)
+
+
+def test_friction_stiffens_a_joint_at_low_level_only(truth):
+    law = Friction(4e4, 4e4 * ANGLE / 10)
+    low, high = resonance(truth, law, 0.5), resonance(truth, law, 2000.0)
+    assert low > high + 0.5
+    assert high == pytest.approx(truth.modes(Q, 1)[0][0], abs=0.5)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.sampled_from(sorted(LAWS)),
+    st.floats(0.05, 20.0),
+    st.integers(0, 2**31),
+)
+def test_no_law_gives_energy_over_a_closed_path(name, size, seed):
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0, 2 * np.pi, 1500)
+    path = sum(rng.standard_normal() * np.sin(k * t) / k for k in (1, 2, 3))
+    angles = size * ANGLE * np.tile(path, 3)  # the same way three times
+    torques = loop(LAWS[name], angles)
+    middles = (torques[1:] + torques[:-1]) / 2
+    work = float(np.sum((middles * np.diff(angles))[1500:]))
+    scale = float(np.sum(np.abs(middles * np.diff(angles))))
+    assert work > -1e-3 * scale
+    if name != "friction":
+        assert work == pytest.approx(0, abs=1e-3 * scale)
+
+
+def test_friction_stays_below_its_coulomb_torque_and_repeats_itself():
+    law = LAWS["friction"]
+    angles = 5 * ANGLE * np.sin(np.linspace(0, 6 * np.pi, 3001))
+    torques = loop(law, angles)
+    assert np.max(np.abs(torques)) < law.coulomb * (1 + 1e-12)
+    assert np.max(np.abs(torques)) > 0.99 * law.coulomb
+    assert torques[1000:2000] == pytest.approx(torques[2000:3000], abs=1e-3 * law.coulomb)
+
+
+def test_slopes_are_bounds():
+    angles = 4 * ANGLE * np.sin(np.linspace(0, 4 * np.pi, 20001))
+    for law in LAWS.values():
+        steps = np.abs(np.diff(loop(law, angles))[1:])
+        assert np.all(steps <= law.slope * np.abs(np.diff(angles)[1:]) * (1 + 1e-6) + 1e-12)
+
+
+def test_a_step_too_long_is_refused(truth):
+    port = Port(Hardening(1e9, ANGLE), joint="joint_6")
+    with pytest.raises(InputError, match="shorten the step"):
+        respond([Pose(truth, Q, pulses([1.0]), [0])], [port], STEP)
