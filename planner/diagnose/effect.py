@@ -1,4 +1,4 @@
-"""What every effect is: a change of the simulation, of its priors, of Z, or of the measured FRFs."""
+"""An effect: a change of the simulation, its priors, Z, or the measured FRFs."""
 
 from dataclasses import dataclass, field
 
@@ -7,7 +7,6 @@ import numpy as np
 from planner.identify.parameters import Priors
 from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
-
 
 NOTHING = 40.0
 
