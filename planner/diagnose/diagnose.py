@@ -14,6 +14,7 @@ from planner.frf.types import Frf
 from planner.identify.data import common_band
 from planner.physics.simulation import Simulation
 
+IN_QUESTION = 10.0  # times the least misfit: candidates that are followed to the end
 TIED = 0.05  # probability that keeps a candidate in the set the data cannot tell apart
 
 
@@ -25,6 +26,7 @@ class Candidate:
     at: str | None
     probability: float
     misfit: float  # χ² per value, NaN for "unknown"
+    log_evidence: float  # tempered, NaN for "unknown"
     parameters: dict[str, tuple[float, float, str]]
     text: str
 
@@ -68,6 +70,8 @@ def diagnose(
         if progress:
             progress(f"{effect.name} at {effect.at}")
         fits.append(fit(problem, effect, [refitted]))
+    best = min(f.per_value for f in fits)
+    fits = [settle(f) if f.per_value < IN_QUESTION * best else f for f in fits]
     weights = weigh(fits)
     candidates = _candidates(fits, weights)
     verdict = {"none": "consistent", "unknown": "unexplained"}.get(
@@ -80,11 +84,11 @@ def diagnose(
 
 def _candidates(fits: Sequence[Fit], weights: Weights) -> tuple[Candidate, ...]:
     out = []
-    for f, p in zip(fits, weights.probabilities, strict=False):
+    for f, p, z in zip(fits, weights.probabilities, weights.log_evidence, strict=False):
         values = f.parameters(weights.temper)
         text = f.effect.text(values) if f.effect.at else "The refitted simulation is enough."
         at = f.effect.at or None
-        out.append(Candidate(f.effect.name, at, float(p), f.per_value, values, text))
+        out.append(Candidate(f.effect.name, at, float(p), f.per_value, float(z), values, text))
     unknown = float(weights.probabilities[-1])
-    out.append(Candidate("unknown", None, unknown, float("nan"), {}, "No candidate explains it."))
+    out.append(Candidate("unknown", None, unknown, np.nan, np.nan, {}, "No candidate explains it."))
     return tuple(sorted(out, key=lambda c: -c.probability))

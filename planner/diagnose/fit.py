@@ -17,9 +17,9 @@ from planner.physics.simulation import Simulation
 # Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
 PRIORS = Priors(stiffness_factor=1.2, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
 LOG_LINES, LINES = 32, 96  # a pose
-LOG_STEPS, STEPS = 10, 25
-TOLERANCE = 1e-5
-SETTLED = 1e-7
+LOG_STEPS, STEPS = 10, 12
+TOLERANCE = 1e-3  # of the value, that a step must gain while all candidates are looked at
+SETTLED = 1e-6, 80  # the same, and most steps, of those that are still in question
 KEPT = 2  # starts that are followed to the end
 
 
@@ -122,7 +122,7 @@ def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
 
 def settle(found: Fit) -> Fit:
     """The same fit, followed until nothing more is to be gained."""
-    last = minimise(found.misfit, found.x, SETTLED, 4 * STEPS)
+    last = minimise(found.misfit, found.x, *SETTLED)
     return replace(found, x=last.x, data=found.misfit.by_pose(last.x))
 
 

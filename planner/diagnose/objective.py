@@ -25,7 +25,8 @@ class ByPose:
 class Misfit:
     """χ²/2 of data and prior over x: springs θ (P), inertial nuisances φ (R), the effect's ψ (p).
 
-    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`.
+    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`, and φ
+    stays where it is.
     """
 
     measured: Measured
@@ -71,20 +72,28 @@ class Misfit:
         """(n,) numbers of real residuals."""
         return 2 * np.count_nonzero(self.weight, axis=(1, 2, 3))
 
+    @property
+    def free(self) -> np.ndarray:
+        """(D,) bool: which entries of x may move."""
+        a, b = self.split
+        out = np.ones(b + len(self.effect.quantities), dtype=bool)
+        out[a:b] = not self.logarithmic
+        return out
+
     def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """FRFs as they would be measured (n, 3, 3, F), and their derivatives (n, D, 3, 3, F)."""
+        """FRFs as they would be measured (n, 3, 3, F), and derivatives (n, free, 3, 3, F)."""
         p, (a, b), s = self.parametrisation, self.split, self.setting.s
         psi = x[b:]
         rate = self.effect.rate(psi)
         s = s if rate is None else s + rate
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
         added = self.effect.impedance(self.setting, psi)
-        h, full = response_gradient(
-            self.matrices, p.elasticity(x[:a]), s, mass, self.inertias, added
-        )
-        springs = len(p.held)
-        theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread)
-        slope = np.concatenate([theta, full[:, springs:]], axis=1)
+        inertias = None if self.logarithmic else self.inertias
+        h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
+        springs, slope = len(p.held), full
+        if not np.array_equal(p.spread, np.eye(springs)):
+            theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
+            slope = np.concatenate([theta, full[:, springs:]], axis=1)
         if rate is not None:
             # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
             e = p.size
@@ -106,7 +115,11 @@ class Misfit:
         n, d = slope.shape[:2]
         j = np.ascontiguousarray(slope).reshape(n, d, -1).view(float)
         r = np.ascontiguousarray(residual).reshape(n, -1).view(float)
-        return ByPose(np.sum(r**2, axis=1), (j @ r[..., None])[..., 0], j @ np.swapaxes(j, 1, 2))
+        free, size = np.flatnonzero(self.free), len(x)
+        gradient, normal = np.zeros((n, size)), np.zeros((n, size, size))
+        gradient[:, free] = (j @ r[..., None])[..., 0]
+        normal[:, free[:, None], free] = j @ np.swapaxes(j, 1, 2)
+        return ByPose(np.sum(r**2, axis=1), gradient, normal)
 
     def __call__(self, x: np.ndarray) -> Quadratic:
         """Data and prior together; ∞ where x cannot be."""
@@ -122,7 +135,7 @@ class Misfit:
         chi2 = float(data.chi2.sum())
         return Quadratic(
             (chi2 + float(away @ away)) / 2,
-            data.gradient.sum(axis=0) + scale * away,
+            data.gradient.sum(axis=0) + np.where(self.free, scale * away, 0.0),
             data.normal.sum(axis=0) + np.diag(scale**2),
             chi2,
         )
@@ -130,7 +143,8 @@ class Misfit:
     def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         weight, measured = self.weight, self.measured.accelerance
         if not self.logarithmic:
-            return weight * (h - measured), slope * weight[:, None]
+            slope *= weight[:, None]
+            return weight * (h - measured), slope
         least = 1e-9 * np.abs(measured) + 1e-300
         safe = np.where(np.abs(h) >= least, h, least)
         return weight * np.log(safe / measured), slope * (weight / safe)[:, None]

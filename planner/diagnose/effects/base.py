@@ -26,7 +26,7 @@ class BaseCompliance(ExtraCompliance):
             return ()
         largest = max(b.stiffness for b in simulation.robot.config.compliance)
         low, high = (float(r * largest) for r in REACH)
-        told = tuple(tuple(map(float, a)) for a in axes)
+        told = tuple((float(x), float(y), float(z)) for x, y, z in axes)
         return (cls("base", (), BASE, told, low, high),)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:

@@ -29,7 +29,7 @@ class TransverseCompliance(ExtraCompliance):
             across = missing_axes(simulation, joint, np.array([a, np.cross(axis, a)]))
             if len(across):
                 low, high = (float(r * stiffest(simulation, joint)) for r in REACH)
-                told = tuple(tuple(map(float, a)) for a in across)
+                told = tuple((float(x), float(y), float(z)) for x, y, z in across)
                 found.append(cls(place, (), joint, told, low, high))
         return tuple(found)
 
