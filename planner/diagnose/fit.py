@@ -19,7 +19,7 @@ PRIORS = Priors(stiffness_factor=1.2, damping_factor=1.6, mass=0.05, inertia=0.0
 LOG_LINES, LINES = 32, 96  # a pose
 LOG_STEPS, STEPS = 10, 12
 TOLERANCE = 1e-3  # of the value, that a step must gain while all candidates are looked at
-SETTLED = 1e-5, 80  # the same, and most steps, of those that are still in question
+SETTLED = 1e-6, 80  # the same, and most steps, of those that are still in question
 KEPT = 2  # starts that are followed to the end
 
 
