@@ -38,8 +38,12 @@ def minimise(
         if progress:
             progress(iteration, at.value)
         scale = np.diagonal(at.normal)
-        damped = at.normal + damping * np.diag(scale)
-        step = -scipy.linalg.solve(damped, at.gradient, assume_a="pos", check_finite=False)
+        # In units in which the diagonal is 1: parameters of any size are solved for as well.
+        unit = 1 / np.sqrt(scale)
+        damped = at.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
+        step = -unit * scipy.linalg.solve(
+            damped, unit * at.gradient, assume_a="pos", check_finite=False
+        )
         step *= min(1.0, LONGEST / max(float(np.max(np.abs(step))), 1e-300))
         expected = -(at.gradient @ step + step @ at.normal @ step / 2)
         if expected <= tolerance * at.value:

@@ -29,6 +29,17 @@ class Inertias:
         return np.sum(np.swapaxes(self.jacobians, 2, 3) @ weighted @ self.jacobians, axis=1)
 
 
+@dataclass(frozen=True, eq=False)
+class Impedance:
+    """What an effect adds to Z: `values` (n, F, e, e), and derivatives `slope` (n, p, F, e, e).
+
+    In N·m/rad; the derivatives are with respect to the effect's own p parameters.
+    """
+
+    values: np.ndarray
+    slope: np.ndarray
+
+
 def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:
     """s (n, F) in rad/s from frequency_hz (n, F) and the window's decay rate (n,)."""
     return 2j * np.pi * np.atleast_2d(frequency_hz) + np.reshape(rate_1_s, (-1, 1))
@@ -47,20 +58,22 @@ def response_gradient(
     s: np.ndarray,
     mass: np.ndarray | None = None,
     inertias: Inertias | None = None,
+    added: Impedance | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives (n, P, 3s, 3h, F).
 
     The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
-    and those of `inertias` (B · p, only if given).
+    those of `inertias` (B · p, only if given), and those of what is `added` to Z (if given).
     """
     points = matrices.hit.shape[1]
     both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
-    x = _solutions(matrices, elasticity, s, mass, both)
+    x = _solutions(matrices, elasticity, s, mass, both, added)
     x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
     e, lossy = x.shape[1], bool(elasticity.loss_factor.any())
     springs = (3 if lossy else 2) * e
     extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
-    shape = len(s), springs + extra, x_sensor.shape[2], points, s.shape[1]
+    own = 0 if added is None else added.slope.shape[1]
+    shape = len(s), springs + extra + own, x_sensor.shape[2], points, s.shape[1]
     out = np.empty(shape, dtype=complex)
     minus = -(s**2)[:, None, None, None]
     each = out[:, :e]
@@ -75,7 +88,11 @@ def response_gradient(
     else:
         each *= k
     if inertias is not None:
-        _by_inertia(inertias, x_hit, x_sensor, s, out[:, springs:])
+        _by_inertia(inertias, x_hit, x_sensor, s, out[:, springs : springs + extra])
+    if added is not None:
+        moved = np.einsum("npfij,njhf->npihf", added.slope, x_hit, optimize=True)
+        out[:, springs + extra :] = np.einsum("niaf,npihf->npahf", x_sensor, moved, optimize=True)
+        out[:, springs + extra :] *= minus
     return _synthesis(matrices, x_hit, s), out
 
 
@@ -92,6 +109,7 @@ def _solutions(
     s: np.ndarray,
     mass: np.ndarray | None,
     rows: np.ndarray,
+    added: Impedance | None = None,
 ) -> np.ndarray:
     """X = Z⁻¹ rowsᵀ as (n, e, rows, F)."""
     mass = matrices.mass if mass is None else mass
@@ -100,6 +118,8 @@ def _solutions(
     diagonal = np.einsum("...ii->...i", z)
     diagonal += elasticity.stiffness * (1 + 1j * elasticity.loss_factor)
     diagonal += s[..., None] * elasticity.damping
+    if added is not None:
+        z = z + added.values
     x = np.linalg.solve(z, np.swapaxes(rows, 1, 2)[:, None].astype(complex))
     return np.ascontiguousarray(np.moveaxis(x, 1, 3))
 

@@ -1,0 +1,114 @@
+"""Something loose on a link: a mass on a spring of its own (hose pack, bracket)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnose.effect import Effect, Quantity, Setting
+from planner.diagnose.effects.mass import REACH, link_size
+from planner.diagnose.effects.places import joint_of, links
+from planner.physics.gradient import Impedance
+from planner.physics.simulation import Simulation
+
+SHARE = 0.05  # of the mean mass of the links
+FREQUENCIES = 3  # starts over the band
+
+
+@dataclass(frozen=True)
+class LocalResonator(Effect):
+    """A mass that slides along a direction of the link, held by spring and damper."""
+
+    low_hz: float = 1.0
+    high_hz: float = 100.0
+
+    name = "local_resonator"
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["LocalResonator", ...]:
+        """On every link."""
+        mass = SHARE * float(np.mean([b[0] for b in simulation.elastic.inertia]))
+        size, (low, high) = REACH * link_size(simulation), simulation.robot.config.band_hz
+        found = []
+        for place, joint in links(simulation):
+            if joint not in simulation.elastic.bodies:
+                continue
+            body = simulation.elastic.inertia[simulation.elastic.bodies.index(joint)]
+            com = body[1:4] / body[0] if body[0] > 0 else np.zeros(3)
+            middle, spread = np.log(low * high) / 2, np.log(high / low) / np.sqrt(12)
+            quantities = (
+                Quantity("mass", "kg", float(np.log(mass)), 1.0, True),
+                Quantity("frequency", "Hz", float(middle), float(spread), True),
+                Quantity("damping_ratio", "1", float(np.log(0.02)), 1.0, True),
+                *(Quantity(f"direction_{a}", "1", 0.0, 1.0) for a in "xyz"),
+                *(
+                    Quantity(f"position_{a}", "m", float(c), size)
+                    for a, c in zip("xyz", com, strict=True)
+                ),
+            )
+            found.append(cls(place, quantities, low, high))
+        return tuple(found)
+
+    def starts(self) -> np.ndarray:
+        """Several frequencies in each of three directions."""
+        middle = np.array([q.mean for q in self.quantities])
+        ratio = self.high_hz / self.low_hz
+        shares = (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES
+        out = []
+        for f in self.low_hz * ratio**shares:
+            for axis in range(3):
+                start = middle.copy()
+                start[1] = np.log(f)
+                start[3 + axis] = 1.0
+                out.append(start)
+        return np.array(out)
+
+    def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
+        """s² m Jₚᵀ [1 + (T − 1) d dᵀ] Jₚ with the transmissibility T of spring and damper."""
+        mass, omega, zeta = np.exp(psi[0]), 2 * np.pi * np.exp(psi[1]), np.exp(psi[2])
+        length = np.linalg.norm(psi[3:6]) + 1e-12
+        d, place = psi[3:6] / length, psi[6:9]
+        jacobian = setting.body(joint_of(setting.simulation, self.at))
+        linear = jacobian[:, :3] + np.cross(jacobian[:, 3:], place, axisa=1, axisc=1)
+        s = setting.s
+        below = s**2 + 2 * zeta * omega * s + omega**2
+        above = 2 * zeta * omega * s + omega**2
+        t = above / below
+        # derivatives of T with respect to ln ω and ln ζ
+        d_above = np.stack([2 * zeta * omega * s + 2 * omega**2, 2 * zeta * omega * s])
+        t_slope = (d_above * below - above * d_above) / below**2
+        along = np.einsum("a,nae->ne", d, linear)
+        full = np.einsum("nae,nag->neg", linear, linear)
+        line = along[:, :, None] * along[:, None]
+        turn = (np.eye(3) - np.outer(d, d)) / length  # ∂d/∂v
+        d_along = np.einsum("av,nae->vne", turn, linear)
+        d_line = _both(d_along, along)
+        moves = np.array([_shift(jacobian[:, 3:], axis) for axis in range(3)])  # ∂Jp/∂p
+        d_full = np.einsum("vnae,nag->vneg", moves, linear)
+        d_full = d_full + np.swapaxes(d_full, 2, 3)
+        d_line_p = _both(np.einsum("a,vnae->vne", d, moves), along)
+        m = mass * (s**2)[..., None, None]
+        u = (t - 1)[..., None, None]
+        values = m * (full[:, None] + u * line[:, None])
+        slopes = [values]
+        slopes += [m * t_slope[k][..., None, None] * line[:, None] for k in range(2)]
+        slopes += [m * u * d_line[v][:, None] for v in range(3)]
+        slopes += [m * (d_full[v][:, None] + u * d_line_p[v][:, None]) for v in range(3)]
+        return Impedance(values, np.stack(slopes, axis=1))
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        return (
+            f"Something of {values['mass'][0]:.2g} kg on {self.at} swings on its own at "
+            f"{values['frequency'][0]:.1f} Hz: check hose pack, brackets and covers there."
+        )
+
+
+def _both(change: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """(3, n, e, e): derivative of a aᵀ for changes (3, n, e) of a (n, e)."""
+    half = change[..., :, None] * along[None, :, None, :]
+    return half + np.swapaxes(half, 2, 3)
+
+
+def _shift(angular: np.ndarray, axis: int) -> np.ndarray:
+    """(n, 3, e): ω × e_axis."""
+    return np.cross(angular, np.eye(3)[axis], axisa=1, axisc=1)

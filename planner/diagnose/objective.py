@@ -1,0 +1,150 @@
+"""Misfit of a simulation with one effect to measured FRFs, pose by pose, with its gradient."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnose.effect import Effect, Setting
+from planner.identify.data import Measured
+from planner.identify.objective import FARTHEST, LOG_DROP, LOG_FLOOR, LOG_PRIOR, Quadratic
+from planner.identify.parameters import Parametrisation
+from planner.physics.gradient import Inertias, response_gradient
+from planner.robot.elastic import Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class ByPose:
+    """χ² (n,), its half gradients (n, D) and Gauss-Newton matrices (n, D, D), data only."""
+
+    chi2: np.ndarray
+    gradient: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """χ²/2 of data and prior over x: springs θ (P), inertial nuisances φ (R), the effect's ψ (p).
+
+    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`, and φ
+    stays where it is.
+    """
+
+    measured: Measured
+    setting: Setting
+    matrices: Matrices
+    inertias: Inertias
+    parametrisation: Parametrisation
+    effect: Effect
+    logarithmic: bool = False
+
+    @property
+    def split(self) -> tuple[int, int]:
+        """Where φ and ψ begin in x."""
+        count = len(self.parametrisation.parameters)
+        return count, count + len(self.parametrisation.nuisances)
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Prior mean of x."""
+        p = self.parametrisation
+        own = [q.mean for q in self.effect.quantities]
+        return np.concatenate([p.mean, np.zeros(len(p.nuisances)), own])
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Prior sd of x."""
+        p = self.parametrisation
+        own = [q.sd for q in self.effect.quantities]
+        return np.concatenate([p.log_sd, np.ones(len(p.nuisances)), own])
+
+    @property
+    def weight(self) -> np.ndarray:
+        """(n, 3, 3, F): one over the sd of the residual's real (and imaginary) part."""
+        m = self.measured
+        if not self.logarithmic:
+            return np.sqrt(2) / m.sd
+        relative = m.sd / np.abs(m.accelerance)
+        kept = relative < LOG_DROP
+        return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
+
+    @property
+    def counts(self) -> np.ndarray:
+        """(n,) numbers of real residuals."""
+        return 2 * np.count_nonzero(self.weight, axis=(1, 2, 3))
+
+    @property
+    def free(self) -> np.ndarray:
+        """(D,) bool: which entries of x may move."""
+        a, b = self.split
+        out = np.ones(b + len(self.effect.quantities), dtype=bool)
+        out[a:b] = not self.logarithmic
+        return out
+
+    def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """FRFs as they would be measured (n, 3, 3, F), and derivatives (n, free, 3, 3, F)."""
+        p, (a, b), s = self.parametrisation, self.split, self.setting.s
+        psi = x[b:]
+        rate = self.effect.rate(psi)
+        s = s if rate is None else s + rate
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        added = self.effect.impedance(self.setting, psi)
+        inertias = None if self.logarithmic else self.inertias
+        h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
+        springs, slope = len(p.held), full
+        if not np.array_equal(p.spread, np.eye(springs)):
+            theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
+            slope = np.concatenate([theta, full[:, springs:]], axis=1)
+        if rate is not None:
+            # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
+            e = p.size
+            down = 2 * full[:, :e].sum(axis=1) + full[:, e : 2 * e].sum(axis=1)
+            along = -rate * down / s[:, None, None]
+            slope = np.concatenate([slope, along[:, None]], axis=1)
+        seen = self.effect.transfer(self.setting, psi)
+        if seen is not None:
+            own = np.einsum("npijf,njkf->npikf", seen.slope, h)
+            slope = np.einsum("nijf,npjkf->npikf", seen.left, slope, optimize=True)
+            slope = np.concatenate([slope, own], axis=1)
+            h = np.einsum("nijf,njkf->nikf", seen.left, h)
+        return h, slope
+
+    def by_pose(self, x: np.ndarray) -> ByPose:
+        """Misfit of each pose at x."""
+        h, slope = self.response(x)
+        residual, slope = self._residual(h, slope)
+        n, d = slope.shape[:2]
+        j = np.ascontiguousarray(slope).reshape(n, d, -1).view(float)
+        r = np.ascontiguousarray(residual).reshape(n, -1).view(float)
+        free, size = np.flatnonzero(self.free), len(x)
+        gradient, normal = np.zeros((n, size)), np.zeros((n, size, size))
+        gradient[:, free] = (j @ r[..., None])[..., 0]
+        normal[:, free[:, None], free] = j @ np.swapaxes(j, 1, 2)
+        return ByPose(np.sum(r**2, axis=1), gradient, normal)
+
+    def __call__(self, x: np.ndarray) -> Quadratic:
+        """Data and prior together; ∞ where x cannot be."""
+        away, scale = (x - self.mean) / self.sd, 1 / self.sd
+        a, b = self.split
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        if np.abs(away).max() > FARTHEST or np.linalg.eigvalsh(mass)[:, 0].min() <= 0:
+            nothing = np.zeros(len(x))
+            return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
+        data = self.by_pose(x)
+        if self.logarithmic:
+            away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
+        chi2 = float(data.chi2.sum())
+        return Quadratic(
+            (chi2 + float(away @ away)) / 2,
+            data.gradient.sum(axis=0) + np.where(self.free, scale * away, 0.0),
+            data.normal.sum(axis=0) + np.diag(scale**2),
+            chi2,
+        )
+
+    def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        weight, measured = self.weight, self.measured.accelerance
+        if not self.logarithmic:
+            slope *= weight[:, None]
+            return weight * (h - measured), slope
+        least = 1e-9 * np.abs(measured) + 1e-300
+        safe = np.where(np.abs(h) >= least, h, least)
+        return weight * np.log(safe / measured), slope * (weight / safe)[:, None]

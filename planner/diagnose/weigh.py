@@ -1,0 +1,72 @@
+"""Probabilities of candidates that stay honest where none of them is quite right."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnose.fit import Fit
+
+ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
+TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
+BOOTSTRAPS = 400
+UNKNOWN_PARAMETERS = 20  # what an unknown effect is charged for, half a ln(count) each
+
+
+def temper(misfit: float, shared: float = 1.0) -> float:
+    """T by which χ² is divided: `shared` at the noise; grows with the share that is not noise."""
+    excess = max(0.0, 1 - 1 / max(misfit, 1e-9))
+    return max(misfit, 1.0) * (shared + ALIKE * excess)
+
+
+def shared_noise(spacing_hz: float, rate_1_s: float) -> float:
+    """Lines over which an exponential window smears the noise: Σ |correlation|² over all lags.
+
+    Noise under e^(−σt) is correlated as 1 / (1 + iΔω/2σ) over Δω.
+    """
+    if rate_1_s <= 0:
+        return 1.0
+    a = 2 * np.pi * spacing_hz / (2 * rate_1_s)
+    return float(np.pi / a / np.tanh(np.pi / a))
+
+
+@dataclass(frozen=True, eq=False)
+class Weights:
+    """Probabilities of the fits, in their order, then of "unknown"; T; scores for pictures."""
+
+    probabilities: np.ndarray
+    temper: float
+    log_evidence: np.ndarray
+    held_out: np.ndarray  # (fits, n) χ²
+
+
+def weigh(fits: Sequence[Fit], seed: int = 0) -> Weights:
+    """Tempered evidence, averaged over which poses might have been taken.
+
+    The average is a Bayesian bootstrap over poses, as in pseudo-BMA+ (Yao et al. 2018, section
+    3.4), of the poses' own misfits: what rests on one pose alone gets no certainty from it.
+    """
+    best = min(f.per_value for f in fits)
+    measured = fits[0].misfit.measured
+    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
+    rate = float(np.median((measured.s.real)[:, 0]))
+    t = temper(best, shared_noise(spacing, rate))
+    evidence = np.array([f.log_evidence(t) + np.log(f.effect.prior) for f in fits])
+    held = np.array([f.held_out(t) for f in fits])
+    count = float(fits[0].misfit.counts.sum())
+    charge = UNKNOWN_PARAMETERS / 2 * np.log(max(count / t, 2.0))
+    unknown = -TOLERATED * count / (2 * t) - charge + _volume(fits[0], t)
+    n = held.shape[1]
+    shares = np.random.default_rng(seed).dirichlet(np.ones(n), BOOTSTRAPS) * n
+    chi2 = np.array([f.data.chi2 for f in fits])
+    scores = -((shares - 1) @ (chi2 - chi2[int(np.argmax(evidence))]).T) / (2 * t)
+    total = np.append(scores + evidence, np.full((BOOTSTRAPS, 1), unknown), axis=1)
+    total -= total.max(axis=1, keepdims=True)
+    weights = np.exp(total)
+    weights /= weights.sum(axis=1, keepdims=True)
+    return Weights(weights.mean(axis=0), t, evidence, held)
+
+
+def _volume(fit: Fit, t: float) -> float:
+    """Log evidence of a fit without its χ²: what springs and nuisances cost any candidate."""
+    return fit.log_evidence(t) + float(fit.data.chi2.sum()) / (2 * t)

@@ -1,0 +1,42 @@
+"""Simulated hits on a robot that deviates from its folder, as FRFs, from the other engine."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from known_robots import KnownRobot
+from planner.frf.estimate import estimate
+from planner.frf.types import Frf
+from planner.physics.simulation import Simulation
+from planner.recording.types import Hit
+from planner.robot.robot import Robot
+from planner.truth.deviation import AddedMass, Deviation, Spring
+from planner.truth.hits import Hammer, simulate_hit
+from planner.truth.model import load_truth
+
+RATE_1_S = 1.5  # exponential window: decays are over when the record ends
+
+
+def hidden(
+    robot: KnownRobot,
+    folder: Path,
+    seed: int,
+    extra: tuple[Spring, ...] = (),
+    added: tuple[AddedMass, ...] = (),
+    channel: Callable[[np.ndarray], np.ndarray] = lambda a: a,
+    poses: int = 8,
+) -> tuple[list[Frf], np.ndarray, Simulation]:
+    """FRFs of 9 hits a pose, poses (n, 6) in rad, and the simulation that knows of nothing."""
+    path = robot.write(folder / "robot")
+    scatter = {"stiffness": 0.1, "damping": 0.2, "inertia": 0.04, "com_m": 0.005}
+    truth = load_truth(path, Deviation(seed=seed, extra=extra, added=added, **scatter))
+    hammer, q, out = Hammer(), robot.poses(poses, seed), []
+    for number, row in enumerate(q):
+        rng, hits = np.random.default_rng([seed, number]), []
+        for axis in ("+x", "+y", "+z") * 3:
+            hit = simulate_hit(truth, row, axis, hammer, rng)
+            seen = channel(hit.acceleration_m_s2)
+            hits.append(Hit(Path("hit"), axis, hammer.sampling_rate_hz, hit.force_n, seen))
+        out.append(estimate(tuple(hits), robot.band_hz, exponential_rate_1_s=RATE_1_S))
+    return out, q, Simulation(Robot.load(path))

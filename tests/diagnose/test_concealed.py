@@ -1,0 +1,56 @@
+"""One hidden effect each, made by the other engine: pytest -m slow tests/diagnose -s"""
+
+import numpy as np
+import pytest
+
+from concealed import hidden
+from known_robots import IRB6640, KR210
+from planner.diagnose.diagnose import diagnose
+from planner.truth.deviation import Spring
+
+pytestmark = pytest.mark.slow
+
+
+def told(diagnosis):
+    for c in diagnosis.candidates[:4]:
+        print(f"{c.effect} at {c.at}: {c.probability:.3f}, misfit {c.misfit:.3f}")
+    print(f"{diagnosis.candidates[0].text} {diagnosis.seconds:.1f} s")
+    assert abs(sum(c.probability for c in diagnosis.candidates) - 1) < 1e-9
+    return diagnosis.candidates[0].effect, diagnosis.candidates[0].at
+
+
+def test_nothing_is_found_where_nothing_is_hidden(tmp_path):
+    diagnosis = diagnose(*hidden(IRB6640, tmp_path, 71))
+    assert told(diagnosis) == ("none", None)
+    assert diagnosis.verdict == "consistent"
+
+
+def test_soft_base(tmp_path):
+    stiffness = (1.9e7, 1.2e7)
+    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    extra = tuple(Spring("base", a, k, 5e-4 * k) for a, k in zip(axes, stiffness, strict=True))
+    diagnosis = diagnose(*hidden(KR210, tmp_path, 72, extra))
+    assert told(diagnosis) == ("base_compliance", "base")
+    assert diagnosis.verdict == "explained"
+    found = diagnosis.candidates[0].parameters
+    for axis, k in zip("xy", stiffness, strict=True):
+        assert abs(found[f"stiffness of base about {axis}"][0] / k - 1) < 0.02
+
+
+def test_gain_of_one_channel(tmp_path):
+    def channel(a: np.ndarray) -> np.ndarray:
+        return a * np.array([[1.0], [0.8], [1.0]])
+
+    diagnosis = diagnose(*hidden(KR210, tmp_path, 73, channel=channel))
+    assert told(diagnosis) == ("sensor_gain", "sensor_y")
+    assert abs(diagnosis.candidates[0].parameters["gain"][0] - 0.8) < 0.002
+
+
+def test_what_no_candidate_describes_is_unknown(tmp_path):
+    def channel(a: np.ndarray) -> np.ndarray:  # cross-talk that depends on time
+        ripple = np.sin(np.linspace(0, 40, a.shape[1]))
+        return a + 0.3 * ripple * a[[1, 2, 0]]
+
+    diagnosis = diagnose(*hidden(KR210, tmp_path, 74, channel=channel))
+    told(diagnosis)
+    assert diagnosis.verdict == "unexplained"
