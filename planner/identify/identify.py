@@ -20,8 +20,7 @@ from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-LOG_LINES = 64  # a pose, in the logarithmic stages
-LOG_STEPS, STEPS = 40, 80
+STEPS = 80
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
@@ -42,10 +41,16 @@ class Effort:
     last_completions: int = 6
     tolerance: float = 1e-6
     sloped: bool = True  # a completion holds to first order, not at one point only
+    stages: tuple[float, ...] = STAGES
+    log_lines: int = 64  # a pose, in the logarithmic stages
+    log_steps: int = 40
+    doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
 
 
 THOROUGH = Effort()
-QUICK = Effort(64, 96, 0, 2, 1e-4, sloped=False)
+QUICK = Effort(
+    48, 80, 0, 1, 1e-4, False, stages=(0.28, 1.0), log_lines=40, log_steps=12, doubtful=False
+)
 
 
 @dataclass(frozen=True)
@@ -177,14 +182,15 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
 def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
     """(θ, φ) from where the plain residual leads home: logarithms in bands that widen."""
     low, high = problem.band_hz
-    for share in STAGES:
+    effort = problem.effort
+    for share in effort.stages:
         stage = f"logarithms up to {low + share * (high - low):.0f} Hz"
-        objective = problem.objective(share, LOG_LINES, logarithmic=True)
-        theta = problem.minimise(objective, theta, number, stage, LOG_STEPS).x
+        objective = problem.objective(share, effort.log_lines, logarithmic=True)
+        theta = problem.minimise(objective, theta, number, stage, effort.log_steps).x
     x = np.concatenate([theta, np.zeros(len(problem.parametrisation.nuisances))])
     if problem.inertial:
-        objective = problem.objective(1.0, LOG_LINES, logarithmic=True, inertia=True)
-        x = problem.minimise(objective, x, number, "logarithms, inertias free", LOG_STEPS).x
+        objective = problem.objective(1.0, effort.log_lines, logarithmic=True, inertia=True)
+        x = problem.minimise(objective, x, number, "logarithms, inertias free", effort.log_steps).x
     return x
 
 
@@ -223,7 +229,8 @@ def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | No
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
     end, misfit = _refine(problem, np.array([*p.near(np.array(theta)), *phi]))
-    return (end, misfit) if misfit < STILL_GOOD * max(warm.misfit, 1.0) else None
+    good = misfit < STILL_GOOD * max(warm.misfit, 1.0)
+    return (end, misfit) if good or not problem.effort.doubtful else None
 
 
 def _result(
