@@ -20,7 +20,6 @@ from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-STEPS = 80
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
@@ -44,6 +43,7 @@ class Effort:
     stages: tuple[float, ...] = STAGES
     log_lines: int = 64  # a pose, in the logarithmic stages
     log_steps: int = 40
+    steps: int = 80
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
 
 
@@ -202,10 +202,10 @@ def _plain(
     tail = bool(np.isfinite(objective.measured.tail_s).any())
     sloped = problem.effort.sloped
     objective = objective.completed(x, sloped) if tail else objective
-    end = problem.minimise(objective, x, number, stage, STEPS)
+    end = problem.minimise(objective, x, number, stage, problem.effort.steps)
     for _ in range(completions if tail else 0):
         objective = objective.completed(end.x, sloped)
-        before, end = end.x, problem.minimise(objective, end.x, number, stage, STEPS)
+        before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
         moved = end.x - before
         # Where the misfit exceeds the noise, so do the sds in which a move counts.
         settled = SETTLED * max(1.0, end.at.chi2 / max(objective.count, 1))
