@@ -1,5 +1,6 @@
 """The measuring chain as one effect: a matrix between true and recorded accelerations, a delay."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,25 +20,25 @@ class SensorChain(Effect):
     """
 
     windowed: bool = False
-    begin: tuple[float, ...] = ()
+    begin: tuple[tuple[float, ...], ...] = ()
 
     name = "sensor_chain"
     artefact = True
 
     @classmethod
-    def build(cls, start: np.ndarray | None = None, windowed: bool = False) -> "SensorChain":
-        """From a start of A (3, 3)."""
-        rate = [Quantity("rate", "1/s", np.log(RATE_1_S[0]), RATE_1_S[1], True)]
+    def build(cls, starts: Sequence[np.ndarray], windowed: bool = False) -> "SensorChain":
+        """From several starts of A (3, 3)."""
+        rate = [Quantity("rate", "1/s", float(np.log(RATE_1_S[0])), RATE_1_S[1], True)]
         delay = Quantity("delay", "s", 0.0, DELAY_SD_S)
         entries = [Quantity(f"a_{i}{j}", "1", 0.0, MATRIX_SD) for i in "xyz" for j in "xyz"]
         quantities = (*(rate if windowed else []), delay, *entries)
-        first = np.zeros(9) if start is None else (start - np.eye(3)).ravel()
-        begin = [float(q.mean) for q in quantities[:-9]] + [float(v) for v in first]
-        return cls("sensor", quantities, windowed, tuple(begin))
+        first = [q.mean for q in quantities[:-9]]
+        begin = tuple((*first, *(float(v) for v in (a - np.eye(3)).flat)) for a in starts)
+        return cls("sensor", quantities, windowed, begin)
 
     def starts(self) -> np.ndarray:
         """See `Effect.starts`."""
-        return np.array([self.begin])
+        return np.array(self.begin)
 
     def rate(self, psi: np.ndarray) -> float | None:
         """See `Effect.rate`."""
