@@ -27,6 +27,8 @@ class Column:
     accelerance: np.ndarray
     variance: np.ndarray
     rate_1_s: float
+    force: np.ndarray  # (F,) in N·s: of one hit, time being 0 at its peak
+    hits: tuple[Hit, ...]
 
 
 class Pulse(NamedTuple):
@@ -87,7 +89,8 @@ def column(
     variance[:, weak] = np.inf
     peak = float(np.mean([peak_n(hit) for hit in hits]))
     total = laid_1_s + carried_1_s
-    return Column(axis, level, peak, frequency[lines], h, variance, total)
+    line = np.exp(2j * np.pi * frequency[lines] * pulse(hits[0]).peak / rate) / rate
+    return Column(axis, level, peak, frequency[lines], h, variance, total, force[0] * line, hits)
 
 
 def _spectrum(

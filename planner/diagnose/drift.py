@@ -23,6 +23,7 @@ SD = 0.2  # of ψ at the end
 BEND_SD = 3.0  # of κ in (1 − e^(−κ·order)) / (1 − e^(−κ)): 0 is linear, large is a warming up
 ALIKE = 40.0  # neighbouring values that err alike where the simulation lacks something
 CLEAR = 8.0
+SHARE = 3.0  # by which the misfit has to fall: physics that goes with the pose gains less
 STILL = 2.0  # times the noise: a pose that answers alike when visited again has not drifted
 
 
@@ -156,7 +157,8 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     plain, *found = fits(recorded, nominal)
     best = settle(min(found, key=lambda f: f.per_value))
     finding = evaluate(plain, best)
-    return (finding,) if finding.log_evidence > CLEAR else ()
+    explained = plain.per_value > SHARE * best.per_value
+    return (finding,) if explained and finding.log_evidence > CLEAR else ()
 
 
 def evaluate(plain: Fit, best: Fit) -> Finding:
