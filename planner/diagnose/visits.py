@@ -75,6 +75,10 @@ class Recorded:
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], ...]:
         """Of each visit: one column per hit axis and force level that was hit, weakest first."""
+        return self.columns_at(LAID)
+
+    def columns_at(self, laid_1_s: float) -> tuple[tuple[Column, ...], ...]:
+        """As `columns`, with an exponential window of this rate (1/s) laid over the records."""
         length = max(len(hit.force_n) for visit in self.visits for hit in visit.hits)
         out = []
         for visit in self.visits:
@@ -82,8 +86,8 @@ class Recorded:
             for hit in visit.hits:
                 groups.setdefault((hit.axis_index, self.level(hit)), []).append(hit)
             found = [
-                column(tuple(hits), axis, level, length, self.band_hz, LAID, self.window_rate_1_s)
-                for (axis, level), hits in sorted(groups.items())
+                column(tuple(hits), *at, length, self.band_hz, laid_1_s, self.window_rate_1_s)
+                for at, hits in sorted(groups.items())
             ]
             out.append(tuple(found))
         return tuple(out)

@@ -1,0 +1,175 @@
+"""The screen for what depends on the force level: nonlinear joints, and what no joint explains."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.diagnose.drift import problem_of
+from planner.diagnose.effect import Effect
+from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
+from planner.diagnose.finding import Finding
+from planner.diagnose.fit import Fit, fit
+from planner.diagnose.nonlinear import Candidate, Data, data_of, descend, own_parameter
+from planner.diagnose.starts import starts
+from planner.diagnose.tone import screen_tone
+from planner.diagnose.visits import Recorded
+from planner.physics.simulation import Simulation
+
+PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same
+ALSO = 2.5  # joints whose equivalent stiffness explains nearly as much are fitted too
+JOINTS = 2
+ROUNDS, MORE = 3, 9
+HOPELESS = 4.0  # times the best χ² after ROUNDS
+ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
+EXPLAINED = 0.9  # of the excess of χ² of the levels' differences, that a law has to take away
+CLEAR = 8.0
+# What step, window and record length leave of a law's numbers (relative sd).
+NUMERICS = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A law at a joint: its log evidence over a linear joint, and the share that it explains."""
+
+    candidate: Candidate
+    at: str
+    log_evidence: float
+    explained: float
+    per_value: float
+    parameters: dict[str, tuple[float, float, str]]
+
+
+def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
+    """Nonlinear joints; `unknown` where the level matters and no joint's law explains it."""
+    if len(recorded.level_n) < 2:
+        return ()
+    tone = screen_tone(recorded)
+    if tone is not None:
+        return (tone,)
+    plain = fit(problem_of(recorded, nominal), Effect(""))
+    system = system_of(plain)
+    found = equivalent(recorded, system)
+    if not len(found.count) or disproportion(found) < PROPORTIONAL:
+        return ()
+    weighed = weigh(recorded, plain, system, found)
+    best = weighed[0]
+    if best.log_evidence > CLEAR and best.explained > EXPLAINED:
+        return (_finding(best),)
+    text = (
+        "The response is not proportional to the force, and no law of a single joint describes "
+        f"how: the best, {best.candidate.law.effect.replace('_', ' ')} at {best.at}, explains "
+        f"{100 * max(best.explained, 0):.0f} % of the differences between force levels."
+    )
+    return (Finding("unknown", None, _excess(found) / 2, {}, text),)
+
+
+def disproportion(found: Equivalent) -> float:
+    """χ² per value of the differences between force levels, 1 if the structure is linear."""
+    return float(found.before.sum() / max(found.count.sum(), 1))
+
+
+def _excess(found: Equivalent) -> float:
+    return float(found.before.sum() - found.count.sum())
+
+
+def weigh(
+    recorded: Recorded, plain: Fit, system: System, found: Equivalent
+) -> tuple[Weighed, ...]:
+    """Every law at the joints that come into question, fitted in time, most probable first."""
+    data = data_of(recorded, plain)
+    left = found.chi2.sum(axis=0)
+    order = np.argsort(left)[:JOINTS]
+    ports = [int(j) for j in order if left[j] < ALSO * left[order[0]]]
+    begin: list[Candidate] = []
+    for port in ports:
+        own = own_parameter(plain, int(system.blocks[port]))
+        begin += starts(found, system, port, plain.x, own)
+    rough = descend(data, plain, begin, ROUNDS)
+    best = min(c.chi2 for c in rough)
+    kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
+    return _weighed(data, plain, system, kept)
+
+
+def _weighed(
+    data: Data, plain: Fit, system: System, kept: list[Candidate]
+) -> tuple[Weighed, ...]:
+    count = 2 * int(np.count_nonzero(data.weight))
+    misfit = max(1.0, min(2 * c.chi2 for c in kept) / count)
+    temper = misfit * (1 + ALIKE * (1 - 1 / misfit))
+    linear = _linear(data, plain)
+    weaker = (data.best != np.arange(len(data.h)))[:, None, None]
+    values = np.count_nonzero(data.weight * weaker)
+    excess = max(linear[1] - values, 1e-9)
+    out = []
+    for c in kept:
+        evidence = (linear[0] - c.chi2) / temper - _volume(plain, c, temper)
+        explained = 1 - max(c.chi2 - linear[2] - values, 0.0) / excess
+        parameters = _parameters(plain, c, temper)
+        out.append(
+            Weighed(c, system.ports[c.port], evidence, explained, 2 * c.chi2 / count, parameters)
+        )
+    return tuple(sorted(out, key=lambda w: -w.log_evidence))
+
+
+def _linear(data: Data, plain: Fit) -> tuple[float, float, float]:
+    """Σ weight |error|² of the linear fit: in all, of the weaker columns, of the strongest.
+
+    A linear simulation says that levels do not differ; of the strongest only the noise is counted,
+    because a linear fit could still follow them.
+    """
+    weaker = (data.best != np.arange(len(data.h)))[:, None, None]
+    change = np.where(weaker, np.abs(data.h - data.h[data.best]) ** 2, 0.0)
+    levels = float(np.sum(data.weight * change))
+    strongest = float(np.count_nonzero(data.weight * ~weaker))
+    return levels + strongest, levels, strongest
+
+
+def _volume(plain: Fit, candidate: Candidate, temper: float) -> float:
+    """What ν costs: ln of how much narrower the data make it than the prior, and its distance."""
+    mean, sd = candidate.prior
+    spread = np.sqrt(np.diagonal(_covariance(candidate, temper))[-2:])
+    away = (candidate.nu - mean) / sd
+    return float(away @ away) / 2 + float(np.sum(np.log(sd / np.minimum(spread, sd))))
+
+
+def _covariance(candidate: Candidate, temper: float) -> np.ndarray:
+    """Of (x, ν)."""
+    assert candidate.normal is not None
+    return np.linalg.inv(2 * candidate.normal / temper)
+
+
+def _parameters(
+    plain: Fit, candidate: Candidate, temper: float
+) -> dict[str, tuple[float, float, str]]:
+    c = candidate
+    spread = _covariance(c, temper)[-2:, -2:]
+    share = c.nu[0] if c.law.signed else 1.0
+    to_k = np.array([c.k / share if c.law.signed else c.k, 0.0])
+    to_a = np.array([0.0, c.a])
+    second, value = (to_a, c.a)
+    if c.law.effect == "friction":
+        second, value = c.a * to_k + c.k * to_a, c.k * c.a
+    out = {}
+    for (name, unit), v, slope in zip(
+        c.law.names, (c.k, value), (to_k, second), strict=True
+    ):
+        sd = float(np.hypot(np.sqrt(slope @ spread @ slope), NUMERICS * v))
+        out[name] = (float(v), sd, unit)
+    return out
+
+
+def _finding(best: Weighed) -> Finding:
+    (first, (k, k_sd, unit)), (second, (a, a_sd, other)) = best.parameters.items()
+    name = best.candidate.law.effect
+    how = {
+        "friction": "sticks and slides: presliding friction",
+        "backlash": "has play",
+        "nonlinear_stiffness": "grows stiffer as it swings" if k > 0 else "grows softer as it swings",
+    }[name]
+    text = (
+        f"{best.at.replace('_', ' ').capitalize()} {how} "
+        f"({first.replace('_', ' ')} {k:.3g} ± {k_sd:.1g} {unit}, {second.replace('_', ' ')} "
+        f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
+        "change with the force."
+    )
+    return Finding(name, best.at, best.log_evidence, best.parameters, text)

@@ -1,0 +1,304 @@
+"""A joint that is not linear: found in FRFs per force level, fitted to the recorded hits in time.
+
+The strongest hits hold the linear parameters (with priors, inertias among them); the differences
+between weaker hits and the strongest ones hold the law, because what the simulation lacks
+otherwise is the same at all levels and drops out of them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.diagnose.columns import Column
+from planner.diagnose.equivalent import System, receptances, system_of
+from planner.diagnose.fit import Fit
+from planner.diagnose.laws import Law
+from planner.diagnose.timedomain import FASTEST, Seen, Strokes, seen, spectra, strokes, torques
+from planner.diagnose.visits import Recorded
+from planner.physics.gradient import response_gradient
+
+LINES = 64
+LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
+MODEL_ERROR = 0.01  # of an FRF, and of a difference
+DIFFERENCE_ERROR = 0.003  # of the FRFs between which the difference is taken
+SHARE_SD, LOG_SHARE, LOG_SHARE_SD, LOG_ANGLE_SD = 1.5, np.log(0.5), 1.5, 2.0
+STEP = 1e-3  # of finite differences in ν and in the joint's own ln stiffness
+FARTHEST = 6.0
+LONGEST = 0.7  # step, in the logarithms of the law or in sds of the linear parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """c columns of n visits on common lines s (F,): FRFs (c, 3, F), `best` (c,) the strongest one.
+
+    `weight` (c, 3, F) is 1/E|error|² of what is compared: a strongest column itself, the
+    difference to it of a weaker one. `slope` (b, D, 3, F) are derivatives of the strongest columns
+    `strong` (b,) by the linear parameters; `normal` (D, D) is what they alone tell.
+    """
+
+    s: np.ndarray
+    h: np.ndarray
+    weight: np.ndarray
+    best: np.ndarray
+    strong: np.ndarray
+    hits: Strokes
+    slope: np.ndarray
+    normal: np.ndarray
+    fastest_hz: float
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A law at a port, at linear parameters x (D,) and ν = (share of the joint's stiffness, ln a).
+
+    Of laws with k > 0 it is the logarithm of the share. `chi2` over `count` complex values.
+    """
+
+    law: Law
+    port: int
+    scale: float
+    middle: float  # ln of the angle around which a is expected
+    x: np.ndarray
+    nu: np.ndarray
+    chi2: float = np.inf
+    value: float = np.inf
+    damping: float = 1e-2
+    normal: np.ndarray | None = None
+    gradient: np.ndarray | None = None
+
+    @property
+    def k(self) -> float:
+        """k in N·m/rad."""
+        return self.scale * float(self.nu[0] if self.law.signed else np.exp(self.nu[0]))
+
+    @property
+    def a(self) -> float:
+        """a in rad."""
+        return float(np.exp(self.nu[1]))
+
+    @property
+    def prior(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd of ν."""
+        if self.law.signed:
+            return np.array([0.0, self.middle]), np.array([SHARE_SD, LOG_ANGLE_SD])
+        return np.array([LOG_SHARE, self.middle]), np.array([LOG_SHARE_SD, LOG_ANGLE_SD])
+
+
+def data_of(recorded: Recorded, plain: Fit) -> Data:
+    """Columns of all visits, and what the linear simulation says of the strongest."""
+    columns: list[Column] = []
+    visits: list[int] = []
+    for number, group in enumerate(recorded.columns_at(LAID)):
+        columns += group
+        visits += [number] * len(group)
+    frequency = columns[0].frequency_hz
+    lines = np.unique(np.linspace(0, len(frequency) - 1, LINES).round().astype(int))
+    s = 2j * np.pi * frequency[lines] + columns[0].rate_1_s
+    h = np.array([c.accelerance[:, lines] for c in columns])
+    variance = np.array([c.variance[:, lines] for c in columns])
+    places = [(v, c.axis) for v, c in zip(visits, columns, strict=True)]
+    best = np.array([max(i for i, p in enumerate(places) if p == place) for place in places])
+    weaker = best != np.arange(len(best))
+    change = np.abs(h - h[best])
+    error = np.where(
+        weaker[:, None, None],
+        variance + variance[best] + (MODEL_ERROR * change) ** 2 + (DIFFERENCE_ERROR * np.abs(h)) ** 2,
+        variance + (MODEL_ERROR * np.abs(h)) ** 2,
+    )
+    weight = np.where(np.isfinite(error), 1 / error, 0.0)
+    strong = np.flatnonzero(~weaker)
+    slope = _slopes(plain, s)
+    slope = np.array([slope[visits[i], :, :, columns[i].axis] for i in strong])
+    d = slope.shape[1]
+    normal = np.zeros((d, d))
+    for row, w in zip(slope, weight[strong], strict=True):
+        scaled = (row * np.sqrt(w)).reshape(d, -1)
+        normal += (scaled @ scaled.conj().T).real
+    fastest = FASTEST * float(frequency[-1])
+    return Data(s, h, weight, best, strong, strokes(visits, columns), slope, normal, fastest)
+
+
+def _slopes(plain: Fit, s: np.ndarray) -> np.ndarray:
+    """Derivatives (n, D, 3, 3, F) by springs and inertias at the linear fit."""
+    misfit = plain.misfit
+    a, b = misfit.split
+    p, n = misfit.parametrisation, len(misfit.matrices.mass)
+    mass = misfit.matrices.mass + misfit.inertias.mass_change(plain.x[a:b])
+    every = np.broadcast_to(s, (n, len(s)))
+    full = response_gradient(
+        misfit.matrices, p.elasticity(plain.x[:a]), every, mass, misfit.inertias
+    )[1]
+    springs = len(p.held)
+    theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
+    return np.concatenate([theta, full[:, springs:]], axis=1)
+
+
+def own_parameter(plain: Fit, block: int) -> int:
+    """Which entry of x is the logarithm of a spring's stiffness."""
+    for i, parameter in enumerate(plain.misfit.parametrisation.parameters):
+        if parameter.kind == "stiffness" and block in parameter.blocks:
+            return i
+    raise ValueError("the joint's spring is no parameter")
+
+
+def predict(
+    data: Data, plain: Fit, candidates: list[Candidate]
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """FRFs (c, 3, F) of all columns, and derivatives (3, c, 3, F) by ν and the own ln stiffness."""
+    systems = [system_of(plain, c.x) for c in candidates]
+    c = len(data.h)
+    ports, laws, k, a, extra = [], [], [], [], []
+    for number, (candidate, system) in enumerate(zip(candidates, systems, strict=True)):
+        view = seen(system, candidate.port, data.hits, data.fastest_hz)
+        own = system.elasticity.stiffness[system.blocks[candidate.port]]
+        for which in range(4):
+            ports.append(view)
+            shift = np.zeros(2)
+            if which in (1, 2):
+                shift[which - 1] = STEP
+            moved = replace(candidate, nu=candidate.nu + shift)
+            k.append(np.full(c, moved.k))
+            a.append(np.full(c, moved.a))
+            extra.append(np.full(c, STEP * own if which == 3 else 0.0))
+            first = (4 * number + which) * c
+            laws.append((candidate.law, slice(first, first + c)))
+    torque = torques(_joined(laws), *map(np.concatenate, (k, a, extra)), _side_by_side(ports))
+    out = []
+    for number, (candidate, system) in enumerate(zip(candidates, systems, strict=True)):
+        parts = [torque[:, (4 * number + i) * c : (4 * number + i + 1) * c] for i in range(4)]
+        h = [_frfs(data, system, candidate.port, spectra(p, data.hits, data.s)) for p in parts]
+        out.append((h[0], (np.array(h[1:]) - h[0]) / STEP))
+    return out
+
+
+def _joined(laws: list[tuple[Law, slice]]) -> list[tuple[Law, slice]]:
+    """Neighbours that follow the same law, as one."""
+    out = [laws[0]]
+    for law, part in laws[1:]:
+        if law is out[-1][0]:
+            out[-1] = law, slice(out[-1][1].start, part.stop)
+        else:
+            out.append((law, part))
+    return out
+
+
+def _side_by_side(ports: list[Seen]) -> Seen:
+    most = max(len(p.grow) for p in ports)
+
+    def padded(values: np.ndarray) -> np.ndarray:
+        return np.pad(values, ((0, most - len(values)), (0, 0)))
+
+    return Seen(
+        np.concatenate([padded(p.grow) for p in ports], axis=1),
+        np.concatenate([padded(p.drive) for p in ports], axis=1),
+        np.concatenate([p.gives for p in ports]),
+        np.concatenate([p.free for p in ports], axis=1),
+    )
+
+
+def _frfs(data: Data, system: System, port: int, torque: np.ndarray) -> np.ndarray:
+    """H = s² (G − G_port T / F) of all columns (c, 3, F)."""
+    force = spectra(data.hits.force.T, data.hits, data.s)
+    out = np.empty_like(data.h)
+    for visit in np.unique(data.hits.visit):
+        found = receptances(system, int(visit), data.s)
+        for c in np.flatnonzero(data.hits.visit == visit):
+            part = torque[c] / force[c]
+            linear = found.sensor_hit[:, :, data.hits.axis[c]]
+            out[c] = (data.s[:, None] ** 2 * (linear - found.sensor_port[:, :, port] * part[:, None])).T
+    return out
+
+
+def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candidate]:
+    """The candidates with χ², objective, gradient and Gauss-Newton matrix where they are."""
+    out = []
+    found = predict(data, plain, candidates)
+    mean, sd = plain.misfit.mean, plain.misfit.sd
+    d = len(plain.x)
+    for candidate, (h, slope) in zip(candidates, found, strict=True):
+        own = own_parameter(plain, int(_block(plain, candidate)))
+        compared = _compare(data, data.h) - _compare(data, h)
+        moved = np.array([_compare(data, one) for one in slope])
+        chi2 = float(np.sum(data.weight * np.abs(compared) ** 2))
+        if not np.isfinite(chi2):
+            out.append(replace(candidate, chi2=np.inf, value=np.inf))
+            continue
+        full = np.zeros((d + 2, d + 2))
+        full[:d, :d] = data.normal
+        gradient = np.zeros(d + 2)
+        at = np.array([d, d + 1, own])
+        linear = data.slope.copy()
+        linear[:, own] = 0.0  # the own stiffness is told by the replica, at all levels
+        strong = data.strong
+        weighted = data.weight * compared
+        gradient[:d] = -np.einsum("bdjf,bjf->d", linear.conj(), weighted[strong]).real
+        cross = np.einsum(
+            "bdjf,pbjf->dp", linear.conj(), data.weight[strong] * moved[:, strong], optimize=True
+        ).real
+        full[own, :] = full[:, own] = 0.0
+        full[:d, at] += cross
+        full[at, :d] += cross.T
+        full[np.ix_(at, at)] += np.einsum("pcjf,qcjf->pq", moved.conj(), data.weight * moved).real
+        gradient[at] -= np.einsum("pcjf,cjf->p", moved.conj(), weighted).real
+        middle, width = candidate.prior
+        centre, scale = np.concatenate([mean, middle]), np.concatenate([sd, width])
+        away = (np.concatenate([candidate.x, candidate.nu]) - centre) / scale
+        full[np.diag_indices(d + 2)] += 0.5 / scale**2
+        gradient += 0.5 * away / scale
+        value = chi2 + 0.5 * float(away @ away)
+        out.append(replace(candidate, chi2=chi2, value=value, normal=full, gradient=gradient))
+    return out
+
+
+def _block(plain: Fit, candidate: Candidate) -> int:
+    return int(system_of(plain).blocks[candidate.port])
+
+
+def _compare(data: Data, h: np.ndarray) -> np.ndarray:
+    """Strongest columns as they are, weaker ones as differences to them."""
+    weaker = (data.best != np.arange(len(h)))[:, None, None]
+    return np.where(weaker, h - h[data.best], h)
+
+
+def step(plain: Fit, candidate: Candidate) -> Candidate:
+    """Where Levenberg and Marquardt would go next; not far at once."""
+    assert candidate.normal is not None
+    assert candidate.gradient is not None
+    full = candidate.normal + candidate.damping * np.diag(np.diagonal(candidate.normal))
+    move = -np.linalg.solve(full, candidate.gradient)
+    law, middle = candidate.law, candidate.middle
+    nu = candidate.nu + np.clip(move[-2:], -LONGEST, LONGEST)
+    low, high = law.least_share, law.most_share
+    if not law.signed:
+        low, high = np.log(low), np.log(high)
+    nu[0] = np.clip(nu[0], low, high)
+    nu[1] = np.clip(nu[1], middle - FARTHEST, middle + FARTHEST)
+    sd = plain.misfit.sd
+    x = candidate.x + np.clip(move[:-2], -LONGEST * sd, LONGEST * sd)
+    mean = plain.misfit.mean
+    return replace(candidate, x=np.clip(x, mean - FARTHEST * sd, mean + FARTHEST * sd), nu=nu)
+
+
+def descend(
+    data: Data, plain: Fit, candidates: list[Candidate], rounds: int, tolerance: float = 1e-3
+) -> list[Candidate]:
+    """All candidates, some rounds further down; those that gain nothing more are left alone."""
+    out = list(candidates)
+    todo = [i for i, c in enumerate(out) if c.gradient is None]
+    for i, new in zip(todo, evaluate(data, plain, [out[i] for i in todo]) if todo else [], strict=True):
+        out[i] = new
+    active = [np.isfinite(c.value) for c in out]
+    for _ in range(rounds):
+        todo = [i for i, on in enumerate(active) if on]
+        if not todo:
+            break
+        for i, new in zip(todo, evaluate(data, plain, [step(plain, out[i]) for i in todo]), strict=True):
+            old = out[i]
+            if new.value < old.value and new.normal is not None:
+                active[i] = old.value - new.value > tolerance * old.value
+                out[i] = replace(new, damping=max(1e-6, old.damping / 10))
+            else:
+                out[i] = replace(old, damping=10 * old.damping)
+                active[i] = old.damping < 1e4
+    return out
+
