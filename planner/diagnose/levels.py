@@ -19,10 +19,11 @@ PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are t
 ALSO = 2.5  # joints whose equivalent stiffness explains nearly as much are fitted too
 JOINTS = 2
 ROUNDS, MORE = 3, 9
-HOPELESS = 4.0  # times the best χ² after ROUNDS
+HOPELESS = 10.0  # times the best χ² after ROUNDS
 ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
 EXPLAINED = 0.9  # of the excess of χ² of the levels' differences, that a law has to take away
 CLEAR = 8.0
+LINEARISED = 0.4  # of the same, by an equivalent stiffness for each hit: below, no joint it is
 # What step, window and record length leave of a law's numbers (relative sd).
 NUMERICS = 0.01
 
@@ -43,24 +44,38 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it."""
     if len(recorded.level_n) < 2:
         return ()
-    tone = screen_tone(recorded)
-    if tone is not None:
-        return (tone,)
     plain = fit(problem_of(recorded, nominal), Effect(""))
     system = system_of(plain)
     found = equivalent(recorded, system)
     if not len(found.count) or disproportion(found) < PROPORTIONAL:
         return ()
+    if equivalent_share(found) < LINEARISED:
+        tone = screen_tone(recorded)
+        if tone is not None:
+            return (tone,)
+        return (_unknown(found, "even with a stiffness of its own for every hit"),)
     weighed = weigh(recorded, plain, system, found)
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
         return (_finding(best),)
-    text = (
-        "The response is not proportional to the force, and no law of a single joint describes "
-        f"how: the best, {best.candidate.law.effect.replace('_', ' ')} at {best.at}, explains "
-        f"{100 * max(best.explained, 0):.0f} % of the differences between force levels."
+    law = best.candidate.law.effect.replace("_", " ")
+    return (
+        _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),
     )
-    return (Finding("unknown", None, _excess(found) / 2, {}, text),)
+
+
+def _unknown(found: Equivalent, how: str) -> Finding:
+    text = (
+        "The response is not proportional to the force, and no single joint describes how: "
+        f"{how}. Look for contact with the surroundings, loose parts or clearance."
+    )
+    return Finding("unknown", None, _excess(found) / 2, {}, text)
+
+
+def equivalent_share(found: Equivalent) -> float:
+    """Share of the levels' differences that a stiffness of its own a hit explains, best joint."""
+    left = float(found.chi2.sum(axis=0).min() - found.count.sum())
+    return 1 - max(left, 0.0) / max(_excess(found), 1e-9)
 
 
 def disproportion(found: Equivalent) -> float:
@@ -72,9 +87,7 @@ def _excess(found: Equivalent) -> float:
     return float(found.before.sum() - found.count.sum())
 
 
-def weigh(
-    recorded: Recorded, plain: Fit, system: System, found: Equivalent
-) -> tuple[Weighed, ...]:
+def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> tuple[Weighed, ...]:
     """Every law at the joints that come into question, fitted in time, most probable first."""
     data = data_of(recorded, plain)
     left = found.chi2.sum(axis=0)
@@ -84,15 +97,23 @@ def weigh(
     for port in ports:
         own = own_parameter(plain, int(system.blocks[port]))
         begin += starts(found, system, port, plain.x, own)
-    rough = descend(data, plain, begin, ROUNDS)
+    rough = descend(data, plain, _best_of_each(descend(data, plain, begin, 0)), ROUNDS)
     best = min(c.chi2 for c in rough)
     kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
     return _weighed(data, plain, system, kept)
 
 
-def _weighed(
-    data: Data, plain: Fit, system: System, kept: list[Candidate]
-) -> tuple[Weighed, ...]:
+def _best_of_each(candidates: list[Candidate]) -> list[Candidate]:
+    """One candidate for each port and law."""
+    best: dict[tuple[int, str], Candidate] = {}
+    for c in candidates:
+        known = best.get((c.port, c.law.effect))
+        if known is None or c.value < known.value:
+            best[c.port, c.law.effect] = c
+    return list(best.values())
+
+
+def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> tuple[Weighed, ...]:
     count = 2 * int(np.count_nonzero(data.weight))
     misfit = max(1.0, min(2 * c.chi2 for c in kept) / count)
     temper = misfit * (1 + ALIKE * (1 - 1 / misfit))
@@ -150,9 +171,7 @@ def _parameters(
     if c.law.effect == "friction":
         second, value = c.a * to_k + c.k * to_a, c.k * c.a
     out = {}
-    for (name, unit), v, slope in zip(
-        c.law.names, (c.k, value), (to_k, second), strict=True
-    ):
+    for (name, unit), v, slope in zip(c.law.names, (c.k, value), (to_k, second), strict=True):
         sd = float(np.hypot(np.sqrt(slope @ spread @ slope), NUMERICS * v))
         out[name] = (float(v), sd, unit)
     return out
@@ -164,7 +183,9 @@ def _finding(best: Weighed) -> Finding:
     how = {
         "friction": "sticks and slides: presliding friction",
         "backlash": "has play",
-        "nonlinear_stiffness": "grows stiffer as it swings" if k > 0 else "grows softer as it swings",
+        "nonlinear_stiffness": "grows stiffer as it swings"
+        if k > 0
+        else "grows softer as it swings",
     }[name]
     text = (
         f"{best.at.replace('_', ' ').capitalize()} {how} "

@@ -42,6 +42,7 @@ class Data:
     best: np.ndarray
     strong: np.ndarray
     hits: Strokes
+    force: np.ndarray  # (c, F) in N·s
     slope: np.ndarray
     normal: np.ndarray
     fastest_hz: float
@@ -102,7 +103,10 @@ def data_of(recorded: Recorded, plain: Fit) -> Data:
     change = np.abs(h - h[best])
     error = np.where(
         weaker[:, None, None],
-        variance + variance[best] + (MODEL_ERROR * change) ** 2 + (DIFFERENCE_ERROR * np.abs(h)) ** 2,
+        variance
+        + variance[best]
+        + (MODEL_ERROR * change) ** 2
+        + (DIFFERENCE_ERROR * np.abs(h)) ** 2,
         variance + (MODEL_ERROR * np.abs(h)) ** 2,
     )
     weight = np.where(np.isfinite(error), 1 / error, 0.0)
@@ -115,7 +119,9 @@ def data_of(recorded: Recorded, plain: Fit) -> Data:
         scaled = (row * np.sqrt(w)).reshape(d, -1)
         normal += (scaled @ scaled.conj().T).real
     fastest = FASTEST * float(frequency[-1])
-    return Data(s, h, weight, best, strong, strokes(visits, columns), slope, normal, fastest)
+    hits = strokes(visits, columns)
+    force = spectra(hits.force.T, hits, s)
+    return Data(s, h, weight, best, strong, hits, force, slope, normal, fastest)
 
 
 def _slopes(plain: Fit, s: np.ndarray) -> np.ndarray:
@@ -198,14 +204,15 @@ def _side_by_side(ports: list[Seen]) -> Seen:
 
 def _frfs(data: Data, system: System, port: int, torque: np.ndarray) -> np.ndarray:
     """H = s² (G − G_port T / F) of all columns (c, 3, F)."""
-    force = spectra(data.hits.force.T, data.hits, data.s)
     out = np.empty_like(data.h)
     for visit in np.unique(data.hits.visit):
         found = receptances(system, int(visit), data.s)
         for c in np.flatnonzero(data.hits.visit == visit):
-            part = torque[c] / force[c]
+            part = torque[c] / data.force[c]
             linear = found.sensor_hit[:, :, data.hits.axis[c]]
-            out[c] = (data.s[:, None] ** 2 * (linear - found.sensor_port[:, :, port] * part[:, None])).T
+            out[c] = (
+                data.s[:, None] ** 2 * (linear - found.sensor_port[:, :, port] * part[:, None])
+            ).T
     return out
 
 
@@ -285,14 +292,18 @@ def descend(
     """All candidates, some rounds further down; those that gain nothing more are left alone."""
     out = list(candidates)
     todo = [i for i, c in enumerate(out) if c.gradient is None]
-    for i, new in zip(todo, evaluate(data, plain, [out[i] for i in todo]) if todo else [], strict=True):
+    for i, new in zip(
+        todo, evaluate(data, plain, [out[i] for i in todo]) if todo else [], strict=True
+    ):
         out[i] = new
     active = [np.isfinite(c.value) for c in out]
     for _ in range(rounds):
         todo = [i for i, on in enumerate(active) if on]
         if not todo:
             break
-        for i, new in zip(todo, evaluate(data, plain, [step(plain, out[i]) for i in todo]), strict=True):
+        for i, new in zip(
+            todo, evaluate(data, plain, [step(plain, out[i]) for i in todo]), strict=True
+        ):
             old = out[i]
             if new.value < old.value and new.normal is not None:
                 active[i] = old.value - new.value > tolerance * old.value
@@ -301,4 +312,3 @@ def descend(
                 out[i] = replace(old, damping=10 * old.damping)
                 active[i] = old.damping < 1e4
     return out
-

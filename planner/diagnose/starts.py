@@ -9,6 +9,8 @@ from planner.diagnose.nonlinear import Candidate
 DECAY = np.linspace(0.0, 1.5, 6)  # ln of how far the swing has faded while it still counts
 EFFECTIVE = 0.7  # of the largest swing: not all modes peak at once
 ROUGH = 0.05  # error of an equivalent stiffness, in shares of the joint's
+MOST, MOST_LACKING = 5.0, 0.9  # of k, in shares of the joint's stiffness
+ASIDE = 4  # steps of the grid to the neighbours
 GRID = np.geomspace(0.01, 4.0, 28)  # a, times the median swing at the highest level
 
 
@@ -19,36 +21,44 @@ def faded(law: Law, swing: np.ndarray, a: float) -> np.ndarray:
     return each @ (weight / weight.sum())
 
 
-def starts(found: Equivalent, system: System, port: int, x: np.ndarray, own: int) -> list[Candidate]:
-    """One candidate a law (and sign of k), at the best of a grid of a."""
+def starts(
+    found: Equivalent, system: System, port: int, x: np.ndarray, own: int
+) -> list[Candidate]:
+    """Candidates of every law (and sign of k): the best of a grid of a, and its neighbours."""
     scale = float(system.elasticity.stiffness[system.blocks[port]])
-    swing, delta = found.swing[:, :, port], found.delta[:, port]
-    weight = 1 / (1 / np.maximum(found.precision[:, port], 1e-300) + (ROUGH * scale) ** 2)
-    middle = float(np.median(swing[:, 1]))
+    middle = float(np.median(found.swing[:, 1, port]))
     out = []
     for law in LAWS:
-        best: dict[int, tuple[float, float, float, float]] = {}
-        for a in GRID * middle:
-            weak, strong = faded(law, swing[:, 0], a), faded(law, swing[:, 1], a)
-            shape = weak - strong
-            power = float(np.sum(weight * np.abs(shape) ** 2))
-            k = float(np.sum(weight * (shape.conj() * delta).real)) / max(power, 1e-300)
-            sign = 1 if k > 0 else -1
-            if not law.signed and sign < 0:
+        tried = [_at(found, law, port, scale, float(a)) for a in GRID * middle]
+        for sign in (1, -1) if law.signed else (1,):
+            fitting = [(left, i) for i, (left, k, _) in enumerate(tried) if sign * k > 0]
+            if not fitting:
                 continue
-            low, high = law.least_share * scale, 5 * scale
-            k = float(np.clip(k, low if law.signed else 0.02 * scale, high))
-            left = float(np.sum(weight * np.abs(delta - k * shape) ** 2))
-            there = float(np.median(strong.real))
-            if sign not in best or left < best[sign][0]:
-                best[sign] = left, k, float(a), there
-        if not best:
-            best[1] = 0.0, 0.3 * scale, 0.3 * middle, 0.0
-        left, k, a, there = min(best.values())
-        moved = x.copy()
-        total = np.clip(1 - k * there / scale, 0.3, 3.0)
-        moved[own] += float(np.log(total))
-        share = k / scale
-        nu = np.array([share if law.signed else np.log(share), np.log(a)])
-        out.append(Candidate(law, port, scale, float(np.log(middle)), moved, nu))
+            best = min(fitting)[1]
+            for i in {max(best - ASIDE, 0), best, min(best + ASIDE, len(GRID) - 1)}:
+                _, k, there = tried[i]
+                if sign * k > 0:
+                    moved = x.copy()
+                    moved[own] += float(np.log(np.clip(1 - k * there / scale, 0.3, 3.0)))
+                    share = k / scale
+                    nu = np.array(
+                        [share if law.signed else np.log(share), np.log(GRID[i] * middle)]
+                    )
+                    out.append(Candidate(law, port, scale, float(np.log(middle)), moved, nu))
     return out
+
+
+def _at(
+    found: Equivalent, law: Law, port: int, scale: float, a: float
+) -> tuple[float, float, float]:
+    """What is left at a, the best k, and the equivalent stiffness per k of the strongest hits."""
+    swing, delta = found.swing[:, :, port], found.delta[:, port]
+    weight = 1 / (1 / np.maximum(found.precision[:, port], 1e-300) + (ROUGH * scale) ** 2)
+    weak, strong = faded(law, swing[:, 0], a), faded(law, swing[:, 1], a)
+    shape = weak - strong
+    power = float(np.sum(weight * np.abs(shape) ** 2))
+    k = float(np.sum(weight * (shape.conj() * delta).real)) / max(power, 1e-300)
+    high = MOST_LACKING if law.effect == "backlash" else MOST
+    k = float(np.clip(k, max(law.least_share, -0.9) * scale, high * scale))
+    left = float(np.sum(weight * np.abs(delta - k * shape) ** 2))
+    return left, k, float(np.median(strong.real))

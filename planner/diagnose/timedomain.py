@@ -18,7 +18,7 @@ from planner.diagnose.laws import Law
 FINER = 5  # steps a sample
 LASTS_S = 1.3  # after the pulse; the window makes the rest of no account
 FASTEST = 3.0  # times the band's end: poles beyond follow at once
-NEWTON = 4
+NEWTON = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,21 +85,37 @@ def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
     used = np.any(own != 0, axis=0)
     poles, own, struck = poles[:, used], own[:, used], struck[:, used]
     grow, older, newer = _weights(poles, hits.step_s)
-    v, a = hits.visit, hits.axis
-    free = np.empty((hits.force.shape[1], len(v)))
-    for c in range(len(v)):
-        # All poles in one: the sum over them as parallel first-order filters.
-        total = static_hit[v[c], a[c]] * hits.force[c]
-        for k in range(poles.shape[1]):
-            weight = struck[v[c], k, a[c]]
-            if weight == 0:
-                continue
-            b = weight * np.array([newer[v[c], k], older[v[c], k]])
-            total = total + signal.lfilter(b, [1.0, -grow[v[c], k]], hits.force[c]).real
-        free[:, c] = total
+    free = np.empty((hits.force.shape[1], len(hits.visit)))
+    for i in range(n):
+        here = np.flatnonzero(hits.visit == i)
+        weight = struck[i][:, hits.axis[here]]  # (p, c)
+        free[:, here] = _free(hits, here, poles[i], weight, (grow[i], older[i], newer[i]))
+        free[:, here] += static_hit[i, hits.axis[here]] * hits.force[here].T
+    v = hits.visit
     drive = own * (newer + older / grow)
     gives = np.sum(own * newer, axis=1).real + static
     return Seen(grow[v].T.copy(), drive[v].T.copy(), gives[v], free)
+
+
+def _free(
+    hits: Strokes,
+    here: np.ndarray,
+    poles: np.ndarray,
+    weight: np.ndarray,
+    rule: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Angles (n, c) of hits `here` on poles (p,), with weights (p, c): driven, then free."""
+    force = hits.force[here]
+    n = force.shape[1]
+    last = 1 + int(np.max(np.flatnonzero(np.any(force != 0, axis=0)), initial=1))
+    out, left = np.zeros((n, len(here))), np.zeros((len(poles), len(here)), dtype=complex)
+    for k, (grow, older, newer) in enumerate(zip(*rule, strict=True)):
+        y = signal.lfilter([newer, older], [1.0, -grow], force[:, :last].astype(complex), axis=1)
+        out[:last] += (y.T * weight[k]).real
+        left[k] = y[:, -1] * weight[k]
+    decay = np.exp(np.outer(np.arange(1, n - last + 1) * hits.step_s, poles))
+    out[last:] = decay.real @ left.real - decay.imag @ left.imag
+    return out
 
 
 def _poles(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -170,4 +186,5 @@ def spectra(torque: np.ndarray, hits: Strokes, s: np.ndarray) -> np.ndarray:
     kernel = np.exp(-np.outer(s, t))
     half = s * hits.step_s / 2
     linear = (np.sinh(half) / half) ** 2 * hits.step_s
-    return (kernel @ torque).T * linear * np.exp(np.outer(hits.zero_s, s))
+    both = kernel.real @ torque + 1j * (kernel.imag @ torque)
+    return both.T * linear * np.exp(np.outer(hits.zero_s, s))

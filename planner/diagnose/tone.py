@@ -2,45 +2,54 @@
 
 import numpy as np
 
+from planner.diagnose.columns import Column
 from planner.diagnose.finding import Finding
 from planner.diagnose.visits import Recorded
 
-SHARP = 3  # lines on each side that a tone may spread over
-LEAST = 12.0  # times the noise that a tone's power has to rise above
-COMMON = 0.5  # of the hits
+WIDTH_HZ = 1.0  # half of what a tone takes up under the window
+CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together
+LEAST = 1.5  # χ² per value: below it levels do not differ
 
 
 def screen_tone(recorded: Recorded) -> Finding | None:
-    """`unknown`, naming the frequency, where a line stays as loud however hard is hit.
+    """`unknown`, naming the frequency, where levels differ at one frequency, whatever the pose.
 
-    The end of each record, when most of the ringing is over, is compared between levels: ringing
-    grows with the force, a tone does not.
+    A tone adds the same to weak and strong hits, so that their FRFs differ there. Resonances,
+    where a nonlinear joint shows, move with the pose.
     """
-    hits = [hit for visit in recorded.visits for hit in visit.hits]
-    n = min(len(hit.force_n) for hit in hits) // 2
-    rate = hits[0].sampling_rate_hz
-    frequency = np.fft.rfftfreq(n, 1 / rate)
-    band = (frequency > recorded.band_hz[0]) & (frequency < recorded.band_hz[1])
-    window = np.hanning(n)
-    power = np.array(
-        [np.abs(np.fft.rfft(window * h.acceleration_m_s2[:, -n:], axis=1)) ** 2 for h in hits]
-    ).sum(axis=1)[:, band]
-    level = np.array([recorded.level(hit) for hit in hits])
-    weak, strong = power[level == level.min()], power[level == level.max()]
-    quiet, loud = np.median(weak, axis=0), np.median(strong, axis=0)
-    line = int(np.argmax(quiet / np.median(quiet)))
-    near = slice(max(0, line - SHARP), line + SHARP + 1)
-    ground = np.delete(quiet, np.arange(len(quiet))[near])
-    forces = recorded.level_n[-1] / recorded.level_n[0]
-    rises = quiet[line] > LEAST * np.median(ground)
-    steady = loud[line] / quiet[line] < np.sqrt(forces)
-    often = np.mean(weak[:, line] > LEAST * np.median(weak, axis=1)) > COMMON
-    if not (rises and steady and often):
+    pairs = [pair for columns in recorded.columns for pair in _pairs(columns)]
+    if not pairs:
         return None
-    evidence = float(len(weak) * np.log(quiet[line] / np.median(ground)))
-    hz = float(frequency[band][line])
+    frequency = pairs[0][0].frequency_hz
+    excess, noise = np.zeros(len(frequency)), np.zeros(len(frequency))
+    for weak, strong in pairs:
+        variance = weak.variance + strong.variance
+        used = np.all(np.isfinite(variance), axis=0)
+        square = np.abs(weak.accelerance - strong.accelerance) ** 2 * np.abs(weak.force) ** 2
+        scale = np.where(used, variance * np.abs(weak.force) ** 2, 1.0).mean()
+        excess += np.where(used, square.sum(axis=0) / scale, 0.0)
+        noise += np.where(used, (variance * np.abs(weak.force) ** 2).sum(axis=0) / scale, 0.0)
+    over = np.maximum(excess - noise, 0.0)
+    line = int(np.argmax(over))
+    near = np.abs(frequency - frequency[line]) <= WIDTH_HZ
+    share = float(over[near].sum() / max(over.sum(), 1e-300))
+    if excess.sum() < LEAST * noise.sum() or share < CONCENTRATED:
+        return None
+    hz = float(np.sum(frequency[near] * over[near]) / over[near].sum())
+    spacing = float(frequency[1] - frequency[0])
     text = (
         f"Something sounds at {hz:.1f} Hz however hard the robot is hit: look for a pump, a fan or "
         "a drive that runs during the test."
     )
-    return Finding("unknown", None, evidence, {"frequency": (hz, rate / n / 2, "Hz")}, text)
+    evidence = float(over[near].sum() / 2)
+    return Finding("unknown", None, evidence, {"frequency": (hz, spacing / 2, "Hz")}, text)
+
+
+def _pairs(columns: tuple[Column, ...]) -> list[tuple[Column, Column]]:
+    """Weakest and strongest column of each hit axis."""
+    out = []
+    for axis in range(3):
+        group = [c for c in columns if c.axis == axis]
+        if len(group) > 1:
+            out.append((group[0], group[-1]))
+    return out
