@@ -106,6 +106,7 @@ class Equivalent:
 
     visit: np.ndarray
     axis: np.ndarray
+    level: np.ndarray  # the weaker one
     swing: np.ndarray
     delta: np.ndarray
     precision: np.ndarray
@@ -136,7 +137,8 @@ def equivalent(recorded: Recorded, system: System) -> Equivalent:
                 found = _delta(full, axis, lines, change, weight, scale)
                 before = float(np.sum(weight * np.abs(change) ** 2))
                 count = int(np.count_nonzero(weight))
-                rows.append((number, axis, np.array([swing, swings[-1]]), *found, before, count))
+                pair = np.array([swing, swings[-1]])
+                rows.append((number, axis, weaker.level, pair, *found, before, count))
     parts = [np.array(part) for part in zip(*rows, strict=True)]
     return Equivalent(*parts)
 

@@ -9,7 +9,14 @@ from planner.diagnose.effect import Effect
 from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
 from planner.diagnose.finding import Finding
 from planner.diagnose.fit import Fit, fit
-from planner.diagnose.nonlinear import Candidate, Data, data_of, descend, own_parameter
+from planner.diagnose.nonlinear import (
+    Candidate,
+    Data,
+    data_of,
+    descend,
+    own_parameter,
+    with_differences,
+)
 from planner.diagnose.starts import starts
 from planner.diagnose.tone import screen_tone
 from planner.diagnose.visits import Recorded
@@ -18,10 +25,11 @@ from planner.physics.simulation import Simulation
 PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same
 ALSO = 2.5  # joints whose equivalent stiffness explains nearly as much are fitted too
 JOINTS = 2
-ROUNDS, MORE = 3, 9
+ROUNDS, MORE, LAST = 3, 9, 6
 HOPELESS = 10.0  # times the best χ² after ROUNDS
 ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
 EXPLAINED = 0.9  # of the excess of χ² of the levels' differences, that a law has to take away
+TOLERANCE = 1e-5  # of the objective, that a last round must gain
 CLEAR = 8.0
 LINEARISED = 0.4  # of the same, by an equivalent stiffness for each hit: below, no joint it is
 # What step, window and record length leave of a law's numbers (relative sd).
@@ -100,6 +108,10 @@ def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> 
     rough = descend(data, plain, _best_of_each(descend(data, plain, begin, 0)), ROUNDS)
     best = min(c.chi2 for c in rough)
     kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
+    first = min(kept, key=lambda c: c.value)
+    whole = with_differences(data, plain, found, first.port)
+    again = [replace(c, normal=None, gradient=None, damping=1e-5) for c in kept if c is first]
+    kept = [c for c in kept if c is not first] + descend(whole, plain, again, LAST, TOLERANCE)
     return _weighed(data, plain, system, kept)
 
 

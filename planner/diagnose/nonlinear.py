@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.diagnose.columns import Column
-from planner.diagnose.equivalent import System, receptances, system_of
+from planner.diagnose.equivalent import Equivalent, System, receptances, system_of
 from planner.diagnose.fit import Fit
 from planner.diagnose.laws import Law
 from planner.diagnose.timedomain import FASTEST, Seen, Strokes, seen, spectra, strokes, torques
 from planner.diagnose.visits import Recorded
-from planner.physics.gradient import response_gradient
+from planner.physics.gradient import Impedance, response_gradient
 
 LINES = 64
 LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
@@ -32,15 +32,17 @@ class Data:
     """c columns of n visits on common lines s (F,): FRFs (c, 3, F), `best` (c,) the strongest one.
 
     `weight` (c, 3, F) is 1/E|error|² of what is compared: a strongest column itself, the
-    difference to it of a weaker one. `slope` (b, D, 3, F) are derivatives of the strongest columns
-    `strong` (b,) by the linear parameters; `normal` (D, D) is what they alone tell.
+    difference to it of a weaker one. `slope` (b, D, 3, F) are derivatives of what is compared by
+    the linear parameters, for the columns `rows` (b,), at first the strongest only; `normal`
+    (D, D) is what they alone tell.
     """
 
     s: np.ndarray
     h: np.ndarray
     weight: np.ndarray
     best: np.ndarray
-    strong: np.ndarray
+    level: np.ndarray  # (c,)
+    rows: np.ndarray
     hits: Strokes
     force: np.ndarray  # (c, F) in N·s
     slope: np.ndarray
@@ -110,29 +112,72 @@ def data_of(recorded: Recorded, plain: Fit) -> Data:
         variance + (MODEL_ERROR * np.abs(h)) ** 2,
     )
     weight = np.where(np.isfinite(error), 1 / error, 0.0)
-    strong = np.flatnonzero(~weaker)
-    slope = _slopes(plain, s)
-    slope = np.array([slope[visits[i], :, :, columns[i].axis] for i in strong])
+    rows = np.flatnonzero(~weaker)
+    hits = strokes(visits, columns)
+    slope = np.empty((len(rows), len(plain.x), 3, len(s)), dtype=complex)
+    full = _slopes(plain, s)
+    slope[:] = full[hits.visit[rows], :, :, hits.axis[rows]]
+    force = spectra(hits.force.T, hits, s)
+    level = np.array([c.level for c in columns])
+    fastest = FASTEST * float(frequency[-1])
+    normal = _normal(slope, weight[rows])
+    return Data(s, h, weight, best, level, rows, hits, force, slope, normal, fastest)
+
+
+def _normal(slope: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Σ Re slope* weight slope, (D, D)."""
     d = slope.shape[1]
     normal = np.zeros((d, d))
-    for row, w in zip(slope, weight[strong], strict=True):
-        scaled = (row * np.sqrt(w)).reshape(d, -1)
-        normal += (scaled @ scaled.conj().T).real
-    fastest = FASTEST * float(frequency[-1])
-    hits = strokes(visits, columns)
-    force = spectra(hits.force.T, hits, s)
-    return Data(s, h, weight, best, strong, hits, force, slope, normal, fastest)
+    for row, w in zip(slope, weight, strict=True):
+        scaled = np.ascontiguousarray((row * np.sqrt(w)).reshape(d, -1)).view(float)
+        normal += scaled @ scaled.T
+    return normal
 
 
-def _slopes(plain: Fit, s: np.ndarray) -> np.ndarray:
-    """Derivatives (n, D, 3, 3, F) by springs and inertias at the linear fit."""
+def with_differences(data: Data, plain: Fit, found: Equivalent, port: int) -> Data:
+    """The same data, with derivatives of the differences too: the joint's equivalent stiffness.
+
+    How far a joint swings depends on inertias and springs: without this, k would seem to be known
+    better than it is.
+    """
+    visit, axis = data.hits.visit, data.hits.axis
+    block = int(system_of(plain).blocks[port])
+    plainly = _slopes(plain, data.s)
+    delta = {
+        (int(v), int(a), int(n)): d
+        for v, a, n, d in zip(
+            found.visit, found.axis, found.level, found.delta[:, port], strict=True
+        )
+    }
+    slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
+    n = int(visit.max()) + 1
+    for a, level in sorted({(int(i), int(j)) for _, i, j in delta}):
+        stiffer = np.array([delta.get((v, a, level), 0.0) for v in range(n)])
+        moved = _slopes(plain, data.s, block, stiffer)
+        for c in np.flatnonzero((axis == a) & (data.level == level)):
+            slope[c] = moved[visit[c], :, :, a] - plainly[visit[c], :, :, a]
+    for c in np.flatnonzero(data.best == np.arange(len(data.h))):
+        slope[c] = plainly[visit[c], :, :, axis[c]]
+    rows = np.arange(len(data.h))
+    return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
+
+
+def _slopes(
+    plain: Fit, s: np.ndarray, block: int = 0, stiffer: np.ndarray | None = None
+) -> np.ndarray:
+    """Derivatives (n, D, 3, 3, F) at the linear fit, one spring being `stiffer` (n,) complex."""
     misfit = plain.misfit
     a, b = misfit.split
     p, n = misfit.parametrisation, len(misfit.matrices.mass)
     mass = misfit.matrices.mass + misfit.inertias.mass_change(plain.x[a:b])
     every = np.broadcast_to(s, (n, len(s)))
+    added = None
+    if stiffer is not None:
+        values = np.zeros((n, len(s), p.size, p.size), dtype=complex)
+        values[:, :, block, block] = stiffer[:, None]
+        added = Impedance(values, np.zeros((n, 0, *values.shape[1:]), dtype=complex))
     full = response_gradient(
-        misfit.matrices, p.elasticity(plain.x[:a]), every, mass, misfit.inertias
+        misfit.matrices, p.elasticity(plain.x[:a]), every, mass, misfit.inertias, added
     )[1]
     springs = len(p.held)
     theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
@@ -234,15 +279,13 @@ def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candid
         full[:d, :d] = data.normal
         gradient = np.zeros(d + 2)
         at = np.array([d, d + 1, own])
-        linear = data.slope.copy()
-        linear[:, own] = 0.0  # the own stiffness is told by the replica, at all levels
-        strong = data.strong
+        rows = data.rows
         weighted = data.weight * compared
-        gradient[:d] = -np.einsum("bdjf,bjf->d", linear.conj(), weighted[strong]).real
-        cross = np.einsum(
-            "bdjf,pbjf->dp", linear.conj(), data.weight[strong] * moved[:, strong], optimize=True
-        ).real
-        full[own, :] = full[:, own] = 0.0
+        gradient[:d] = -_times(data.slope, weighted[rows])[:, 0]
+        cross = _times(data.slope, *(data.weight[rows] * moved[:, rows]))
+        # The own stiffness is told by the replica, at all levels.
+        gradient[own] = 0.0
+        cross[own] = full[own, :] = full[:, own] = 0.0
         full[:d, at] += cross
         full[at, :d] += cross.T
         full[np.ix_(at, at)] += np.einsum("pcjf,qcjf->pq", moved.conj(), data.weight * moved).real
@@ -254,6 +297,15 @@ def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candid
         gradient += 0.5 * away / scale
         value = chi2 + 0.5 * float(away @ away)
         out.append(replace(candidate, chi2=chi2, value=value, normal=full, gradient=gradient))
+    return out
+
+
+def _times(slope: np.ndarray, *values: np.ndarray) -> np.ndarray:
+    """Σ Re slope* values: slope (b, D, 3, F), values (b, 3, F) each; (D, values)."""
+    out = np.zeros((slope.shape[1], len(values)))
+    for i, row in enumerate(slope):
+        flat = row.reshape(len(row), -1).view(float)
+        out += flat @ np.array([np.ascontiguousarray(v[i]).ravel().view(float) for v in values]).T
     return out
 
 

@@ -110,7 +110,8 @@ def _free(
     last = 1 + int(np.max(np.flatnonzero(np.any(force != 0, axis=0)), initial=1))
     out, left = np.zeros((n, len(here))), np.zeros((len(poles), len(here)), dtype=complex)
     for k, (grow, older, newer) in enumerate(zip(*rule, strict=True)):
-        y = signal.lfilter([newer, older], [1.0, -grow], force[:, :last].astype(complex), axis=1)
+        driven = force[:, :last].astype(complex)
+        y = np.asarray(signal.lfilter([newer, older], [1.0, -grow], driven, axis=1))
         out[:last] += (y.T * weight[k]).real
         left[k] = y[:, -1] * weight[k]
     decay = np.exp(np.outer(np.arange(1, n - last + 1) * hits.step_s, poles))
