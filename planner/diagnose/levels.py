@@ -9,14 +9,8 @@ from planner.diagnose.effect import Effect
 from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
 from planner.diagnose.finding import Finding
 from planner.diagnose.fit import Fit, fit
-from planner.diagnose.nonlinear import (
-    Candidate,
-    Data,
-    data_of,
-    descend,
-    own_parameter,
-    with_differences,
-)
+from planner.diagnose.leveldata import Data, data_of, own_parameter, with_differences
+from planner.diagnose.nonlinear import Candidate, descend
 from planner.diagnose.starts import starts
 from planner.diagnose.tone import screen_tone
 from planner.diagnose.visits import Recorded
