@@ -68,7 +68,7 @@ def data_of(recorded: Recorded, plain: Fit) -> Data:
     rows = np.flatnonzero(~weaker)
     hits = strokes(visits, columns)
     slope = np.empty((len(rows), len(plain.x), 3, len(s)), dtype=complex)
-    full = _slopes(plain, s)
+    full = _slopes(plain, s, plain.x)
     slope[:] = full[hits.visit[rows], :, :, hits.axis[rows]]
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
@@ -87,26 +87,25 @@ def _normal(slope: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return normal
 
 
-def with_differences(data: Data, plain: Fit, found: Equivalent, port: int) -> Data:
-    """The same data, with derivatives of the differences too: the joint's equivalent stiffness.
+def relinearised(data: Data, plain: Fit, found: Equivalent, port: int, x: np.ndarray) -> Data:
+    """The same data with derivatives at x, of the differences too.
 
-    How far a joint swings depends on inertias and springs: without this, k would seem to be known
-    better than it is.
+    Every column has the stiffness that the joint has for it: that of the linear fit at the highest
+    level, and Δ more at the others. How far a joint swings depends on inertias and springs:
+    without the differences' derivatives, k would seem to be known better than it is.
     """
     visit, axis = data.hits.visit, data.hits.axis
     block = int(system_of(plain).blocks[port])
-    plainly = _slopes(plain, data.s)
-    delta = {
-        (int(v), int(a), int(n)): d
-        for v, a, n, d in zip(
-            found.visit, found.axis, found.level, found.delta[:, port], strict=True
-        )
-    }
-    slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
+    strongest = system_of(plain).elasticity.stiffness[block]
+    there = strongest - system_of(plain, x).elasticity.stiffness[block]
+    places = zip(found.visit.tolist(), found.axis.tolist(), found.level.tolist(), strict=True)
+    delta = dict(zip(places, found.delta[:, port], strict=True))
     n = int(visit.max()) + 1
+    slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
+    plainly = _slopes(plain, data.s, x, block, np.full(n, there))
     for a, level in sorted({(int(i), int(j)) for _, i, j in delta}):
-        stiffer = np.array([delta.get((v, a, level), 0.0) for v in range(n)])
-        moved = _slopes(plain, data.s, block, stiffer)
+        stiffer = np.array([there + delta.get((v, a, level), 0.0) for v in range(n)])
+        moved = _slopes(plain, data.s, x, block, stiffer)
         for c in np.flatnonzero((axis == a) & (data.level == level)):
             slope[c] = moved[visit[c], :, :, a] - plainly[visit[c], :, :, a]
     for c in np.flatnonzero(data.best == np.arange(len(data.h))):
@@ -116,13 +115,13 @@ def with_differences(data: Data, plain: Fit, found: Equivalent, port: int) -> Da
 
 
 def _slopes(
-    plain: Fit, s: np.ndarray, block: int = 0, stiffer: np.ndarray | None = None
+    plain: Fit, s: np.ndarray, x: np.ndarray, block: int = 0, stiffer: np.ndarray | None = None
 ) -> np.ndarray:
-    """Derivatives (n, D, 3, 3, F) at the linear fit, one spring being `stiffer` (n,) complex."""
+    """Derivatives (n, D, 3, 3, F) at x, one spring being `stiffer` (n,), complex."""
     misfit = plain.misfit
     a, b = misfit.split
     p, n = misfit.parametrisation, len(misfit.matrices.mass)
-    mass = misfit.matrices.mass + misfit.inertias.mass_change(plain.x[a:b])
+    mass = misfit.matrices.mass + misfit.inertias.mass_change(x[a:b])
     every = np.broadcast_to(s, (n, len(s)))
     added = None
     if stiffer is not None:
@@ -130,7 +129,7 @@ def _slopes(
         values[:, :, block, block] = stiffer[:, None]
         added = Impedance(values, np.zeros((n, 0, *values.shape[1:]), dtype=complex))
     full = response_gradient(
-        misfit.matrices, p.elasticity(plain.x[:a]), every, mass, misfit.inertias, added
+        misfit.matrices, p.elasticity(x[:a]), every, mass, misfit.inertias, added
     )[1]
     springs = len(p.held)
     theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)

@@ -207,9 +207,17 @@ def step(plain: Fit, candidate: Candidate) -> Candidate:
 
 
 def descend(
-    data: Data, plain: Fit, candidates: list[Candidate], rounds: int, tolerance: float = 1e-3
+    data: Data,
+    plain: Fit,
+    candidates: list[Candidate],
+    rounds: int,
+    tolerance: float = 1e-3,
+    least: float = 1e-6,
 ) -> list[Candidate]:
-    """All candidates, some rounds further down; those that gain nothing more are left alone."""
+    """All candidates, some rounds further down; those that gain nothing more are left alone.
+
+    `least` is the smallest damping: how far poorly known directions may go.
+    """
     out = list(candidates)
     todo = [i for i, c in enumerate(out) if c.gradient is None]
     for i, new in zip(
@@ -227,7 +235,7 @@ def descend(
             old = out[i]
             if new.value < old.value and new.normal is not None:
                 active[i] = old.value - new.value > tolerance * old.value
-                out[i] = replace(new, damping=max(1e-6, old.damping / 10))
+                out[i] = replace(new, damping=max(least, old.damping / 10))
             else:
                 out[i] = replace(old, damping=10 * old.damping)
                 active[i] = old.damping < 1e4
