@@ -121,11 +121,11 @@ def _answer(
     ]
     drawn: dict[str, Any] = {"plots": [], "rrd": None}
     if pictures.wanted:
-        from planner.show.modal_plots import campbell_figure
+        from planner.show.modal_plots import frequency_figure
 
         seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
         mark = "SIMULATED recordings · " if survey.simulated else ""
-        figure = campbell_figure(
+        figure = frequency_figure(
             survey.poses,
             tracks.frequency_hz[:, seen],
             survey.frequency_sd_hz[:, seen],
