@@ -96,10 +96,10 @@ def _labelled(
     from planner.robot.robot import Robot
 
     simulation = Simulation(Robot.load(robot_toml))
-    middle = q[int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
+    middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
     count = min(labels + ABOVE, simulation.elastic.size)
-    modes = simulation.followed(q, count, simulation.families(middle, q))
-    tracks = track(found, Guide(modes.frequency_hz, modes.shape), x)
+    modes = simulation.followed(q, count, simulation.families(q[middle], q))
+    tracks = track(found, Guide(modes.frequency_hz, modes.shape, middle), x)
     return tracks, modes.frequency_hz
 
 
