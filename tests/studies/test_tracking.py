@@ -33,7 +33,7 @@ from random_ways import (
 )
 from true_modes import Measured, measure_all
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 COUNT, ABOVE, POSES = 4, 2, 60
 CROSSING = 106  # the first seed from 100 on for which modes of the true robot cross twice
 
