@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.frf.types import Frf
+from planner.fusion.hedged import BELIEF
 from planner.identify.extended import Structure, extended
 from planner.identify.identify import QUICK, Effort, identify
 from planner.identify.parameters import Priors
@@ -24,6 +25,7 @@ SUSPECT, FOLDS = 3.0, 2
 HELPS = 0.5  # of the misfit, at most, is left where springs not stated are believed in
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
+BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
 RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
 LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
 
@@ -106,13 +108,15 @@ class LowFidelity:
     def discrepancy(self, measured_hz: np.ndarray) -> np.ndarray | None:
         """Size of ln f's error (count,) where the simulation was not fitted; None: not known.
 
-        measured_hz (n, count), NaN where a mode was not found. Before a pose could be left out it
-        is as uncertain as ever; a simulation that explains its recordings is nearly right.
+        measured_hz (n, count), NaN where a mode was not found. A simulation that explains its
+        recordings is nearly right; another is as uncertain as ever before a pose was left out.
         """
-        if self.learned is None or len(measured_hz) < 2:
+        if self.learned is None:
             return None
-        if self.left_out is None:
+        if self.learned.fits:
             return np.full(self.count, RIGHT)
+        if self.left_out is None:
+            return None
         error = np.log(measured_hz / self.left_out)
         known = np.isfinite(error)
         square = np.where(known, error, 0.0) ** 2
@@ -134,6 +138,11 @@ class LowFidelity:
         if self.learned is None:
             return f"{text}, so that it is used as robot.toml states it, or not at all."
         return f"{text}, or its geometry is off."
+
+    @property
+    def belief(self) -> float:
+        """Probability that it is of use, by the FRFs: a whole matrix of them is hard to fit."""
+        return BELIEVED if self.learned is not None and self.learned.fits else BELIEF
 
     def frequency_sd(self, q: np.ndarray) -> np.ndarray:
         """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation."""

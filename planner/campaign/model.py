@@ -126,7 +126,8 @@ class _Guided:
         labelled = label(cell, used, low)
         seen = observations(cell, labelled, low)
         known = low.discrepancy(frequencies(labelled)) if labelled else None
-        return cls(low, used, labelled, seen, fit_primary(seen, known, low.left_out))
+        primary = fit_primary(seen, known, low.left_out, belief=low.belief)
+        return cls(low, used, labelled, seen, primary)
 
     @property
     def log_evidence(self) -> float:
