@@ -105,7 +105,7 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
     rest = list(placed.unexpected)
     gaps = [i for i, row in enumerate(placed.modes) if _gap(row)]
     if gaps:
-        free = _matched(poses, _columns(ranked, place), x, ordered=False)
+        free = _matched(poses, guide, x, ordered=False)
         sure[gaps] = free.probability[gaps]
         for i in gaps:
             modes[i], rest[i] = free.modes[i], free.unexpected[i]
