@@ -91,8 +91,7 @@ def track(
 def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Tracks:
     """Places in the order of frequency first, then which label each place carries.
 
-    Where a mode is missing between others its place is doubtful, the more so near an exchange:
-    there the labels' own shapes and frequencies at the neighbours decide.
+    Where a mode is missing between others its place is doubtful: there the guide's families decide.
     """
     order = np.argsort(guide.frequency_hz, axis=1, kind="stable")  # NaN comes last
     ranked = _columns(guide, order)
@@ -120,8 +119,7 @@ def _columns(guide: Guide, chosen: np.ndarray) -> Guide:
 
 def _gap(row: Sequence[Mode | None]) -> bool:
     """Whether a mode is missing below one that was found."""
-    found = [mode is not None for mode in row]
-    return any(later and not now for now, later in pairwise(found))
+    return any(now is None and later is not None for now, later in pairwise(row))
 
 
 def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, ordered: bool) -> Tracks:
