@@ -23,6 +23,7 @@ SD = 0.2  # of ψ at the end
 BEND_SD = 3.0  # of κ in (1 − e^(−κ·order)) / (1 − e^(−κ)): 0 is linear, large is a warming up
 ALIKE = 40.0  # neighbouring values that err alike where the simulation lacks something
 CLEAR = 8.0
+COURSE = 0.01  # relative sd of the change: no course is quite one of these
 SHARE = 3.0  # by which the misfit has to fall: physics that goes with the pose gains less
 STILL = 2.0  # times the noise: a pose that answers alike when visited again has not drifted
 
@@ -168,7 +169,7 @@ def evaluate(plain: Fit, best: Fit) -> Finding:
     values = best.parameters(temper)
     size, sd, _ = values["change"]
     change = float(np.expm1(size))
-    told = {"change": (change, (1 + change) * sd, "1")}
+    told = {"change": (change, float(np.hypot((1 + change) * sd, COURSE * change)), "1")}
     evidence = best.log_evidence(temper) - plain.log_evidence(temper)
     return Finding("drift", "campaign", evidence, told, best.effect.text(told))
 
