@@ -108,7 +108,8 @@ def _spectrum(
     noise = hit.acceleration_m_s2[:, :rest].var(axis=1, ddof=1) if enough else _floor(hit)
     near = np.zeros(n)
     near[at.first : at.last] = 1
-    aside = hit.force_n[near == 0]
+    # A window that the records carry has made the noise after the pulse smaller than it was.
+    aside = (hit.force_n * np.exp(carried_1_s * np.maximum(t, 0)))[near == 0]
     level = np.median(hit.force_n[:rest]) if enough else np.median(hit.force_n)
     force = np.fft.rfft(hit.sign * (hit.force_n - level) * near * window, length)[lines]
     a = np.fft.rfft((hit.acceleration_m_s2 - offset[:, None]) * window, length, axis=1)[:, lines]
