@@ -10,7 +10,7 @@ DECAY = np.linspace(0.0, 1.5, 6)  # ln of how far the swing has faded while it s
 EFFECTIVE = 0.7  # of the largest swing: not all modes peak at once
 ROUGH = 0.05  # error of an equivalent stiffness, in shares of the joint's
 MOST, MOST_LACKING = 5.0, 0.9  # of k, in shares of the joint's stiffness
-ASIDE = 4  # steps of the grid to the neighbours
+ASIDE = (-4, 0, 4, 8)  # steps of the grid to the neighbours: fading hits look like smaller a
 GRID = np.geomspace(0.01, 4.0, 28)  # a, times the median swing at the highest level
 
 
@@ -35,7 +35,7 @@ def starts(
             if not fitting:
                 continue
             best = min(fitting)[1]
-            for i in {max(best - ASIDE, 0), best, min(best + ASIDE, len(GRID) - 1)}:
+            for i in sorted({int(np.clip(best + shift, 0, len(GRID) - 1)) for shift in ASIDE}):
                 _, k, there = tried[i]
                 if sign * k > 0:
                     moved = x.copy()
