@@ -42,7 +42,7 @@ def each(
                 index, attempt = worker.busy
                 try:
                     answer = connection.recv()  # type: ignore[union-attr]
-                except EOFError:
+                except (EOFError, OSError):  # closed, or reset
                     team.pop(worker.connection).stop()
                     if attempt < ATTEMPTS:
                         waiting.appendleft((index, attempt + 1))
@@ -86,7 +86,7 @@ def _work(connection: Connection, function: Callable[[Any, Any], Any], shared: A
     while True:
         try:
             item = connection.recv()
-        except EOFError:
+        except (EOFError, OSError):  # closed, or reset
             return
         connection.send(attempt(function, shared, item))
 
