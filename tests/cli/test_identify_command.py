@@ -104,7 +104,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     assert "N·m/rad" in run.stdout
     assert "SIMULATED" in run.stdout
     assert "No pose was held out" in " ".join(run.stdout.split())
-    assert (tmp_path / "plots" / "campbell_xx_after.png").stat().st_size > 10_000
+    assert (tmp_path / "plots" / "map_xx_after.png").stat().st_size > 10_000
     assert (tmp_path / "plots" / "frf_P0.png").stat().st_size > 10_000
     assert tomllib.loads(out.read_text())["urdf"] == "identified.urdf"
     Robot.load(out)
