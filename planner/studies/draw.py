@@ -59,12 +59,8 @@ def legend(figure: Figure, panel: Axes) -> None:
     )
 
 
-def curves(
-    panel: Axes, x: np.ndarray, names: Sequence[str], values: np.ndarray, xlabel: str, ylabel: str
-) -> None:
-    """values (x, names) as lines with points; NaN stays out."""
-    for i, (name, colour) in enumerate(colours(names).items()):
+def curves(panel: Axes, x: np.ndarray, palette: dict[str, str], values: np.ndarray) -> None:
+    """values (x, names) as lines with points, in the colours of a palette by name."""
+    for i, (name, colour) in enumerate(palette.items()):
         panel.plot(x, values[:, i], "o-", ms=4, lw=1.4, color=colour, label=name)
-    panel.set_xlabel(xlabel)
-    panel.set_ylabel(ylabel)
     panel.grid(True, alpha=0.25)

@@ -160,29 +160,32 @@ def _findings(scores: Table, thin: Table, ours: dict[int, list[float]]) -> tuple
 
 
 def _maps(told: Told, seen: Sweep) -> Figure:
-    """Truth beyond 105° and what each model says there, in one colour scale."""
-    figure = draw.new((11.0, 6.2), f"Driving-point accelerance beyond {TRAINED_DEG:.0f}° (told)")
-    panels = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
-    surfaces = {"truth (MuJoCo)": seen.truth} | {n: told.amplitude[n] for n in NAMES}
-    level = {name: 20 * np.log10(np.maximum(a, 1e-9)) for name, a in surfaces.items()}
-    top = level["truth (MuJoCo)"].max()
-    image = None
-    for panel, (name, values) in zip(panels, level.items(), strict=False):
+    """What is measured, the truth beyond, and what each model says there, in one colour scale."""
+    figure = draw.new((11.0, 6.2), f"Driving-point accelerance, measured to {TRAINED_DEG:.0f}°")
+    panels = figure.subplots(2, 4, sharey=True).ravel()
+    surfaces = {"measured": seen.amplitude, "truth (MuJoCo)": seen.truth}
+    surfaces |= {name: told.amplitude[name] for name in NAMES}
+    top = _decibel(seen.amplitude).max()
+    for panel, (name, amplitude) in zip(panels, surfaces.items(), strict=True):
+        angles = seen.angles_deg if name == "measured" else BEYOND_DEG
         image = panel.pcolormesh(
-            BEYOND_DEG, seen.lines_hz, values, vmin=top - 40, vmax=top, cmap="viridis",
+            angles, seen.lines_hz, _decibel(amplitude), vmin=top - 40, vmax=top, cmap="viridis",
             rasterized=True,
         )  # fmt: skip
-        r2 = "" if name.startswith("truth") else f", R² {_scores(surfaces[name], seen)[0]:.3f}"
+        known = name in ("measured", "truth (MuJoCo)")
+        r2 = "" if known else f", R² {_scores(amplitude, seen)[0]:.3f}"
         panel.set_title(f"{name}{r2}", fontsize=9)
-    panels[-1].axis("off")
-    for panel in panels[4:7]:
+        if panel is panels[-1]:
+            figure.colorbar(image, ax=list(panels), label="dB re 1 m/s²/N", pad=0.01)
+    for panel in panels[4:]:
         panel.set_xlabel("joint 3 (°)")
     for panel in panels[::4]:
         panel.set_ylabel("frequency (Hz)")
-    panels[3].tick_params(labelbottom=True)
-    assert image is not None
-    figure.colorbar(image, ax=panels[-1], label="dB re 1 m/s²/N", fraction=0.5, location="left")
     return figure
+
+
+def _decibel(amplitude: np.ndarray) -> np.ndarray:
+    return 20 * np.log10(np.maximum(amplitude, 1e-9))
 
 
 def _overlays(told: Told, seen: Sweep) -> Figure:
@@ -216,7 +219,10 @@ def _experiments(thin: Table, ours: dict[int, list[float]]) -> Figure:
     figure = draw.new((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every so manyth experiment")
     panel = figure.subplots()
     values = np.array([row[1:] for row in thin.rows], dtype=float)
-    draw.curves(panel, np.array(STEPS), thin.columns[1:], values, "every … experiment", "R²")
+    palette = draw.colours(NAMES)
+    draw.curves(panel, np.array(STEPS), {n: palette[n] for n in thin.columns[1:]}, values)
+    panel.set_xlabel("every … experiment")
+    panel.set_ylabel("R²")
     for seed in ROBOTS[1:]:
         panel.plot(STEPS, ours[seed], ":", color=draw.COLOURS[-1], lw=1.0)
     panel.axhline(OURS_AT_LEAST, color="black", lw=0.8, ls="--")
