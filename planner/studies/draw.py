@@ -7,7 +7,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-COLOURS = ("0.6", "tab:orange", "tab:olive", "tab:purple", "tab:blue", "tab:green", "tab:red")
+COLOURS = {
+    "bias": "0.6", "linear": "tab:olive", "quadratic": "tab:cyan", "cubic": "tab:purple",
+    "rbf": "tab:blue", "GP": "tab:blue", "AR1": "tab:green", "NARGP": "tab:orange",
+    "MFDGP": "tab:brown", "simulation": "0.6", "ours": "tab:red",
+    "scatter allows": "0.8", "one by one": "tab:blue", "together": "tab:red",
+}  # fmt: skip
 
 
 def new(size: tuple[float, float], title: str = "") -> Figure:
@@ -16,11 +21,6 @@ def new(size: tuple[float, float], title: str = "") -> Figure:
     FigureCanvasAgg(figure)
     figure.suptitle(title, fontsize=11)
     return figure
-
-
-def colours(names: Sequence[str]) -> dict[str, str]:
-    """A colour for each of up to seven names; the last has the strongest."""
-    return dict(zip(names, COLOURS[-len(names) :], strict=True))
 
 
 def bars(
@@ -34,9 +34,9 @@ def bars(
     """values (groups, names) side by side; what lies below `floor` is cut, with an arrow there."""
     width = 0.84 / len(names)
     places = np.arange(len(groups))
-    for i, (name, colour) in enumerate(colours(names).items()):
+    for i, name in enumerate(names):
         x = places + (i - (len(names) - 1) / 2) * width
-        panel.bar(x, values[:, i], 0.92 * width, label=name, color=colour)
+        panel.bar(x, values[:, i], 0.92 * width, label=name, color=COLOURS[name])
         if floor is not None:
             for place in x[values[:, i] < floor]:
                 panel.annotate(
@@ -59,8 +59,8 @@ def legend(figure: Figure, panel: Axes) -> None:
     )
 
 
-def curves(panel: Axes, x: np.ndarray, palette: dict[str, str], values: np.ndarray) -> None:
-    """values (x, names) as lines with points, in the colours of a palette by name."""
-    for i, (name, colour) in enumerate(palette.items()):
-        panel.plot(x, values[:, i], "o-", ms=4, lw=1.4, color=colour, label=name)
+def curves(panel: Axes, x: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
+    """values (x, names) as lines with points."""
+    for i, name in enumerate(names):
+        panel.plot(x, values[:, i], "o-", ms=4, lw=1.4, color=COLOURS[name], label=name)
     panel.grid(True, alpha=0.25)

@@ -49,16 +49,16 @@ def _figure_8(eight: np.ndarray) -> Figure:
         (3.2 * modes, 6.4), "Figure 8: natural frequencies, told with N poses (medians over splits)"
     )
     panels = figure.subplots(2, modes, sharex=True)
-    palette = draw.colours(FUSIONS)
     for k in range(modes):
         upper, lower = panels[:, k]
-        draw.curves(upper, counts, palette, np.maximum(eight[:, k, :, 0], FLOOR))
+        draw.curves(upper, counts, FUSIONS, np.maximum(eight[:, k, :, 0], FLOOR))
         upper.axhline(0.9, color="black", ls="--", lw=0.8)
         upper.set_ylim(FLOOR - 0.03, 1.05)
         upper.set_title(f"mode {k + 1}", fontsize=10)
-        draw.curves(lower, counts, palette, eight[:, k, :, 1])
+        draw.curves(lower, counts, FUSIONS, eight[:, k, :, 1])
         lower.set_ylim(bottom=0)
         lower.set_xlabel("poses N")
+        lower.set_xticks(counts[::2])
     panels[0, 0].set_ylabel(f"R² (below {FLOOR:g}: drawn there)")
     panels[1, 0].set_ylabel("RMSE (Hz)")
     draw.legend(figure, panels[0, 0])

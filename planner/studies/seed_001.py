@@ -191,7 +191,7 @@ def _decibel(amplitude: np.ndarray) -> np.ndarray:
 def _overlays(told: Told, seen: Sweep) -> Figure:
     figure = draw.new((9.0, 8.0), "FRFs beyond the training, at three angles")
     panels = figure.subplots(len(SHOWN_DEG), 1, sharex=True)
-    colours = draw.colours(NAMES)
+    colours = draw.COLOURS
     for panel, angle in zip(panels, SHOWN_DEG, strict=True):
         i = int(np.flatnonzero(angle == BEYOND_DEG)[0])
         for name in ("simulation", "GP", "MFDGP", "NARGP"):
@@ -219,12 +219,11 @@ def _experiments(thin: Table, ours: dict[int, list[float]]) -> Figure:
     figure = draw.new((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every so manyth experiment")
     panel = figure.subplots()
     values = np.array([row[1:] for row in thin.rows], dtype=float)
-    palette = draw.colours(NAMES)
-    draw.curves(panel, np.array(STEPS), {n: palette[n] for n in thin.columns[1:]}, values)
+    draw.curves(panel, np.array(STEPS), thin.columns[1:], values)
     panel.set_xlabel("every … experiment")
     panel.set_ylabel("R²")
     for seed in ROBOTS[1:]:
-        panel.plot(STEPS, ours[seed], ":", color=draw.COLOURS[-1], lw=1.0)
+        panel.plot(STEPS, ours[seed], ":", color=draw.COLOURS["ours"], lw=1.0)
     panel.axhline(OURS_AT_LEAST, color="black", lw=0.8, ls="--")
     panel.set_xticks(STEPS)
     panel.set_ylim(min(0.5, float(values.min()) - 0.05), 1.02)
