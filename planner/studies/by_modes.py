@@ -41,11 +41,14 @@ def _observations(tracks: Tracks, count: int, seen: Sweep) -> ModalObservations:
                     empty[i, k] = getattr(mode, name)
         return empty
 
+    known = {
+        name: gathered(name, np.full(shape, np.nan))
+        for name in ("frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd")
+    }
     return ModalObservations(
         _scaled(seen.angles_deg),
-        *(gathered(name, np.full(shape, np.nan))
-          for name in ("frequency_hz", "frequency_sd_hz", "damping_ratio", "damping_sd")),
-        gathered("residue", np.full((*shape, 3, 3), np.nan + 0j)),
-        gathered("residue_sd", np.full((*shape, 3, 3), np.nan)),
+        **known,
+        residue=gathered("residue", np.full((*shape, 3, 3), np.nan + 0j)),
+        residue_sd=gathered("residue_sd", np.full((*shape, 3, 3), np.nan)),
         simulated=seen.modes(seen.angles_deg, count),
-    )  # fmt: skip
+    )

@@ -40,7 +40,7 @@ def bars(
         if floor is not None:
             for place in x[values[:, i] < floor]:
                 panel.annotate(
-                    "", (place, floor), (place, floor * 0.55),
+                    "", (place, floor), (place, floor + 0.08),
                     arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 0.8},
                 )  # fmt: skip
     panel.axhline(0, color="black", lw=0.6)

@@ -173,7 +173,7 @@ def _about_frequencies(seven: np.ndarray, eight: np.ndarray) -> tuple[Finding, .
             "With 15 poses RBF, AR1 and NARGP mostly reach R² > 0.9.",
             f"in {100 * high:.0f} % of modes and models; least "
             + ", ".join(f"{n} {r2[n].min():.3f}" for n in FUSIONS),
-            high > 0.5,
+            bool(high > 0.5),
         ),
         Finding(
             "Linear, quadratic and cubic kernels cannot follow the frequencies.",

@@ -166,7 +166,7 @@ def _by_mode(scores: Scores) -> Table:
 
 
 def _kinds_figure(table: Table) -> Figure:
-    return _figure(table, "144 modal parameters at 112 postures, 5-fold cross-validation", 0.0)
+    return _figure(table, "144 modal parameters at 112 postures, 5-fold cross-validation", -0.5)
 
 
 def _modes_figure(table: Table) -> Figure:

@@ -28,6 +28,7 @@ NOISE, FLOOR = 0.02, 0.005  # of an FRF's line, and of its rms over the band
 BEYOND_DEG = np.arange(106.0, 121.0)
 DRESS_PACK = Resonator("link_3", (0.2, 0.3, -0.18), (0.0, 0.0, 1.0), 40.0, 21.0, 0.03)
 ACROSS = 2  # the tcp axis that lies across the arm's plane
+HITS = (0, 0, 10)  # along it only
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +66,7 @@ class Sweep:
         shape = (3, 3, len(self.lines_hz))
         h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
         h[:, ACROSS], variance[:, ACROSS] = self.column[i], self.variance[i]
-        hits = tuple(10 if axis == ACROSS else 0 for axis in range(3))
-        return Frf(self.lines_hz, h, variance, np.full(shape, np.nan), hits, BAND_HZ)
+        return Frf(self.lines_hz, h, variance, np.full(shape, np.nan), HITS, BAND_HZ)
 
     def modes(self, angles_deg: np.ndarray, count: int) -> SimulatedModes:
         """What the simulation says at angles (n,) in °."""
