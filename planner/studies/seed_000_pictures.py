@@ -4,10 +4,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.studies import draw
+from planner.studies.seed_000_names import COUNTS, FREQUENCY_MODELS, FUSIONS, KERNELS
 
-SEVEN = ("linear", "quadratic", "cubic", "rbf", "AR1", "NARGP")
-KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
-FUSIONS = ("rbf", "AR1", "NARGP")
 FLOOR = -0.2  # of R² in bars; less is drawn cut off
 
 
@@ -17,7 +15,8 @@ def pictures(
     """By file name; scores (outputs, models, 3), in 8 by count, in 11 by residue."""
     return {
         "seed_000_figure_7": _benchmark(
-            seven, SEVEN, "Figure 7: natural frequencies, 15 poses trained, 20 told", "RMSE (Hz)"
+            seven, FREQUENCY_MODELS, "Figure 7: natural frequencies, 15 poses trained, 20 told",
+            "RMSE (Hz)",
         ),
         "seed_000_figure_8": _figure_8(eight),
         "seed_000_figure_10": _benchmark(
@@ -43,7 +42,7 @@ def _benchmark(scores: np.ndarray, names: tuple[str, ...], title: str, unit: str
 
 
 def _figure_8(eight: np.ndarray) -> Figure:
-    counts = np.arange(3, 3 + len(eight))
+    counts = np.array(COUNTS)
     modes = eight.shape[1]
     figure = draw.new(
         (3.2 * modes, 6.4), "Figure 8: natural frequencies, told with N poses (medians over splits)"
