@@ -68,4 +68,4 @@ def _text(answer: dict[str, Any]) -> "RenderableType":
 def _cell(value: str | float) -> str:
     if isinstance(value, str):
         return value
-    return "–" if value != value else f"{value:.3f}"
+    return "–" if value != value else f"{value:.4g}"
