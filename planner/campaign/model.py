@@ -89,11 +89,15 @@ class Model:
 
 
 def build(
-    cell: Cell, state: CampaignState, frf_of: Callable[[Measurement, ModesTable], Frf]
+    cell: Cell,
+    state: CampaignState,
+    frf_of: Callable[[Measurement, ModesTable], Frf],
+    residues: bool = True,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns.
+    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns. Without
+    `residues` only frequencies and damping are fitted, and no FRF can be predicted.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     if cell.config.fidelity.simulation == "updated" and used:
@@ -108,7 +112,8 @@ def build(
             _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
-    return Model(cell, best.labelled, best.low, fit_surrogate(best.seen, primary=best.primary))
+    surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues)
+    return Model(cell, best.labelled, best.low, surrogate)
 
 
 @dataclass(frozen=True, eq=False)

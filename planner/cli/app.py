@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, respond, warn
+from planner.cli.comparison import compare
 from planner.cli.identification import identify
+from planner.cli.study import study
 
 app = typer.Typer(
     name="planner",
@@ -256,6 +258,8 @@ def modes(
 
 
 app.command()(identify)
+app.command()(compare)
+app.command()(study)
 
 
 @app.command()
