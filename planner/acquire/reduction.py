@@ -19,9 +19,9 @@ from planner.acquire.outputs import FrequencyOutputs, Poses, Target
 from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.kernels import parse
 
-BLOCK = 64  # candidates at a time: their covariances with the target stay in the cache
-TASK = 4  # blocks a call; every call has the same shapes, so that nothing is compiled anew
-WIDTH = 8  # the number of features is rounded up to a multiple of it, for the same reason
+BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
+TASK = 16  # blocks a call where there are many; calls of equal shape are compiled once
+WIDTH = 4  # the number of features is rounded up to a multiple of it, for the same reason
 WORTH_THREADS = 20_000_000  # covariances
 
 
@@ -53,7 +53,8 @@ def _label(outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapp
     a, va = _features(outputs, k, poses, sign=-1.0)
     b, _ = _features(outputs, k, target.poses, sign=1.0)
     scale = va + outputs.noise[k]
-    step, n = BLOCK * TASK, len(poses)
+    n = len(poses)
+    step = BLOCK * TASK if n > 4 * BLOCK * TASK else BLOCK
     x = _filled(poses.x, step)
     a = np.stack([_filled(one, step) for one in a])
     theta, xu = outputs.posterior.theta[k], target.poses.x
@@ -69,7 +70,7 @@ def _label(outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapp
     return list(done / scale)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jax.jit, static_argnums=0, compiler_options={"xla_cpu_prefer_vector_width": "512"})
 def _squares(
     kernel: str, theta: Array, x: Array, a: Array, xu: Array, b: Array, weight: Array
 ) -> Array:
