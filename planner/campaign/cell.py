@@ -28,10 +28,13 @@ class Cell:
     workspace: Workspace
 
     @classmethod
-    def load(cls, robot_toml: Path, config: CampaignConfig) -> "Cell":
-        """Load the robot and hold the workspace against it; InputError where they disagree."""
+    def load(cls, robot_toml: Path, config: CampaignConfig, robot: Robot | None = None) -> "Cell":
+        """Load the robot and hold the workspace against it; InputError where they disagree.
+
+        `robot` is the one of robot_toml, where it was loaded already.
+        """
         check_name(config.acquisition.name)
-        robot = Robot.load(robot_toml)
+        robot = robot or Robot.load(robot_toml)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
         return cls(config, robot, simulation, workspace)

@@ -85,11 +85,15 @@ class Model:
 
 
 def build(
-    cell: Cell, state: CampaignState, frf_of: Callable[[Measurement, ModesTable], Frf]
+    cell: Cell,
+    state: CampaignState,
+    frf_of: Callable[[Measurement, ModesTable], Frf],
+    residues: bool = True,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns.
+    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns. Without
+    `residues` only frequencies and damping are fitted, and no FRF can be predicted.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     if cell.config.fidelity.simulation == "updated" and used:
@@ -100,7 +104,8 @@ def build(
         # What lacks physics is bent by fitting it; as it stands it may be the better guide.
         candidates.append(_Guided.by(cell, used, replace(cell.frozen, suspect=low)))
     best = max(candidates, key=lambda guided: guided.log_evidence)
-    return Model(cell, best.labelled, best.low, fit_surrogate(best.seen, primary=best.primary))
+    surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues)
+    return Model(cell, best.labelled, best.low, surrogate)
 
 
 @dataclass(frozen=True, eq=False)

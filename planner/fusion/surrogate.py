@@ -63,7 +63,7 @@ class Surrogate:
     """The fitted models; immutable."""
 
     primary: HedgedAR1  # log f of every label, then log ζ of every label
-    residue: HedgedAR1  # real and imaginary parts, scaled
+    residue: HedgedAR1 | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
 
     @property
@@ -82,12 +82,11 @@ class Surrogate:
         return self.primary.split(_primary_low(simulated))[1][:, : self.count]
 
     def predict(self, x: np.ndarray, simulated: SimulatedModes) -> ModalPrediction:
-        """Modes at x (q, d) where the simulation says `simulated`."""
+        """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted."""
         q, k = len(x), self.count
         mean, sd = self.primary.predict(x, _primary_low(simulated))
         f, zeta = np.exp(mean[:, :k]), np.exp(mean[:, k:])
-        low = _parts(simulated.residue) / np.repeat(self.scale, 18)
-        parts, parts_sd = self.residue.predict(x, low)
+        parts, parts_sd = self._parts(x, simulated)
         parts = parts.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
         parts_sd = parts_sd.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
         return ModalPrediction(
@@ -98,6 +97,13 @@ class Surrogate:
             parts[..., 0] + 1j * parts[..., 1],
             np.sqrt(np.mean(parts_sd**2, axis=-1)),
         )
+
+    def _parts(self, x: np.ndarray, simulated: SimulatedModes) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled parts of the residues and their sd, (q, 18 k) each."""
+        if self.residue is None:
+            nothing = np.full((len(x), 18 * self.count), np.nan)
+            return nothing, nothing
+        return self.residue.predict(x, _parts(simulated.residue) / np.repeat(self.scale, 18))
 
 
 def _relative_sd(sd: np.ndarray) -> np.ndarray:
@@ -163,15 +169,19 @@ def fit_surrogate(
     has_simulation: bool = True,
     reference: SimulatedModes | None = None,
     primary: HedgedAR1 | None = None,
+    residues: bool = True,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
     `reference` is as in `fit_primary`; `primary` is what that gave, where it was fitted already.
+    Without `residues` these are left out, which takes two thirds of the time.
     """
     k = seen.frequency_hz.shape[1]
     if primary is None:
         primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
     scale = _scale(seen, reference)
+    if not residues:
+        return Surrogate(primary, None, scale)
     wide = np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
