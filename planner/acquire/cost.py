@@ -1,6 +1,7 @@
 """What measuring a pose costs in minutes: travel at the joints' speeds, and every hit."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -45,7 +46,7 @@ def shortest_tour(
     first = cost.travel(q, start)
 
     def length(order: list[int]) -> float:
-        legs = [apart[a, b] for a, b in zip(order, order[1:], strict=False)]
+        legs = [apart[a, b] for a, b in pairwise(order)]
         return float(first[order[0]] + sum(legs))
 
     order: list[int] = [int(np.argmin(first))]

@@ -48,9 +48,7 @@ class FrfNoise:
                 steps.append(float(frf.frequency_hz[1] - frf.frequency_hz[0]))
         if not floors:
             return cls(ASSUMED_RELATIVE, None, (band_hz[1] - band_hz[0]) / 200, max(misfit, 1.0))
-        return cls(
-            MODEL_ERROR, float(np.median(floors)), float(np.median(steps)), max(misfit, 1.0)
-        )
+        return cls(MODEL_ERROR, float(np.median(floors)), float(np.median(steps)), max(misfit, 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +64,8 @@ class OpenParameters:
     def poses(self, x: np.ndarray, low: np.ndarray, q: np.ndarray, informed: bool) -> Poses:
         """Poses q (n, dof) in rad with their slopes and, where `informed`, their information."""
         count, p = low.shape[1], len(self.covariance)
+        if not len(q):
+            return Poses(x, low, np.zeros((0, count, p)), np.zeros((0, AXES, p, p)))
         slope = log_frequency_slope(self.simulation, self.parametrisation, q, count)
         information = self.information(q) if informed else np.zeros((len(q), AXES, p, p))
         return Poses(x, low, np.nan_to_num(slope), information)

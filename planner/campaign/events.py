@@ -110,10 +110,14 @@ class Withdrawn(Event, frozen=True, tag="withdrawn"):
 
 
 class Skipped(Event, frozen=True, tag="skipped"):
-    """A proposed pose cannot or shall not be measured; it is not offered again."""
+    """A proposed pose cannot or shall not be measured; it is not offered again.
+
+    `neighbours`: what stands in the way there (the reason) does so around it too.
+    """
 
     pose: str
     reason: str = ""
+    neighbours: bool = False
 
 
 class Starred(Event, frozen=True, tag="starred"):

@@ -6,12 +6,16 @@ from functools import cached_property
 
 import numpy as np
 
+from planner.acquire.outputs import FrequencyOutputs, Poses
+from planner.acquire.parameters import FrfNoise
+from planner.acquire.propose import DESIGNS, Pick, Travel
 from planner.acquire.propose import propose as choose
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.events import Proposal
 from planner.campaign.fidelity import LowFidelity, learn
 from planner.campaign.labels import LabelledPose, frequencies, label, observations
+from planner.campaign.outlook import cost_of, outlook
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import NoPoseLeftError
 from planner.frf.types import Frf
@@ -26,6 +30,9 @@ from planner.fusion.surrogate import (
 )
 from planner.physics.dynamics import SimulatedModes
 
+# Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
+AVOIDED = 0.1
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -35,6 +42,7 @@ class Model:
     labelled: tuple[LabelledPose, ...]
     low: LowFidelity
     surrogate: Surrogate
+    frf_noise: FrfNoise | None = None  # None: no FRF was looked at
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Modes at poses q (n, dof) in rad."""
@@ -50,6 +58,12 @@ class Model:
     def simulated_candidates(self) -> SimulatedModes:
         """What the low fidelity says at the candidates."""
         return self.low.simulate(self.cell.candidates.q)
+
+    @cached_property
+    def outlook(self) -> tuple[FrequencyOutputs, Poses]:
+        """The posterior as acquisitions see it, and the candidates."""
+        said = self.simulated_candidates
+        return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise)
 
     def _predict(
         self, q: np.ndarray, features: np.ndarray, simulated: SimulatedModes
@@ -96,16 +110,20 @@ def build(
     `residues` only frequencies and damping are fitted, and no FRF can be predicted.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
+    noise = None
     if cell.config.fidelity.simulation == "updated" and used:
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        low = learn(low, [frf_of(m, table) for m in used], q, table.band_hz)
+        frfs = tuple(frf_of(m, table) for m in used)
+        low = learn(low, frfs, q, table.band_hz)
+        misfit = low.identified.misfit if low.identified else 1.0
+        noise = FrfNoise.of(frfs, table.band_hz, misfit)
     candidates = [_Guided.by(cell, used, low)]
     if low.left_out is not None:
         # What lacks physics is bent by fitting it; as it stands it may be the better guide.
         candidates.append(_Guided.by(cell, used, replace(cell.frozen, suspect=low)))
     best = max(candidates, key=lambda guided: guided.log_evidence)
     surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues)
-    return Model(cell, best.labelled, best.low, surrogate)
+    return Model(cell, best.labelled, best.low, surrogate, noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,17 +154,7 @@ def propose(
     """The next poses to measure; NoPoseLeftError when no candidate is left."""
     cell = model.cell
     candidates = cell.candidates
-    taken = [m.joints_deg for m in state.measurements.values()]
-    taken += [state.proposals[pose].joints_deg for pose in state.skipped]
-    picks = choose(
-        acquisition,
-        model.surrogate,
-        candidates.features,
-        model.simulated_candidates,
-        count=count,
-        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
-        seed=state.events,
-    )
+    picks = _picks(model, state, count, acquisition)
     if not picks:
         raise NoPoseLeftError(
             f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
@@ -161,6 +169,30 @@ def propose(
             reason=_reason(model, pick.index, acquisition),
         )
         for i, pick in enumerate(picks)
+    )
+
+
+def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
+    cell = model.cell
+    x = cell.candidates.features
+    taken = [m.joints_deg for m in state.measurements.values()]
+    travel = Travel(cost_of(cell), cell.candidates.q, np.deg2rad(taken[-1]) if taken else None)
+    taken += [state.proposals[pose].joints_deg for pose in state.skipped]
+    allowed = cell.allowed
+    for pose in state.avoided:
+        there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
+        allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
+    return choose(
+        acquisition,
+        model.surrogate,
+        x,
+        model.simulated_candidates,
+        count=count,
+        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
+        seed=state.events,
+        outlook=None if acquisition in DESIGNS else model.outlook,
+        travel=travel,
+        allowed=allowed,
     )
 
 

@@ -37,7 +37,9 @@ def log_frequency_slope(
             out[:, :, p] = springs[:, list(parameter.blocks)].sum(axis=1)
     if parametrisation.nuisances:
         basis = parametrisation.basis
-        moved = np.einsum("nbie,nek->nbik", simulation.elastic.body_jacobians(q), phi, optimize=True)
+        moved = np.einsum(
+            "nbie,nek->nbik", simulation.elastic.body_jacobians(q), phi, optimize=True
+        )
         half = np.einsum("bpij,nbjk->nbpik", basis, moved, optimize=True)
         inertial = -0.5 * np.einsum("nbik,nbpik->nkbp", moved, half, optimize=True)
         out[:, :, own:] = inertial.reshape(len(q), count, -1)

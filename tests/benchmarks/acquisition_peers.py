@@ -18,9 +18,7 @@ from emukit.model_wrappers import GPyModelWrapper
 job = np.load(sys.argv[1])
 d = job["x"].shape[1]
 kernel = GPy.kern.Matern52(d, float(job["variance"]), job["lengths"], ARD=True)
-model = GPy.models.GPRegression(
-    job["x"], job["y"][:, None], kernel, noise_var=float(job["noise"])
-)
+model = GPy.models.GPRegression(job["x"], job["y"][:, None], kernel, noise_var=float(job["noise"]))
 space = ParameterSpace([ContinuousParameter(f"x{i}", 0, 1) for i in range(d)])
 acquisition = IntegratedVarianceReduction(GPyModelWrapper(model), space, job["points"])
 acquisition.evaluate(job["candidates"][:10])
