@@ -6,10 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
+from planner.acquire.mixed import mixed
 from planner.acquire.outputs import FrequencyOutputs, Poses
 from planner.acquire.parameters import FrfNoise
 from planner.acquire.propose import DESIGNS, Pick, Travel
 from planner.acquire.propose import propose as choose
+from planner.acquire.repeats import repeat_gain
+from planner.acquire.stopping import Forecast, forecast
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.events import Proposal
@@ -32,6 +35,7 @@ from planner.physics.dynamics import SimulatedModes
 
 # Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
 AVOIDED = 0.1
+CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +68,35 @@ class Model:
         """The posterior as acquisitions see it, and the candidates."""
         said = self.simulated_candidates
         return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise)
+
+    @cached_property
+    def forecast(self) -> Forecast:
+        """Predicted RMSE over the workspace, and what one more measurement would gain."""
+        outputs, poses = self.outlook
+        best = poses.one(int(np.argmax(mixed(outputs, poses[:CONSIDERED]))))
+        stop = self.cell.config.stop
+        return forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
+
+    @property
+    def done(self) -> bool:
+        """Whether the target is reached with the probability that campaign.toml asks for."""
+        stop = self.cell.config.stop
+        enough = len(self.labelled) >= stop.measurements_min
+        return enough and self.forecast.reached >= stop.probability
+
+    def repeat(self) -> tuple[str, float, float] | None:
+        """The measured pose that gains most from more hits, its gain, and that of a new pose.
+
+        None where nothing is measured. Gains are reductions of the mean relative variance.
+        """
+        if not self.labelled:
+            return None
+        outputs, poses = self.outlook
+        sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
+              for p in self.labelled]  # fmt: skip
+        gain = repeat_gain(outputs, np.array(sd) ** 2)
+        best, fresh = int(np.argmax(gain)), mixed(outputs, poses[:CONSIDERED])
+        return self.labelled[best].pose, float(gain[best]), float(np.max(fresh))
 
     def _predict(
         self, q: np.ndarray, features: np.ndarray, simulated: SimulatedModes
