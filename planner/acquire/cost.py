@@ -37,7 +37,7 @@ class Cost:
 def shortest_tour(
     cost: Cost, q: np.ndarray, start: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A short order (n,) of visiting q (n, dof) from `start`, and the minutes (n,) of each visit.
+    """A short order (n,) of visiting q (n, dof) from `start`, and the minutes (n,) of each leg.
 
     Nearest neighbour, then two-opt (Croes 1958) until nothing is gained; the tour does not return.
     """
@@ -61,9 +61,5 @@ def shortest_tour(
                 other = order[:i] + order[i : j + 1][::-1] + order[j + 1 :]
                 if length(other) < length(order) - 1e-12:
                     order, improved = other, True
-    place = [start, *(q[i] for i in order[:-1])]
-    minutes = [
-        float(cost.minutes(q[i : i + 1], at, (0, 1, 2))[0])
-        for i, at in zip(order, place, strict=True)
-    ]
-    return np.array(order), np.array(minutes)
+    legs = [first[order[0]], *(apart[a, b] for a, b in pairwise(order))]
+    return np.array(order), np.array(legs)

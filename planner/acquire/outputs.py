@@ -114,6 +114,11 @@ class FrequencyOutputs:
         return len(self.noise)
 
     @property
+    def measurement(self) -> float:
+        """Variance that EMA alone gives a frequency from hits along all axes."""
+        return MEASUREMENT_SD**2
+
+    @property
     def weights(self) -> np.ndarray:
         """(k,) how much each label counts, over the workspace."""
         return self.workspace.importance.sum(axis=0)

@@ -1,11 +1,12 @@
 """From acquisition to proposals: scores on reachable candidates, one pose after another."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.acquire import space_filling
+from planner.acquire.axes import best_axes
 from planner.acquire.cost import Cost, shortest_tour
 from planner.acquire.goal import goal
 from planner.acquire.integrated_variance import integrated_variance
@@ -43,20 +44,25 @@ NEAR = 1e-3  # in model coordinates: no second measurement at the same place
 
 @dataclass(frozen=True)
 class Pick:
-    """A chosen candidate, its score (NaN for designs, which have none) and its minutes (or NaN)."""
+    """A chosen candidate, its score (NaN for designs, which have none), minutes, hit axes."""
 
     index: int
     score: float
     minutes: float = float("nan")
+    axes: tuple[int, ...] = ALL_AXES
 
 
 @dataclass(frozen=True, eq=False)
 class Travel:
-    """What measuring costs: candidates q (n, dof) in rad, where the robot stands (dof,) or None."""
+    """What measuring costs: candidates q (n, dof) in rad, where the robot stands (dof,) or None.
+
+    With `shares` (n, k, 3) of `axis_shares` the axes to hit are chosen as well.
+    """
 
     cost: Cost
     q: np.ndarray
     at: np.ndarray | None = None
+    shares: np.ndarray | None = None
 
 
 def check_name(name: str) -> None:
@@ -126,10 +132,14 @@ def _one_after_another(
             minutes = travel.cost.minutes(travel.q[free], at, ALL_AXES)
             rate = gain / minutes
         best = int(np.argmax(rate))  # the first of equals
-        index = int(free[best])
-        picks.append(Pick(index, float(gain[best]), float(minutes[best])))
+        index, axes, spent = int(free[best]), ALL_AXES, float(minutes[best])
+        if travel is not None and travel.shares is not None:
+            there = float(travel.cost.travel(travel.q[[index]], at)[0])
+            axes, _ = best_axes(outputs, poses.one(index), travel.shares[index], travel.cost, there)
+            spent = there + travel.cost.per_pose + travel.cost.hitting(axes)
+        picks.append(Pick(index, float(gain[best]), spent, axes))
         at = None if travel is None else travel.q[index]
-        outputs = outputs.planning(poses.one(index))
+        outputs = outputs.planning(poses.one(index), axes)
         free = free[np.linalg.norm(poses.x[free] - poses.x[index], axis=1) > NEAR]
     return tuple(picks)
 
@@ -139,7 +149,9 @@ def _toured(picks: tuple[Pick, ...], travel: Travel | None) -> tuple[Pick, ...]:
     if travel is None or len(picks) < 3:
         return picks
     q = travel.q[[p.index for p in picks]]
-    order, minutes = shortest_tour(travel.cost, q, travel.at)
+    order, legs = shortest_tour(travel.cost, q, travel.at)
+    spent = [travel.cost.per_pose + travel.cost.hitting(picks[i].axes) for i in order]
     return tuple(
-        Pick(picks[i].index, picks[i].score, float(m)) for i, m in zip(order, minutes, strict=True)
+        replace(picks[i], minutes=float(leg + own))
+        for i, leg, own in zip(order, legs, spent, strict=True)
     )

@@ -30,26 +30,30 @@ def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.nda
 
     Averaged over the hyperparameters, which are held.
     """
-    samples = range(outputs.posterior.theta.shape[1])
-    todo = [(k, s) for k in range(outputs.count) for s in samples if target.importance[:, k].any()]
-    size = len(poses) * len(target.poses) * len(todo)
-    total = np.zeros(len(poses))
+    return np.sum(reduction_by_label(outputs, poses, target)[0], axis=0)
+
+
+def reduction_by_label(
+    outputs: FrequencyOutputs, poses: Poses, target: Target
+) -> tuple[np.ndarray, np.ndarray]:
+    """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
+    size = len(poses) * len(target.poses) * outputs.count * outputs.posterior.theta.shape[1]
+    labels = range(outputs.count)
     if size < WORTH_THREADS:
-        parts = [p for k in range(outputs.count) for p in _label(outputs, poses, target, k, map)]
+        both = [_label(outputs, poses, target, k, map) for k in labels]
     else:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            labels = range(outputs.count)
-            parts = [p for k in labels for p in _label(outputs, poses, target, k, pool.map)]
-    for part in parts:
-        total += part
-    return total / len(samples)
+            both = [_label(outputs, poses, target, k, pool.map) for k in labels]
+    return np.array([r for r, _ in both]), np.array([v for _, v in both])
 
 
-def _label(outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapped) -> list:
-    """Reductions (n,) by label k, one an hyperparameter sample."""
+def _label(
+    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapped
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
     weight = target.importance[:, k]
     if not weight.any() or not len(poses):
-        return []
+        return np.zeros(len(poses)), np.ones(len(poses))
     a, va = _features(outputs, k, poses, sign=-1.0)
     b, _ = _features(outputs, k, target.poses, sign=1.0)
     scale = va + outputs.noise[k]
@@ -67,7 +71,7 @@ def _label(outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapp
         return np.asarray(_squares(kernel, theta[s], x[part], a[s, part], xu, b[s], weight))
 
     done = np.concatenate(list(mapped(run, jobs))).reshape(len(theta), -1)[:, :n]
-    return list(done / scale)
+    return np.mean(done / scale, axis=0), np.mean(scale, axis=0)
 
 
 @partial(jax.jit, static_argnums=0, compiler_options={"xla_cpu_prefer_vector_width": "512"})

@@ -35,7 +35,8 @@ class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `mode_weights`: how much each mode counts (none: all alike). `own_poses_deg`: poses of the
     engineer's, offered besides the candidates, or `own_only`. `singularity_margin`: least singular
     value of the tcp's Jacobian, its linear part over the reach, of a pose that is offered.
-    `hammer_height_m`: heights of the tcp that the hammer reaches.
+    `hammer_height_m`: heights of the tcp that the hammer reaches. `hit_axes`: "all", as FRFs
+    need, or the "best" ones per minute, as frequencies need.
     """
 
     name: str = "integrated_variance"
@@ -45,6 +46,7 @@ class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     own_only: bool = False
     singularity_margin: float = 0.0
     hammer_height_m: tuple[float, float] | None = None
+    hit_axes: Literal["all", "best"] = "all"
 
 
 class ForbiddenTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from planner.acquire.axes import axis_shares
 from planner.acquire.mixed import mixed
 from planner.acquire.outputs import FrequencyOutputs, Poses
 from planner.acquire.parameters import FrfNoise
@@ -200,6 +201,8 @@ def propose(
             position_m=_xyz(candidates.position_m[pick.index]),
             score=float(pick.score),
             reason=_reason(model, pick.index, acquisition),
+            hits=tuple("xyz"[axis] for axis in pick.axes),
+            minutes=round(pick.minutes, 2) if np.isfinite(pick.minutes) else None,
         )
         for i, pick in enumerate(picks)
     )
@@ -209,7 +212,11 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     cell = model.cell
     x = cell.candidates.features
     taken = [m.joints_deg for m in state.measurements.values()]
-    travel = Travel(cost_of(cell), cell.candidates.q, np.deg2rad(taken[-1]) if taken else None)
+    at = np.deg2rad(taken[-1]) if taken else None
+    shares = None
+    if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
+        shares = axis_shares(model.simulated_candidates.residue)
+    travel = Travel(cost_of(cell), cell.candidates.q, at, shares)
     taken += [state.proposals[pose].joints_deg for pose in state.skipped]
     allowed = cell.allowed
     for pose in state.avoided:

@@ -51,7 +51,8 @@ def proposals(answer: dict[str, Any]) -> RenderableType:
                 _with_sd(100 * mode["damping_ratio"], 100 * mode["damping_sd"]),
             )
         x, y, z = proposal["position_m"]
-        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {proposal['reason']}"
+        hits = f"hit along {', '.join(proposal['hits'])}"
+        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal['reason']}"
         parts += [angles, Text(place), expected]
     said = [answer["forecast"]["text"], (answer["repeat"] or {"text": ""})["text"]]
     return Group(*parts, Text(" ".join(filter(None, said))))

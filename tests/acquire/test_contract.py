@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from test_acquire import X, conditioned_variance, over, with_parameters
 
+from planner.acquire.axes import axis_shares, best_axes
 from planner.acquire.cost import Cost, shortest_tour
 from planner.acquire.goal import goal
 from planner.acquire.mixed import mixed
@@ -265,11 +266,11 @@ def test_the_best_gain_per_minute_is_near_and_tours_are_short(surrogate):
         for speed in (1e-3, 1e-2)
     ]  # fmt: skip
     assert picks[0].index == picks[1].index == 0  # where it stands: no minutes
-    order, minutes = shortest_tour(slow, q[:8], q[100])
+    order, legs = shortest_tour(slow, q[:8], q[100])
     given = sum(slow.travel(q[i + 1 : i + 2], q[i])[0] for i in range(7))
     given += slow.travel(q[:1], q[100])[0]
     assert sorted(order.tolist()) == list(range(8))
-    assert minutes.sum() < given
+    assert legs.sum() < given
 
 
 def test_what_is_not_allowed_is_not_proposed(surrogate):
@@ -277,3 +278,22 @@ def test_what_is_not_allowed_is_not_proposed(surrogate):
     for name in ("integrated_variance", "maximin_lhs"):
         picks = propose(name, surrogate, X, simulated(X), 5, None, 0, allowed=allowed)
         assert all(allowed[p.index] for p in picks)
+
+
+def test_axes_are_saved_where_one_shows_every_mode(surrogate):
+    outputs, poses = over(surrogate, X, 30)
+    cost = Cost(np.ones(6), per_pose=1.0, per_hit=0.25, hits_per_axis=4)
+    along_x = np.tile([0.8, 0.1, 0.1], (4, 1))
+    hidden = along_x.copy()
+    hidden[2] = [0.01, 0.5, 0.49]  # mode 3 does not show along x
+    assert best_axes(outputs, poses.one(60), along_x, cost, 0.0)[0] == (0,)
+    assert best_axes(outputs, poses.one(60), hidden, cost, 0.0)[0] in ((1,), (2,))
+    free = Cost(np.ones(6), per_pose=1.0, per_hit=1e-9)
+    assert best_axes(outputs, poses.one(60), along_x, free, 0.0)[0] == (0, 1, 2)
+
+
+def test_shares_of_the_axes_add_up():
+    rng = np.random.default_rng(3)
+    residue = rng.standard_normal((5, 2, 3, 3)) + 1j * rng.standard_normal((5, 2, 3, 3))
+    residue[1, 1] = np.nan
+    np.testing.assert_allclose(axis_shares(residue).sum(axis=2), 1.0)

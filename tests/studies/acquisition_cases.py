@@ -20,6 +20,7 @@ from planner.truth.model import Truth, load_truth
 
 ROBOTS = {"KR10": KR10, "IRB 6640": IRB6640, "KR210": KR210}
 MODES, CANDIDATES, UNUSED, LINES = 4, 200, 60, 160
+LEAST_SEEN = 0.02  # share of a mode in the hit axes below which EMA does not find it
 FREQUENCY_SD, DAMPING_SD, FRF_SD = 1e-3, 0.05, 0.02  # relative, the last one to the FRF's rms
 
 
@@ -33,34 +34,54 @@ class Case:
     unused: np.ndarray
     true_hz: np.ndarray
 
-    def measure(self, q: np.ndarray, number: int) -> tuple[Measurement, Frf]:
-        """Modes and FRF at q (6,), with noise of its own for every pose."""
+    def measure(
+        self, q: np.ndarray, number: int, axes: tuple[int, ...] = (0, 1, 2)
+    ) -> tuple[Measurement, Frf]:
+        """Modes and FRF at q (6,) hit along `axes`, with noise of its own for every pose.
+
+        With fewer axes frequencies are less certain, and modes that hardly show are not found.
+        """
         rng = np.random.default_rng([self.seed, number])
         band = self.cell.config.modes.band_hz
+
+        def lost(values: np.ndarray) -> np.ndarray:
+            """Columns that were not hit are not known."""
+            out = np.array(values)
+            out[:, left] = np.nan
+            return out
+
         hertz, zeta, residue = self.truth.modes(q, MODES)
-        modes = []
+        modes, left = [], [i for i in range(3) if i not in axes]
         for f, z, r in zip(hertz, zeta, residue, strict=True):
+            square = np.sum(np.abs(r) ** 2, axis=0)
+            seen = square[list(axes)].sum() / square.sum()
+            if seen < LEAST_SEEN:
+                continue
+            relative = FREQUENCY_SD / np.sqrt(seen)
             sd = 0.03 * np.abs(r).max()
             noisy = r + sd * (rng.standard_normal((3, 3)) + 1j * rng.standard_normal((3, 3)))
+            shape = np.linalg.svd(noisy[:, list(axes)])[0][:, 0]
             modes.append(
                 Mode(
-                    f * np.exp(FREQUENCY_SD * rng.standard_normal()), f * FREQUENCY_SD,
+                    f * np.exp(relative * rng.standard_normal()), f * relative,
                     z * np.exp(DAMPING_SD * rng.standard_normal()), z * DAMPING_SD,
-                    noisy, np.full((3, 3), sd), np.linalg.svd(noisy)[0][:, 0], 1.0,
+                    lost(noisy), lost(np.full((3, 3), sd)), shape, 1.0,
                 )
             )  # fmt: skip
-        lines = np.linspace(*band, LINES)
+        lines, hits = np.linspace(*band, LINES), tuple(4 if i in axes else 0 for i in range(3))
         h = self.truth.accelerance(q, lines)
         sd = FRF_SD * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 2), keepdims=True))
         noise = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
         variance = np.broadcast_to(sd**2, h.shape)
         h = h + sd / np.sqrt(2) * noise
-        frf = Frf(lines, h, variance, np.full(h.shape, np.nan), (4, 4, 4), band)
+        frf = Frf(lines, lost(h), lost(variance), np.full(h.shape, np.nan), hits, band)
         found = tuple(from_mode(m) for m in modes)
         return Measurement(f"P{number}", tuple(np.rad2deg(q)), (), found), frf
 
 
-def make(robot: str, seed: int, simulation: str, directory: Path, lacking: str = "") -> Case:
+def make(
+    robot: str, seed: int, simulation: str, directory: Path, lacking: str = "", axes: str = "all"
+) -> Case:
     """`lacking`: what the simulation has not, "floor" (a soft one) or "tilts" (and the floor)."""
     arm = ROBOTS[robot]
     full = arm.write(directory / "full", 2)
@@ -74,7 +95,7 @@ def make(robot: str, seed: int, simulation: str, directory: Path, lacking: str =
         "workspace": {"joints_deg": [list(r) for r in arm.joints_deg]},
         "modes": {"count": MODES, "band_hz": [arm.band_hz[0], 0.4 * arm.band_hz[1]]},
         "fidelity": {"simulation": simulation},
-        "acquisition": {"candidates": CANDIDATES},
+        "acquisition": {"candidates": CANDIDATES, "hit_axes": axes},
     }
     cell = Cell.load(toml, config_from_builtins(table))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
@@ -115,6 +136,7 @@ def campaign(
     if not isinstance(strategy, str):
         planned += [i for i in strategy if i not in initial]
     for n in range(1, budget + 1):
+        axes: tuple[int, ...] = (0, 1, 2)
         if n <= len(planned):
             q = candidates.q[planned[n - 1]]
         else:
@@ -122,9 +144,10 @@ def campaign(
             model = model or build(case.cell, state, frf_of, residues=False)
             (proposal,) = propose(model, state, 1, str(strategy))
             q = np.deg2rad(np.array(proposal.joints_deg))
-        minutes += float(cost.minutes(q[None], at, (0, 1, 2))[0])
+            axes = tuple("xyz".index(hit) for hit in proposal.hits)
+        minutes += float(cost.minutes(q[None], at, axes)[0])
         at = q
-        measurement, frf = case.measure(q, n)
+        measurement, frf = case.measure(q, n, axes)
         measurements = {**measurements, measurement.pose: measurement}
         frfs[measurement.pose] = frf
         state = CampaignState(measurements=measurements, events=n)
