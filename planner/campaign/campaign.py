@@ -178,10 +178,7 @@ class Campaign:
             self._append(Withdrawn(pose, reason))
 
     def skip(self, pose: str, reason: str = "", neighbours: bool = False) -> None:
-        """A proposed pose cannot or shall not be measured; it is not offered again.
-
-        Nor are its `neighbours`, if what stands in the way there does so around it too.
-        """
+        """A proposed pose shall not be measured: never offered again, nor its `neighbours`."""
         with self._acting():
             if pose not in self.state.open:
                 raise InputError(f"Pose {pose} is not an open proposal; see planner status.")
