@@ -2,8 +2,9 @@
 
 `pytest -m slow tests/studies/test_acquisitions.py -s` prints the tables. STUDY_ROBOTS (all
 three), STUDY_SEEDS (5), STUDY_FIRST (101) and STUDY_LACKING ("floor"; "" for the right physics,
-"tilts") make it larger; STUDY_KEPT names a folder that keeps finished runs. Truths are MuJoCo models with ± 15 % springs, 4 % inertias and noise of
-EMA's size; errors are those at 60 poses never measured. Seeds 1-20 were used in development.
+"tilts") make it larger; STUDY_KEPT names a folder that keeps finished runs. Truths are MuJoCo
+models with ± 15 % springs, 4 % inertias and noise of EMA's size; errors are those at 60 poses
+never measured. Seeds 1-20 were used in development.
 """
 
 import os
