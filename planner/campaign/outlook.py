@@ -9,7 +9,7 @@ from planner.acquire.propose import INTEGRATION
 from planner.campaign.cell import Cell
 from planner.campaign.fidelity import PRIORS, LowFidelity
 from planner.fusion.surrogate import Surrogate
-from planner.identify.parameters import Priors, parametrise
+from planner.identify.parameters import parametrise
 from planner.physics.dynamics import SimulatedModes
 
 # The first of the candidates, evenly spread, whose information about parameters is worked out.
@@ -18,17 +18,17 @@ INFORMED = 500
 
 def open_parameters(cell: Cell, low: LowFidelity, noise: FrfNoise | None) -> OpenParameters | None:
     """The simulation's parameters as measured so far; None where it does not learn."""
-    nominal, found = low.nominal, low.identified
+    nominal, learned = low.nominal, low.learned
     # One that was identified and then set aside has nothing to learn that would be believed.
     if cell.config.fidelity.simulation != "updated" or nominal is None or low.suspect is not None:
         return None
     band = cell.config.modes.band_hz
     noise = noise or FrfNoise.of((), band, 1.0)
-    if found is None:
+    if learned is None:
         p = parametrise(nominal, PRIORS)
         known = np.diag(np.concatenate([p.log_sd**2, np.ones(len(p.nuisances))]))
         return OpenParameters(nominal, p, known, noise, band)
-    p = parametrise(nominal, PRIORS if found.nuisances else Priors())
+    p, found = parametrise(learned.structure.simulation, learned.priors), learned.identified
     return OpenParameters(found.simulation, p, found.covariance, noise, band)
 
 

@@ -14,7 +14,7 @@ from scipy.stats import norm, qmc
 from planner.frf import modal
 from planner.fusion.ar1 import OutputPrior
 from planner.fusion.data import TrainingData
-from planner.fusion.hedged import HedgedAR1, fit_hedged
+from planner.fusion.hedged import BELIEF, HedgedAR1, fit_hedged
 from planner.physics.dynamics import SimulatedModes
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
@@ -134,6 +134,7 @@ def fit_primary(
     left_out_hz: np.ndarray | None = None,
     has_simulation: bool = True,
     reference: SimulatedModes | None = None,
+    belief: float = BELIEF,
 ) -> HedgedAR1:
     """Fit log f of every label and log ζ of every label.
 
@@ -141,7 +142,7 @@ def fit_primary(
     elsewhere: its error at the measured poses says too little. None: it was not fitted.
     `left_out_hz` (n, k) is what it said of each pose before it had seen it, by which it is judged.
     `reference` is the simulation over the workspace: it says how large frequencies are before
-    anything is measured.
+    anything is measured. `belief` is the simulation's probability before these frequencies.
     """
     k = seen.frequency_hz.shape[1]
     y = np.concatenate([_log(seen.frequency_hz), _log(seen.damping_ratio)], axis=1)
@@ -161,6 +162,7 @@ def fit_primary(
         SAMPLES,
         KEPT,
         _judged(left_out_hz),
+        belief,
     )
 
 
