@@ -126,6 +126,8 @@ class FrequencyOutputs:
     def planning(self, pose: Poses, axes: tuple[int, ...] = ALL_AXES) -> "FrequencyOutputs":
         """The same once a pose (n = 1) has been hit along `axes` too."""
         root = self.covariance_root
+        if not pose.information.shape[-1]:
+            return replace(self, planned=self.planned.followed_by(pose))
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root
         factor = np.linalg.cholesky(np.eye(len(root)) + gained)
         left = np.linalg.solve(factor, root.T).T  # root (I + G)⁻¹ rootᵀ = left leftᵀ

@@ -37,7 +37,7 @@ def parameter_reduction(
     outputs: FrequencyOutputs, poses: Poses, target: Target, axes: Axes = ALL_AXES
 ) -> np.ndarray:
     """Reduction (n,) of a target's mean variance by hits along `axes` at n poses: tr A (Σ − Σ')."""
-    if not len(outputs.covariance_root) or not len(poses):
+    if not poses.information.shape[-1] or not len(poses):
         return np.zeros(len(poses))
     matters = _matters(outputs, target)
     parts = []

@@ -63,11 +63,11 @@ class OpenParameters:
 
     def poses(self, x: np.ndarray, low: np.ndarray, q: np.ndarray, informed: bool) -> Poses:
         """Poses q (n, dof) in rad with their slopes and, where `informed`, their information."""
-        count, p = low.shape[1], len(self.covariance)
-        if not len(q):
-            return Poses(x, low, np.zeros((0, count, p)), np.zeros((0, AXES, p, p)))
-        slope = log_frequency_slope(self.simulation, self.parametrisation, q, count)
-        information = self.information(q) if informed else np.zeros((len(q), AXES, p, p))
+        count = low.shape[1]
+        slope = np.zeros((0, count, len(self.covariance)))
+        if len(q):
+            slope = log_frequency_slope(self.simulation, self.parametrisation, q, count)
+        information = self.information(q) if informed else np.zeros((len(q), AXES, 0, 0))
         return Poses(x, low, np.nan_to_num(slope), information)
 
     def information(self, q: np.ndarray) -> np.ndarray:

@@ -33,6 +33,7 @@ ACQUISITIONS: dict[str, Score] = {
 }
 # What these look at is nothing where no parameter of the simulation is open.
 OF_PARAMETERS = ("parameter_information", "d_information")
+INFORMED = (*OF_PARAMETERS, "mixed", "goal")  # those that look at parameters at all
 DESIGNS: dict[str, Design] = {
     "random": space_filling.random,
     "sobol": space_filling.sobol,
@@ -63,6 +64,11 @@ class Travel:
     q: np.ndarray
     at: np.ndarray | None = None
     shares: np.ndarray | None = None
+
+    def among(self, which: np.ndarray) -> "Travel":
+        """The same for some of the candidates."""
+        shares = None if self.shares is None else self.shares[which]
+        return replace(self, q=self.q[which], shares=shares)
 
 
 def check_name(name: str) -> None:

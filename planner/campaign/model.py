@@ -10,7 +10,7 @@ from planner.acquire.axes import axis_shares
 from planner.acquire.mixed import mixed
 from planner.acquire.outputs import FrequencyOutputs, Poses
 from planner.acquire.parameters import FrfNoise
-from planner.acquire.propose import DESIGNS, Pick, Travel
+from planner.acquire.propose import DESIGNS, INFORMED, Pick, Travel
 from planner.acquire.propose import propose as choose
 from planner.acquire.repeats import repeat_gain
 from planner.acquire.stopping import Forecast, forecast
@@ -19,7 +19,7 @@ from planner.campaign.config import ModesTable
 from planner.campaign.events import Proposal
 from planner.campaign.fidelity import LowFidelity, learn
 from planner.campaign.labels import LabelledPose, frequencies, label, observations
-from planner.campaign.outlook import cost_of, outlook
+from planner.campaign.outlook import cost_of, informed_candidates, outlook
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import NoPoseLeftError
 from planner.frf.types import Frf
@@ -70,8 +70,16 @@ class Model:
     @cached_property
     def outlook(self) -> tuple[FrequencyOutputs, Poses]:
         """The posterior as acquisitions see it, and the candidates."""
+        return self._outlook(informed=False)
+
+    @cached_property
+    def informed(self) -> tuple[FrequencyOutputs, Poses]:
+        """The same with what `informed_candidates` would tell of the simulation's parameters."""
+        return self._outlook(informed=True)
+
+    def _outlook(self, informed: bool) -> tuple[FrequencyOutputs, Poses]:
         said = self.simulated_candidates
-        return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise)
+        return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise, informed)
 
     @cached_property
     def forecast(self) -> Forecast:
@@ -246,18 +254,24 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     for pose in state.avoided:
         there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
         allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
-    return choose(
+    asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
+    if acquisition in INFORMED:
+        asked, seen = informed_candidates(cell), model.informed
+    elif acquisition not in DESIGNS:
+        seen = model.outlook
+    picks = choose(
         acquisition,
         model.surrogate,
-        x,
-        model.simulated_candidates,
+        x[asked],
+        SimulatedModes(said.frequency_hz[asked], said.damping_ratio[asked], said.residue[asked]),
         count=count,
         exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
         seed=state.events,
-        outlook=None if acquisition in DESIGNS else model.outlook,
-        travel=travel,
-        allowed=allowed,
+        outlook=seen,
+        travel=travel.among(asked),
+        allowed=allowed[asked],
     )
+    return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
 
 
 def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:

@@ -13,7 +13,7 @@ from planner.identify.parameters import parametrise
 from planner.physics.dynamics import SimulatedModes
 
 # The first of the candidates, evenly spread, whose information about parameters is worked out.
-INFORMED = 500
+MOST_INFORMED = 200
 
 
 def open_parameters(cell: Cell, low: LowFidelity, noise: FrfNoise | None) -> OpenParameters | None:
@@ -32,29 +32,38 @@ def open_parameters(cell: Cell, low: LowFidelity, noise: FrfNoise | None) -> Ope
     return OpenParameters(found.simulation, p, found.covariance, noise, band)
 
 
+def informed_candidates(cell: Cell) -> np.ndarray:
+    """Indices of the candidates whose information about parameters is asked for; own ones too."""
+    spread = cell.spread
+    own = np.arange(spread, len(cell.candidates.q))
+    return np.concatenate([np.arange(min(spread, MOST_INFORMED)), own])
+
+
 def outlook(
     cell: Cell,
     low: LowFidelity,
     surrogate: Surrogate,
     simulated: SimulatedModes,
     noise: FrfNoise | None,
+    informed: bool,
 ) -> tuple[FrequencyOutputs, Poses]:
-    """Posterior over the workspace (and the goal), and all candidates as poses.
+    """Posterior over the workspace (and the goal), and candidates as poses.
 
     `simulated` is what the low fidelity says at the candidates, `noise` that of FRFs so far.
+    `informed`: the poses are those of `informed_candidates`, with what they tell of parameters.
     """
     candidates = cell.candidates
     inputs = surrogate.frequency_inputs(simulated)
     open_ = open_parameters(cell, low, noise)
+    asked = informed_candidates(cell) if informed else np.arange(len(candidates.q))
     if open_ is None:
-        poses, covariance = Poses.plain(candidates.features, inputs), None
+        poses, covariance = Poses.plain(candidates.features[asked], inputs[asked]), None
     else:
-        first = slice(0, INFORMED)
-        poses = open_.poses(candidates.features[first], inputs[first], candidates.q[first], True)
-        rest = slice(INFORMED, None)
-        more = open_.poses(candidates.features[rest], inputs[rest], candidates.q[rest], False)
-        poses, covariance = poses.followed_by(more), open_.covariance
-    workspace = poses[: min(INTEGRATION, cell.spread)]
+        poses = open_.poses(
+            candidates.features[asked], inputs[asked], candidates.q[asked], informed
+        )
+        covariance = open_.covariance
+    workspace = poses[: min(INTEGRATION, MOST_INFORMED, cell.spread)]
     weights = cell.config.acquisition.mode_weights
     target = Target.evenly(workspace, None if weights is None else np.array(weights))
     goal = _goal(cell, low, surrogate, open_, target, simulated)
