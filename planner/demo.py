@@ -148,6 +148,7 @@ def _summary(
             float(np.mean(inside[known[:, k], k])) if known[:, k].any() else float("nan")
             for k in range(truth.shape[1])
         ],
+        "remarks": list(campaign.model.remarks),
         "step_seconds": [step["seconds"] for step in steps],
         "steps": steps,
         "rrd": str(rrd),

@@ -8,7 +8,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.frf.types import Frf
 from planner.fusion.hedged import BELIEF
-from planner.identify.extended import Structure, extended
+from planner.identify.extended import FLOOR, Structure, extended
 from planner.identify.identify import QUICK, Effort, identify
 from planner.identify.parameters import Priors
 from planner.identify.result import Identification
@@ -163,7 +163,9 @@ def _lacking(found: tuple[str, ...]) -> str:
     if not found:
         return f"{text}, but not yet where; tilts of all joints and the floor are identified."
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
-    return f"{text}, identified beside what it states: {'; '.join(found[:NAMED])}{more}."
+    named = "; ".join(found[:NAMED])
+    bolts = " Check the anchor bolts." if FLOOR in named else ""
+    return f"{text}, identified beside what it states: {named}{more}.{bolts}"
 
 
 def learn(

@@ -8,6 +8,7 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 from planner.cli.comparison import compare
 from planner.cli.identification import identify
+from planner.cli.study import study
 
 app = typer.Typer(
     name="planner",
@@ -262,6 +263,7 @@ def modes(
 
 app.command()(identify)
 app.command()(compare)
+app.command()(study)
 
 
 @app.command()

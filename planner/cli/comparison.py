@@ -54,7 +54,7 @@ def compare(
     as_json: AsJson = False,
 ) -> int:
     """Compare sampling strategies: error by number of measurements, on poses not used."""
-    from planner.cli.progress import counting
+    from planner.cli.progress import bars
     from planner.cli.render_comparison import compared
     from planner.compare.bench import assemble, decide
     from planner.compare.conduct import conduct, recorded
@@ -69,7 +69,7 @@ def compare(
     rows = read_recordings(recordings, loaded.joint_names).rows
     config = decide(loaded, [row.joints_deg for row in rows], campaign, simulation)
     folder = out or _cache_folder()
-    with counting(quiet=as_json) as progress:
+    with bars(quiet=as_json) as progress:
         poses = recorded(recordings, loaded.joint_names, config.modes, folder, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)

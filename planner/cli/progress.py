@@ -25,7 +25,7 @@ def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def counting(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+def bars(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """A function (what, done, of how many) that moves a bar for each thing that is counted."""
     from rich.progress import (
         BarColumn,
@@ -39,14 +39,27 @@ def counting(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     times = (TimeElapsedColumn(), TimeRemainingColumn())
     screen = console(quiet)
-    bars: dict[str, Any] = {}
+    shown: dict[str, Any] = {}
     with Progress(
         *columns, *times, console=screen, transient=True, disable=not screen.is_terminal
     ) as progress:
 
         def tell(what: str, done: int, total: int) -> None:
-            if what not in bars:
-                bars[what] = progress.add_task(what, total=total)
-            progress.update(bars[what], completed=done)
+            if what not in shown:
+                shown[what] = progress.add_task(what, total=total)
+            progress.update(shown[what], completed=done)
 
         yield tell
+
+
+@contextmanager
+def counting(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A function that shows what is being done and which share (0 to 1) is, as a bar."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
+               TextColumn("{task.description}"))  # fmt: skip
+    screen = console(quiet)
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda text, share: bar.update(task, description=text, completed=share)

@@ -254,6 +254,7 @@ def demo(answer: dict[str, Any]) -> RenderableType:
     )
     seconds = answer["step_seconds"]
     lines = [
+        *answer["remarks"],
         f"On {answer['unused']} poses that were never used. Refit and next proposal: first "
         f"{seconds[0]:.2f} s, then at most {max(seconds[1:], default=0.0):.2f} s.",
         f"Campaign: {answer['campaign']}",

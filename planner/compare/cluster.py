@@ -28,7 +28,7 @@ def each(
                 client.submit(attempt, function, data, items[i], pure=False): i for i in left
             }
             left = []
-            for future in as_completed(futures):
+            for future in as_completed(futures, loop=client.loop):
                 index = futures.pop(future)
                 if future.status == "finished":
                     yield index, future.result()

@@ -30,7 +30,7 @@ def each(
     Processes are spawned: forking a process with compiled JAX code in it may hang.
     """
     waiting = deque((index, 1) for index in range(len(items)))
-    team: dict[Connection, _Worker] = {}
+    team: dict[Any, _Worker] = {}  # by the connection to it
     try:
         while waiting or team:
             while waiting and len(team) < workers:
@@ -38,10 +38,10 @@ def each(
                 worker.give(items, *waiting.popleft())
                 team[worker.connection] = worker
             for connection in wait(list(team)):
-                worker = team[connection]  # type: ignore[index]
+                worker = team[connection]
                 index, attempt = worker.busy
                 try:
-                    answer = connection.recv()  # type: ignore[union-attr]
+                    answer = worker.connection.recv()
                 except (EOFError, OSError):  # closed, or reset
                     team.pop(worker.connection).stop()
                     if attempt < ATTEMPTS:

@@ -19,12 +19,49 @@ from planner.modes.measure import Source, measure
 from planner.recording.folder import read_recordings
 from planner.recording.types import PoseRow
 
+ARRAYS = ("frequency_hz", "accelerance", "variance", "coherence")
+
 
 class Refusal(msgspec.Struct, frozen=True):
     """A file that could not be used, and why."""
 
     file: str
     reason: str
+
+
+class FrfText(msgspec.Struct, frozen=True):
+    """What an FRF holds beside arrays; no `tail_s` stands for ∞, which JSON does not have."""
+
+    hits: tuple[int, int, int]
+    usable_band_hz: tuple[float, float]
+    exponential_rate_1_s: float
+    remarks: tuple[str, ...]
+    tail_s: float | None
+    force_window_s: float
+
+    @classmethod
+    def of(cls, frf: Frf) -> "FrfText":
+        tail_s = frf.tail_s if np.isfinite(frf.tail_s) else None
+        return cls(
+            frf.hits, frf.usable_band_hz, frf.exponential_rate_1_s, frf.remarks, tail_s,
+            frf.force_window_s,
+        )  # fmt: skip
+
+    def frf(self, arrays: dict[str, np.ndarray]) -> Frf:
+        tail_s = float("inf") if self.tail_s is None else self.tail_s
+        return Frf(
+            arrays["frequency_hz"],
+            arrays["accelerance"],
+            arrays["variance"],
+            arrays["coherence"],
+            self.hits,
+            self.usable_band_hz,
+            self.exponential_rate_1_s,
+            self.remarks,
+            tail_s,
+            arrays.get("force_share"),
+            self.force_window_s,
+        )
 
 
 class Made(msgspec.Struct, frozen=True):
@@ -34,7 +71,7 @@ class Made(msgspec.Struct, frozen=True):
     refused: tuple[Refusal, ...]
     reason: str  # why there are no modes; empty where there are
     simulated: bool
-    frf: dict
+    frf: FrfText | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +119,15 @@ def make(_: None, pose: PoseFiles) -> bytes:
     modes = from_modal(found.modal)
     refused = tuple(Refusal(v.source.name, v.reason) for v in found.verdicts if not v.accepted)
     reason = "" if modes else (found.remarks[-1] if found.remarks else "No mode was found.")
-    values = {} if found.frf is None else dict(vars(found.frf))
-    arrays = {k: values.pop(k) for k in tuple(values) if isinstance(values[k], np.ndarray)}
+    arrays = {} if found.frf is None else {n: getattr(found.frf, n) for n in ARRAYS}
+    if found.frf is not None and found.frf.force_share is not None:
+        arrays["force_share"] = found.frf.force_share
     made = Made(
         Measurement(first.pose, first.joints_deg, (), modes, found.remarks),
         refused,
         reason,
         any(v.simulated for v in found.verdicts),
-        {k: "inf" if v == np.inf else v for k, v in values.items()},
+        FrfText.of(found.frf) if found.frf else None,
     )
     buffer = io.BytesIO()
     np.savez(buffer, made=np.frombuffer(content.of(made), np.uint8), **arrays)
@@ -101,9 +139,7 @@ def unpack(data: bytes) -> PoolPose:
     with np.load(io.BytesIO(data), allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}
     made = msgspec.json.decode(arrays.pop("made").tobytes(), type=Made)
-    values = {k: np.inf if v == "inf" else v for k, v in made.frf.items()}
-    values |= {k: tuple(v) for k, v in values.items() if isinstance(v, list)}
-    frf = Frf(**arrays, **values) if arrays else None
+    frf = made.frf.frf(arrays) if made.frf else None
     return PoolPose(made.measurement, frf, made.refused, made.reason, made.simulated)
 
 

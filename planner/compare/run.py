@@ -46,10 +46,12 @@ def _run(bench: Bench, task: Task) -> Run:
         if len(used) == task.budget:
             break
         used = [*used, planned.pop(0) if planned else _chosen(bench, model, state, task.strategy)]
-    columns = (tuple(column) for column in zip(*scores, strict=True))
+    rmse_percent, r2, coverage95 = zip(*scores, strict=True)
     names = tuple(bench.measurements[i].pose for i in used)
     seconds = time.perf_counter() - wall, time.process_time() - process
-    return Run(task.strategy, task.seed, names, tuple(counts), *columns, *seconds)
+    return Run(
+        task.strategy, task.seed, names, tuple(counts), rmse_percent, r2, coverage95, *seconds
+    )
 
 
 def _planned(cell: PoolCell, task: Task) -> tuple[list[int], list[int]]:

@@ -1,6 +1,7 @@
 """Measured poses of true robots (MuJoCo) for the study of low fidelities, cell by cell."""
 
 import json
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from planner.modes.measure import Source, frf_of, measure
 from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
 from planner.truth.hits import Hammer
-from planner.truth.model import load_truth
+from planner.truth.model import Truth, load_truth
 from true_modes import hits_at
 
 POOL, UNUSED, MODES = 30, 60, 4
@@ -43,36 +44,58 @@ class MeasuredCell:
         return order[most:] if self.among else np.arange(len(self.unused))
 
 
+def truth_of(
+    robot: KnownRobot, directory: Path, deviation: Deviation, per_joint: int
+) -> tuple[Path, Truth]:
+    """robot.toml with `per_joint` springs a joint, and a truth that has two."""
+    full = robot.write(directory / "full", 2)
+    toml = full if per_joint == 2 else robot.write(directory / "robot", per_joint)
+    return toml, load_truth(full, deviation)
+
+
+def hit(
+    truth: Truth, q: np.ndarray, name: str, band_hz: tuple[float, float], seed: int
+) -> tuple[Measurement, Frf]:
+    """Twelve hits at q (6,) in rad, through FRFs to modes; seeded by `seed` and the name."""
+    rng = np.random.default_rng([seed, int(name[1:])])
+    frf = estimate(hits_at(truth, q, HAMMER, rng), band_hz)
+    modal = from_modal(estimate_modes(frf, band_hz))
+    return Measurement(name, tuple(np.rad2deg(q)), (), modal), frf
+
+
+def band_of(robot: KnownRobot) -> tuple[float, float]:
+    """The part of the robot's band (Hz) that holds the lowest modes."""
+    return robot.band_hz[0], 0.4 * robot.band_hz[1]
+
+
+def cell_of(robot: KnownRobot, toml: Path, simulation: str) -> Cell:
+    """A campaign over the robot's joint box."""
+    table = {
+        "robot": str(toml),
+        "workspace": {"joints_deg": [list(r) for r in robot.joints_deg]},
+        "modes": {"count": MODES, "band_hz": list(band_of(robot))},
+        "fidelity": {"simulation": simulation},
+        "acquisition": {"candidates": 50},
+    }
+    return Cell.load(toml, config_from_builtins(table))
+
+
 def box(
     robot: KnownRobot, directory: Path, seed: int, deviation: Deviation, per_joint: int
 ) -> MeasuredCell:
     """Poses all over a 6-D joint box; the simulation has `per_joint` springs, the truth two."""
-    full = robot.write(directory / "full", 2)
-    toml = full if per_joint == 2 else robot.write(directory / "robot", per_joint)
-    truth = load_truth(full, deviation)
+    toml, truth = truth_of(robot, directory, deviation, per_joint)
     rng = np.random.default_rng(seed)
     low, high = np.deg2rad(np.transpose(robot.joints_deg))
     poses, unused = rng.uniform(low, high, (POOL, 6)), rng.uniform(low, high, (UNUSED, 6))
-    band = robot.band_hz[0], 0.4 * robot.band_hz[1]
-    measured, frfs = [], {}
-    for i, q in enumerate(poses):
-        frf = estimate(hits_at(truth, q, HAMMER, np.random.default_rng([seed, i])), band)
-        frfs[f"P{i}"] = frf
-        modal = from_modal(estimate_modes(frf, band))
-        measured.append(Measurement(f"P{i}", tuple(np.rad2deg(q)), (), modal))
-    true_hz = np.array([truth.modes(q, MODES)[0] for q in unused])
-
-    def cells(simulation: str) -> Cell:
-        table = {
-            "robot": str(toml),
-            "workspace": {"joints_deg": [list(r) for r in robot.joints_deg]},
-            "modes": {"count": MODES, "band_hz": list(band)},
-            "fidelity": {"simulation": simulation},
-            "acquisition": {"candidates": 50},
-        }
-        return Cell.load(toml, config_from_builtins(table))
-
-    return MeasuredCell(cells, tuple(measured), frfs, unused, true_hz)
+    found = [hit(truth, q, f"P{i}", band_of(robot), seed) for i, q in enumerate(poses)]
+    return MeasuredCell(
+        lambda simulation: cell_of(robot, toml, simulation),
+        tuple(measurement for measurement, _ in found),
+        {measurement.pose: frf for measurement, frf in found},
+        unused,
+        np.array([truth.modes(q, MODES)[0] for q in unused]),
+    )
 
 
 def scatter(seed: int, **more: object) -> Deviation:
@@ -85,12 +108,17 @@ def right(robot: KnownRobot, directory: Path, seed: int) -> MeasuredCell:
     return box(robot, directory, seed, scatter(seed), 2)
 
 
+def soft(robot: KnownRobot, seed: int) -> Deviation:
+    """Scatter, and a floor that tilts."""
+    stiffness = 25 * max(robot.torsion)
+    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+    floor = tuple(Spring("base", axis, stiffness, 3e-4 * stiffness) for axis in axes)
+    return scatter(seed, extra=floor)
+
+
 def lacking(robot: KnownRobot, directory: Path, seed: int) -> MeasuredCell:
     """Torsion springs only; the truth tilts in every joint and stands on a soft floor."""
-    soft = 25 * max(robot.torsion)
-    axes = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-    floor = tuple(Spring("base", axis, soft, 3e-4 * soft) for axis in axes)
-    return box(robot, directory, seed, scatter(seed, extra=floor), 1)
+    return box(robot, directory, seed, soft(robot, seed), 1)
 
 
 def foreign(robot: KnownRobot, directory: Path, seed: int) -> MeasuredCell:
@@ -133,8 +161,6 @@ def plane() -> MeasuredCell:
 
 
 def _builtins(source: Path) -> dict[str, object]:
-    import tomllib
-
     return tomllib.loads((source / "campaign.toml").read_text())
 
 
