@@ -98,9 +98,7 @@ def play(
 
 
 def _done(campaign: Campaign) -> bool:
-    stop, model = campaign.cell.config.stop, campaign.model
-    overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
-    return len(model.labelled) >= stop.measurements_min and overall <= stop.frequency_sd_percent
+    return campaign.model.done
 
 
 def _step(report: ImportReport, proposal: Proposal, seconds: float) -> dict[str, Any]:

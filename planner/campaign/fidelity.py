@@ -50,6 +50,12 @@ class Learned:
         return self.identified.misfit <= SUSPECT
 
     @property
+    def priors(self) -> Priors:
+        """Those it was identified with."""
+        priors = self.structure.priors
+        return priors if self.identified.nuisances else _springs_only(priors)
+
+    @property
     def found(self) -> tuple[str, ...]:
         """Springs that robot.toml does not state, that matter and that the recordings determine.
 
@@ -148,9 +154,8 @@ class LowFidelity:
         """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation."""
         if self.learned is None:
             return np.zeros((len(q), self.count))
-        structure, identified = self.learned.structure, self.learned.identified
-        priors = structure.priors if identified.nuisances else _springs_only(structure.priors)
-        return frequency_sd(identified, structure.simulation, priors, q, self.count)
+        nominal, identified = self.learned.structure.simulation, self.learned.identified
+        return frequency_sd(identified, nominal, self.learned.priors, q, self.count)
 
 
 def _lacking(found: tuple[str, ...]) -> str:

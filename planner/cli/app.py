@@ -131,11 +131,15 @@ def skip(
     reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
-    """Say that a proposed pose cannot be measured; it is not offered again."""
+    """Say that a proposed pose cannot be measured; it is not offered again.
+
+    With a reason its neighbours are not offered either: what stands in the way there does so
+    around it too.
+    """
     from planner.campaign.campaign import Campaign
     from planner.cli import render
 
-    Campaign(directory).skip(pose, reason)
+    Campaign(directory).skip(pose, reason, neighbours=bool(reason))
     return respond({"skipped": pose, "reason": reason}, as_json, render.skipped)
 
 
