@@ -15,14 +15,13 @@ from planner.campaign.labels import LabelledPose, frequencies, label, observatio
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import NoPoseLeftError
 from planner.frf.types import Frf
+from planner.fusion.frf_bands import ModalPrediction, frf_moments
 from planner.fusion.hedged import HedgedAR1
 from planner.fusion.surrogate import (
     ModalObservations,
-    ModalPrediction,
     Surrogate,
     fit_primary,
     fit_surrogate,
-    frf_prediction,
 )
 from planner.physics.dynamics import SimulatedModes
 
@@ -62,7 +61,7 @@ class Model:
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N."""
-        return frf_prediction(self.predict(q), frequency_hz)
+        return frf_moments(self.predict(q), frequency_hz)
 
     @property
     def remarks(self) -> tuple[str, ...]:

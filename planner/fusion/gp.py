@@ -22,9 +22,10 @@ from planner.errors import InputError
 from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.data import Padded
 from planner.fusion.kernels import Kernel, parse
+from planner.fusion.predictive import Predictive
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
-JITTERS = (1e-10, 1e-8, 1e-6)  # relative to the prior variance
+JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +65,18 @@ class Posterior:
         `outputs` (indices) asks for some of them only.
         """
         asked = range(len(self.mask)) if outputs is None else outputs.tolist()
-        mean, variance = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
+        mean, sd = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
-            cross, white = self._cross(j, x, low[:, j])
-            means = (self.weights[j][:, None, :] @ cross)[:, 0]
-            own = self._own(j, x, low[:, j]) - np.sum(white**2, axis=1)
-            mean[:, i] = self.prior.mean[j] + np.mean(means, axis=0)
-            variance[:, i] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
-        return mean, np.sqrt(variance)
+            found = self.predictive(j, x, low[:, j])
+            mean[:, i], sd[:, i] = found.mean, found.sd
+        return mean, sd
+
+    def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:
+        """Output j, noise-free, at x (q, d) with centred low (q,), one Gaussian per sample."""
+        cross, white = self._cross(j, x, low)
+        means = self.prior.mean[j] + (self.weights[j][:, None, :] @ cross)[:, 0]
+        own = self._own(j, x, low) - np.sum(white**2, axis=1)
+        return Predictive(np.full(len(means), 1 / len(means)), means, np.sqrt(np.maximum(own, 0.0)))
 
     def covariance(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray

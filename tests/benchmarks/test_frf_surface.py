@@ -11,7 +11,8 @@ import pytest
 from frf_surface import BAND_HZ, HIGH_LINES, LOW_SHAPE, measured, measured_matrix, simulated
 from planner.frf.types import Frf
 from planner.fusion.surface import Grid, fit_surface
-from planner.fusion.surrogate import ModalObservations, fit_surrogate, frf_prediction
+from planner.fusion.frf_bands import frf_moments
+from planner.fusion.surrogate import ModalObservations, fit_surrogate
 from planner.modes.estimate import estimate_modes
 
 PAPER = {"simulation": 0.353, "GP": 0.785, "MFDGP": 0.758, "NARGP": 0.982}
@@ -40,7 +41,7 @@ def by_modes(angles, matrices, simulation):
     )
     fitted = fit_surrogate(seen)
     prediction = fitted.predict((BEYOND[:, None] - 70) / 50, simulation(BEYOND, count))
-    mean, sd = frf_prediction(prediction, LINES)
+    mean, sd = frf_moments(prediction, LINES)
     return np.abs(mean[:, 2, 2]).T, sd[:, 2, 2].T
 
 
