@@ -10,8 +10,8 @@ import pytest
 
 from frf_surface import BAND_HZ, HIGH_LINES, LOW_SHAPE, measured, measured_matrix, simulated
 from planner.frf.types import Frf
-from planner.fusion.surface import Grid, fit_surface
 from planner.fusion.frf_bands import frf_moments
+from planner.fusion.surface import Grid, fit_surface
 from planner.fusion.surrogate import ModalObservations, fit_surrogate
 from planner.modes.estimate import estimate_modes
 

@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 import fusion_peers
 from fusion_problems import PROBLEMS, Design, design
@@ -114,7 +113,7 @@ def folder(tmp_path):
 
 
 def told(scores, problems):
-    """Prints the table; (median RMSE, mean NLPD per cell, coverage, share of R² ≥ 0.9) by method."""
+    """Prints the table; by method median RMSE, NLPDs of the cells, coverage, share of R² ≥ 0.9."""
     methods = ("ours", MOMENTS, *PEERS)
     print("\ncoverage %, mean NLPD, median RMSE / sd of the output")
     print(" " * 18 + "".join(f"{m:>24s}" for m in methods))
