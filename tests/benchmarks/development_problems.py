@@ -3,7 +3,7 @@
 Two-fidelity functions of Dong et al. 2015 (camel, Bohachevsky, Booth, Himmelblau), Xiong et al.
 2013 (Park, the second), Perdikaris et al. 2017 and Cutajar et al. 2019 (bent waves), the OTL
 circuit (Ben-Ari & Steinberg 2007) and the wing's weight (Forrester et al. 2008) with a simulation
-that knows less, sums of random waves, and robots with other modes and deviations than `robot_problems`.
+that knows less, sums of random waves, and other modes of robots than in `robot_problems`.
 """
 
 from collections.abc import Callable
