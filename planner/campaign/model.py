@@ -67,6 +67,7 @@ class Model:
     def remarks(self) -> tuple[str, ...]:
         """What the engineer should know of the model: doubts about the simulation."""
         found = [self.low.remark] if self.low.remark else []
+        found += self.surrogate.remarks
         if self.labelled and self.low.simulation is not None:
             left = [str(k + 1) for k, w in enumerate(self.surrogate.frequency_trust) if w < 0.5]
             if left:

@@ -130,6 +130,7 @@ def status(campaign: Campaign) -> dict[str, Any]:
             len(state.used) >= config.stop.measurements_min
             and np.sqrt(np.mean(sd**2)) <= config.stop.frequency_sd_percent
         ),
+        "remarks": list(model.remarks),
         "log": {"entries": state.events, "torn_bytes": campaign.torn_bytes},
         "joint_names": list(campaign.cell.robot.joint_names),
         "stored_but_not_imported": campaign.orphans(),

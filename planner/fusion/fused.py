@@ -14,7 +14,6 @@ from planner.fusion.single import GRID_PRIOR, fit_gp
 SHAPES = ("rbf", "matern52")
 GRID_SHAPES = (*SHAPES, "rbf+linear", "rbf+quadratic")  # many samples can tell a trend
 SOME = 64
-RIVAL = 0.05  # of the likeliest shape's weight: what else is fitted to all samples
 DISCREPANCIES = (*SHAPES, "linear")
 BENDS = ("product", "rbf")
 TREND = 0.5
@@ -26,16 +25,15 @@ BELIEF = {"AR1": 0.7, "NARGP": 0.2, "GP": 0.1}
 def fit_low(samples: Samples, nugget: float = GRID_PRIOR.nugget) -> Mixture:
     """The cheap level from its samples; fit it once, and keep it while measurements come in.
 
-    Of many samples some tell which shapes of kernel are worth fitting to all of them. `nugget` as
-    in `fit_fused`.
+    Of many samples some tell which shape of kernel is worth fitting to all of them. `nugget` as in
+    `fit_fused`.
     """
     prior, shapes = replace(GRID_PRIOR, nugget=nugget), GRID_SHAPES
     if len(samples.y) > SOME:
         rows = np.linspace(0, len(samples.y) - 1, SOME).astype(int)
         some = Samples(samples.x[rows], samples.y[rows], samples.sd[rows])
         weights = mix({shape: fit_gp(some, shape, prior) for shape in shapes}).weights
-        most = max(weights.values())
-        shapes = tuple(shape for shape in shapes if weights[shape] > RIVAL * most)
+        shapes = (max(shapes, key=lambda shape: weights[shape]),)
     return mix({shape: fit_gp(samples, shape, prior) for shape in shapes})
 
 

@@ -26,6 +26,11 @@ from planner.fusion.predictive import Predictive
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
+UNREMARKABLE = 1e-10
+SINGULAR = (
+    "The covariance was singular until {:g} of its variance was added to the noise: two poses are "
+    "nearly the same, and their sds claim more than that."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +147,6 @@ def fit(
     first, *more = normal_points(samples, p, 1 + rounds)
     moved = np.stack(more)
     y = (padded.y - prior.mean[:, None]) * padded.mask
-    remarks: tuple[str, ...] = ()
 
     def attempt(jitter: float) -> tuple[Array, Array, Array, Array]:
         return _fit(
@@ -154,12 +158,12 @@ def fit(
     for jitter in JITTERS:
         theta, whiten, weights, evidence = (np.array(a) for a in attempt(jitter))
         if np.isfinite(weights).all() and np.isfinite(whiten).all():
+            remarks = (SINGULAR.format(jitter),) if jitter > UNREMARKABLE else ()
             evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
             return Posterior(
                 padded.x, padded.low, padded.mask, theta, whiten, weights, prior, kernel,
                 evidence, remarks,
             )  # fmt: skip
-        remarks = (f"The covariance was singular; more than {jitter:g} had to be added to it.",)
     raise InputError(
         "No Gaussian process fits the measured modes; set aside poses that are measured twice "
         "or far off with `planner withdraw`."

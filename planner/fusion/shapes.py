@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.fusion.ar1 import AR1, OutputPrior, fit_ar1
 from planner.fusion.data import TrainingData
+from planner.fusion.gp import Posterior
 
 SURE = 1e-3  # weight below which a kernel is not asked
 
@@ -26,6 +27,11 @@ class KernelAverage:
     def likeliest(self) -> tuple[str, ...]:
         """Each output's likeliest kernel."""
         return tuple(self.kernels[i] for i in np.argmax(self.weights, axis=0).tolist())
+
+    @property
+    def posteriors(self) -> tuple[Posterior, ...]:
+        """One a kernel."""
+        return tuple(model.posterior for model in self.models)
 
     @property
     def log_evidence(self) -> np.ndarray:

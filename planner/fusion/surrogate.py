@@ -60,6 +60,12 @@ class Surrogate:
         return len(self.scale)
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """What went wrong in the fits, each once."""
+        fits = (self.primary.posterior, *self.damping.posteriors, self.residue.posterior)
+        return tuple(dict.fromkeys(remark for fit in fits for remark in fit.remarks))
+
+    @property
     def frequency_trust(self) -> np.ndarray:
         """(k,) weight of the simulation in each label's frequency."""
         return np.where(self.primary.uses_low, self.primary.weight, 1 - self.primary.weight)

@@ -71,8 +71,6 @@ def test_averaged_tasks_cover_what_they_say():
         for model, found in ((average_tasks(fitted), inside), (fitted, alone)):
             mean, sd = model.predict(GRID)
             found.append(np.mean(np.abs(mean - truth(GRID)) < 1.96 * sd))
-    print(
-        f"95 % intervals hold {np.mean(inside):.2f}, of the most probable {np.mean(alone):.2f}"
-    )
+    print(f"95 % intervals hold {np.mean(inside):.2f}, of the most probable {np.mean(alone):.2f}")
     assert np.mean(inside) >= np.mean(alone)
     assert np.mean(inside) > 0.85
