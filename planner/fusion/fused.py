@@ -16,25 +16,24 @@ GRID_SHAPES = (*SHAPES, "rbf+linear", "rbf+quadratic")  # many samples can tell 
 SOME = 64
 DISCREPANCIES = (*SHAPES, "linear")
 BENDS = ("product", "rbf")
-TREND = 0.5
+TREND, CORNER = 0.5, 2.0
 # Before any data. AR1's ρ may be 0, so it forgives a simulation of no use; a GP cannot thank a good
 # one. Chosen on `development_problems`: at three points the GP's share is error for nothing.
 BELIEF = {"AR1": 0.7, "NARGP": 0.2, "GP": 0.1}
 
 
-def fit_low(samples: Samples, nugget: float = GRID_PRIOR.nugget) -> Mixture:
+def fit_low(samples: Samples) -> Mixture:
     """The cheap level from its samples; fit it once, and keep it while measurements come in.
 
-    Of many samples some tell which shape of kernel is worth fitting to all of them. `nugget` as in
-    `fit_fused`.
+    Of many samples some tell which shape of kernel is worth fitting to all of them.
     """
-    prior, shapes = replace(GRID_PRIOR, nugget=nugget), GRID_SHAPES
+    shapes = GRID_SHAPES
     if len(samples.y) > SOME:
         rows = np.linspace(0, len(samples.y) - 1, SOME).astype(int)
         some = Samples(samples.x[rows], samples.y[rows], samples.sd[rows])
-        weights = mix({shape: fit_gp(some, shape, prior) for shape in shapes}).weights
+        weights = mix({shape: fit_gp(some, shape, GRID_PRIOR) for shape in shapes}).weights
         shapes = (max(shapes, key=lambda shape: weights[shape]),)
-    return mix({shape: fit_gp(samples, shape, prior) for shape in shapes})
+    return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in shapes})
 
 
 def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float = 1e-3) -> Mixture:
@@ -44,8 +43,9 @@ def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float
     beyond the samples' sds, over the scale of the output: 1e-6 for values known to be exact.
     """
     fused, alone = (replace(p, nugget=nugget) for p in (recursive.PRIOR, single.PRIOR))
-    # A simulation may be off by a trend over the workspace as by an offset.
-    trend = replace(fused, amplitude=TREND)
+    # A simulation may be off by a trend over the workspace as by an offset. The kernel's origin is a
+    # corner of the workspace, far from where the trend's offset is small.
+    trend = replace(fused, amplitude=TREND, bias_sd=CORNER)
     _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
     families: dict[str, dict[str, Averaged]] = {
         "AR1": {

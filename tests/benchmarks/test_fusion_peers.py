@@ -62,7 +62,7 @@ def ask_peers(designs: dict[str, Design], folder: Path, name: str, peers=PEERS):
 def ours(d: Design) -> tuple[Predictive, float]:
     """Prediction and seconds: the cheap level is fitted too, and the values are known as exact."""
     start = time.perf_counter()
-    low = fit_low(Samples.of(d.x_low, d.y_low), EXACT)
+    low = fit_low(Samples.of(d.x_low, d.y_low))
     model = fit_fused(Samples.of(d.x_high, d.y_high), low, float(np.std(d.y_low)), EXACT)
     return model.predictive(d.x_test), time.perf_counter() - start
 
