@@ -43,8 +43,8 @@ def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float
     beyond the samples' sds, over the scale of the output: 1e-6 for values known to be exact.
     """
     fused, alone = (replace(p, nugget=nugget) for p in (recursive.PRIOR, single.PRIOR))
-    # A simulation may be off by a trend over the workspace as by an offset. The kernel's origin is a
-    # corner of the workspace, far from where the trend's offset is small.
+    # A simulation may be off by a trend over the workspace as by an offset. The kernel's origin is
+    # a corner of the workspace, far from where the trend's offset is small.
     trend = replace(fused, amplitude=TREND, bias_sd=CORNER)
     _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
     families: dict[str, dict[str, Averaged]] = {
