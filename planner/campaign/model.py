@@ -25,6 +25,10 @@ from planner.fusion.surrogate import (
 )
 from planner.physics.dynamics import SimulatedModes
 
+# Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
+# that are none.
+MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
+
 
 @dataclass(frozen=True, eq=False)
 class Model:
@@ -96,9 +100,13 @@ def build(
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
         low = learn(low, [frf_of(m, table) for m in used], q, table.band_hz)
     candidates = [_Guided.by(cell, used, low)]
-    if low.left_out is not None:
-        # What lacks physics is bent by fitting it; as it stands it may be the better guide.
-        candidates.append(_Guided.by(cell, used, replace(cell.frozen, suspect=low)))
+    if low.learned is not None and not low.learned.fits:
+        # What lacks physics is bent by fitting it: as it stands it may be a better
+        # guide, or none.
+        stated = replace(cell.frozen, suspect=low.learned)
+        candidates += [
+            _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
+        ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
     return Model(cell, best.labelled, best.low, fit_surrogate(best.seen, primary=best.primary))
 
@@ -108,6 +116,7 @@ class _Guided:
     """Labels and frequencies as one low fidelity makes them."""
 
     low: LowFidelity
+    used: tuple[Measurement, ...]
     labelled: tuple[LabelledPose, ...]
     seen: ModalObservations
     primary: HedgedAR1
@@ -117,12 +126,28 @@ class _Guided:
         labelled = label(cell, used, low)
         seen = observations(cell, labelled, low)
         known = low.discrepancy(frequencies(labelled)) if labelled else None
-        return cls(low, labelled, seen, fit_primary(seen, known, low.left_out))
+        primary = fit_primary(seen, known, low.left_out, belief=low.belief)
+        return cls(low, used, labelled, seen, primary)
 
     @property
     def log_evidence(self) -> float:
-        """How probable the measured frequencies were, all labels together."""
-        return float(np.sum(self.primary.log_evidence[: self.low.count]))
+        """How probable the measured modes were, all labels together.
+
+        A label without a mode, and a mode below the last label that got none, are rare too.
+        """
+        labels = self.primary.log_evidence[: self.low.count]
+        missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
+        return float(np.sum(labels)) + missed * MISSED + self.stray * STRAY
+
+    @property
+    def stray(self) -> int:
+        """Measured modes that are no label's though labels lie above them."""
+        count = 0
+        for pose, measurement in zip(self.labelled, self.used, strict=True):
+            given = {mode.frequency_hz for mode in pose.modes if mode is not None}
+            free = [m.frequency_hz for m in measurement.modes if m.likely]
+            count += sum(f not in given and f < max(given, default=0.0) for f in free)
+        return count
 
 
 def propose(

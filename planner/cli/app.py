@@ -7,6 +7,7 @@ import typer
 
 from planner.cli.answer import AsJson, respond, warn
 from planner.cli.identification import identify
+from planner.cli.study import study
 
 app = typer.Typer(
     name="planner",
@@ -270,6 +271,7 @@ def modes(
 
 
 app.command()(identify)
+app.command()(study)
 
 
 @app.command()

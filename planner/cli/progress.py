@@ -21,3 +21,16 @@ def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(verb, total=None)
         yield lambda text: bar.update(task, description=f"{verb}: {text}")
+
+
+@contextmanager
+def counting(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A function that shows what is being done and which share (0 to 1) is, as a bar."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
+               TextColumn("{task.description}"))  # fmt: skip
+    screen = console(quiet)
+    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
+        task = bar.add_task("starting", total=1.0)
+        yield lambda text, share: bar.update(task, description=text, completed=share)

@@ -13,7 +13,7 @@ import numpy as np
 from planner.fusion.ar1 import OutputPrior
 from planner.fusion.data import TrainingData
 from planner.fusion.frf_bands import ModalPrediction
-from planner.fusion.hedged import HedgedAR1, fit_hedged
+from planner.fusion.hedged import BELIEF, HedgedAR1, fit_hedged
 from planner.fusion.shapes import KernelAverage, fit_shapes
 from planner.physics.dynamics import SimulatedModes
 
@@ -116,6 +116,7 @@ def fit_primary(
     left_out_hz: np.ndarray | None = None,
     has_simulation: bool = True,
     reference: SimulatedModes | None = None,
+    belief: float = BELIEF,
 ) -> HedgedAR1:
     """Fit log f of every label.
 
@@ -123,7 +124,7 @@ def fit_primary(
     elsewhere: its error at the measured poses says too little. None: it was not fitted.
     `left_out_hz` (n, k) is what it said of each pose before it had seen it, by which it is judged.
     `reference` is the simulation over the workspace: it says how large frequencies are before
-    anything is measured.
+    anything is measured. `belief` is the simulation's probability before these frequencies.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
@@ -139,6 +140,7 @@ def fit_primary(
         SAMPLES,
         KEPT,
         judged,
+        belief,
     )
 
 
