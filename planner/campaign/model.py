@@ -23,14 +23,13 @@ from planner.campaign.outlook import cost_of, informed_candidates, outlook
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import NoPoseLeftError
 from planner.frf.types import Frf
+from planner.fusion.frf_bands import ModalPrediction, frf_moments
 from planner.fusion.hedged import HedgedAR1
 from planner.fusion.surrogate import (
     ModalObservations,
-    ModalPrediction,
     Surrogate,
     fit_primary,
     fit_surrogate,
-    frf_prediction,
 )
 from planner.physics.dynamics import SimulatedModes
 
@@ -121,12 +120,13 @@ class Model:
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N."""
-        return frf_prediction(self.predict(q), frequency_hz)
+        return frf_moments(self.predict(q), frequency_hz)
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What the engineer should know of the model: doubts about the simulation."""
         found = [self.low.remark] if self.low.remark else []
+        found += self.surrogate.remarks
         if self.labelled and self.low.simulation is not None:
             left = [str(k + 1) for k, w in enumerate(self.surrogate.frequency_trust) if w < 0.5]
             if left:

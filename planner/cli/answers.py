@@ -146,6 +146,7 @@ def status(campaign: Campaign) -> dict[str, Any]:
         "target_frequency_sd_percent": config.stop.frequency_sd_percent,
         "done": bool(model.done),
         "forecast": _forecast(model),
+        "remarks": list(model.remarks),
         "log": {"entries": state.events, "torn_bytes": campaign.torn_bytes},
         "joint_names": list(campaign.cell.robot.joint_names),
         "stored_but_not_imported": campaign.orphans(),

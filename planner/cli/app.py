@@ -91,12 +91,26 @@ def import_(
 
 
 @app.command()
-def status(directory: Directory, as_json: AsJson = False) -> int:
-    """What has been measured, what is open, and how sure the model is."""
+def status(
+    directory: Directory,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Draw each pose predicted without it into this folder."
+        ),
+    ] = None,
+    format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
+    as_json: AsJson = False,
+) -> int:
+    """What has been measured, what is open, how sure the model is and whether it may be."""
     from planner.campaign.campaign import Campaign
     from planner.cli import answers, render
+    from planner.cli.left_out import left_out
+    from planner.show.pictures import Pictures
 
-    return respond(answers.status(Campaign(directory)), as_json, render.status)
+    campaign, pictures = Campaign(directory), Pictures(plot, format_)
+    answer = answers.status(campaign) | left_out(campaign, pictures)
+    return respond(answer, as_json, render.status)
 
 
 @app.command()

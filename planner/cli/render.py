@@ -113,7 +113,10 @@ def status(answer: dict[str, Any]) -> RenderableType:
             f"{len(answer['stored_but_not_imported'])} recordings were stored, but the program "
             f"stopped before they were imported: import them again."
         )
+    lines += answer["remarks"] + answer["leave_one_out"]["text"]
     lines += [f"refused {r['file']}: {r['reason']}" for r in answer["refused"]]
+    if answer["plots"]:
+        lines.append("\n  ".join(["Pictures:", *answer["plots"]]))
     parts: list[RenderableType] = [measured, Text("\n".join(lines))]
     return Group(*parts, SIMULATED) if answer["simulated"] else Group(*parts)
 

@@ -6,7 +6,8 @@ frequency that changes smoothly, and that the simulation follows.
 
 import numpy as np
 
-from planner.fusion.surrogate import ModalObservations, fit_surrogate, frf_prediction
+from planner.fusion.frf_bands import frf_moments
+from planner.fusion.surrogate import ModalObservations, fit_surrogate
 from planner.modes.estimate import estimate_modes
 from planner.modes.track import Guide, Tracks, track
 from planner.studies.sweep import ACROSS, BAND_HZ, BEYOND_DEG, SWEEP_DEG, Sweep
@@ -23,7 +24,7 @@ def tell_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     tracks = track(found, Guide(guide.frequency_hz, guide.shape), x, ordered=True)
     fitted = fit_surrogate(_observations(tracks, count, seen))
     prediction = fitted.predict(_scaled(BEYOND_DEG), seen.modes(BEYOND_DEG, count))
-    mean, sd = frf_prediction(prediction, seen.lines_hz)
+    mean, sd = frf_moments(prediction, seen.lines_hz)
     return np.abs(mean[:, ACROSS, ACROSS]).T, sd[:, ACROSS, ACROSS].T
 
 

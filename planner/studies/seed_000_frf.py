@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.frf import modal
-from planner.fusion.surrogate import ModalObservations, fit_surrogate, frf_prediction
+from planner.fusion.frf_bands import frf_band
+from planner.fusion.surrogate import ModalObservations, fit_surrogate
 from planner.physics.dynamics import SimulatedModes
 from planner.studies import draw
 from planner.studies.recorded import Recorded, split
@@ -42,7 +43,8 @@ def figure_12(seen: Recorded) -> Rebuilt:
     hz, measured = frf.frequency_hz[lines], frf.accelerance[..., lines]
     fitted = fit_surrogate(_rows(seen.modes, train, seen.x))
     prediction = fitted.predict(seen.x[told], _simulated(seen.modes.simulated, told))
-    mean, sd = (a[0] for a in frf_prediction(prediction, hz, SAMPLES))
+    band = frf_band(prediction, hz, samples=SAMPLES)
+    mean, sd = band.mean[0], band.sd[0]
     own = _rows(seen.modes, told, seen.x)
     best = modal.accelerance(hz, modal.pole(own.frequency_hz, own.damping_ratio), own.residue)[0]
     told_r2, best_r2 = (
