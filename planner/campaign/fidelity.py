@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.errors import InputError
 from planner.frf.types import Frf
 from planner.fusion.hedged import BELIEF
 from planner.identify.extended import FLOOR, Structure, extended
@@ -52,8 +51,7 @@ class Learned:
     @property
     def priors(self) -> Priors:
         """Those it was identified with."""
-        priors = self.structure.priors
-        return priors if self.identified.nuisances else _springs_only(priors)
+        return self.structure.priors
 
     @property
     def found(self) -> tuple[str, ...]:
@@ -192,47 +190,9 @@ def learn(
 def _identified(
     structure: Structure, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
 ) -> Learned:
-    """With uncertain inertias; with springs alone where the inertias found are impossible.
-
-    Inertias are strained beyond what a body can have where something else is missing; where the
-    simulation fits, a small body whose inertia hardly matters may be beyond it too.
-    """
-    effort, nominal = _effort(len(frfs)), structure.simulation
-    try:
-        found = identify(
-            frfs, q, nominal, structure.priors, band_hz=band_hz, starts=1, effort=effort
-        )
-    except InputError:  # not even the mass matrix makes sense
-        found = None
-    if found is not None and (found.misfit <= SUSPECT or possible(found.simulation)):
-        return Learned(structure, found)
-    springs = _springs_only(structure.priors)
-    found = identify(
-        frfs, q, nominal, springs, band_hz=band_hz, starts=1, warm=found, effort=effort
-    )
+    effort, nominal, priors = _effort(len(frfs)), structure.simulation, structure.priors
+    found = identify(frfs, q, nominal, priors, band_hz=band_hz, starts=1, effort=effort)
     return Learned(structure, found)
-
-
-def _springs_only(priors: Priors) -> Priors:
-    return replace(priors, mass=0.0, inertia=0.0, com_m=0.0)
-
-
-def possible(simulation: Simulation) -> bool:
-    """Whether every body with mass could exist: its pseudo-inertia is positive definite.
-
-    (Wensing, Kim & Slotine 2018, eq. 20.)
-    """
-    for m, x, y, z, xx, xy, yy, xz, yz, zz in simulation.elastic.inertia:
-        if m == 0:
-            continue
-        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        pseudo = np.empty((4, 4))
-        pseudo[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
-        pseudo[:3, 3] = pseudo[3, :3] = x, y, z
-        pseudo[3, 3] = m
-        if not np.all(np.linalg.eigvalsh(pseudo) > 0):
-            return False
-    return True
 
 
 def _left_out(
@@ -256,14 +216,16 @@ def _again(
     warm: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
 ) -> Identification:
     """From fewer poses, starting where all of them led."""
-    structure, springs = warm.structure, _springs_only(warm.structure.priors)
-    priors = structure.priors if warm.identified.nuisances else springs
     # Beside an error of a percent, forty lines and no completion are exact enough.
     rough = replace(_effort(len(frfs)), last_lines=40, last_completions=0)
-    nominal, first = structure.simulation, warm.identified
-    try:
-        return identify(
-            frfs, q, nominal, priors, band_hz=band_hz, starts=1, warm=first, effort=rough
-        )
-    except InputError:
-        return identify(frfs, q, nominal, springs, band_hz=band_hz, starts=1, effort=rough)
+    structure, first = warm.structure, warm.identified
+    return identify(
+        frfs,
+        q,
+        structure.simulation,
+        structure.priors,
+        band_hz=band_hz,
+        starts=1,
+        warm=first,
+        effort=rough,
+    )
