@@ -13,8 +13,11 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One elastic rotation: axis in the joint's child frame, N·m/rad, N·m·s/rad.
 
     `joint` may be "base": between floor and robot, about an axis of the world, through the URDF's
-    origin. `loss_factor` η makes the stiffness K(1+iη) (structural damping). Blocks with the same
-    `tie` share their stiffness, damping and loss factor, also when those are identified.
+    origin. It may be a link: the rotation is half-way to the joint that this carries, and gives
+    with what lies beyond (the link's own mass does not). With `slide` it is no rotation but a
+    shift along the axis (N/m, N·s/m). `loss_factor` η makes the stiffness K(1+iη) (structural
+    damping). Blocks with the same `tie` share their stiffness, damping and loss factor, also when
+    those are identified.
     """
 
     joint: str
@@ -23,6 +26,7 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping: float
     loss_factor: float = 0.0
     tie: str = ""
+    slide: bool = False
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
