@@ -102,6 +102,10 @@ class Effect:
         """ψ (k, p) from which it is fitted."""
         return np.array([[q.mean for q in self.quantities]])
 
+    def parts(self) -> "tuple[Effect, ...]":
+        """The effects that act together; itself where it is one."""
+        return (self,)
+
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """One or two plain sentences an engineer can act on."""
         told = ", ".join(f"{n} {v:.3g} ± {sd:.1g} {u}" for n, (v, sd, u) in values.items())

@@ -1,6 +1,6 @@
 """Misfit of a simulation with one effect to measured FRFs, pose by pose, with its gradient."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,7 +87,8 @@ class Misfit:
         rate = self.effect.rate(psi)
         s = s if rate is None else s + rate
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        added = self.effect.impedance(self.setting, psi)
+        setting = self.setting if rate is None else replace(self.setting, s=s)
+        added = self.effect.impedance(setting, psi)
         inertias = None if self.logarithmic else self.inertias
         h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
         springs, slope = len(p.held), full
@@ -100,7 +101,7 @@ class Misfit:
             down = 2 * full[:, :e].sum(axis=1) + full[:, e : 2 * e].sum(axis=1)
             along = -rate * down / s[:, None, None]
             slope = np.concatenate([slope, along[:, None]], axis=1)
-        seen = self.effect.transfer(self.setting, psi)
+        seen = self.effect.transfer(setting, psi)
         if seen is not None:
             own = np.einsum("npijf,njkf->npikf", seen.slope, h)
             slope = np.einsum("nijf,npjkf->npikf", seen.left, slope, optimize=True)

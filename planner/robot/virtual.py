@@ -17,8 +17,8 @@ class VirtualModel:
     """Model in whose coordinates the robot's own joints and the elastic ones have their places.
 
     `elastic` follows robot.toml, `bodies` names what moves (joints, the base where it is elastic,
-    and the outer halves of links that bend), `carriers` are the joints of `model` that carry them, `frames` translates the
-    robot's frame numbers.
+    and the outer halves of links that bend), `carriers` are the joints of `model` that carry them,
+    `frames` translates the robot's frame numbers.
     """
 
     model: pin.Model

@@ -10,11 +10,14 @@ from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
 
 SD = 0.3  # of the stiffness
+ORDERS = (1, 2)  # a turn: out of balance, or like the teeth of two halves
 
 
 @dataclass(frozen=True)
 class AngleDependentStiffness(Effect):
-    """K(q) = K₀ + a cos q + b sin q of the rotation about the joint's own axis."""
+    """K(q) = K₀ + a cos nq + b sin nq of the rotation about the joint's own axis, n = order."""
+
+    order: int = 1
 
     name = "angle_dependent_stiffness"
 
@@ -28,7 +31,7 @@ class AngleDependentStiffness(Effect):
                 k = float(simulation.elasticity.stiffness[number])
                 waves = ("cosine", "sine")
                 quantities = tuple(Quantity(w, "N·m/rad", 0.0, SD * k) for w in waves)
-                found.append(cls(place, quantities))
+                found += [cls(place, quantities, order) for order in ORDERS]
         return tuple(found)
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
@@ -37,7 +40,7 @@ class AngleDependentStiffness(Effect):
         joint = joint_of(simulation, self.at)
         number = _block(simulation, joint)
         assert number is not None
-        angle = setting.q[:, simulation.robot.joint_names.index(joint)]
+        angle = self.order * setting.q[:, simulation.robot.joint_names.index(joint)]
         waves = np.stack([np.cos(angle), np.sin(angle)], axis=1)  # (n, 2)
         (n, f), e = setting.s.shape, simulation.elastic.size
         slope = np.zeros((n, 2, f, e, e), dtype=complex)
@@ -47,7 +50,11 @@ class AngleDependentStiffness(Effect):
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
         size = float(np.hypot(values["cosine"][0], values["sine"][0]))
-        return f"The stiffness of {self.at} changes with its angle by ± {size:.2g} N·m/rad."
+        times = {1: "once", 2: "twice"}[self.order]
+        return (
+            f"The stiffness of {self.at} changes with its angle, {times} a turn, by ± {size:.2g} "
+            f"N·m/rad: check gear, gravity compensator and cables."
+        )
 
 
 def _block(simulation: Simulation, joint: str) -> int | None:
