@@ -8,7 +8,7 @@ from planner.identify.parameters import Priors
 from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
 
-NOTHING = 40.0
+NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong
 
 
 @dataclass(frozen=True)

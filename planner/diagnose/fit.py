@@ -11,27 +11,31 @@ from planner.diagnose.objective import ByPose, Misfit
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
 from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
-from planner.identify.solver import minimise
+from planner.identify.solver import Minimum, minimise
 from planner.physics.gradient import Inertias
 from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
 
 # Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
-PRIORS = Priors(stiffness_factor=1.2, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
+PRIORS = Priors(stiffness_factor=1.17, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
 
 
 @dataclass(frozen=True)
 class Grade:
-    """How closely one looks: lines a pose, relative sd of all that no simulation follows."""
+    """How closely one looks: lines a pose, relative sd of all that no simulation follows.
+
+    As in `Misfit`: whether logarithms are compared, and whether inertias are free.
+    """
 
     lines: int
     model_error: float = 0.003
     logarithmic: bool = False
+    inertial: bool = True
 
 
-GLANCE, COARSE = Grade(32, 0.05, True), Grade(32, 0.05)
+GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
 CLOSE, FINE = Grade(40), Grade(72)
-GLANCE_STEPS, COARSE_STEPS, CLOSE_STEPS = 8, 8, 6
+ROUGH_STEPS, PROMISE_STEPS = 8, 2
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
 KEPT = 2  # starts that are followed
@@ -52,11 +56,12 @@ class Problem:
         body, measured = _prepared(self, effect), _measured(self, grade)
         setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
         inertias, p = body.inertias, body.parametrisation
-        return Misfit(measured, setting, body.matrices, inertias, p, effect, grade.logarithmic)
+        kind = grade.logarithmic, grade.inertial
+        return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
 
-    def without(self, poses: Sequence[int]) -> "Problem":
-        """The same without some poses."""
-        kept = [i for i in range(len(self.q)) if i not in poses]
+    def at(self, poses: Sequence[int]) -> "Problem":
+        """The same with some of the poses only."""
+        kept = list(poses)
         return replace(self, frfs=tuple(self.frfs[i] for i in kept), q=self.q[kept])
 
 
@@ -137,7 +142,8 @@ class Fit:
         for i, s in enumerate(p.parameters):
             if s.name in chosen:
                 value, unit = float(np.exp(self.x[i])), UNITS[s.kind]
-                unit = unit.replace("·m", "", 1).replace("rad", "m") if " along " in s.name else unit
+                if " along " in s.name:
+                    unit = unit.replace("·m", "", 1).replace("rad", "m")
                 out[s.name] = (value, value * float(sd[i]), unit)
         for q, name in zip(part.quantities, _own_names(part), strict=True):
             i = names.index(name)
@@ -155,50 +161,66 @@ def _names(misfit: Misfit) -> list[str]:
     return [*(s.name for s in p.parameters), *p.nuisances, *_own_names(misfit.effect)]
 
 
-def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
-    """A first fit: from the prior's median by way of logarithms, and from each warm one."""
-    close, coarse = problem.misfit(effect, CLOSE), problem.misfit(effect, COARSE)
-    ends = [] if len(effect.parts()) > 1 and warm else [_approach(problem, effect)]
-    for earlier in warm:
-        points = _points(coarse, earlier)
-        ends.append(_best(coarse, points, COARSE_STEPS))
-        ends.append(_best(close, points, COARSE_STEPS))
-    return _at(close, _best(close, ends, CLOSE_STEPS))
+def fit(problem: Problem, effect: Effect) -> Fit:
+    """From the prior's median by way of logarithms."""
+    coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
+    return _at(close, _best(close, [_best(coarse, [_approach(problem, effect)])]))
+
+
+def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """A rough fit with inertias as they are: from the prior's median, and from an earlier fit."""
+    coarse = problem.misfit(effect, COARSE)
+    ends = [_best(coarse, points(coarse, warm))]
+    if len(effect.parts()) == 1:
+        ends.append(_best(coarse, [_approach(problem, effect)]))
+    return _at(coarse, min(ends, key=lambda x: coarse(x).value))
+
+
+def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """A few steps with all that is free, from an earlier fit."""
+    close = problem.misfit(effect, CLOSE)
+    return _at(close, _best(close, points(close, warm), PROMISE_STEPS))
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:
-    rough, coarse = problem.misfit(effect, GLANCE), problem.misfit(effect, COARSE)
+    rough = problem.misfit(effect, GLANCE)
     b = rough.split[1]
-    points = [np.concatenate([rough.mean[:b], psi]) for psi in effect.starts()]
-    if len(points) > KEPT:
-        found = [minimise(rough, x, 1e-2, 2) for x in points]
-        points = [m.x for m in sorted(found, key=lambda m: m.at.value)[:KEPT]]
-    return _best(coarse, [minimise(rough, x, LOOSE, GLANCE_STEPS).x for x in points], COARSE_STEPS)
+    starts = [np.concatenate([rough.mean[:b], psi]) for psi in effect.starts()]
+    return _best(rough, starts)
 
 
-def _best(misfit: Misfit, points: Sequence[np.ndarray], steps: int) -> np.ndarray:
-    """Where the best of the points leads."""
-    values = [misfit(x).value for x in points]
-    order = np.argsort(values)[: KEPT if len(points) > KEPT else 1]
-    if len(order) > 1:
-        tried = [minimise(misfit, points[i], LOOSE, 3) for i in order]
-        x = min(tried, key=lambda m: m.at.value).x
-    else:
-        x = points[order[0]]
-    return minimise(misfit, x, LOOSE, steps).x
+def _best(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> np.ndarray:
+    """Where the best of the starts leads."""
+    if len(starts) > KEPT:
+        starts = sorted(starts, key=lambda x: _hope(misfit, x))[:KEPT]
+    if len(starts) > 1:
+        tried = [_minimise(misfit, x, LOOSE, 2) for x in starts]
+        starts = [min(tried, key=lambda m: m.at.value).x]
+    return _minimise(misfit, starts[0], LOOSE, steps).x
+
+
+def _hope(misfit: Misfit, x: np.ndarray) -> float:
+    """The value, less what the best of the effect's own parameters would gain at once."""
+    at, own = misfit(x), slice(misfit.split[1], None)
+    gains = at.gradient[own] ** 2 / (2 * np.maximum(np.diagonal(at.normal)[own], 1e-300))
+    return at.value - float(gains.max(initial=0.0))
 
 
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
     misfit = problem.misfit(found.effect, grade)
-    return _at(misfit, minimise(misfit, found.x, SETTLED[0], steps).x)
+    return _at(misfit, _minimise(misfit, found.x, SETTLED[0], steps).x)
+
+
+def _minimise(misfit: Misfit, x: np.ndarray, tolerance: float, steps: int) -> Minimum:
+    return minimise(misfit, x, tolerance, steps, longest=misfit.longest)
 
 
 def _at(misfit: Misfit, x: np.ndarray) -> Fit:
     return Fit(misfit.effect, misfit, x, misfit.by_pose(x))
 
 
-def _points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:
+def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:
     """x of an earlier fit, with what is new at its starts.
 
     Further springs start once as they may be, and once so stiff that they change little.

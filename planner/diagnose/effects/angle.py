@@ -29,23 +29,28 @@ class AngleDependentStiffness(Effect):
             number = _block(simulation, joint)
             if number is not None:
                 k = float(simulation.elasticity.stiffness[number])
-                waves = ("cosine", "sine")
-                quantities = tuple(Quantity(w, "N·m/rad", 0.0, SD * k) for w in waves)
+                waves = [Quantity(w, "N·m/rad", 0.0, SD * k) for w in ("cosine", "sine")]
+                quantities = (*waves, Quantity("damping_share", "1", 1.0, 0.5))
                 found += [cls(place, quantities, order) for order in ORDERS]
         return tuple(found)
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
-        """On the diagonal, one value a pose."""
+        """On the diagonal, one value a pose; `damping_share` of the damping changes alike."""
         simulation = setting.simulation
         joint = joint_of(simulation, self.at)
         number = _block(simulation, joint)
         assert number is not None
         angle = self.order * setting.q[:, simulation.robot.joint_names.index(joint)]
         waves = np.stack([np.cos(angle), np.sin(angle)], axis=1)  # (n, 2)
-        (n, f), e = setting.s.shape, simulation.elastic.size
-        slope = np.zeros((n, 2, f, e, e), dtype=complex)
-        slope[..., number, number] = waves[:, :, None]
-        return Impedance(np.einsum("p,npfij->nfij", psi, slope), slope)
+        block = simulation.robot.config.compliance[number]
+        late = setting.s * block.damping / block.stiffness  # (n, F)
+        own = np.empty((len(angle), 3, setting.s.shape[1]), dtype=complex)
+        own[:, :2] = waves[:, :, None] * (1 + psi[2] * late)[:, None]
+        own[:, 2] = (waves @ psi[:2])[:, None] * late
+        change = np.einsum("p,npf->nf", psi[:2], own[:, :2])
+        unit = np.zeros((simulation.elastic.size, simulation.elastic.size))
+        unit[number, number] = 1.0
+        return Impedance(change[..., None, None] * unit, own[..., None, None] * unit)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""

@@ -40,8 +40,7 @@ class StructuralDamping(Effect):
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
         """Loss factors."""
         return tuple(
-            f"loss_factor of {b.tie or place_name(b)}"
-            for b in simulation.robot.config.compliance
+            f"loss_factor of {b.tie or place_name(b)}" for b in simulation.robot.config.compliance
         )
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:

@@ -49,11 +49,14 @@ class ExtraCompliance(Effect):
     def priors(self, simulation: Simulation, priors: Priors) -> Priors:
         """Log-uniform ones of the new springs' stiffness and damping."""
         time, bounds = damping_time(simulation), dict(priors.bounds)
+        blocks = simulation.robot.config.compliance
+        undamped = {place_name(b) for b in blocks if b.damping == 0}
         for give, block in zip(self.gives, self.blocks(time), strict=True):
             place = place_name(block)
             bounds[f"stiffness of {place}"] = (give.lower, give.upper)
             low, high = give.lower * time, give.upper * time
-            bounds[f"damping of {place}"] = (low / DAMPING_FACTOR, high * DAMPING_FACTOR)
+            if place not in undamped:
+                bounds[f"damping of {place}"] = (low / DAMPING_FACTOR, high * DAMPING_FACTOR)
         return replace(priors, bounds=bounds)
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
 
 SHARE = 0.05  # of the mean mass of the links
-FREQUENCIES = 3  # starts over the band
+FREQUENCIES = 6  # starts over the band
+LITTLE = 0.3  # of the middling mass: starts change little, and their gradients tell how much
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,7 @@ class LocalResonator(Effect):
         for f in self.low_hz * ratio**shares:
             for axis in range(3):
                 start = middle.copy()
+                start[0] += np.log(LITTLE)
                 start[1] = np.log(f)
                 start[3 + axis] = 1.0
                 out.append(start)
