@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, respond, warn
+from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
 
 app = typer.Typer(
@@ -256,6 +257,7 @@ def modes(
 
 
 app.command()(identify)
+app.command()(diagnose)
 
 
 @app.command()

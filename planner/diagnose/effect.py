@@ -1,6 +1,7 @@
 """An effect: a change of the simulation, its priors, Z, or the measured FRFs."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -105,6 +106,12 @@ class Effect:
     def parts(self) -> "tuple[Effect, ...]":
         """The effects that act together; itself where it is one."""
         return (self,)
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """What it adds to robot.toml: entries of the lists of an [[effects]] block, by list."""
+        return {}
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """One or two plain sentences an engineer can act on."""

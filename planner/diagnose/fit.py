@@ -59,6 +59,11 @@ class Problem:
         kind = grade.logarithmic, grade.inertial
         return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
 
+    def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:
+        """The simulation with an effect's structure, and its parameters."""
+        body = _prepared(self, effect)
+        return body.simulation, body.parametrisation
+
     def at(self, poses: Sequence[int]) -> "Problem":
         """The same with some of the poses only."""
         kept = list(poses)

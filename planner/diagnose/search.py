@@ -54,7 +54,7 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
     none = settle(problem, warm, CLOSE, STEPS)
     clearly = none.per_value > CLEARLY
-    few = problem.at(farthest_first(problem.q)[:FEW]) if clearly else problem
+    few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
     fits = []
     for number, effect in enumerate(effects):
         tell(_words(effect), 0.6 * number / max(len(effects), 1))

@@ -9,14 +9,18 @@ from planner.diagnose.fit import Fit
 
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
+LEAST = 0.3  # no noise is overstated by more
 BOOTSTRAPS = 400
 UNKNOWN_PARAMETERS = 20  # what an unknown effect is charged for, half a ln(count) each
 
 
 def temper(misfit: float, shared: float = 1.0) -> float:
-    """T by which χ² is divided: `shared` at the noise; grows with the share that is not noise."""
+    """T by which χ² is divided: misfit · `shared` at the noise and below, where it was overstated.
+
+    Above, it grows with the share that is not noise.
+    """
     excess = max(0.0, 1 - 1 / max(misfit, 1e-9))
-    return max(misfit, 1.0) * (shared + ALIKE * excess)
+    return max(misfit, LEAST) * (shared + ALIKE * excess)
 
 
 def shared_noise(spacing_hz: float, rate_1_s: float) -> float:

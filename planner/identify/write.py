@@ -19,7 +19,8 @@ DIGITS = 6  # significant ones: more than any identification knows
 def updated_toml(text: str, result: Identification, urdf: str | None = None) -> str:
     """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced."""
     document = tomlkit.parse(text)
-    blocks = document["compliance"]
+    blocks = [*document["compliance"]]
+    blocks += [b for e in document.get("effects", ()) for b in e.get("compliance", ())]
     for estimate in result.estimates:
         for number in estimate.blocks:
             blocks[number][estimate.kind] = float(f"{estimate.value:.{DIGITS}g}")

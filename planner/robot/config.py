@@ -42,6 +42,53 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Resonator(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A mass (kg) on a spring of its own, at a place of a link's joint frame, along a direction.
+
+    `frequency_hz` and `damping_ratio` are those that it has on a link that is held.
+    """
+
+    joint: str
+    position_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    mass: float
+    frequency_hz: float
+    damping_ratio: float
+
+
+class Harmonic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Stiffness about a joint's own axis that goes with its angle q: + c cos nq + s sin nq."""
+
+    joint: str
+    order: int
+    cosine: float
+    sine: float
+
+
+class Told(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A parameter of an effect, as the diagnosis found it."""
+
+    value: float
+    sd: float
+    unit: str
+
+
+class Effect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Physics that the diagnosis found missing, and what it adds to the simulation.
+
+    `payload` may have a negative mass here, where a stated one was too large.
+    """
+
+    effect: str
+    at: str
+    probability: float = 1.0
+    parameters: dict[str, Told] = {}
+    compliance: tuple[Compliance, ...] = ()
+    payload: tuple[Payload, ...] = ()
+    resonator: tuple[Resonator, ...] = ()
+    harmonic: tuple[Harmonic, ...] = ()
+
+
 class Obstacle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A box fixed to the world: floor, table, fence."""
 
@@ -59,7 +106,7 @@ class CollisionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of robot.toml.
+    """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
     With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
     own stiffness, of the size of weight times height, is added.
@@ -76,13 +123,33 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     collision: CollisionTable = CollisionTable()
+    effects: tuple[Effect, ...] = ()
+    resonator: tuple[Resonator, ...] = ()
+    harmonic: tuple[Harmonic, ...] = ()
 
 
 def load_config(path: Path) -> RobotConfig:
     """Read and check robot.toml; InputError with one sentence where it is wrong."""
     config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
-    return config
+    return _with_effects(config, path)
+
+
+def _with_effects(config: RobotConfig, path: Path) -> RobotConfig:
+    lists = ("compliance", "payload", "resonator", "harmonic")
+    added = {
+        name: (*getattr(config, name), *(x for e in config.effects for x in getattr(e, name)))
+        for name in lists
+    }
+    whole = msgspec.structs.replace(config, **added)
+    _check_compliances(whole, path)
+    for block in whole.resonator:
+        if not min(block.mass, block.frequency_hz, block.damping_ratio) > 0:
+            raise InputError(
+                f"{path}: the resonator at {block.joint} needs a mass, frequency_hz and "
+                f"damping_ratio above 0; correct them."
+            )
+    return whole
 
 
 def _check(config: RobotConfig, path: Path) -> None:

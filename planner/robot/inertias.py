@@ -7,7 +7,7 @@ import pinocchio as pin
 import scipy.linalg
 
 from planner.robot.robot import BASE, Robot
-from planner.robot.virtual import OUTER
+from planner.robot.virtual import OUTER, SMALL
 
 ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 ORDER = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of moments in Pinocchio's ten numbers
@@ -31,7 +31,7 @@ def urdf_with_inertias(
     for body, values in zip(bodies, change, strict=True):
         if body.endswith(OUTER):
             body, values = _of_whole(robot, body.removesuffix(OUTER), values)
-        if np.any(values):
+        if np.any(values) and not body.startswith(f"{SMALL} "):
             frame = _heaviest(robot, body, links)
             share = _change(links[frame.name], _seen_from(frame.placement, values))
             shares |= {body: share} if share < 1 else {}

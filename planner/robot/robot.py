@@ -63,6 +63,12 @@ class Robot:
                     f"{self.urdf_path.name}, nor a link with one beyond; it has "
                     f"{', '.join(self.joint_names)}."
                 )
+        for block in (*self.config.resonator, *self.config.harmonic):
+            if block.joint not in self.joint_names:
+                raise InputError(
+                    f'{self.path}: [[effects]] joint "{block.joint}" is no actuated joint of '
+                    f"{self.urdf_path.name}; it has {', '.join(self.joint_names)}."
+                )
         for block in self.config.payload:
             self.frame_id("[[payload]] link", block.link)
         bad = np.flatnonzero(~(self.lower_rad < self.upper_rad))

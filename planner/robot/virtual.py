@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from planner.robot.robot import BASE, Robot
 
+SMALL = "resonator"  # and its number: a body of its own too
 OUTER = ", outer half"  # of a link that bends: a body of its own
 INERTIA_NAMES = ("m", "mx", "my", "mz", "xx", "xy", "yy", "xz", "yz", "zz")  # Pinocchio's order
 
@@ -16,9 +17,9 @@ INERTIA_NAMES = ("m", "mx", "my", "mz", "xx", "xy", "yy", "xz", "yz", "zz")  # P
 class VirtualModel:
     """Model in whose coordinates the robot's own joints and the elastic ones have their places.
 
-    `elastic` follows robot.toml, `bodies` names what moves (joints, the base where it is elastic,
-    and the outer halves of links that bend), `carriers` are the joints of `model` that carry them,
-    `frames` translates the robot's frame numbers.
+    `elastic` follows robot.toml, resonators last, `bodies` names what moves (joints, the base
+    where it is elastic, the outer halves of links that bend, resonators), `carriers` are the
+    joints of `model` that carry them, `frames` translates the robot's frame numbers.
     """
 
     model: pin.Model
@@ -50,6 +51,12 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
             names.append(name)
             carriers.append(carrier)
             bodies.append(values)
+    small = _resonators(robot, model, last)
+    for number, block in enumerate(robot.config.resonator):
+        names.append(f"{SMALL} {number + 1}")
+        carriers.append(small[number])
+        bodies.append(np.array([block.mass, *np.zeros(9)]))
+    elastic = np.append(elastic, [model.joints[k].idx_q for k in small]).astype(int)
     inertia = np.array(bodies)
     if inertia_change is not None:
         inertia = inertia + inertia_change
@@ -60,6 +67,17 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
         for f in source.frames
     )
     return VirtualModel(model, rigid, elastic, tuple(names), tuple(carriers), inertia, frames)
+
+
+def _resonators(robot: Robot, model: pin.Model, last: list[int]) -> list[int]:
+    """Numbers of the sliding joints that carry the resonators' masses."""
+    found = []
+    for number, block in enumerate(robot.config.resonator):
+        parent = last[robot.joint_names.index(block.joint) + 1]
+        place = pin.SE3(np.eye(3), np.array(block.position_m, dtype=float))
+        axis = np.array(block.direction, dtype=float)
+        found.append(_add_joint(model, parent, axis, place, f"{SMALL} {number + 1}", True))
+    return found
 
 
 def _halves(values: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """A joint's stiffness that changes with its angle: gear contact, gravity compensator."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -51,6 +52,18 @@ class AngleDependentStiffness(Effect):
         unit = np.zeros((simulation.elastic.size, simulation.elastic.size))
         unit[number, number] = 1.0
         return Impedance(change[..., None, None] * unit, own[..., None, None] * unit)
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """See `Effect.elements`."""
+        block = {
+            "joint": joint_of(simulation, self.at),
+            "order": self.order,
+            "cosine": values["cosine"][0],
+            "sine": values["sine"][0],
+        }
+        return {"harmonic": [block]}
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""

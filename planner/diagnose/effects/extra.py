@@ -1,6 +1,7 @@
 """Elastic degrees of freedom that the simulation lacks: what base, bearings and links share."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -63,6 +64,20 @@ class ExtraCompliance(Effect):
         """Stiffness and damping of each new degree of freedom."""
         places = [place_name(b) for b in self.blocks(1.0)]
         return tuple(f"{kind} of {p}" for p in places for kind in ("stiffness", "damping"))
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """See `Effect.elements`."""
+        fitted = {place_name(b): b for b in simulation.robot.config.compliance}
+        blocks = []
+        for block in self.blocks(1.0):
+            place = place_name(block)
+            entry = {"joint": block.joint, "axis": list(block.axis), "slide": block.slide}
+            entry["stiffness"] = values[f"stiffness of {place}"][0]
+            entry["damping"] = values.get(f"damping of {place}", (0.0, 0.0, ""))[0]
+            blocks.append(entry | {"loss_factor": fitted[place].loss_factor})
+        return {"compliance": blocks}
 
 
 def told(values: dict[str, tuple[float, float, str]]) -> str:
