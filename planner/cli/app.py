@@ -8,6 +8,7 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
+from planner.cli.proving import prove
 
 app = typer.Typer(
     name="planner",
@@ -258,6 +259,7 @@ def modes(
 
 app.command()(identify)
 app.command()(diagnose)
+app.command()(prove)
 
 
 @app.command()

@@ -79,7 +79,8 @@ def diagnose(
     candidates = _candidates(found, weights)
     first = candidates[0].places[0][0]
     verdict = {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
-    best = found.finalists[int(np.argmax(weights.probabilities[:-1]))]
+    likeliest = found.finalists[int(np.argmax(weights.log_evidence))]
+    best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
     return Diagnosis(
         verdict, candidates, found.finalists[0], best, weights.temper, seconds, problem

@@ -11,7 +11,7 @@ ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power b
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
 LEAST = 0.3  # no noise is overstated by more
 BOOTSTRAPS = 400
-UNKNOWN_PARAMETERS = 20  # what an unknown effect is charged for, half a ln(count) each
+UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each
 
 
 def temper(misfit: float, shared: float = 1.0) -> float:

@@ -13,7 +13,7 @@ SHARE = 0.25  # of the largest, that makes a band, pose or direction one of thos
 
 @dataclass(frozen=True, eq=False)
 class Where:
-    """Mean square residuals, 1 at the noise: by band (k,), by pose (n,), by response and hit (3, 3).
+    """Mean square residuals, 1 at the noise: by band (k,), pose (n,), response and hit (3, 3).
 
     `edges_hz` (k + 1,) are the bands'.
     """

@@ -39,7 +39,7 @@ def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") ->
                 number, measured[:, i, i], h[:, i, i], lines[0], "pose, in recorded order", title
             )
     for k in np.argsort(-before.by_pose)[:MOST].tolist():
-        name = re.sub(r"[^\w.-]", "_", names[k])
+        name = re.sub(r"[^\w.-]", "_", str(names[k]))
         curves = [h[k] for h in sides]
         figures[f"frf_{name}"] = _overlay(lines[k], measured[k], curves, f"{mark}Pose {names[k]}")
     return figures
