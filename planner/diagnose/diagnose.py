@@ -76,7 +76,7 @@ def diagnose(
     all_ = library(simulation) if effects is None else effects
     found = search(problem, refitted, all_, tell)
     weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
-    candidates = _candidates(found, weights)
+    candidates = _candidates(found, weights, all_)
     first = candidates[0].places[0][0]
     verdict = {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
     likeliest = found.finalists[int(np.argmax(weights.log_evidence))]
@@ -97,14 +97,16 @@ def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
     return out
 
 
-def _candidates(found: Found, weights: Weights) -> tuple[Candidate, ...]:
+def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
     shares = list(weights.probabilities[:-1])
     unknown = float(weights.probabilities[-1])
-    best = max(shares)
-    for _, behind, left in found.left:
+    leader = int(np.argmax(shares))
+    own = _priors([fits[leader].effect], all_)[0]
+    before = _priors([effect for effect, _, _ in found.left], all_)
+    for (_, behind, left), prior in zip(found.left, before, strict=True):
         fits.append(left)
-        shares.append(best * float(np.exp(-behind)))
+        shares.append(shares[leader] * float(np.exp(-behind)) * prior / own)
     total = sum(shares) + unknown
     groups: dict[tuple, list[int]] = {}
     for i, f in enumerate(fits):
