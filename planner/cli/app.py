@@ -6,9 +6,11 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, respond, warn
+from planner.cli.comparison import compare
 from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
 from planner.cli.proving import prove
+from planner.cli.study import study
 
 app = typer.Typer(
     name="planner",
@@ -91,12 +93,26 @@ def import_(
 
 
 @app.command()
-def status(directory: Directory, as_json: AsJson = False) -> int:
-    """What has been measured, what is open, and how sure the model is."""
+def status(
+    directory: Directory,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Draw each pose predicted without it into this folder."
+        ),
+    ] = None,
+    format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
+    as_json: AsJson = False,
+) -> int:
+    """What has been measured, what is open, how sure the model is and whether it may be."""
     from planner.campaign.campaign import Campaign
     from planner.cli import answers, render
+    from planner.cli.left_out import left_out
+    from planner.show.pictures import Pictures
 
-    return respond(answers.status(Campaign(directory)), as_json, render.status)
+    campaign, pictures = Campaign(directory), Pictures(plot, format_)
+    answer = answers.status(campaign) | left_out(campaign, pictures)
+    return respond(answer, as_json, render.status)
 
 
 @app.command()
@@ -131,11 +147,15 @@ def skip(
     reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
-    """Say that a proposed pose cannot be measured; it is not offered again."""
+    """Say that a proposed pose cannot be measured; it is not offered again.
+
+    With a reason its neighbours are not offered either: what stands in the way there does so
+    around it too.
+    """
     from planner.campaign.campaign import Campaign
     from planner.cli import render
 
-    Campaign(directory).skip(pose, reason)
+    Campaign(directory).skip(pose, reason, neighbours=bool(reason))
     return respond({"skipped": pose, "reason": reason}, as_json, render.skipped)
 
 
@@ -260,6 +280,8 @@ def modes(
 app.command()(identify)
 app.command()(diagnose)
 app.command()(prove)
+app.command()(compare)
+app.command()(study)
 
 
 @app.command()

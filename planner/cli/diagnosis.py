@@ -34,7 +34,7 @@ def diagnose(
 ) -> int:
     """Locate where simulation and recordings differ, name the missing physics, show the fit."""
     from planner.cli import modal
-    from planner.cli.progress import advancing
+    from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
     from planner.diagnose.diagnose import diagnose as run
     from planner.diagnose.recorded import read_recorded
@@ -46,7 +46,7 @@ def diagnose(
     modal.check(None, "h1", None, window_rate_1_s)
     nominal = Robot.load(robot)
     wanted = read_poses(predict, nominal.joint_names) if predict else ()
-    with advancing("diagnosing", quiet=as_json) as tell:
+    with counting(quiet=as_json) as tell:
         recorded = read_recorded(
             recordings,
             nominal.joint_names,

@@ -35,6 +35,10 @@ def identify(
     inertias: Annotated[
         bool, typer.Option(help="Let masses and inertias err by 5 %, centres of mass by 1 cm.")
     ] = True,
+    extend: Annotated[
+        bool,
+        typer.Option(help="Add the tilts of joints and floor that robot.toml leaves out."),
+    ] = False,
     held_out: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="Poses to judge by (default: 1 of 4).")
     ] = None,
@@ -59,6 +63,7 @@ def identify(
     from planner.cli import modal
     from planner.cli.progress import reporting
     from planner.cli.render_identification import identified
+    from planner.identify.extended import Structure, extended
     from planner.identify.held_out import identify_judged
     from planner.identify.parameters import Priors
     from planner.identify.recorded import read_recorded
@@ -74,27 +79,31 @@ def identify(
     if out is not None:
         check_target(out, nominal)
     simulation, band = Simulation(nominal), band_hz or nominal.config.band_hz
+    priors = Priors(mass=MASS, inertia=INERTIA, com_m=COM_M) if inertias else Priors()
+    fitted = extended(simulation, priors) if extend else Structure(simulation, priors)
     with reporting("identifying", quiet=as_json) as progress:
         recorded = read_recorded(recordings, nominal.joint_names, band, window_rate_1_s, progress)
         judged = identify_judged(
             recorded.frfs,
             recorded.q,
-            simulation,
-            Priors(mass=MASS, inertia=INERTIA, com_m=COM_M) if inertias else Priors(),
+            fitted.simulation,
+            fitted.priors,
             held_out,
             band_hz=band,
             starts=starts,
             seed=seed,
             progress=_told(progress),
         )
-    answer = _answer(nominal, recorded, judged) | {
+    found = fitted.simulation.robot
+    answer = _answer(found, recorded, judged) | {
         "band_hz": list(band),
         "inertias": inertias,
+        "added": fitted.added,
         "out": None,
         **_drawn(pictures, recorded, judged, simulation, band),
     }
     if out is not None:
-        _write(answer, out, nominal, recorded, judged)
+        _write(answer, out, found, recorded, judged)
     answer["seconds"] = time.perf_counter() - started
     for file, reason in recorded.refused:
         warn(f"Refused {file}: {reason}")
@@ -154,7 +163,7 @@ def _answer(robot: "Robot", recorded: "Recorded", judged: "Judged") -> dict[str,
     if final.misfit > LARGE:
         remarks.append(
             f"The misfit is {final.misfit:.1f}, 1 being the noise: the simulation lacks more than "
-            f"springs can make up for, and what it lacks is hidden in them; see planner diagnose."
+            f"springs can make up for, and what it lacks is hidden in them; try --extend."
         )
     if not final.converged:
         remarks.append("The last fit had not come to rest; try more --starts.")

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 def console(quiet: bool, stderr: bool = True):
@@ -24,12 +25,41 @@ def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def advancing(verb: str, quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """A function that shows what is being done, and a bar with the share of all that is done."""
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+def bars(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """A function (what, done, of how many) that moves a bar for each thing that is counted."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = (BarColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    times = (TimeElapsedColumn(), TimeRemainingColumn())
+    screen = console(quiet)
+    shown: dict[str, Any] = {}
+    with Progress(
+        *columns, *times, console=screen, transient=True, disable=not screen.is_terminal
+    ) as progress:
+
+        def tell(what: str, done: int, total: int) -> None:
+            if what not in shown:
+                shown[what] = progress.add_task(what, total=total)
+            progress.update(shown[what], completed=done)
+
+        yield tell
+
+
+@contextmanager
+def counting(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A function that shows what is being done and which share (0 to 1) is, as a bar."""
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
+               TextColumn("{task.description}"))  # fmt: skip
     screen = console(quiet)
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
-        task = bar.add_task(verb, total=1.0)
-        yield lambda text, share: bar.update(task, description=f"{verb}: {text}", completed=share)
+        task = bar.add_task("starting", total=1.0)
+        yield lambda text, share: bar.update(task, description=text, completed=share)

@@ -20,13 +20,13 @@ def prove(
     as_json: AsJson = False,
 ) -> int:
     """Make concealed cases with another engine, seal, diagnose, unseal and score them."""
-    from planner.cli.progress import advancing
+    from planner.cli.progress import counting
     from planner.prove.report import write
     from planner.prove.run import diagnose_all, make, told, unseal
     from planner.prove.score import score
 
     folder = out or Path(f"proof-{cases}-{seed}")
-    with advancing("proving", quiet=as_json) as tell:
+    with counting(quiet=as_json) as tell:
         proof = make(folder, cases, seed, tell)
         print(f"Sealed answers: {proof.whole}", file=sys.stderr, flush=True)
         diagnose_all(proof, jobs, tell)

@@ -96,10 +96,10 @@ def _labelled(
     from planner.robot.robot import Robot
 
     simulation = Simulation(Robot.load(robot_toml))
-    middle = q[int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
+    middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
     count = min(labels + ABOVE, simulation.elastic.size)
-    modes = simulation.followed(q, count, simulation.families(middle, q))
-    tracks = track(found, Guide(modes.frequency_hz, modes.shape), x)
+    modes = simulation.followed(q, count, simulation.families(q[middle], q))
+    tracks = track(found, Guide(modes.frequency_hz, modes.shape, middle), x)
     return tracks, modes.frequency_hz
 
 
@@ -121,11 +121,11 @@ def _answer(
     ]
     drawn: dict[str, Any] = {"plots": [], "rrd": None}
     if pictures.wanted:
-        from planner.show.modal_plots import campbell_figure
+        from planner.show.modal_plots import frequency_figure
 
         seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
         mark = "SIMULATED recordings · " if survey.simulated else ""
-        figure = campbell_figure(
+        figure = frequency_figure(
             survey.poses,
             tracks.frequency_hz[:, seen],
             survey.frequency_sd_hz[:, seen],

@@ -35,7 +35,7 @@ class Grade:
 
 GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
 CLOSE, FINE = Grade(40), Grade(72)
-ROUGH_STEPS, PROMISE_STEPS = 8, 2
+ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
 KEPT = 2  # starts that are followed
@@ -138,8 +138,11 @@ class Fit:
             out[i] = chi2 + 2 * g @ step + step @ n @ step
         return out
 
-    def parameters(self, temper: float, part: Effect) -> dict[str, tuple[float, float, str]]:
-        """Value, sd and unit of what belongs to one of the effects."""
+    def parameters(
+        self, temper: float, part: Effect | None = None
+    ) -> dict[str, tuple[float, float, str]]:
+        """Value, sd and unit of what belongs to the effect, or to one of its parts."""
+        part = part or self.effect
         sd = np.sqrt(np.diagonal(np.linalg.inv(self.precision(temper))))
         p, names = self.misfit.parametrisation, _names(self.misfit)
         chosen = part.springs(self.misfit.setting.simulation)
@@ -166,10 +169,14 @@ def _names(misfit: Misfit) -> list[str]:
     return [*(s.name for s in p.parameters), *p.nuisances, *_own_names(misfit.effect)]
 
 
-def fit(problem: Problem, effect: Effect) -> Fit:
-    """From the prior's median by way of logarithms."""
+def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
+    """From the prior's median by way of logarithms, and from each warm one; on the finest lines."""
     coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
-    return _at(close, _best(close, [_best(coarse, [_approach(problem, effect)])]))
+    ends = [_best(coarse, [_approach(problem, effect)])]
+    for earlier in warm:
+        ends.append(_best(close, points(close, earlier)))
+    fine = problem.misfit(effect, FINE)
+    return _at(fine, _minimise(fine, _best(close, ends), LOOSE, LAST_STEPS).x)
 
 
 def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:

@@ -111,7 +111,7 @@ class Misfit:
             down = 2 * full[:, :e].sum(axis=1) + full[:, e : 2 * e].sum(axis=1)
             along = -rate * down / s[:, None, None]
             slope = np.concatenate([slope, along[:, None]], axis=1)
-        seen = self.effect.transfer(setting, psi)
+        seen = self.effect.transfer(self.setting, psi)
         if seen is not None:
             own = np.einsum("npijf,njkf->npikf", seen.slope, h)
             slope = np.einsum("nijf,npjkf->npikf", seen.left, slope, optimize=True)

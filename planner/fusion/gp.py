@@ -22,9 +22,15 @@ from planner.errors import InputError
 from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.data import Padded
 from planner.fusion.kernels import Kernel, parse
+from planner.fusion.predictive import Predictive
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
-JITTERS = (1e-10, 1e-8, 1e-6)  # relative to the prior variance
+JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
+UNREMARKABLE = 1e-10
+SINGULAR = (
+    "The covariance was singular until {:g} of its variance was added to the noise: two poses are "
+    "nearly the same, and their sds claim more than that."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,14 +70,18 @@ class Posterior:
         `outputs` (indices) asks for some of them only.
         """
         asked = range(len(self.mask)) if outputs is None else outputs.tolist()
-        mean, variance = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
+        mean, sd = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
-            cross, white = self._cross(j, x, low[:, j])
-            means = (self.weights[j][:, None, :] @ cross)[:, 0]
-            own = self._own(j, x, low[:, j]) - np.sum(white**2, axis=1)
-            mean[:, i] = self.prior.mean[j] + np.mean(means, axis=0)
-            variance[:, i] = np.mean(np.maximum(own, 0.0), axis=0) + np.var(means, axis=0)
-        return mean, np.sqrt(variance)
+            found = self.predictive(j, x, low[:, j])
+            mean[:, i], sd[:, i] = found.mean, found.sd
+        return mean, sd
+
+    def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:
+        """Output j, noise-free, at x (q, d) with centred low (q,), one Gaussian per sample."""
+        cross, white = self._cross(j, x, low)
+        means = self.prior.mean[j] + (self.weights[j][:, None, :] @ cross)[:, 0]
+        own = self._own(j, x, low) - np.sum(white**2, axis=1)
+        return Predictive(np.full(len(means), 1 / len(means)), means, np.sqrt(np.maximum(own, 0.0)))
 
     def covariance(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
@@ -137,7 +147,6 @@ def fit(
     first, *more = normal_points(samples, p, 1 + rounds)
     moved = np.stack(more)
     y = (padded.y - prior.mean[:, None]) * padded.mask
-    remarks: tuple[str, ...] = ()
 
     def attempt(jitter: float) -> tuple[Array, Array, Array, Array]:
         return _fit(
@@ -149,12 +158,12 @@ def fit(
     for jitter in JITTERS:
         theta, whiten, weights, evidence = (np.array(a) for a in attempt(jitter))
         if np.isfinite(weights).all() and np.isfinite(whiten).all():
+            remarks = (SINGULAR.format(jitter),) if jitter > UNREMARKABLE else ()
             evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
             return Posterior(
                 padded.x, padded.low, padded.mask, theta, whiten, weights, prior, kernel,
                 evidence, remarks,
             )  # fmt: skip
-        remarks = (f"The covariance was singular; more than {jitter:g} had to be added to it.",)
     raise InputError(
         "No Gaussian process fits the measured modes; set aside poses that are measured twice "
         "or far off with `planner withdraw`."

@@ -61,11 +61,13 @@ def fit_hedged(
     samples: int = 256,
     kept: int = 32,
     judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
+    belief: float = BELIEF,
 ) -> HedgedAR1:
     """Fit m outputs; arguments as of `fit_ar1`.
 
     `judged` are low-fidelity values (n, m) and priors by which the simulation is believed, where
-    those of `data` have seen the very measurements: what it said of each pose before.
+    those of `data` have seen the very measurements: what it said of each pose before. `belief` is
+    its probability before these data.
     """
     fused = fit_ar1(data, with_low, without_low, centre, samples, kept)
     believed = fused
@@ -77,7 +79,7 @@ def fit_hedged(
     ignored = replace(data, low=np.full_like(data.low, np.nan))
     alone = fit_ar1(ignored, with_low, without_low, nothing, samples, kept)
     gap = believed.posterior.log_evidence - alone.posterior.log_evidence
-    gap = np.where(fused.uses_low, gap + np.log(BELIEF / (1 - BELIEF)), np.inf)
+    gap = np.where(fused.uses_low, gap + np.log(belief / (1 - belief)), np.inf)
     # Without a measurement there is nothing to doubt the simulation by.
     gap = np.where(fused.posterior.mask.any(axis=1), gap, np.inf)
     trust = gap >= 0

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from planner.errors import InputError
+from planner.fusion.predictive import Predictive
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +40,14 @@ class Model(Protocol):
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        ...
+
+
+class Averaged(Model, Protocol):
+    """A model whose hyperparameters are averaged: it predicts a mixture."""
+
+    def predictive(self, x: np.ndarray) -> Predictive:
+        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
         ...
 
 

@@ -14,7 +14,7 @@ from planner.fusion.data import Padded
 from planner.fusion.gp import Prior
 from planner.fusion.kernels import parse
 
-JITTER = 1e-10
+JITTER = 1e-12
 SOME = 128  # points that are enough to find the neighbourhood of the MAP
 
 _Data = tuple[np.ndarray, tuple[np.ndarray, ...]]

@@ -13,9 +13,11 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.fusion.levels import LowLevel, Samples
-from planner.fusion.sparse import SparseGP, fit_sparse
+from planner.fusion.mixture import Mixture
+from planner.fusion.sparse import SparseGP, average_sparse, fit_sparse
 
 COUNT = 5
+FEW = 100  # measurements that leave the hyperparameters in doubt
 NODES = norm.ppf((np.arange(COUNT) + 0.5) / COUNT)
 NODES = NODES / np.std(NODES)
 
@@ -25,7 +27,7 @@ class MFDGP:
     """Fitted layers; the first one's output is centred and scaled for the second."""
 
     low: LowLevel
-    high: SparseGP
+    high: SparseGP | Mixture
     centre: float
     scale: float
 
@@ -51,7 +53,10 @@ def cutajar(d: int, shape: str = "rbf") -> str:
 def fit_mfdgp(
     measured: Samples, low: LowLevel | Samples, inducing: int = 200, kernel: str | None = None
 ) -> MFDGP:
-    """Both layers; `low` may be a fitted (or exact) level, which is then layer 1."""
+    """Both layers; `low` may be a fitted (or exact) level, which is then layer 1.
+
+    Of few measurements, layer 2's hyperparameters are averaged (`sparse.average_sparse`).
+    """
     level = fit_sparse(low, "rbf", inducing) if isinstance(low, Samples) else low
     value, _ = level.predict(measured.x)
     centre, scale = float(np.mean(value)), float(np.std(value)) or 1.0
@@ -59,7 +64,9 @@ def fit_mfdgp(
     tiled = Samples(wide, np.tile(measured.y, COUNT), np.tile(measured.sd, COUNT))
     weights = np.full(len(wide), 1 / COUNT)
     expression = kernel or cutajar(measured.x.shape[1])
-    return MFDGP(level, fit_sparse(tiled, expression, inducing, weights), centre, scale)
+    high = fit_sparse(tiled, expression, inducing, weights)
+    few = len(measured.y) <= FEW
+    return MFDGP(level, average_sparse(high, tiled, weights) if few else high, centre, scale)
 
 
 def _spread(low: LowLevel, x: np.ndarray, centre: float, scale: float) -> np.ndarray:

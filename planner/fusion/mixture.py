@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError
-from planner.fusion.levels import Model
+from planner.fusion.levels import Averaged
+from planner.fusion.predictive import Predictive, together
 
 NEGLIGIBLE = 1e-4  # weight below which a model is not asked
 
@@ -19,21 +20,23 @@ NEGLIGIBLE = 1e-4  # weight below which a model is not asked
 class Mixture:
     """Models by name and their weights, which sum to one."""
 
-    models: Mapping[str, Model]
+    models: Mapping[str, Averaged]
     weights: Mapping[str, float]
     log_evidence: float
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        found = self.predictive(x)
+        return found.mean, found.sd
+
+    def predictive(self, x: np.ndarray) -> Predictive:
+        """The same, one Gaussian per model and sample of its hyperparameters."""
         asked = [name for name, w in self.weights.items() if w > NEGLIGIBLE]
         w = np.array([self.weights[name] for name in asked])
-        parts = [self.models[name].predict(x) for name in asked]
-        means, sds = (np.array([p[i] for p in parts]) for i in (0, 1))
-        mean = (w / w.sum()) @ means
-        return mean, np.sqrt((w / w.sum()) @ (sds**2 + (means - mean) ** 2))
+        return together([self.models[name].predictive(x) for name in asked], w / w.sum())
 
 
-def mix(models: Mapping[str, Model], prior: Mapping[str, float] | None = None) -> Mixture:
+def mix(models: Mapping[str, Averaged], prior: Mapping[str, float] | None = None) -> Mixture:
     """Mixture with prior weights (default: all alike); log-evidences must be of the same data."""
     if not models:
         raise InputError("A mixture needs at least one model.")

@@ -3,8 +3,8 @@
 cov(f_a(x), f_b(x')) = B_ab k(x, x') (intrinsic coregionalisation, Bonilla et al. 2008), with
 B = L Lᵀ free and a noise per task. Where every output is observed at every pose, K is B ⊗ K_x + D
 and two small eigendecompositions do what one large Cholesky factor would (Rakitsch et al. 2013);
-with gaps the observed entries are taken as they are. Hyperparameters: the most probable ones; t²/2
-of them cannot be averaged over.
+with gaps the observed entries are taken as they are. Hyperparameters: the most probable ones, or a
+Laplace mixture around them (`task_average`).
 """
 
 from collections.abc import Callable
@@ -200,8 +200,8 @@ def fit_multitask(
     scale = np.sqrt(np.sum(apart**2, axis=0) / count)
     scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
     tasks = Tasks(x, np.where(known, (y - centre) / scale, np.nan), kernel)
-    start = _start(tasks)
-    middle, width = start.flat(), _widths(start)
+    start = first_guess(tasks)
+    middle, width = start.flat(), prior_sds(start)
 
     def negative(vector: np.ndarray) -> tuple[float, np.ndarray]:
         value, slope = log_density(tasks, start.like(vector))
@@ -216,7 +216,7 @@ def fit_multitask(
         found = _climb(negative, middle, np.where(tasks_only, 0.0, 6 * width), middle, 20)
         found = _climb(negative, middle, 6 * width, found, iterations)
     h = start.like(found)
-    return MultiTaskGP(tasks, h, _solve(tasks, h), centre, scale)
+    return MultiTaskGP(tasks, h, solve(tasks, h), centre, scale)
 
 
 def _climb(
@@ -233,7 +233,7 @@ def _climb(
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
     """Log marginal likelihood and its slope in `h.flat()`."""
-    solved = _solve(tasks, h)
+    solved = solve(tasks, h)
     slope_root = (solved.slope_b + solved.slope_b.T) @ h.root
     slope_theta = np.array(pull(tasks.kernel, h.theta, tasks.x, solved.slope_k))
     return solved.value, np.concatenate(
@@ -241,7 +241,7 @@ def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
     )
 
 
-def _solve(tasks: Tasks, h: Hyperparameters) -> Solved:
+def solve(tasks: Tasks, h: Hyperparameters) -> Solved:
     k = parse(tasks.kernel, tasks.x.shape[1]).covariance(np, h.theta, tasks.x, tasks.x)
     k = k + RELATIVE_JITTER * np.mean(np.diag(k)) * np.eye(len(k))
     return (solve_kronecker if tasks.complete else solve_dense)(
@@ -256,7 +256,7 @@ def pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
     return jax.grad(lambda t: jnp.sum(k.covariance(jnp, t, x, x) * slope))(theta)
 
 
-def _start(tasks: Tasks) -> Hyperparameters:
+def first_guess(tasks: Tasks) -> Hyperparameters:
     # Over the poses that two outputs share; made positive definite after that.
     filled, known = np.nan_to_num(tasks.y), np.isfinite(tasks.y).astype(float)
     t = filled.shape[1]
@@ -266,7 +266,7 @@ def _start(tasks: Tasks) -> Hyperparameters:
     return Hyperparameters(np.linalg.cholesky(covariance), np.full(t, np.log(NOISE)), theta)
 
 
-def _widths(h: Hyperparameters) -> np.ndarray:
+def prior_sds(h: Hyperparameters) -> np.ndarray:
     """Prior sds of `h.flat()`; k's first amplitude and its nugget stay, for B and D hold them."""
     theta = np.full(len(h.theta), LENGTH_SPREAD)
     theta[:2] = 1e-6

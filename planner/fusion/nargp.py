@@ -13,6 +13,7 @@ from scipy.stats import norm
 from planner.fusion.ar1 import AR1, OutputPrior, fit_ar1
 from planner.fusion.data import TrainingData
 from planner.fusion.levels import LowLevel, Samples
+from planner.fusion.predictive import Predictive
 from planner.fusion.recursive import PRIOR, scales
 
 NODES = norm.ppf((np.arange(9) + 0.5) / 9)  # equally probable values of the cheap level
@@ -34,15 +35,23 @@ class NARGP:
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        found = self.predictive(x)
+        return found.mean, found.sd
+
+    def predictive(self, x: np.ndarray) -> Predictive:
+        """The same, one Gaussian per sample of the hyperparameters."""
         value, unsure = self.low.predict(x)
         scaled, sd = (value - self.low_centre) / self.low_scale, unsure / self.low_scale
         nodes = NODES if np.max(sd, initial=0.0) > CERTAIN else np.zeros(1)
         low = (scaled[None, :] + nodes[:, None] * sd[None, :]).reshape(-1)
         wide = np.column_stack([np.tile(x, (len(nodes), 1)), low])
-        mean, spread = self.model.predict(wide, low[:, None])
-        mean, spread = (a[:, 0].reshape(len(nodes), -1) for a in (mean, spread))
-        total = np.sqrt(np.mean(spread**2, axis=0) + np.var(mean, axis=0))
-        return self.centre + self.scale * np.mean(mean, axis=0), self.scale * total
+        base, offset = self.model.split(low[:, None])
+        found = self.model.posterior.predictive(0, wide, offset[:, 0])
+        shape = len(found.weights), len(nodes), len(x)
+        means, sds = (found.means + base[:, 0]).reshape(shape), found.sds.reshape(shape)
+        sds = np.sqrt(np.mean(sds**2, axis=1) + np.var(means, axis=1))
+        moments = Predictive(found.weights, np.mean(means, axis=1), sds)
+        return moments.scaled(self.centre, self.scale)
 
 
 def perdikaris(d: int, shape: str = "rbf") -> str:

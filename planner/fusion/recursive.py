@@ -12,8 +12,10 @@ import numpy as np
 from planner.fusion.ar1 import AR1, OutputPrior, fit_ar1
 from planner.fusion.data import TrainingData
 from planner.fusion.levels import LowLevel, Samples, spread
+from planner.fusion.predictive import Predictive
 
-PRIOR = OutputPrior(bias_sd=0.5, slope_sd=1.0, amplitude=0.1, nugget=1e-3, spread=1.5)
+# Simulations are off by a thousandth of what they vary or by all of it: hence the wide spread.
+PRIOR = OutputPrior(bias_sd=0.5, slope_sd=1.0, amplitude=0.2, nugget=1e-3, spread=2.0)
 TRUST = 2.0  # measurements' worth of belief that both levels vary by the same amount
 
 
@@ -31,12 +33,19 @@ class RecursiveAR1:
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        found = self.predictive(x)
+        return found.mean, found.sd
+
+    def predictive(self, x: np.ndarray) -> Predictive:
+        """The same, one Gaussian per sample of the hyperparameters."""
         value, unsure = self.low.predict(x)
         scaled = (value - self.low_centre) / self.low_scale
-        mean, sd = self.model.predict(x, scaled[:, None])
-        factor = np.mean((1 + self.model.posterior.slopes(0)) ** 2)
-        sd = np.sqrt(sd[:, 0] ** 2 + factor * (unsure / self.low_scale) ** 2)
-        return self.centre + self.scale * mean[:, 0], self.scale * sd
+        base, offset = self.model.split(scaled[:, None])
+        found = self.model.posterior.predictive(0, x, offset[:, 0])
+        slope = np.abs(1 + self.model.posterior.slopes(0))
+        found = found.widened(slope[:, None] * unsure[None, :] / self.low_scale)
+        shifted = Predictive(found.weights, found.means + base[:, 0], found.sds)
+        return shifted.scaled(self.centre, self.scale)
 
 
 def fit_recursive(

@@ -10,10 +10,12 @@ from planner.fusion.gp import Posterior, Prior, fit
 from planner.fusion.kernels import parse
 from planner.fusion.levels import Samples, spread
 from planner.fusion.marginal import laplace
+from planner.fusion.predictive import Predictive
 
 PRIOR = OutputPrior(bias_sd=1.0, slope_sd=0.0, amplitude=1.0, nugget=1e-3)  # of y scaled to sd 1
-# A simulation's grid: no noise, and enough points to tell an input that hardly matters.
-GRID_PRIOR = replace(PRIOR, nugget=1e-4, length=1.0, length_spread=2.0)
+# A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to
+# tell an input that hardly matters. The spread is the likeliest on the development problems.
+GRID_PRIOR = replace(PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
 MANY = 64  # points; above, samples are fewer, for the hyperparameters are then well determined
 
 
@@ -28,8 +30,12 @@ class SingleGP:
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
-        mean, sd = self.posterior.predict(x, np.zeros((len(x), 1)))
-        return self.centre + self.scale * mean[:, 0], self.scale * sd[:, 0]
+        found = self.predictive(x)
+        return found.mean, found.sd
+
+    def predictive(self, x: np.ndarray) -> Predictive:
+        """The same, one Gaussian per sample of the hyperparameters."""
+        return self.posterior.predictive(0, x, np.zeros(len(x))).scaled(self.centre, self.scale)
 
 
 def fit_gp(

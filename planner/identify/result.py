@@ -121,7 +121,9 @@ def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tu
 
 
 def _words(names: list[str], vector: np.ndarray, ratio: float) -> str:
-    order = [i for i in np.argsort(-np.abs(vector)) if abs(vector[i]) > SHOWN][:NAMED]
+    by_share = np.argsort(-np.abs(vector))
+    # Where many have a small share, those with the largest stand for all.
+    order = [i for i in by_share if abs(vector[i]) > SHOWN][:NAMED] or list(by_share[:NAMED])
     left = f"{100 * min(ratio, 1.0):.0f} % of the prior's spread is left"
     if len(order) == 1:
         return f"The {names[order[0]]} is not determined: {left}."

@@ -35,6 +35,8 @@ def cut_off(solved: Poles, s: np.ndarray, tail_s: np.ndarray) -> np.ndarray:
     out = np.zeros((*solved.residues.shape[:1], *solved.residues.shape[2:], s.shape[1]), complex)
     for i in np.flatnonzero(np.isfinite(tail_s)):
         alive = solved.poles[i].real * tail_s[i] > OVER
+        if not alive.any():
+            continue
         pole = solved.poles[i, alive][:, None]
         lost = pole**2 * np.exp((pole - s[i]) * tail_s[i]) / (s[i] - pole)
         flat = solved.residues[i, alive].reshape(len(pole), -1)

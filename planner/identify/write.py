@@ -1,5 +1,6 @@
 """An identified robot as a folder: robot.toml, whose comments and order stay, and its URDF."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import tomlkit
 
 from planner.errors import InputError
 from planner.identify.result import Identification
+from planner.robot.config import Compliance
 from planner.robot.elastic import ElasticModel
 from planner.robot.inertias import urdf_with_inertias
 from planner.robot.robot import Robot
@@ -16,11 +18,22 @@ from planner.robot.urdf import copy_meshes
 DIGITS = 6  # significant ones: more than any identification knows
 
 
-def updated_toml(text: str, result: Identification, urdf: str | None = None) -> str:
-    """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced."""
+def updated_toml(
+    text: str, result: Identification, urdf: str | None = None, added: Sequence[Compliance] = ()
+) -> str:
+    """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
+
+    `added` blocks, which the identification counts last, follow those in the text.
+    """
     document = tomlkit.parse(text)
-    blocks = [*document["compliance"]]
+    listed = document["compliance"]
+    blocks = [*listed]
     blocks += [b for e in document.get("effects", ()) for b in e.get("compliance", ())]
+    for block in added:
+        table = tomlkit.table()
+        table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
+        listed.append(table)
+        blocks.append(table)
     for estimate in result.estimates:
         for number in estimate.blocks:
             blocks[number][estimate.kind] = float(f"{estimate.value:.{DIGITS}g}")
@@ -69,7 +82,10 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
             _write_new(urdf, text)
             if elsewhere:
                 copy_meshes(robot.urdf_path, urdf)
-        _write_new(out, updated_toml(robot.path.read_text(encoding="utf-8"), result, name))
+        stated = robot.path.read_text(encoding="utf-8")
+        inside = sum(len(e.compliance) for e in robot.config.effects)
+        added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
+        _write_new(out, updated_toml(stated, result, name, added))
     except OSError as error:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."

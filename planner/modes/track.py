@@ -1,7 +1,8 @@
 """Following each mode through the workspace: one label per mode over all measured poses.
 
-What a label should look like at a pose comes from a guide (the simulation's frequency and shape
-there) and from the poses labelled so far: the log ratio of measured to guided frequency is
+Modes are first put in the order of frequency, then named from pose to pose (`names`). What a
+label should look like at a pose comes from a guide (the simulation's frequency and shape there)
+and from the poses labelled so far: the log ratio of measured to guided frequency is
 smooth over the workspace (kriging, leaving the pose itself out), shapes resemble those of the
 neighbours (carried over by the rotation that the guide's shapes undergo), damping that of all
 poses. A mode may be missing at a pose, unexpected, or change places with another; the
@@ -10,11 +11,14 @@ probabilities sum over all matchings.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from planner.modes.compare import align, unexpected_cost
 from planner.modes.matching import best, chances
+from planner.modes.names import name_chances
 from planner.modes.types import ModalModel, Mode
 
 # Log frequency: how far an unfitted guide may be off, by how much its error varies over the
@@ -32,22 +36,24 @@ class Guide:
     """What is expected: frequency_hz (n, k) and shape (n, k, 3) of k labels at n poses.
 
     NaN where a label does not exist. Columns are labels, in any order of frequency; a label
-    may cross others from pose to pose.
+    may cross others from pose to pose. At pose `reference` labels are named after the columns.
     """
 
     frequency_hz: np.ndarray
     shape: np.ndarray
+    reference: int = 0
 
     @classmethod
     def by_example(cls, poses: Sequence[Sequence[Mode]], labels: int | None = None) -> "Guide":
         """Without a simulation the pose with the most modes says what there is everywhere."""
-        example = max(poses, key=len)[:labels]
+        reference = max(range(len(poses)), key=lambda i: len(poses[i]))
+        example = poses[reference][:labels]
         count = len(example) if labels is None else labels
         frequency, shape = np.full(count, np.nan), np.full((count, 3), np.nan + 0j)
         frequency[: len(example)] = [mode.frequency_hz for mode in example]
         shape[: len(example)] = [mode.shape for mode in example]
         n = len(poses)
-        return cls(np.tile(frequency, (n, 1)), np.tile(shape, (n, 1, 1)))
+        return cls(np.tile(frequency, (n, 1)), np.tile(shape, (n, 1, 1)), reference)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +83,46 @@ def track(
     With `ordered`, labels are places in the order of frequency, which is continuous over the
     workspace even where modes cross, and keep that order; the guide's columns must do so too.
     """
+    if not ordered and len(poses):
+        return _named(poses, guide, x)
+    return _matched(poses, guide, x, ordered)
+
+
+def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Tracks:
+    """Places in the order of frequency first, then which label each place carries.
+
+    Where a mode is missing between others its place is doubtful: there the guide's families decide.
+    """
+    order = np.argsort(guide.frequency_hz, axis=1, kind="stable")  # NaN comes last
+    ranked = _columns(guide, order)
+    placed = _matched(poses, ranked, x, ordered=True)
+    chance = name_chances(placed.modes, np.argsort(order, axis=1), x, guide.reference)
+    place = np.array([linear_sum_assignment(-c)[1] for c in chance])
+    rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
+    sure = placed.probability[rows, place]
+    modes = [tuple(row[b] for b in p) for row, p in zip(placed.modes, place, strict=True)]
+    rest = list(placed.unexpected)
+    gaps = [i for i, row in enumerate(placed.modes) if _gap(row)]
+    if gaps:
+        free = _matched(poses, guide, x, ordered=False)
+        sure[gaps] = free.probability[gaps]
+        for i in gaps:
+            modes[i], rest[i] = free.modes[i], free.unexpected[i]
+    return Tracks(tuple(modes), sure * chance[rows, labels, place], tuple(rest))
+
+
+def _columns(guide: Guide, chosen: np.ndarray) -> Guide:
+    """The guide with the chosen columns (n, k) of every pose."""
+    rows = np.arange(len(chosen))[:, None]
+    return Guide(guide.frequency_hz[rows, chosen], guide.shape[rows, chosen], guide.reference)
+
+
+def _gap(row: Sequence[Mode | None]) -> bool:
+    """Whether a mode is missing below one that was found."""
+    return any(now is None and later is not None for now, later in pairwise(row))
+
+
+def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, ordered: bool) -> Tracks:
     expected = np.log(guide.frequency_hz)
     chosen = [_first(modes, *row) for modes, row in zip(poses, _rows(guide), strict=True)]
     gains: list[np.ndarray] = []

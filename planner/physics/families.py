@@ -17,8 +17,9 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from planner.physics.dynamics import SimulatedModes
 
 # Between poses whose shapes are compared. Modes that exchange their shapes over less than this
-# are taken to cross; over more, to veer and keep their order.
-STEP_RAD = 0.2
+# are taken to cross; over more, to veer and keep their order. In longer steps veering looks like
+# crossing, and two robots that are nearly alike would be followed differently.
+STEP_RAD = 0.02
 FREQUENCY_STEP = 0.3  # of log frequency in one step: as unlikely as a shape unlike the one before
 
 Undamped = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]

@@ -179,3 +179,12 @@ class Robot:
         return pin.computeFrameJacobian(
             self.model, self._data, np.asarray(q, dtype=float), self.tcp_id, pin.LOCAL
         )
+
+    def singularity(self, q: np.ndarray) -> np.ndarray:
+        """Distance (n,) from singular poses of q (n, dof) in rad; 0 at one.
+
+        Least singular value of the tcp's Jacobian, its linear part in units of the reach.
+        """
+        scale = np.repeat([1 / self.reach_m, 1.0], 3)[:, None]
+        both = [np.linalg.svd(scale * self.jacobian(row), compute_uv=False)[-1] for row in q]
+        return np.array(both)

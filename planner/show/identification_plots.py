@@ -1,4 +1,4 @@
-"""Pictures of an identification: Campbell maps and direct FRFs, before and after."""
+"""Pictures of an identification: FRF maps and direct FRFs, before and after."""
 
 import re
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
-from planner.show.campbell import campbell_map
+from planner.show.frf_map import frf_map
 from planner.show.plots import AXES
 
 BEFORE, AFTER = ("tab:blue", "--"), ("tab:red", "-")
@@ -34,7 +34,7 @@ def identification_figures(
     mark: str = "",
     most: int = 6,
 ) -> dict[str, Figure]:
-    """Campbell maps of every direct FRF with the nominal and the identified simulation.
+    """FRF maps of every direct FRF with the nominal and the identified simulation.
 
     Then the direct FRFs themselves at up to `most` poses, held-out ones first.
     """
@@ -45,13 +45,13 @@ def identification_figures(
     number, figures = np.arange(1.0, len(poses) + 1), {}
     for i, axis in enumerate(AXES):
         for when, simulated in (("before", before), ("after", after)):
-            figures[f"campbell_{axis}{axis}_{when}"] = campbell_map(
+            figures[f"map_{axis}{axis}_{when}"] = frf_map(
                 number,
                 measured[:, i, i],
                 simulated[:, i, i],
                 lines,
                 "pose, in recorded order",
-                f"{mark}Campbell map of H {axis}{axis}, {when} identification",
+                f"{mark}Map of H {axis}{axis}, {when} identification",
             )
     for pose in sorted(poses, key=lambda pose: not pose.held_out)[:most]:
         name = re.sub(r"[^\w.-]", "_", pose.name)

@@ -239,7 +239,7 @@ def mac_figure(modal: ModalModel, title: str = "") -> Figure:
     return figure
 
 
-def campbell_figure(
+def frequency_figure(
     place: tuple[str, ...] | np.ndarray,
     frequency_hz: np.ndarray,
     sd_hz: np.ndarray,

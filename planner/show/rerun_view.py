@@ -20,7 +20,7 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.modes.measure import MeasuredPose
 from planner.show import plots
-from planner.show.modal_plots import campbell_figure
+from planner.show.modal_plots import frequency_figure
 from planner.show.rerun_stream import open_stream
 
 TIMELINE = "measurement"
@@ -178,7 +178,7 @@ class RerunView:
         frequency, sd = np.moveaxis(np.array(rows), -1, 0)
         simulated = np.array([pose.simulated_hz for pose in poses])
         mark = "SIMULATED recordings · " if self._simulated else ""
-        figure = campbell_figure(
+        figure = frequency_figure(
             tuple(pose.pose for pose in poses),
             frequency,
             sd,

@@ -4,6 +4,7 @@ Every law is a scalar one: an elastic angle θ (rad, or m) gives a restoring tor
 Arrays are (hits,), because the hits at a pose are integrated together.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -25,8 +26,22 @@ class Law(Protocol):
         ...
 
 
+class Elastic(ABC):
+    """A law without a state: torque(θ) is a function of the angle."""
+
+    @abstractmethod
+    def at(self, angle: np.ndarray) -> np.ndarray:
+        """Torque at an angle."""
+
+    def torque(
+        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """See `Law`."""
+        return self.at(now), state
+
+
 @dataclass(frozen=True)
-class Hardening:
+class Hardening(Elastic):
     """Stiffness from K at small angles to K + `stiffness` (softening: < 0) at large ones.
 
     τ = k θ³ / (θ² + a²), a smooth form of a gear's stiffness in steps; `angle` is a.
@@ -40,15 +55,13 @@ class Hardening:
         """9/8 k, at θ = √3 a."""
         return 9 / 8 * abs(self.stiffness)
 
-    def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, angle: np.ndarray) -> np.ndarray:
         """See the class."""
-        return self.stiffness * now**3 / (now**2 + self.angle**2), state
+        return self.stiffness * angle**3 / (angle**2 + self.angle**2)
 
 
 @dataclass(frozen=True)
-class Backlash:
+class Backlash(Elastic):
     """A dead zone of ± `gap`, in which only K - `stiffness` is left (seals, preload).
 
     τ = -k clip(θ, -g, g): beyond the gap the full stiffness K, shifted by the gap.
@@ -62,11 +75,9 @@ class Backlash:
         """k, within the gap."""
         return self.stiffness
 
-    def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, angle: np.ndarray) -> np.ndarray:
         """See the class."""
-        return -self.stiffness * np.clip(now, -self.gap, self.gap), state
+        return -self.stiffness * np.clip(angle, -self.gap, self.gap)
 
 
 @dataclass(frozen=True)
@@ -97,7 +108,7 @@ class Friction:
 
 
 @dataclass(frozen=True)
-class Contact:
+class Contact(Elastic):
     """A spring that something else presses on: it lets go beyond its `preload` (m)."""
 
     stiffness: float
@@ -108,8 +119,6 @@ class Contact:
         """k, while it touches."""
         return self.stiffness
 
-    def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def at(self, angle: np.ndarray) -> np.ndarray:
         """See the class."""
-        return self.stiffness * np.maximum(now, -self.preload), state
+        return self.stiffness * np.maximum(angle, -self.preload)

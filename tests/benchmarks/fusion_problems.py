@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-LOW_POINTS = {1: 25, 2: 50, 3: 60, 4: 80, 8: 120}
+LOW_POINTS = {1: 25, 2: 50, 3: 60, 4: 80, 6: 100, 8: 120, 10: 130}
 TEST_POINTS = 400
 
 

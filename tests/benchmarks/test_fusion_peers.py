@@ -1,5 +1,9 @@
 """Ours beside emukit, SMT and BoTorch on the same data: coverage, NLPD, error and time.
 
+Every prediction is scored as what it is: the peers' are Gaussians, ours is a mixture of Gaussians.
+What its mean and sd alone would score is told too. `development_problems` is what ours was
+developed on.
+
 `pytest -m slow -s tests/benchmarks/test_fusion_peers.py` prints the tables. The peers (extra
 `peers`) run in the interpreter that PEERS_PYTHON names, else in this one. FUSION_SEEDS (20) says
 how many designs per cell, FUSION_ANSWERS a folder that keeps the peers' answers between runs.
@@ -14,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import norm
 
 import fusion_peers
 from fusion_problems import PROBLEMS, Design, design
 from planner.fusion.fused import fit_fused, fit_low
 from planner.fusion.levels import Samples
+from planner.fusion.predictive import Predictive
 from planner.fusion.recursive import fit_recursive
 from robot_problems import ROBOT_PROBLEMS
 
@@ -27,6 +31,8 @@ COUNTS = (3, 5, 8, 11, 15)
 SEEDS = int(os.environ.get("FUSION_SEEDS", "20"))
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 PEERS = tuple(fusion_peers.PEERS)
+MOMENTS = "ours as Gaussian"
+EXACT = 1e-6  # noise of computed values, over their scale
 SD_FLOOR = 1e-6  # of the test values' sd: below it all of these functions are rounding errors
 
 pytestmark = [
@@ -53,19 +59,26 @@ def ask_peers(designs: dict[str, Design], folder: Path, name: str, peers=PEERS):
     return np.load(answers)
 
 
-def ours(d: Design):
-    """Mean, sd, seconds: the cheap level is fitted too, and the values are known to be exact."""
+def ours(d: Design) -> tuple[Predictive, float]:
+    """Prediction and seconds: the cheap level is fitted too, and the values are known as exact."""
     start = time.perf_counter()
     low = fit_low(Samples.of(d.x_low, d.y_low))
-    model = fit_fused(Samples.of(d.x_high, d.y_high), low, float(np.std(d.y_low)), 1e-5)
-    return *model.predict(d.x_test), time.perf_counter() - start
+    model = fit_fused(Samples.of(d.x_high, d.y_high), low, float(np.std(d.y_low)), EXACT)
+    return model.predictive(d.x_test), time.perf_counter() - start
 
 
-def score(d: Design, mean, sd, seconds):
+def gaussian(mean, sd) -> Predictive:
+    """Of a mean and an sd (q,)."""
+    return Predictive(np.ones(1), mean[None], sd[None])
+
+
+def score(d: Design, found: Predictive, seconds):
     """Share inside the 95 % interval, NLPD and RMSE of y scaled to sd 1, seconds."""
-    off, sd = (mean - d.y_test) / d.y_test.std(), np.maximum(sd / d.y_test.std(), SD_FLOOR)
-    inside = np.mean(np.abs(off) < 1.96 * sd)
-    return inside, -np.mean(norm.logpdf(off, scale=sd)), np.sqrt(np.mean(off**2)), float(seconds)
+    least, size = SD_FLOOR * d.y_test.std(), d.y_test.std()
+    found = Predictive(found.weights, found.means, np.maximum(found.sds, least))
+    inside = np.mean(np.abs(found.below(d.y_test) - 0.5) < 0.475)
+    nlpd = -np.mean(found.log_density(d.y_test)) - np.log(size)
+    return inside, nlpd, np.sqrt(np.mean((found.mean - d.y_test) ** 2)) / size, float(seconds)
 
 
 def run(problems, name, seeds, folder):
@@ -81,11 +94,16 @@ def run(problems, name, seeds, folder):
         answers = ask_peers(designs, folder, f"{name}{seed}")
         for key, d in designs.items():
             p, n, _ = key.split("/")
-            out.setdefault((p, int(n), "ours"), []).append(score(d, *ours(d)))
+            found, seconds = ours(d)
+            out.setdefault((p, int(n), "ours"), []).append(score(d, found, seconds))
+            rough = gaussian(found.mean, found.sd)
+            out.setdefault((p, int(n), MOMENTS), []).append(score(d, rough, seconds))
             for peer in PEERS:
                 if f"{key}/{peer}/mean" in answers:
-                    values = (answers[f"{key}/{peer}/{what}"] for what in ("mean", "sd", "seconds"))
-                    out.setdefault((p, int(n), peer), []).append(score(d, *values))
+                    mean, sd, took = (
+                        answers[f"{key}/{peer}/{what}"] for what in ("mean", "sd", "seconds")
+                    )
+                    out.setdefault((p, int(n), peer), []).append(score(d, gaussian(mean, sd), took))
     return {key: np.array(rows) for key, rows in out.items()}
 
 
@@ -95,8 +113,8 @@ def folder(tmp_path):
 
 
 def told(scores, problems):
-    """Prints the table; (median RMSE, mean NLPD per cell, coverage) per method."""
-    methods = ("ours", *PEERS)
+    """Prints the table; by method median RMSE, NLPDs of the cells, coverage, share of R² ≥ 0.9."""
+    methods = ("ours", MOMENTS, *PEERS)
     print("\ncoverage %, mean NLPD, median RMSE / sd of the output")
     print(" " * 18 + "".join(f"{m:>24s}" for m in methods))
     cells = [(p, n) for p in problems for n in COUNTS]
@@ -111,36 +129,41 @@ def told(scores, problems):
     for m in methods:
         rows = np.concatenate([scores[(*cell, m)] for cell in cells])
         nlpd = np.array([scores[(*cell, m)][:, 1].mean() for cell in cells])
-        out[m] = np.median(rows[:, 2]), nlpd, rows[:, 0].mean()
         good = np.mean(rows[:, 2] < np.sqrt(0.1))
+        out[m] = np.median(rows[:, 2]), nlpd, rows[:, 0].mean(), good
         print(
             f"{m:13s} coverage {100 * out[m][2]:5.1f} %  NLPD median {np.median(rows[:, 1]):6.2f} "
             f"mean {rows[:, 1].mean():9.2f}  median RMSE {out[m][0]:.4f}  "
             f"R² ≥ 0.9: {100 * good:.0f} %  {rows[:, 3].mean():.2f} s"
         )
-    own = out["ours"][1]
-    for peer in PEERS:
-        print(f"NLPD below {peer} in {100 * np.mean(own < out[peer][1]):.0f} % of the cells")
-    least = np.min([out[p][1] for p in PEERS], axis=0)
-    print(f"NLPD below all of them at once in {100 * np.mean(own < least):.0f} % of the cells")
+    for m in ("ours", MOMENTS):
+        own = out[m][1]
+        for peer in PEERS:
+            print(f"NLPD of {m} below {peer} in {100 * np.mean(own < out[peer][1]):.0f} % of cells")
+        least = np.min([out[p][1] for p in PEERS], axis=0)
+        print(f"NLPD of {m} below all of them at once in {100 * np.mean(own < least):.0f} %")
+        lost = [f"{p} {n}" for (p, n), worse in zip(cells, own >= least, strict=True) if worse]
+        print("lost to one of them: " + ", ".join(lost))
     return out
 
 
 def test_calibration_and_error_beside_the_peers(folder):
     out = told(run(PROBLEMS, "", SEEDS, folder), PROBLEMS)
-    rmse, nlpd, coverage = out["ours"]
+    rmse, nlpd, coverage, good = out["ours"]
     assert 0.90 <= coverage <= 0.97
-    assert rmse <= 1.05 * min(out[p][0] for p in PEERS)
-    assert min(np.mean(nlpd < out[p][1]) for p in PEERS) >= 0.75
+    assert rmse <= min(out[p][0] for p in PEERS)
+    assert good >= max(out[p][3] for p in PEERS)
+    assert min(np.mean(nlpd < out[p][1]) for p in PEERS) >= 0.8
 
 
 def test_robots_beside_the_peers(folder):
     problems = {name: make() for name, make in ROBOT_PROBLEMS.items()}
-    out = told(run(problems, "robots", min(SEEDS, 5), folder), problems)
-    rmse, nlpd, coverage = out["ours"]
-    assert 0.88 <= coverage <= 0.99
-    assert rmse <= 1.05 * min(out[p][0] for p in PEERS)
-    assert min(np.mean(nlpd < out[p][1]) for p in PEERS) >= 0.6
+    out = told(run(problems, "robots", SEEDS, folder), problems)
+    rmse, nlpd, coverage, good = out["ours"]
+    assert 0.90 <= coverage <= 0.97
+    assert rmse <= min(out[p][0] for p in PEERS)
+    assert good >= max(out[p][3] for p in PEERS)
+    assert min(np.mean(nlpd < out[p][1]) for p in PEERS) >= 0.8
 
 
 def test_times_of_a_refit_with_500_simulated_and_30_measured_points(tmp_path):
@@ -167,4 +190,5 @@ def test_times_of_a_refit_with_500_simulated_and_30_measured_points(tmp_path):
     for name, s in (seconds | peers).items():
         ratios = "".join(f"  {p} / this {t / s:7.1f}" for p, t in peers.items())
         print(f"{name:24s} {s:8.3f} s{ratios}")
-    assert peers["emukit AR1"] > 30 * seconds["AR1, low level kept"]
+    assert peers["emukit AR1"] > 100 * seconds["AR1, low level kept"]
+    assert peers["SMT MFK"] > 3 * seconds["AR1, everything"]

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from planner.campaign.fidelity import PRIORS, LowFidelity, learn, possible
+from planner.campaign.fidelity import PRIORS, LowFidelity, learn
 from planner.frf.estimate import estimate
+from planner.identify.feasible import pseudo_inertia
 from planner.identify.parameters import parametrise
 from planner.identify.uncertainty import frequency_sd, frequency_sensitivity
 from planner.physics.families import undamped_modes
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import Deviation, Resonator
 from planner.truth.hits import Hammer
 from planner.truth.model import load_truth
 from robots import BAND_HZ, JOINTS_DEG, make_arm
@@ -20,9 +21,9 @@ HAMMER = Hammer(peak_n=60.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=
 COUNT = 4
 
 
-def measured(path, n: int = 4):
+def measured(path, n: int = 4, resonators: tuple[Resonator, ...] = ()):
     """FRFs at n poses and true frequencies at 20 others."""
-    truth = load_truth(path, Deviation(7, 0.15, 0.15, 0.03, 0.003))
+    truth = load_truth(path, Deviation(7, 0.15, 0.15, 0.03, 0.003, resonators=resonators))
     rng = np.random.default_rng(0)
     low, high = np.deg2rad(np.transpose(JOINTS_DEG))
     q, other = rng.uniform(low, high, (n, 6)), rng.uniform(low, high, (20, 6))
@@ -92,21 +93,26 @@ def test_the_same_recordings_teach_the_same(tmp_path):
     np.testing.assert_array_equal(once.frequency_hz, again.frequency_hz)
 
 
-def test_missing_physics_is_noticed_and_said(tmp_path):
-    frfs, q, _, _ = measured(make_arm(tmp_path / "true", transverse=True), n=3)
+def test_springs_that_the_description_lacks_are_found_and_named(tmp_path):
+    frfs, q, other, true_hz = measured(make_arm(tmp_path / "true", transverse=True), n=3)
     path = make_arm(tmp_path / "simulated")
+    before = LowFidelity(COUNT, Simulation(Robot.load(path)))
+    after = learn(before, frfs, q, BAND_HZ)
+    assert rmse(before, other, true_hz) > 0.1
+    assert rmse(after, other, true_hz) < 0.01
+    assert "robot.toml lacks compliance" in after.remark
+    assert " about x " in after.remark
+    assert after.left_out is None
+
+
+def test_physics_that_no_joint_has_is_noticed_and_said(tmp_path):
+    hose = Resonator("link_4", (0.0, 0.0, 0.1), (0.0, 1.0, 0.0), 6.0, 18.0, 0.02)
+    path = make_arm(tmp_path)
+    frfs, q, _, _ = measured(path, 3, resonators=(hose,))
     after = learn(LowFidelity(COUNT, Simulation(Robot.load(path))), frfs, q, BAND_HZ)
     assert "lacks physics" in after.remark
     assert after.left_out is not None
     assert after.left_out.shape == (3, COUNT)
     assert after.simulation is not None
-    assert possible(after.simulation)
-
-
-def test_bodies_that_cannot_exist_are_known(tmp_path):
-    simulation = Simulation(Robot.load(make_arm(tmp_path)))
-    assert possible(simulation)
-    change = np.zeros_like(simulation.elastic.inertia)
-    change[2, 4] = 50.0  # I_xx beyond I_yy + I_zz
-    changed = simulation.changed(simulation.elasticity, change)
-    assert not possible(changed)
+    body = pseudo_inertia(after.simulation.elastic.inertia)
+    assert np.all(np.linalg.eigvalsh(body[after.simulation.elastic.inertia[:, 0] > 0]) > 0)

@@ -104,7 +104,7 @@ def test_text_and_pictures_beside_the_input(cell, tmp_path):
     assert "N·m/rad" in run.stdout
     assert "SIMULATED" in run.stdout
     assert "No pose was held out" in " ".join(run.stdout.split())
-    assert (tmp_path / "plots" / "campbell_xx_after.png").stat().st_size > 10_000
+    assert (tmp_path / "plots" / "map_xx_after.png").stat().st_size > 10_000
     assert (tmp_path / "plots" / "frf_P0.png").stat().st_size > 10_000
     assert tomllib.loads(out.read_text())["urdf"] == "identified.urdf"
     Robot.load(out)
@@ -192,3 +192,20 @@ def assert_one_sentence(run, says: str) -> None:
     assert says in run.stderr
     assert len(run.stderr.strip().splitlines()) == 1
     assert "Traceback" not in run.stderr
+
+
+def test_compliance_that_the_description_lacks_is_added_where_asked(tmp_path):
+    """Truth tilts in every joint; the stated torsion springs alone cannot follow."""
+    truth = load_truth(make_arm(tmp_path / "true", transverse=True), Deviation(6, 0.15, 0.15))
+    low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T
+    q = np.random.default_rng(1).uniform(low, high, (4, 6))
+    named = [(f"P{i}", row) for i, row in enumerate(q)]
+    folder = record_poses(truth, named, tmp_path / "hits", repeats=3, hammer=HAMMER)
+    robot, out = make_arm(tmp_path / "stated"), tmp_path / "found" / "robot.toml"
+    plain = planner_json("identify", folder, "--robot", robot)
+    wider = planner_json("identify", folder, "--robot", robot, "--extend", "--out", out)
+    assert plain["misfit"] > 10 > 2 > wider["misfit"]
+    assert any("--extend" in remark for remark in plain["remarks"])
+    assert wider["held_out"]["frac"] > 0.97 > plain["held_out"]["frac"]
+    assert len(wider["parameters"]) == 6 + wider["added"] == len(Robot.load(out).config.compliance)
+    assert wider["written"]["frac"] > 0.97

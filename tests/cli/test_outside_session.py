@@ -1,6 +1,7 @@
 """A whole session by the contract on a robot that is not the shipped one."""
 
 import csv
+from pathlib import Path
 
 import numpy as np
 
@@ -32,9 +33,15 @@ def test_eight_measurements_and_a_prediction(tmp_path):
         assert report["refused"] == []
     again = planner("import", cell, folder, "--json")
     assert again.returncode == 0
-    status = answer("status", cell)
+    status = answer("status", cell, "--plot", tmp_path / "pictures")
     assert len(status["measurements"]) == MEASUREMENTS
     assert status["simulated"] is True
+    left_out = status["leave_one_out"]
+    assert left_out["values"] == len(left_out["frequencies"]) > 2 * MEASUREMENTS
+    assert 0.5 < left_out["coverage"]["0.95"] <= 1
+    for row in left_out["frequencies"]:
+        assert abs(row["measured_hz"] - row["predicted_hz"]) < 8 * row["sd_hz"]
+    assert Path(status["plots"][0]).read_bytes().startswith(b"\x89PNG")
 
     rng = np.random.default_rng(5)
     poses = np.array([[rng.uniform(a, b) for a, b in JOINTS_DEG] for _ in range(30)])

@@ -1,4 +1,4 @@
-"""Metrics and Campbell diagram of a path of the shipped campaign, from files to figures."""
+"""Metrics and FRF map of a path of the shipped campaign, from files to figures."""
 
 import os
 from pathlib import Path
@@ -13,7 +13,7 @@ from planner.frf.types import Frf
 from planner.modes.measure import Source, measure
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from planner.show.campbell import campbell_map
+from planner.show.frf_map import frf_map
 from planner.show.plots import save
 
 BAND_HZ = (4.0, 60.0)
@@ -56,11 +56,11 @@ def test_measured_against_truth_and_simulation(tmp_path, truth_of_the_campaign):
         assert np.all(np.array(figures(exact)) - figures(nominal) > 0.05)
         folder = Path(os.environ.get("PLANNER_PLOTS", tmp_path))
         folder.mkdir(parents=True, exist_ok=True)
-        figure = campbell(name, frfs, simulated)
-        save(figure, folder / f"campbell_{name.replace(' ', '_')}.png")
+        figure = drawn(name, frfs, simulated)
+        save(figure, folder / f"map_{name.replace(' ', '_')}.png")
 
 
-def campbell(name: str, frfs: list[Frf], simulated: list[np.ndarray]) -> Figure:
+def drawn(name: str, frfs: list[Frf], simulated: list[np.ndarray]) -> Figure:
     lines = np.linspace(*BAND_HZ, 250)
     pair = [
         np.array([np.interp(lines, frf.frequency_hz, np.abs(h[1, 1])) for frf, h in rows])
@@ -70,7 +70,7 @@ def campbell(name: str, frfs: list[Frf], simulated: list[np.ndarray]) -> Figure:
         )
     ]
     number = np.arange(1, len(frfs) + 1)
-    return campbell_map(number, pair[0], pair[1], lines, "pose", f"SIMULATED, {name}, yy")
+    return frf_map(number, pair[0], pair[1], lines, "pose", f"SIMULATED, {name}, yy")
 
 
 def figures(found: Agreement) -> list[float]:

@@ -9,12 +9,7 @@ from planner.fusion import gp
 from planner.fusion.ar1 import OutputPrior, fit_ar1
 from planner.fusion.data import TrainingData
 from planner.fusion.kernels import KERNELS
-from planner.fusion.surrogate import (
-    ModalObservations,
-    ModalPrediction,
-    fit_surrogate,
-    frf_prediction,
-)
+from planner.fusion.surrogate import ModalObservations, fit_surrogate
 from planner.physics.dynamics import SimulatedModes
 
 PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.3, amplitude=0.1, nugget=0.01)
@@ -177,27 +172,3 @@ def test_frequencies_and_damping_stay_positive():
     )
     assert (p.frequency_hz > 0).all()
     assert (p.damping_ratio > 0).all()
-
-
-def test_frf_of_a_certain_prediction_is_the_modal_sum():
-    x = np.random.default_rng(0).random((2, 2))
-    low, lines = simulated(x), np.linspace(4, 60, 50)
-    zero = np.full((2, 4), 1e-9)
-    p = ModalPrediction(low.frequency_hz, zero, low.damping_ratio, zero * 0.01, low.residue,
-                        np.full((2, 4, 3, 3), 1e-18))  # fmt: skip
-    mean, sd = frf_prediction(p, lines)
-    from planner.frf import modal
-
-    exact = modal.accelerance(lines, modal.pole(low.frequency_hz, low.damping_ratio), low.residue)
-    np.testing.assert_allclose(mean, exact, atol=1e-6 * np.abs(exact).max())
-    assert sd.max() < 1e-4 * np.abs(exact).max()
-
-
-def test_a_few_hundred_samples_of_the_frf_are_as_good_as_ten_thousand():
-    x = np.random.default_rng(0).random((2, 2))
-    p = fit_surrogate(observed(5, 0)).predict(x, simulated(x))
-    lines = np.linspace(4, 50, 60)
-    few, many = (frf_prediction(p, lines, samples) for samples in (256, 10_000))
-    size = np.sqrt(np.mean(np.abs(many[0]) ** 2, axis=-1, keepdims=True))
-    assert np.max(np.abs(few[0] - many[0]) / size) < 0.1
-    assert np.median(np.abs(few[1] / many[1] - 1)) < 0.03

@@ -15,7 +15,7 @@ from planner.identify.data import stack
 from planner.identify.identify import identify
 from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
-from planner.identify.result import undetermined
+from planner.identify.result import _words, undetermined
 from planner.identify.write import updated_toml
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
@@ -316,3 +316,10 @@ def test_bad_input_in_one_sentence(frfs, simulation):
     falling = Priors(bounds={"stiffness of joint_1 about z": (2.0, 1.0)})
     with pytest.raises(InputError, match="must rise"):
         identify(frfs, POSES, simulation, falling)
+
+
+def test_a_direction_in_which_many_parameters_share_still_has_words():
+    vector = np.array([1.0, -1.0] * 10) / np.sqrt(20)
+    text = _words([f"stiffness {i}" for i in range(20)], vector, 0.9)
+    assert text.startswith("The ratio of stiffness ")
+    assert "90 % of the prior's spread is left" in text

@@ -127,3 +127,33 @@ def test_nothing_measured_and_nothing_expected():
     unknown = Guide(np.full((2, 2), np.nan), np.full((2, 2, 3), np.nan + 0j))
     found = [[mode(10.0, SHAPES[0])], [mode(10.1, SHAPES[0])]]
     assert track(found, unknown, X[:2]).modes == ((None, None),) * 2
+
+
+def near_each_other(exchanged: bool) -> tuple[np.ndarray, list[list[Mode]]]:
+    """Modes 2 and 3 come near each other at x = 0.5, and may exchange their shapes there."""
+    apart = 2 * np.hypot(2 * (X[:, 0] - 0.5), 0.05)
+    truth = np.stack([0 * apart + 8, 15 - apart / 2, 15 + apart / 2, 0 * apart + 30], axis=1)
+    found = poses(truth, np.random.default_rng(4))
+    if exchanged:
+        for row in found[10:]:
+            low, high = row[1], row[2]
+            row[1:3] = [
+                mode(low.frequency_hz, high.shape),
+                mode(high.frequency_hz, low.shape),
+            ]
+    return truth, found
+
+
+def test_measured_shapes_that_keep_their_places_outweigh_a_guide_that_crosses():
+    truth, found = near_each_other(exchanged=False)
+    tracks = track(found, guided(crossing()[1]), X)
+    assert np.all(right(tracks, truth))
+    assert np.min(tracks.probability) > 0.95
+
+
+def test_beyond_an_exchange_that_may_be_a_crossing_labels_are_unsure():
+    truth, found = near_each_other(exchanged=True)
+    tracks = track(found, guided(truth), X)
+    assert np.min(tracks.probability[:10]) > 0.9
+    assert np.max(tracks.probability[10:, 1:3]) < 0.9
+    assert np.min(tracks.probability[10:, [0, 3]]) > 0.9

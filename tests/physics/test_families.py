@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from known_robots import KR10
+from pendulums import pendulum_urdf
 from planner.errors import InputError
 from planner.physics import dynamics
 from planner.physics.simulation import Simulation
@@ -19,13 +20,7 @@ from planner.truth.model import load_truth
 LINES = np.linspace(5, 150, 50)
 MASS, RADIUS, MOMENT, STIFFNESS = 3.0, 0.4, 0.05, 60.0
 
-PENDULUM = f"""<robot name="one"><link name="base_link"/><link name="arm"><inertial>
-<origin xyz="0 0 {-RADIUS}" rpy="0 0 0"/><mass value="{MASS}"/>
-<inertia ixx="{MOMENT}" iyy="{MOMENT}" izz="{MOMENT}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="tip"/><joint name="turn" type="revolute"><parent link="base_link"/><child link="arm"/>
-<origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 1 0"/>
-<limit lower="-4" upper="4" velocity="1" effort="0"/></joint><joint name="end" type="fixed">
-<parent link="arm"/><child link="tip"/><origin xyz="0 0 -0.7" rpy="0 0 0"/></joint></robot>"""
+PENDULUM = pendulum_urdf(MASS, MOMENT, (0, 0, -RADIUS), (0, 0, -0.7), (0, 1, 0))
 
 
 def edited(path: Path, *pairs: tuple[str, str], more: str = "") -> Path:

@@ -14,7 +14,7 @@ from planner.frf.metrics import agreement
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from planner.show.campbell import campbell_map
+from planner.show.frf_map import frf_map
 from planner.show.plots import save
 from planner.truth.model import load_truth
 
@@ -194,7 +194,7 @@ def test_busch_2020_figure_3_again(tmp_path):
     assert np.all(np.abs(found[[0, -1]] / PUBLISHED - 1) < 0.15)
     folder = Path(os.environ.get("PLANNER_PLOTS", tmp_path))
     folder.mkdir(parents=True, exist_ok=True)
-    figure = campbell_map(angles, None, frf, lines, "joint 3 (°)", "KR240, horizontal FRF")
+    figure = frf_map(angles, None, frf, lines, "joint 3 (°)", "KR240, horizontal FRF")
     path = folder / "busch2020_figure3.png"
     save(figure, path)
     print(f"plot: {path}")

@@ -14,7 +14,7 @@ from planner.frf.types import Frf
 from planner.modes.compare import mac
 from planner.modes.estimate import estimate_modes, identification
 from planner.show.marks import spread, with_sd
-from planner.show.modal_plots import campbell_figure, mac_figure, modal_figures
+from planner.show.modal_plots import frequency_figure, mac_figure, modal_figures
 from planner.show.plots import save
 
 BAND = (4.0, 60.0)
@@ -210,7 +210,7 @@ def test_campbell_diagram_has_gaps_error_bars_and_dashes():
     y = np.array([0.5, -0.5, 0.0])
     frequency = np.array([[10.0, 20.0], [11.0, np.nan], [12.0, 21.0]])
     sd = np.array([[0.1, 0.2], [0.1, np.nan], [0.3, np.nan]])
-    figure = campbell_figure(y, frequency, sd, frequency * 1.1, axis="tool y (m)")
+    figure = frequency_figure(y, frequency, sd, frequency * 1.1, axis="tool y (m)")
     axes = figure.axes[0]
     one, two = (c.lines[0] for c in axes.containers)
     assert one.get_xdata().tolist() == [-0.5, 0.0, 0.5]  # along the coordinate
@@ -227,7 +227,7 @@ def test_campbell_diagram_has_gaps_error_bars_and_dashes():
 def test_campbell_diagram_over_named_poses_labels_close_modes_apart():
     names = tuple(f"P{k:03d}" for k in range(20))
     frequency = np.linspace([10.0, 10.01, 10.02, 30.0], [9.0, 9.01, 9.02, 25.0], 20)
-    figure = campbell_figure(names, frequency, np.full(frequency.shape, 0.01))
+    figure = frequency_figure(names, frequency, np.full(frequency.shape, 0.01))
     axes = figure.axes[0]
     assert [label.get_text() for label in axes.get_xticklabels()] == list(names)
     assert len(axes.texts) == 4

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from known_robots import KNOWN_ROBOTS, KR10
+from pendulums import pendulum_urdf
 from planner.errors import InputError
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
@@ -19,13 +20,7 @@ from planner.truth.model import load_truth
 MASS, RADIUS, MOMENT, STIFFNESS, DAMPING = 3.0, 0.4, 0.05, 2.0e4, 12.0
 INERTIA = MOMENT + MASS * RADIUS**2
 
-PENDULUM = f"""<robot name="one"><link name="base_link"/><link name="arm"><inertial>
-<origin xyz="{RADIUS} 0 0" rpy="0 0 0"/><mass value="{MASS}"/>
-<inertia ixx="{MOMENT}" iyy="{MOMENT}" izz="{MOMENT}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="tip"/><joint name="turn" type="revolute"><parent link="base_link"/><child link="arm"/>
-<origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" velocity="1" effort="0"/></joint><joint name="end" type="fixed">
-<parent link="arm"/><child link="tip"/><origin xyz="0.7 0 0" rpy="0 0 0"/></joint></robot>"""
+PENDULUM = pendulum_urdf(MASS, MOMENT, (RADIUS, 0, 0), (0.7, 0, 0), (0, 0, 1))
 
 PENDULUM_TOML = f"""name = "one"
 urdf = "one.urdf"

@@ -1,4 +1,4 @@
-"""Campbell diagram of a path: FRF magnitude over frequency and pose (seed 004, section 2.5)."""
+"""FRF map of a path: magnitude over frequency and pose (Campbell map of seed 004, section 2.5)."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +10,7 @@ FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn al
 DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
 
-def campbell_map(
+def frf_map(
     pose_axis: np.ndarray,
     measured: np.ndarray | None,
     simulated: np.ndarray | None,

@@ -1,10 +1,10 @@
-"""Campbell diagrams hold the numbers that they are given, in the right cells."""
+"""FRF maps hold the numbers that they are given, in the right cells."""
 
 import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from planner.show.campbell import campbell_map
+from planner.show.frf_map import frf_map
 from planner.show.plots import png
 
 FREQUENCY = np.arange(0.0, 30.0)
@@ -23,7 +23,7 @@ def test_measured_simulated_and_difference():
     rng = np.random.default_rng(0)
     measured = rng.uniform(0.1, 1, (5, 30)) * np.exp(1j)
     pose = np.array([70.0, 90.0, 80.0, 110.0, 100.0])
-    figure = campbell_map(pose, measured, 2 * measured, FREQUENCY, "joint 3 (°)")
+    figure = frf_map(pose, measured, 2 * measured, FREQUENCY, "joint 3 (°)")
     assert list(panels(figure)) == ["measured", "simulated", "simulated − measured"]
     difference, _ = levels(figure, "simulated − measured")
     np.testing.assert_allclose(difference, 20 * np.log10(2))
@@ -38,7 +38,7 @@ def test_measured_simulated_and_difference():
 def test_measured_and_simulated_share_their_colours():
     measured = np.full((3, 30), 1e-3)
     measured[1, 10] = 1.0
-    figure = campbell_map(np.arange(3), measured, 10 * measured, FREQUENCY)
+    figure = frf_map(np.arange(3), measured, 10 * measured, FREQUENCY)
     limits = [
         c.get_clim()
         for title in ("measured", "simulated")
@@ -49,7 +49,7 @@ def test_measured_and_simulated_share_their_colours():
 
 
 def test_only_a_simulation_of_one_pose_with_log_frequency():
-    figure = campbell_map(np.array([3.0]), None, np.ones((1, 30)), FREQUENCY, log_frequency=True)
+    figure = frf_map(np.array([3.0]), None, np.ones((1, 30)), FREQUENCY, log_frequency=True)
     shown, corners = levels(figure, "simulated")
     assert list(panels(figure)) == ["simulated"]
     assert shown.shape == (29, 1)  # 0 Hz has no place on a log axis
@@ -62,16 +62,16 @@ def test_nan_stays_blank_and_zero_is_drawn():
     measured = np.ones((4, 30))
     measured[2] = np.nan
     measured[1, 4] = 0.0
-    figure = campbell_map(np.arange(4), measured, np.ones((4, 30)), FREQUENCY)
+    figure = frf_map(np.arange(4), measured, np.ones((4, 30)), FREQUENCY)
     shown, _ = levels(figure, "measured")
     assert shown.mask[:, 2].all()
     assert shown.mask.sum() == 30
     assert png(figure)
-    assert png(campbell_map(np.arange(4), np.full((4, 30), np.nan), None, FREQUENCY))
+    assert png(frf_map(np.arange(4), np.full((4, 30), np.nan), None, FREQUENCY))
 
 
 def test_what_cannot_be_drawn():
     with pytest.raises(ValueError, match="measured FRF has shape"):
-        campbell_map(np.arange(3), np.ones((30, 3)), None, FREQUENCY)
+        frf_map(np.arange(3), np.ones((30, 3)), None, FREQUENCY)
     with pytest.raises(ValueError, match="neither"):
-        campbell_map(np.arange(3), None, None, FREQUENCY)
+        frf_map(np.arange(3), None, None, FREQUENCY)

@@ -1,0 +1,66 @@
+"""Pictures that the studies share: groups of bars, curves, maps over (frequency, pose)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+COLOURS = {
+    "bias": "0.6", "linear": "tab:olive", "quadratic": "tab:cyan", "cubic": "tab:purple",
+    "rbf": "tab:blue", "GP": "tab:blue", "AR1": "tab:green", "NARGP": "tab:orange",
+    "MFDGP": "tab:brown", "simulation": "0.6", "ours": "tab:red",
+    "scatter allows": "0.8", "one by one": "tab:blue", "together": "tab:red",
+}  # fmt: skip
+
+
+def new(size: tuple[float, float], title: str = "") -> Figure:
+    """An empty figure, size in inches."""
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=11)
+    return figure
+
+
+def bars(
+    panel: Axes,
+    groups: Sequence[str],
+    names: Sequence[str],
+    values: np.ndarray,
+    ylabel: str,
+    floor: float | None = None,
+) -> None:
+    """values (groups, names) side by side; what lies below `floor` is cut, with an arrow there."""
+    width = 0.84 / len(names)
+    places = np.arange(len(groups))
+    for i, name in enumerate(names):
+        x = places + (i - (len(names) - 1) / 2) * width
+        panel.bar(x, values[:, i], 0.92 * width, label=name, color=COLOURS[name])
+        if floor is not None:
+            for place in x[values[:, i] < floor]:
+                panel.annotate(
+                    "", (place, floor), (place, floor + 0.08),
+                    arrowprops={"arrowstyle": "-|>", "color": "black", "lw": 0.8},
+                )  # fmt: skip
+    panel.axhline(0, color="black", lw=0.6)
+    if floor is not None:
+        panel.set_ylim(floor, 1.05)
+    panel.set_xticks(places, groups)
+    panel.set_ylabel(ylabel)
+    panel.grid(True, axis="y", alpha=0.25)
+
+
+def legend(figure: Figure, panel: Axes) -> None:
+    """One legend for all panels, below them."""
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside lower center", ncols=min(len(labels), 7), fontsize=9
+    )
+
+
+def curves(panel: Axes, x: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
+    """values (x, names) as lines with points."""
+    for i, name in enumerate(names):
+        panel.plot(x, values[:, i], "o-", ms=4, lw=1.4, color=COLOURS[name], label=name)
+    panel.grid(True, alpha=0.25)

@@ -1,0 +1,48 @@
+"""A mixture of Gaussians: density, quantiles and moments belong together."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import norm
+
+from planner.fusion.predictive import Predictive, together
+
+ONE = Predictive(np.ones(1), np.array([[0.3, -2.0]]), np.array([[0.5, 2.0]]))
+
+
+def test_of_one_gaussian_all_is_the_gaussian():
+    y = np.array([0.1, 1.0])
+    np.testing.assert_allclose(ONE.log_density(y), norm.logpdf(y, ONE.means[0], ONE.sds[0]))
+    np.testing.assert_allclose(ONE.below(y), norm.cdf(y, ONE.means[0], ONE.sds[0]))
+    low, high = ONE.interval(0.95)
+    np.testing.assert_allclose(low, ONE.mean - 1.959964 * ONE.sd, atol=1e-5)
+    np.testing.assert_allclose(high, ONE.mean + 1.959964 * ONE.sd, atol=1e-5)
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.integers(0, 1000), st.floats(0.01, 0.99))
+def test_quantiles_undo_probabilities(seed, probability):
+    rng = np.random.default_rng(seed)
+    w = rng.dirichlet(np.ones(4))
+    found = Predictive(w, rng.standard_normal((4, 3)), np.exp(rng.standard_normal((4, 3))))
+    np.testing.assert_allclose(found.below(found.quantile(probability)), probability, atol=1e-9)
+
+
+def test_density_is_the_slope_of_the_probability_and_integrates_to_the_moments():
+    rng = np.random.default_rng(0)
+    found = Predictive(np.array([0.2, 0.8]), rng.standard_normal((2, 1)), np.array([[0.3], [1.2]]))
+    grid = np.linspace(-9, 9, 4001)
+    density = np.exp([found.log_density(np.array([v]))[0] for v in grid])
+    slope = np.gradient([found.below(np.array([v]))[0] for v in grid], grid)
+    np.testing.assert_allclose(density[1:-1], slope[1:-1], atol=1e-4)
+    mean = np.trapezoid(density * grid, grid)
+    assert mean == pytest.approx(found.mean[0], abs=1e-6)
+    variance = np.trapezoid(density * (grid - mean) ** 2, grid)
+    assert np.sqrt(variance) == pytest.approx(found.sd[0], abs=1e-6)
+
+
+def test_mixtures_of_mixtures_scale_and_widen():
+    both = together([ONE, ONE.scaled(1.0, -2.0)], np.array([0.25, 0.75]))
+    np.testing.assert_allclose(both.mean, 0.25 * ONE.mean + 0.75 * (1 - 2 * ONE.mean))
+    np.testing.assert_allclose(ONE.widened(np.array([1.2, 1.5])).sd, [1.3, 2.5])

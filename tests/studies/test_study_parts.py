@@ -1,0 +1,111 @@
+"""What the papers' studies are made of: data, splits, the command's answers to bad input."""
+
+import numpy as np
+import pytest
+
+from planner.errors import InputError
+from planner.studies import plane, recorded, run, seed_002, sweep
+from planner.studies.report import Finding, Report, Table, check_folder, write
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return plane.true_robot(1)
+
+
+def test_the_sweep_has_the_papers_points():
+    seen = sweep.sweep(1)
+    assert seen.simulated.size == 12_801
+    assert seen.amplitude.size == 2_622
+    assert seen.angles_deg.max() == 105
+    assert sweep.BEYOND_DEG.min() > 105
+    assert np.array_equal(seen.every(3).angles_deg, seen.angles_deg[::3])
+
+
+def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks():
+    """In the band, across the arm: two simulated, three true ones (and in-plane ones in both)."""
+    seen, truth = sweep.sweep(1), sweep.true_robot(1)
+    for angle in (70.0, 105.0, 120.0):
+        simulated = seen.modes(np.array([angle]), 6)
+        f, _, residue = truth.modes(sweep.poses(np.array([angle]))[0], 6)
+        across = {
+            "simulated": (simulated.frequency_hz[0], simulated.residue[0]),
+            "true": (f, residue),
+        }
+        count = {}
+        for name, (hz, r) in across.items():
+            size = np.abs(r[:, sweep.ACROSS, sweep.ACROSS]) / hz
+            count[name] = np.count_nonzero((hz < 30) & (size > 0.003 * size.max()))
+        assert count == {"simulated": 2, "true": 3}
+
+
+def test_parameters_of_the_plane_are_reciprocal(truth):
+    """L is R over its reference entry, for the robot has no feedback; frequencies rise."""
+    q, x = plane.postures(truth)
+    assert x.shape == (112, 3)
+    few = q[::40]
+    parameters = plane.parameters(truth, few)
+    for posture, rows in zip(few, parameters, strict=True):
+        poles = truth.poles(posture)[0]
+        order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][: plane.MODES]
+        for k, row in zip(order, rows, strict=True):
+            left = row[plane.LEFT].reshape(3, 2) @ [1, 1j]
+            right = row[plane.RIGHT].reshape(4, 2) @ [1, 1j]
+            assert np.isclose(row[0], np.abs(poles[k]) / (2 * np.pi))
+            # Reciprocity: L is R over its own reference entry.
+            candidates = [np.insert(left, i, 1.0) for i in range(4)]
+            off = [np.linalg.norm(right / right[i] - c) for i, c in enumerate(candidates)]
+            assert min(off) < 1e-6 * np.linalg.norm(right / right[np.argmin(off)])
+
+
+def test_scatter_is_relative(truth):
+    clean = plane.parameters(truth, plane.postures(truth)[0][:3])
+    sd = plane.scatter(clean)
+    assert np.allclose(sd[..., 0], 0.002 * clean[..., 0])
+    assert np.allclose(sd[..., 1], 0.05 * clean[..., 1])
+    assert np.allclose(sd[..., 2], sd[..., 7])
+
+
+def test_splits_are_nested_spread_and_complete():
+    grid = np.stack(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 7)), axis=-1).reshape(-1, 2)
+    train, test = recorded.split(grid, 3)
+    assert sorted([*train, *test]) == list(range(35))
+    assert len(train) == len(set(train)) == 15
+    assert np.array_equal(train, recorded.split(grid, 3)[0])
+    assert not np.array_equal(train, recorded.split(grid, 4)[0])
+    # From every pose a trained one is near.
+    apart = np.linalg.norm(grid[:, None] - grid[train][None], axis=2).min(axis=1)
+    assert apart.max() < 0.5
+
+
+def test_modes_of_a_posture_give_its_frf_back(tmp_path):
+    """Six true modes nearly are the truth's FRF in their band."""
+    truth = seed_002.load_truth(seed_002.KR210.write(tmp_path, 3))
+    q = np.deg2rad([0.0, -80.0, 90.0, 0.0, 70.0, 180.0])
+    told = seed_002._synthesised(seed_002._parameters(truth, q)[None])[0]
+    true = truth.accelerance(q, seed_002.LINES_HZ)[np.arange(3), np.arange(3)]
+    assert np.linalg.norm(told - true) < 0.1 * np.linalg.norm(true)
+
+
+def test_a_report_is_written_as_tables_and_pictures(tmp_path):
+    from planner.studies.draw import new
+
+    figure = new((3, 2), "empty")
+    table = Table("t", "T", ("a", "b"), (("x", 1.5),))
+    made = Report("seed-000", "data", (table,), (Finding("p", "h", True),), {"f": figure})
+    files = write(made, tmp_path)
+    assert [f.rsplit("/", 1)[1] for f in files] == ["t.csv", "f.png"]
+    assert (tmp_path / "t.csv").read_text().split() == ["a,b", "x,1.5"]
+    assert made.table("t") is table
+    assert write(made, None) == []
+
+
+def test_bad_input_is_one_sentence(tmp_path):
+    with pytest.raises(InputError, match=r"no study seed-9; choose one of seed-000"):
+        run.find("seed-9")
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(InputError, match="name another folder"):
+        check_folder(file)
+    with pytest.raises(InputError, match="name another folder"):
+        check_folder(file / "below")
