@@ -17,11 +17,11 @@ from planner.physics.simulation import Simulation
 
 # CAD masses and moments are right to 5 %, centres of mass to 1 cm.
 PRIORS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
-# Misfit (χ² per value) from which the simulation is suspected to lack physics: springs that
-# robot.toml does not state are tried, and where these do not help enough, what it says of a pose
-# is tested by identifying it without that pose; into so many parts at most.
+# Misfit (χ² per value) from which the simulation is suspected to lack physics. Where springs that
+# robot.toml does not state do not mend that, what it says of a pose is tested by identifying it
+# without that pose; into so many parts at most.
 SUSPECT, FOLDS = 3.0, 2
-HELPS = 0.5  # of the misfit, at most, is left where springs not stated are believed in
+BEST = 0.95  # misfit below which no springs that are added can bring it
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
@@ -118,7 +118,7 @@ class LowFidelity:
         if self.learned is None:
             return None
         if self.learned.fits:
-            return np.full(self.count, RIGHT)
+            return np.full(self.count, RIGHT * max(self.learned.identified.misfit, 1.0))
         if self.left_out is None:
             return None
         error = np.log(measured_hz / self.left_out)
@@ -176,22 +176,39 @@ def learn(
     nominal = before.nominal
     if nominal is None or not frfs:
         return before
-    learned = _identified(Structure(nominal, PRIORS), frfs, q, band_hz)
-    if not learned.fits:
-        wider = _identified(extended(nominal, PRIORS), frfs, q, band_hz)
-        if wider.identified.misfit < HELPS * learned.identified.misfit:
-            learned = wider
+    learned = _wider(_identified(Structure(nominal, PRIORS), frfs, q, band_hz), frfs, q, band_hz)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, frfs, q, band_hz, before.count)
     return LowFidelity(before.count, nominal, learned, left_out)
 
 
+def _wider(
+    stated: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+) -> Learned:
+    """With springs that robot.toml does not state, where the recordings speak for them.
+
+    That is where χ² falls by more than ln n for each of their parameters (Schwarz 1978).
+    """
+    structure = extended(stated.structure.simulation, stated.structure.priors)
+    first = stated.identified
+    penalty = 2 * structure.added * np.log(first.values)
+    if first.values * (first.misfit - BEST) < penalty:
+        return stated
+    wider = _identified(structure, frfs, q, band_hz, first if stated.fits else None)
+    gain = first.values * (first.misfit - wider.identified.misfit)
+    return wider if gain > penalty else stated
+
+
 def _identified(
-    structure: Structure, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+    structure: Structure,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float],
+    warm: Identification | None = None,
 ) -> Learned:
     effort, nominal, priors = _effort(len(frfs)), structure.simulation, structure.priors
-    found = identify(frfs, q, nominal, priors, band_hz=band_hz, starts=1, effort=effort)
+    found = identify(frfs, q, nominal, priors, band_hz=band_hz, starts=1, warm=warm, effort=effort)
     return Learned(structure, found)
 
 

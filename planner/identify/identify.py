@@ -261,6 +261,7 @@ def _result(
         end.x,
         covariance,
         misfit,
+        round(end.at.chi2 / misfit),
         residuals(fitted, problem.frfs, q, problem.band_hz).by_pose,
         fit_similarity(fitted, problem.frfs, q, problem.band_hz),
         undetermined(p, covariance),
