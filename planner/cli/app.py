@@ -7,7 +7,9 @@ import typer
 
 from planner.cli.answer import AsJson, respond, warn
 from planner.cli.comparison import compare
+from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
+from planner.cli.proving import prove
 from planner.cli.study import study
 
 app = typer.Typer(
@@ -276,6 +278,8 @@ def modes(
 
 
 app.command()(identify)
+app.command()(diagnose)
+app.command()(prove)
 app.command()(compare)
 app.command()(study)
 

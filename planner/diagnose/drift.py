@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.diagnose.effect import Effect, Quantity
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import Fit, Problem, fit, settle
+from planner.diagnose.fit import Fit, Grade, Problem, fit, settle
 from planner.diagnose.objective import Misfit
 from planner.diagnose.visits import Recorded
 from planner.identify.data import common_band
@@ -92,7 +92,7 @@ class DriftMisfit(Misfit):
             m = self.matrices
             matrices = Matrices(m.mass[one], m.hit[one], m.sensor[one], m.geometric[one])
             inertias = None
-            if not self.logarithmic:
+            if self.inertial:
                 inertias = Inertias(self.inertias.jacobians[one], self.inertias.basis)
             h, full = response_gradient(
                 matrices, now, self.setting.s[one], mass[one], inertias, None
@@ -112,9 +112,9 @@ class DriftProblem(Problem):
 
     order: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def misfit(self, effect: Effect, lines: int, logarithmic: bool = False) -> Misfit:
+    def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """See `Problem.misfit`."""
-        plain = super().misfit(effect, lines, logarithmic)
+        plain = super().misfit(effect, grade)
         if not isinstance(effect, Drift):
             return plain
         fields = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
@@ -156,7 +156,7 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     if len(recorded.visits) < 4 or _unchanged(recorded):
         return ()
     plain, *found = fits(recorded, nominal)
-    best = settle(min(found, key=lambda f: f.per_value))
+    best = settle(problem_of(recorded, nominal), min(found, key=lambda f: f.per_value))
     finding = evaluate(plain, best)
     explained = plain.per_value > SHARE * best.per_value
     return (finding,) if explained and finding.log_evidence > CLEAR else ()

@@ -8,7 +8,7 @@ from planner.diagnose.drift import problem_of
 from planner.diagnose.effect import Effect
 from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import LINES, LOG_LINES, Fit
+from planner.diagnose.fit import FINE, GLANCE, Fit
 from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
 from planner.diagnose.nonlinear import Candidate, descend
 from planner.diagnose.starts import starts
@@ -77,9 +77,9 @@ def base(recorded: Recorded, nominal: Simulation) -> Fit:
     A full fit would bend inertias until they imitate what is not linear, and does not come back.
     """
     problem = problem_of(recorded, nominal)
-    rough = problem.misfit(Effect(""), LOG_LINES, logarithmic=True)
+    rough = problem.misfit(Effect(""), GLANCE)
     found = minimise(rough, rough.mean, 1e-4, LOG_STEPS)
-    misfit = problem.misfit(Effect(""), LINES)
+    misfit = problem.misfit(Effect(""), FINE)
     return Fit(Effect(""), misfit, found.x, misfit.by_pose(found.x))
 
 

@@ -13,7 +13,7 @@ from planner.diagnose.chain import SensorChain
 from planner.diagnose.effect import Effect
 from planner.diagnose.equivalent import equivalent, system_of
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import fit
+from planner.diagnose.fit import Grade, fit
 from planner.diagnose.locate import locate
 from planner.diagnose.visits import Recorded
 from planner.diagnose.window import screen_window
@@ -121,8 +121,8 @@ def test_a_pose_that_answers_as_before_has_not_drifted(plain):
 def test_without_drift_its_misfit_is_the_plain_one_and_gradients_agree(plain, simulation):
     problem = drift.problem_of(plain, simulation)
     quantities = (drift.Quantity("change", "1", 0.0, 0.2), drift.Quantity("bend", "1", 0.0, 3.0))
-    misfit = problem.misfit(drift.Drift("campaign", quantities), 8)
-    still = problem.misfit(Effect(""), 8)
+    misfit = problem.misfit(drift.Drift("campaign", quantities), Grade(8))
+    still = problem.misfit(Effect(""), Grade(8))
     x = misfit.mean
     assert np.allclose(misfit.response(x)[0], still.response(still.mean)[0], rtol=1e-12)
     x = x + 0.1 * misfit.sd * np.random.default_rng(0).standard_normal(len(x))
@@ -131,7 +131,7 @@ def test_without_drift_its_misfit_is_the_plain_one_and_gradients_agree(plain, si
 
 def test_gradient_of_the_chain(plain, simulation):
     problem = drift.problem_of(plain, simulation)
-    misfit = problem.misfit(SensorChain.build([np.eye(3)], windowed=True), 8)
+    misfit = problem.misfit(SensorChain.build([np.eye(3)], windowed=True), Grade(8))
     x = misfit.mean + 0.05 * misfit.sd * np.random.default_rng(1).standard_normal(len(misfit.sd))
     check_gradient(misfit, x, range(len(x) - 11, len(x)))
 
