@@ -1,6 +1,8 @@
 """Diagnosis of recordings that differ from the simulation (`planner diagnose`)."""
 
 import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,8 +12,11 @@ from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
     from planner.diagnose.diagnose import Candidate, Diagnosis
+    from planner.diagnose.finding import Finding
     from planner.diagnose.predict import Agreement
     from planner.diagnose.recorded import Recorded
+    from planner.diagnose.together import Together
+    from planner.physics.simulation import Simulation
     from planner.robot.robot import Robot
 
 
@@ -38,6 +43,7 @@ def diagnose(
     from planner.cli.render_diagnosis import diagnosed
     from planner.diagnose.diagnose import diagnose as run
     from planner.diagnose.recorded import read_recorded
+    from planner.diagnose.together import linear_effects_apply, together
     from planner.physics.simulation import Simulation
     from planner.recording.folder import read_poses
     from planner.robot.robot import Robot
@@ -54,14 +60,18 @@ def diagnose(
             window_rate_1_s,
             lambda text: tell(text, 0.0),
         )
+        simulation = Simulation(nominal)
+        screened = _screened(recordings, recorded, simulation, window_rate_1_s, tell)
+        recorded = screened.recorded
         found = run(
             recorded.frfs,
             recorded.q,
-            Simulation(nominal),
-            tell=lambda text, share: tell(text, 0.02 + 0.93 * share),
+            simulation,
+            effects=None if linear_effects_apply(screened.findings) else (),
+            tell=lambda text, share: tell(text, 0.2 + 0.75 * share),
         )
         tell("judging at poses set aside", 0.95)
-        answer = _answer(recorded, found)
+        answer = _answer(recorded, found, together(screened.findings, found))
         answer |= {"npz": None, "robot": None, "plots": []}
         if wanted:
             rows = [(row.pose, row.joints_deg) for row in wanted]
@@ -81,7 +91,44 @@ def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
     return folder.absolute() / f"{predict.stem}.npz"
 
 
-def _answer(recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class _Screened:
+    findings: "tuple[Finding, ...]"
+    recorded: "Recorded"  # corrected for the artefacts
+
+
+def _screened(
+    folder: Path,
+    recorded: "Recorded",
+    simulation: "Simulation",
+    window_rate_1_s: float,
+    tell: "Callable[[str, float], None]",
+) -> _Screened:
+    """What the hits themselves say; nothing where there are only FRFs, or a window is stated."""
+    from planner.diagnose.recorded import corrected
+    from planner.diagnose.screens import screen
+    from planner.diagnose.together import ARTEFACTS
+    from planner.diagnose.visits import read_visits
+    from planner.errors import RefusedError
+
+    robot = simulation.robot
+    tell("looking at the measuring chain, the order in time and the force levels", 0.02)
+    try:
+        visits = read_visits(folder, robot.joint_names, robot.config.band_hz)
+    except RefusedError:
+        return _Screened((), recorded)
+    if window_rate_1_s:
+        return _Screened((), recorded)
+    found = screen(visits, simulation)
+    artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
+    if not artefacts:
+        return _Screened(found.findings, recorded)
+    said = f"The recordings were corrected for: {', '.join(artefacts)}."
+    clean = replace(corrected(recorded, found.clean), remarks=(*recorded.remarks, said))
+    return _Screened(found.findings, clean)
+
+
+def _answer(recorded: "Recorded", found: "Diagnosis", whole: "Together") -> dict[str, Any]:
     from planner.diagnose.predict import agreement, held_out
     from planner.diagnose.where import where
 
@@ -89,9 +136,20 @@ def _answer(recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
     aside, judged = held_out(found.problem, found.refitted, found.best)
     fitted = agreement(found.problem, found.refitted, found.best)
     return {
-        "verdict": found.verdict,
-        "findings": _findings(found),
-        "candidates": _candidates(found),
+        "verdict": whole.verdict,
+        "findings": [
+            *(_established(finding, p) for finding, p in whole.established),
+            *(_findings(found) if whole.linear else []),
+        ],
+        "candidates": [
+            {
+                "effect": " + ".join(name for name, _ in c.places),
+                "at": " + ".join(at for _, at in c.places if at) or None,
+                "probability": c.probability,
+                "effects": [{"effect": name, "at": at} for name, at in c.places],
+            }
+            for c in whole.candidates
+        ],
         "undecided": [list(c.places) for c in found.undecided],
         "where": {
             "bands_hz": place.bands_hz(),
@@ -157,17 +215,17 @@ def _words(candidate: "Candidate") -> str:
     return f"{' and '.join(said)} ({100 * candidate.probability:.0f} %)"
 
 
-def _candidates(found: "Diagnosis") -> list[dict[str, Any]]:
-    """All of them; a pair is one entry that names both."""
-    return [
-        {
-            "effect": " + ".join(name for name, _ in c.places),
-            "at": " + ".join(at for _, at in c.places if at) or None,
-            "probability": c.probability,
-            "effects": [{"effect": name, "at": at} for name, at in c.places],
-        }
-        for c in found.candidates
-    ]
+def _established(finding: "Finding", probability: float) -> dict[str, Any]:
+    return {
+        "effect": finding.effect,
+        "at": finding.at,
+        "probability": probability,
+        "parameters": {
+            n: {"value": v, "sd": sd, "unit": unit}
+            for n, (v, sd, unit) in finding.parameters.items()
+        },
+        "text": f"{finding.text} ({100 * probability:.0f} %)",
+    }
 
 
 def _agreement(of: "Agreement | None") -> dict[str, Any]:

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.diagnose.visits import Recorded as Visits
 from planner.errors import RefusedError
+from planner.frf.estimate import estimate
 from planner.frf.types import Frf
 from planner.frf.weighted import weighted
 from planner.modes.measure import Source, average
@@ -71,6 +73,17 @@ def read_recorded(
     poses, q, frfs, hits, places = zip(*found, strict=True)
     rest = tuple(refused), tuple(remarks), simulated
     return Recorded(poses, np.array(q), frfs, hits, places, *rest)
+
+
+def corrected(recorded: Recorded, visits: Visits) -> Recorded:
+    """The same poses with FRFs of hits that were corrected for artefacts, one entry a visit.
+
+    `hits` and `places` stay those of the table.
+    """
+    rate, band = visits.window_rate_1_s, visits.band_hz
+    frfs = tuple(_ended(v.hits, estimate(v.hits, band), band, rate) for v in visits.visits)
+    poses = tuple(visit.pose for visit in visits.visits)
+    return replace(recorded, poses=poses, q=visits.q, frfs=frfs)
 
 
 def _ended(hits: tuple[Hit, ...], frf: Frf, band_hz: tuple[float, float], stated: float) -> Frf:

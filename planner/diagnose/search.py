@@ -32,6 +32,8 @@ class Found:
 
 def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
     """Fit all effects beside `refitted`, the fit of none, and pairs where one is not enough."""
+    if not effects:
+        return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
     best = min(f.per_value for f in found.finalists)
     if best <= ENOUGH:

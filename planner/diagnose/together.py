@@ -1,0 +1,77 @@
+"""Screens and linear effects together: one verdict, one list of candidates.
+
+Screens look at what averaged FRFs hide: the measuring chain, the order in time, the force levels.
+Artefacts are corrected before physics is looked for. Where a joint is nonlinear, or drifts,
+averaged FRFs cannot be those of any linear effect, and none is looked for.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnose.diagnose import Candidate, Diagnosis
+from planner.diagnose.finding import Finding
+
+ARTEFACTS = ("sensor_rotation", "channel_delay", "exponential_window", "sensor_gain", "polarity",
+             "swapped_axes")  # fmt: skip
+UNKNOWN = "unknown"
+PRIOR = 0.05  # of any one screen's effect before its data
+SUREST = 0.98  # screens approximate: none is surer than they were right on concealed cases
+Place = tuple[str, str | None]
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """Effects at their places that are there together, none of them if empty."""
+
+    places: tuple[Place, ...]
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Verdict, all candidates (most probable first, summing to 1), and what screens established."""
+
+    verdict: str
+    candidates: tuple[Ranked, ...]
+    established: tuple[tuple[Finding, float], ...]  # with their probabilities
+    linear: bool  # whether linear effects belong to the findings too
+
+
+def linear_effects_apply(findings: Sequence[Finding]) -> bool:
+    """Whether averaged FRFs, once artefacts are corrected, may be those of linear effects."""
+    return all(f.effect in (*ARTEFACTS, UNKNOWN) for f in findings)
+
+
+def probability(finding: Finding) -> float:
+    """Of what a screen found, from its evidence."""
+    odds = finding.log_evidence + np.log(PRIOR / (1 - PRIOR))
+    return float(min(SUREST, 1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0)))))
+
+
+def together(findings: Sequence[Finding], diagnosis: Diagnosis) -> Together:
+    """Combine; `diagnosis` is that of the corrected FRFs."""
+    known = [(f, probability(f)) for f in findings if f.effect != UNKNOWN]
+    strange = max((probability(f) for f in findings if f.effect == UNKNOWN), default=0.0)
+    linear = linear_effects_apply(findings)
+    others = diagnosis.candidates if linear else ()
+    share = float(np.prod([p for _, p in known])) * (1 - strange)
+    found: tuple[Place, ...] = tuple((f.effect, f.at) for f, _ in known)
+    ranked = {("none", None): 0.0, (UNKNOWN, None): 1 - share}
+    out: dict[tuple[Place, ...], float] = {(key,): value for key, value in ranked.items()}
+    for places, weight in _linear(others) or (((), 1.0),):
+        unknown = places == ((UNKNOWN, None),)
+        key = places if unknown else (found + places) or (("none", None),)
+        out[key] = out.get(key, 0.0) + share * weight
+    candidates = sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)
+    first = candidates[0].places[0][0]
+    verdict = {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
+    return Together(verdict, tuple(candidates), tuple(known), linear)
+
+
+def _linear(candidates: Sequence[Candidate]) -> tuple[tuple[tuple[Place, ...], float], ...]:
+    def places(candidate: Candidate) -> tuple[Place, ...]:
+        return tuple(p for p in candidate.places if p[0] != "none")
+
+    return tuple((places(c), c.probability) for c in candidates)

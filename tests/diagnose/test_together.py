@@ -1,0 +1,70 @@
+"""Screens and linear effects as one list of candidates."""
+
+from dataclasses import dataclass
+from typing import Any, cast
+
+import pytest
+
+from planner.diagnose.finding import Finding
+from planner.diagnose.together import linear_effects_apply, together
+
+
+@dataclass(frozen=True)
+class Linear:
+    places: tuple
+    probability: float
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    candidates: tuple[Linear, ...]
+
+
+def combined(findings, *linear):
+    return together(findings, cast(Any, Diagnosed(tuple(Linear((p,), w) for p, w in linear))))
+
+
+NONE, BASE = ("none", None), ("base_compliance", "base")
+UNKNOWN = ("unknown", None)
+GAIN = Finding("sensor_gain", "sensor_z", 500.0)
+FRICTION = Finding("friction", "joint_2", 60.0)
+TONE = Finding("unknown", None, 80.0)
+
+
+@pytest.mark.parametrize("findings", [(), (GAIN,), (FRICTION,), (TONE,), (GAIN, FRICTION)])
+def test_probabilities_sum_to_one_and_fall(findings):
+    found = combined(findings, (BASE, 0.7), (NONE, 0.2), (UNKNOWN, 0.1))
+    shares = [c.probability for c in found.candidates]
+    assert sum(shares) == pytest.approx(1.0)
+    assert shares == sorted(shares, reverse=True)
+
+
+def test_without_findings_the_linear_verdict_stands():
+    assert combined((), (NONE, 0.9), (BASE, 0.1)).verdict == "consistent"
+    assert combined((), (BASE, 0.9), (NONE, 0.1)).verdict == "explained"
+    assert combined((), (UNKNOWN, 0.9), (NONE, 0.1)).verdict == "unexplained"
+
+
+def test_an_artefact_stands_beside_the_physics_that_is_found_once_it_is_corrected():
+    found = combined((GAIN,), (BASE, 0.9), (NONE, 0.1))
+    assert found.candidates[0].places == (("sensor_gain", "sensor_z"), BASE)
+    alone = combined((GAIN,), (NONE, 0.9), (BASE, 0.1))
+    assert alone.candidates[0].places == (("sensor_gain", "sensor_z"),)
+    assert alone.verdict == "explained"
+
+
+def test_a_nonlinear_joint_leaves_no_linear_effect():
+    assert not linear_effects_apply((FRICTION,))
+    assert linear_effects_apply((GAIN, TONE))
+    found = combined((FRICTION,), (BASE, 0.9), (NONE, 0.1))
+    assert found.candidates[0].places == (("friction", "joint_2"),)
+    assert all(BASE not in c.places for c in found.candidates)
+
+
+def test_a_tone_is_unknown_whatever_else_fits():
+    assert combined((TONE,), (BASE, 0.9), (NONE, 0.1)).verdict == "unexplained"
+
+
+def test_little_evidence_for_an_artefact_makes_it_doubtful():
+    weak = Finding("channel_delay", "sensor", 3.0)
+    assert 0.3 < combined((weak,), (NONE, 1.0)).candidates[0].probability < 0.7
