@@ -98,9 +98,7 @@ def play(
 
 
 def _done(campaign: Campaign) -> bool:
-    stop, model = campaign.cell.config.stop, campaign.model
-    overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
-    return len(model.labelled) >= stop.measurements_min and overall <= stop.frequency_sd_percent
+    return campaign.model.done
 
 
 def _step(report: ImportReport, proposal: Proposal, seconds: float) -> dict[str, Any]:
@@ -150,6 +148,7 @@ def _summary(
             float(np.mean(inside[known[:, k], k])) if known[:, k].any() else float("nan")
             for k in range(truth.shape[1])
         ],
+        "remarks": list(campaign.model.remarks),
         "step_seconds": [step["seconds"] for step in steps],
         "steps": steps,
         "rrd": str(rrd),

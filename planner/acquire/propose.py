@@ -1,25 +1,39 @@
 """From acquisition to proposals: scores on reachable candidates, one pose after another."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.acquire import space_filling
+from planner.acquire.axes import best_axes
+from planner.acquire.cost import Cost, shortest_tour
+from planner.acquire.goal import goal
 from planner.acquire.integrated_variance import integrated_variance
-from planner.acquire.outputs import FrequencyOutputs
+from planner.acquire.mixed import mixed
+from planner.acquire.mutual_information import mutual_information
+from planner.acquire.outputs import ALL_AXES, FrequencyOutputs, Poses, Target
+from planner.acquire.parameter_information import d_information, parameter_information
 from planner.acquire.variance import variance
 from planner.errors import InputError
 from planner.fusion.surrogate import Surrogate
 from planner.physics.dynamics import SimulatedModes
 
-Score = Callable[[FrequencyOutputs, np.ndarray, np.ndarray], np.ndarray]
+Score = Callable[[FrequencyOutputs, Poses], np.ndarray]
 Design = Callable[[np.ndarray, np.ndarray, int, int], np.ndarray]
 
 ACQUISITIONS: dict[str, Score] = {
     "variance": variance,
     "integrated_variance": integrated_variance,
+    "mutual_information": mutual_information,
+    "parameter_information": parameter_information,
+    "d_information": d_information,
+    "mixed": mixed,
+    "goal": goal,
 }
+# What these look at is nothing where no parameter of the simulation is open.
+OF_PARAMETERS = ("parameter_information", "d_information")
+INFORMED = (*OF_PARAMETERS, "mixed", "goal")  # those that look at parameters at all
 DESIGNS: dict[str, Design] = {
     "random": space_filling.random,
     "sobol": space_filling.sobol,
@@ -31,10 +45,30 @@ NEAR = 1e-3  # in model coordinates: no second measurement at the same place
 
 @dataclass(frozen=True)
 class Pick:
-    """A chosen candidate and its score (NaN for designs, which have none)."""
+    """A chosen candidate, its score (NaN for designs, which have none), minutes, hit axes."""
 
     index: int
     score: float
+    minutes: float = float("nan")
+    axes: tuple[int, ...] = ALL_AXES
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """What measuring costs: candidates q (n, dof) in rad, where the robot stands (dof,) or None.
+
+    With `shares` (n, k, 3) of `axis_shares` the axes to hit are chosen as well.
+    """
+
+    cost: Cost
+    q: np.ndarray
+    at: np.ndarray | None = None
+    shares: np.ndarray | None = None
+
+    def among(self, which: np.ndarray) -> "Travel":
+        """The same for some of the candidates."""
+        shares = None if self.shares is None else self.shares[which]
+        return replace(self, q=self.q[which], shares=shares)
 
 
 def check_name(name: str) -> None:
@@ -42,6 +76,14 @@ def check_name(name: str) -> None:
     if name not in ACQUISITIONS and name not in DESIGNS:
         known = ", ".join([*ACQUISITIONS, *DESIGNS])
         raise InputError(f'There is no acquisition "{name}"; choose one of {known}.')
+
+
+def workspace_outputs(
+    surrogate: Surrogate, x: np.ndarray, simulated: SimulatedModes
+) -> tuple[FrequencyOutputs, Poses]:
+    """Posterior over the first candidates, which stand for the workspace; all as poses."""
+    poses = Poses.plain(x, surrogate.frequency_inputs(simulated))
+    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:INTEGRATION])), poses
 
 
 def propose(
@@ -52,38 +94,70 @@ def propose(
     count: int,
     exclude: np.ndarray | None,
     seed: int,
+    outlook: tuple[FrequencyOutputs, Poses] | None = None,
+    travel: Travel | None = None,
+    allowed: np.ndarray | None = None,
 ) -> tuple[Pick, ...]:
     """Up to `count` picks among candidates x (n, d); the same for the same arguments.
 
-    `exclude` (t, d) are poses measured or refused: candidates at the same place are left out.
+    `exclude` (t, d) are poses measured or refused: candidates at the same place are left out, as
+    are those not `allowed` (n,). With `outlook` the simulation's open parameters are seen too;
+    with `travel` the best gain per minute is chosen, and several picks make a short tour.
     """
     check_name(name)
     taken = np.zeros((0, x.shape[1])) if exclude is None else exclude
     distance = np.min(np.linalg.norm(x[:, None] - taken[None], axis=2), axis=1, initial=np.inf)
-    free = np.flatnonzero(distance > NEAR)
+    free = np.flatnonzero((distance > NEAR) & (True if allowed is None else allowed))
     if not free.size:
         return ()
     if name in DESIGNS:
         picks = free[DESIGNS[name](x[free], taken, count, seed)]
         return tuple(Pick(int(i), float("nan")) for i in picks)
-    return _one_after_another(ACQUISITIONS[name], surrogate, x, simulated, count, free)
+    outputs, poses = outlook or workspace_outputs(surrogate, x, simulated)
+    if name in OF_PARAMETERS and not len(outputs.covariance_root):
+        name = "integrated_variance"
+    picks = _one_after_another(ACQUISITIONS[name], outputs, poses, count, free, travel)
+    return _toured(picks, travel)
 
 
 def _one_after_another(
     score: Score,
-    surrogate: Surrogate,
-    x: np.ndarray,
-    simulated: SimulatedModes,
+    outputs: FrequencyOutputs,
+    poses: Poses,
     count: int,
     free: np.ndarray,
+    travel: Travel | None,
 ) -> tuple[Pick, ...]:
-    low = surrogate.frequency_inputs(simulated)
-    outputs = FrequencyOutputs.of(surrogate, x[:INTEGRATION], low[:INTEGRATION])
     picks: list[Pick] = []
+    at = None if travel is None else travel.at
     while len(picks) < count and free.size:
-        scores = score(outputs, x[free], low[free])
-        best = int(np.argmax(scores))  # the first of equals
-        picks.append(Pick(int(free[best]), float(scores[best])))
-        outputs = outputs.planning(x[free[best]], low[free[best]])
-        free = free[np.linalg.norm(x[free] - x[free[best]], axis=1) > NEAR]
+        gain = score(outputs, poses[free])
+        minutes = np.full(len(free), np.nan)
+        rate = gain
+        if travel is not None:
+            minutes = travel.cost.minutes(travel.q[free], at, ALL_AXES)
+            rate = gain / minutes
+        best = int(np.argmax(rate))  # the first of equals
+        index, axes, spent = int(free[best]), ALL_AXES, float(minutes[best])
+        if travel is not None and travel.shares is not None:
+            there = float(travel.cost.travel(travel.q[[index]], at)[0])
+            axes, _ = best_axes(outputs, poses.one(index), travel.shares[index], travel.cost, there)
+            spent = there + travel.cost.per_pose + travel.cost.hitting(axes)
+        picks.append(Pick(index, float(gain[best]), spent, axes))
+        at = None if travel is None else travel.q[index]
+        outputs = outputs.planning(poses.one(index), axes)
+        free = free[np.linalg.norm(poses.x[free] - poses.x[index], axis=1) > NEAR]
     return tuple(picks)
+
+
+def _toured(picks: tuple[Pick, ...], travel: Travel | None) -> tuple[Pick, ...]:
+    """The same picks in the order of a short tour from where the robot stands."""
+    if travel is None or len(picks) < 3:
+        return picks
+    q = travel.q[[p.index for p in picks]]
+    order, legs = shortest_tour(travel.cost, q, travel.at)
+    spent = [travel.cost.per_pose + travel.cost.hitting(picks[i].axes) for i in order]
+    return tuple(
+        replace(picks[i], minutes=float(leg + own))
+        for i, leg, own in zip(order, legs, spent, strict=True)
+    )

@@ -15,7 +15,7 @@ def sobol(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray
     """The candidates nearest to the next points of a Sobol sequence, after those taken."""
     power = int(np.ceil(np.log2(len(taken) + count + 1)))
     points = qmc.Sobol(x.shape[1], scramble=True, rng=np.random.default_rng(0)).random_base2(power)
-    return _nearest(x, points[len(taken) :], count)
+    return nearest(x, points[len(taken) :], count)
 
 
 def maximin_lhs(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -32,10 +32,10 @@ def maximin_lhs(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.n
         points = np.array(lhs.generate([(0.0, 1.0)] * x.shape[1], total, random_state=0))
     for place in taken:
         points = np.delete(points, np.argmin(np.sum((points - place) ** 2, axis=1)), axis=0)
-    return _nearest(x, points, count)
+    return nearest(x, points, count)
 
 
-def _nearest(x: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
+def nearest(x: np.ndarray, points: np.ndarray, count: int) -> np.ndarray:
     """For each point the nearest candidate not yet chosen; indices (≤ count,)."""
     chosen: list[int] = []
     for point in points:

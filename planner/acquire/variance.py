@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from planner.acquire.outputs import FrequencyOutputs
+from planner.acquire.outputs import FrequencyOutputs, Poses
 
 
-def variance(outputs: FrequencyOutputs, x: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """Weighted mean relative variance (n,) of the natural frequencies at x (n, d), low (n, k)."""
-    score = np.zeros(len(x))
-    for k in range(outputs.count):
-        score += outputs.variance(k, x, low) * outputs.weights[k]
-    return score
+def variance(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
+    """Weighted mean relative variance (n,) of the natural frequencies at n poses."""
+    each = [outputs.variance(k, poses) * w for k, w in enumerate(outputs.weights)]
+    return np.sum(each, axis=0)

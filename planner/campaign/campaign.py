@@ -177,12 +177,12 @@ class Campaign:
                 raise InputError(f"Pose {pose} is not among the measured ones; see planner status.")
             self._append(Withdrawn(pose, reason))
 
-    def skip(self, pose: str, reason: str = "") -> None:
-        """A proposed pose cannot or shall not be measured; it is not offered again."""
+    def skip(self, pose: str, reason: str = "", neighbours: bool = False) -> None:
+        """A proposed pose shall not be measured: never offered again, nor its `neighbours`."""
         with self._acting():
             if pose not in self.state.open:
                 raise InputError(f"Pose {pose} is not an open proposal; see planner status.")
-            self._append(Skipped(pose, reason))
+            self._append(Skipped(pose, reason, neighbours))
 
     def star(self, pose: str) -> None:
         """Mark a pose as worth a second look."""

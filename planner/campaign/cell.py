@@ -12,6 +12,7 @@ from planner.campaign.fidelity import LowFidelity
 from planner.errors import InputError
 from planner.physics.dynamics import SimulatedModes
 from planner.physics.simulation import Simulation
+from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
@@ -28,20 +29,68 @@ class Cell:
     workspace: Workspace
 
     @classmethod
-    def load(cls, robot_toml: Path, config: CampaignConfig) -> "Cell":
-        """Load the robot and hold the workspace against it; InputError where they disagree."""
+    def load(cls, robot_toml: Path, config: CampaignConfig, robot: Robot | None = None) -> "Cell":
+        """Load the robot and hold the workspace against it; InputError where they disagree.
+
+        `robot` is the one of robot_toml, where it was loaded already.
+        """
         check_name(config.acquisition.name)
-        robot = Robot.load(robot_toml)
+        robot = robot or Robot.load(robot_toml)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
         return cls(config, robot, simulation, workspace)
 
     @cached_property
     def candidates(self) -> Candidates:
-        """Reachable poses of the workspace, the same for the same configuration."""
+        """Reachable poses of the workspace, the same for the same configuration; then own ones."""
+        own = self.config.acquisition.own_poses_deg
+        spread = self._spread
+        if own is None:
+            return spread
+        q = np.array([self.check_pose(tuple(p), "[acquisition] own_poses_deg") for p in own])
+        collisions = Collisions(self.robot)
+        q = q[[not collisions.contacts(one) for one in q]]
+        return Candidates(
+            np.concatenate([spread.q, q]),
+            np.concatenate([spread.features, self.features(q)]),
+            np.concatenate([spread.position_m, self.robot.forward_batch(q)[1]]),
+            spread.rejected,
+        )
+
+    @cached_property
+    def _spread(self) -> Candidates:
         return self.workspace.candidates(
             self.robot, self.config.acquisition.candidates, CANDIDATE_SEED
         )
+
+    @property
+    def spread(self) -> int:
+        """How many of the candidates, the first ones, are spread evenly over the workspace."""
+        own = self.config.acquisition.own_poses_deg
+        return len(self.candidates.q) if own is None else len(self._spread.q)
+
+    @cached_property
+    def allowed(self) -> np.ndarray:
+        """(n,) bool: which candidates may be offered; the model has to be good at all of them."""
+        table, found = self.config.acquisition, self.candidates
+        allowed = np.ones(len(found.q), dtype=bool)
+        if table.own_only:
+            allowed[: self.spread] = False
+        if table.hammer_height_m is not None:
+            low, high = table.hammer_height_m
+            allowed &= (found.position_m[:, 2] >= low) & (found.position_m[:, 2] <= high)
+        if table.singularity_margin > 0:
+            allowed &= self.robot.singularity(found.q) >= table.singularity_margin
+        for zone in self.config.forbidden:
+            at = found.position_m if zone.position_m else np.rad2deg(found.q)
+            box = np.array(zone.position_m or zone.joints_deg, dtype=float)
+            if len(box) != at.shape[1]:
+                raise InputError(
+                    f"[[forbidden]] joints_deg has {len(box)} ranges, the robot {at.shape[1]} "
+                    f"joints; give one range a joint."
+                )
+            allowed &= ~np.all((at >= box[:, 0]) & (at <= box[:, 1]), axis=1)
+        return allowed
 
     def features(self, q: np.ndarray) -> np.ndarray:
         """Coordinates (n, d) of poses q (n, dof) in rad that the model uses."""

@@ -30,10 +30,46 @@ class ModesTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class AcquisitionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How the next pose is chosen, and from how many candidates in the workspace."""
+    """How the next pose is chosen, and from how many candidates in the workspace.
+
+    `mode_weights`: how much each mode counts (none: all alike). `own_poses_deg`: poses of the
+    engineer's, offered besides the candidates, or `own_only`. `singularity_margin`: least singular
+    value of the tcp's Jacobian, its linear part over the reach, of a pose that is offered.
+    `hammer_height_m`: heights of the tcp that the hammer reaches. `hit_axes`: "all", as FRFs
+    need, or the "best" ones per minute, as frequencies need.
+    """
 
     name: str = "integrated_variance"
     candidates: int = 500
+    mode_weights: list[float] | None = None
+    own_poses_deg: list[list[float]] | None = None
+    own_only: bool = False
+    singularity_margin: float = 0.0
+    hammer_height_m: tuple[float, float] | None = None
+    hit_axes: Literal["all", "best"] = "all"
+
+
+class ForbiddenTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Where no pose is offered: a box of tcp positions, or of joint angles."""
+
+    position_m: list[tuple[float, float]] | None = None
+    joints_deg: list[tuple[float, float]] | None = None
+
+
+class GoalTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What acquisition "goal" is to know best: poses (as of a milling path), modes in a band."""
+
+    joints_deg: list[list[float]] | None = None
+    band_hz: tuple[float, float] | None = None
+
+
+class CostTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What measuring takes: the share of the URDF's joint speeds at which the robot travels."""
+
+    speed_share: float = 0.1
+    minutes_per_pose: float = 1.0
+    minutes_per_hit: float = 0.25
+    hits_per_axis: int = 4
 
 
 class FidelityTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,9 +83,10 @@ class FidelityTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """When the campaign may end: predicted frequency sd (mean over the workspace, %)."""
+    """When the campaign may end: frequency RMSE over the workspace (%), with a `probability`."""
 
     frequency_sd_percent: float = 1.0
+    probability: float = 0.95
     measurements_min: int = 3
     measurements_max: int = 30
 
@@ -63,6 +100,9 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     acquisition: AcquisitionTable = AcquisitionTable()
     fidelity: FidelityTable = FidelityTable()
     stop: StopTable = StopTable()
+    goal: GoalTable = GoalTable()
+    cost: CostTable = CostTable()
+    forbidden: list[ForbiddenTable] = []
 
 
 def load_campaign_config(path: Path) -> CampaignConfig:
@@ -99,7 +139,13 @@ def _check(config: CampaignConfig, path: Path) -> None:
     band = config.modes.band_hz
     if not 0 < band[0] < band[1]:
         raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
+    _check_choices(config, path)
     limits = [
+        ("[cost] speed_share", config.cost.speed_share, 1e-3, 1.0),
+        ("[cost] minutes_per_pose", config.cost.minutes_per_pose, 0.0, 1e3),
+        ("[cost] minutes_per_hit", config.cost.minutes_per_hit, 1e-3, 1e3),
+        ("[cost] hits_per_axis", config.cost.hits_per_axis, 1, 100),
+        ("[stop] probability", config.stop.probability, 0.5, 0.999),
         ("[modes] count", config.modes.count, 1, 20),
         ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
         ("[acquisition] candidates", config.acquisition.candidates, 10, 20_000),
@@ -108,3 +154,27 @@ def _check(config: CampaignConfig, path: Path) -> None:
     for name, value, low, high in limits:
         if not low <= value <= high:
             raise InputError(f"{path}: {name} is {value}; it must lie between {low} and {high}.")
+
+
+def _check_choices(config: CampaignConfig, path: Path) -> None:
+    weights, count = config.acquisition.mode_weights, config.modes.count
+    if weights is not None and (len(weights) != count or min(weights) < 0 or not sum(weights) > 0):
+        raise InputError(
+            f"{path}: [acquisition] mode_weights needs {count} numbers from 0 up, not all of them "
+            f"0; correct it."
+        )
+    for name, poses in (
+        ("[acquisition] own_poses_deg", config.acquisition.own_poses_deg),
+        ("[goal] joints_deg", config.goal.joints_deg),
+    ):
+        if poses is not None and (not poses or len({len(pose) for pose in poses}) != 1):
+            raise InputError(f"{path}: {name} needs one list of joint angles a pose; correct it.")
+    if config.acquisition.own_only and not config.acquisition.own_poses_deg:
+        raise InputError(f"{path}: [acquisition] own_only needs own_poses_deg; add them.")
+    for zone in config.forbidden:
+        if (zone.position_m is None) == (zone.joints_deg is None):
+            raise InputError(
+                f"{path}: [[forbidden]] needs either position_m or joints_deg; give one of them."
+            )
+        if zone.position_m is not None and len(zone.position_m) != 3:
+            raise InputError(f"{path}: [[forbidden]] position_m needs ranges of x, y, z.")

@@ -21,13 +21,18 @@ class Configured(Event, frozen=True, tag="configured"):
 
 
 class Proposal(msgspec.Struct, frozen=True):
-    """A pose to measure: joint setpoint, tcp position, score of the acquisition, why."""
+    """A pose to measure: joint setpoint, tcp position, score of the acquisition, why.
+
+    `hits` are the tcp axes to hit along, `minutes` what getting there and hitting takes.
+    """
 
     pose: str
     joints_deg: tuple[float, ...]
     position_m: tuple[float, float, float]
     score: float
     reason: str
+    hits: tuple[str, ...] = ("x", "y", "z")
+    minutes: float | None = None
 
 
 class Proposed(Event, frozen=True, tag="proposed"):
@@ -110,10 +115,14 @@ class Withdrawn(Event, frozen=True, tag="withdrawn"):
 
 
 class Skipped(Event, frozen=True, tag="skipped"):
-    """A proposed pose cannot or shall not be measured; it is not offered again."""
+    """A proposed pose cannot or shall not be measured; it is not offered again.
+
+    `neighbours`: what stands in the way there (the reason) does so around it too.
+    """
 
     pose: str
     reason: str = ""
+    neighbours: bool = False
 
 
 class Starred(Event, frozen=True, tag="starred"):

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.frf import modal
 from planner.frf.types import Frf
 from planner.fusion.hedged import BELIEF
-from planner.identify.extended import Structure, extended
+from planner.identify.extended import FLOOR, Structure, extended
 from planner.identify.identify import QUICK, Effort, identify
 from planner.identify.parameters import Priors
 from planner.identify.result import Identification
@@ -18,11 +18,11 @@ from planner.physics.simulation import Simulation
 
 # CAD masses and moments are right to 5 %, centres of mass to 1 cm.
 PRIORS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
-# Misfit (χ² per value) from which the simulation is suspected to lack physics: springs that
-# robot.toml does not state are tried, and where these do not help enough, what it says of a pose
-# is tested by identifying it without that pose; into so many parts at most.
+# Misfit (χ² per value) from which the simulation is suspected to lack physics. Where springs that
+# robot.toml does not state do not mend that, what it says of a pose is tested by identifying it
+# without that pose; into so many parts at most.
 SUSPECT, FOLDS = 3.0, 2
-HELPS = 0.5  # of the misfit, at most, is left where springs not stated are believed in
+BEST = 0.95  # misfit below which no springs that are added can bring it
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
@@ -48,6 +48,11 @@ class Learned:
     def fits(self) -> bool:
         """Whether nothing speaks for physics that it lacks."""
         return self.identified.misfit <= SUSPECT
+
+    @property
+    def priors(self) -> Priors:
+        """Those it was identified with."""
+        return self.structure.priors
 
     @property
     def found(self) -> tuple[str, ...]:
@@ -105,6 +110,23 @@ class LowFidelity:
             return SimulatedModes(empty, empty, residue)
         return self.simulation.modes(q, count)
 
+    def above(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
+        """What modes above those modelled add to the accelerance, (n, 3, 3, F) in m/s²/N.
+
+        0 unless the simulation was identified and fits: it is not known then.
+        """
+        if self.learned is None or not self.learned.fits:
+            return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
+        simulation = self.learned.identified.simulation
+        modes = simulation.modes(q, self.count)
+        known = np.isfinite(modes.frequency_hz)
+        pole = modal.pole(
+            np.where(known, modes.frequency_hz, 1.0), np.where(known, modes.damping_ratio, 0.1)
+        )
+        residue = np.where(known[..., None, None], modes.residue, 0.0)
+        below = modal.accelerance(frequency_hz, pole, residue)
+        return simulation.accelerance(q, frequency_hz) - below
+
     def discrepancy(self, measured_hz: np.ndarray) -> np.ndarray | None:
         """Size of ln f's error (count,) where the simulation was not fitted; None: not known.
 
@@ -114,7 +136,7 @@ class LowFidelity:
         if self.learned is None:
             return None
         if self.learned.fits:
-            return np.full(self.count, RIGHT)
+            return np.full(self.count, RIGHT * max(self.learned.identified.misfit, 1.0))
         if self.left_out is None:
             return None
         error = np.log(measured_hz / self.left_out)
@@ -148,9 +170,8 @@ class LowFidelity:
         """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation."""
         if self.learned is None:
             return np.zeros((len(q), self.count))
-        structure, identified = self.learned.structure, self.learned.identified
-        priors = structure.priors if identified.nuisances else _springs_only(structure.priors)
-        return frequency_sd(identified, structure.simulation, priors, q, self.count)
+        nominal, identified = self.learned.structure.simulation, self.learned.identified
+        return frequency_sd(identified, nominal, self.learned.priors, q, self.count)
 
 
 def _lacking(found: tuple[str, ...]) -> str:
@@ -158,7 +179,9 @@ def _lacking(found: tuple[str, ...]) -> str:
     if not found:
         return f"{text}, but not yet where; tilts of all joints and the floor are identified."
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
-    return f"{text}, identified beside what it states: {'; '.join(found[:NAMED])}{more}."
+    named = "; ".join(found[:NAMED])
+    bolts = " Check the anchor bolts." if FLOOR in named else ""
+    return f"{text}, identified beside what it states: {named}{more}.{bolts}"
 
 
 def learn(
@@ -171,61 +194,40 @@ def learn(
     nominal = before.nominal
     if nominal is None or not frfs:
         return before
-    learned = _identified(Structure(nominal, PRIORS), frfs, q, band_hz)
-    if not learned.fits:
-        wider = _identified(extended(nominal, PRIORS), frfs, q, band_hz)
-        if wider.identified.misfit < HELPS * learned.identified.misfit:
-            learned = wider
+    learned = _wider(_identified(Structure(nominal, PRIORS), frfs, q, band_hz), frfs, q, band_hz)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, frfs, q, band_hz, before.count)
     return LowFidelity(before.count, nominal, learned, left_out)
 
 
-def _identified(
-    structure: Structure, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+def _wider(
+    stated: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
 ) -> Learned:
-    """With uncertain inertias; with springs alone where the inertias found are impossible.
+    """With springs that robot.toml does not state, where the recordings speak for them.
 
-    Inertias are strained beyond what a body can have where something else is missing; where the
-    simulation fits, a small body whose inertia hardly matters may be beyond it too.
+    That is where χ² falls by more than ln n for each of their parameters (Schwarz 1978).
     """
-    effort, nominal = _effort(len(frfs)), structure.simulation
-    try:
-        found = identify(
-            frfs, q, nominal, structure.priors, band_hz=band_hz, starts=1, effort=effort
-        )
-    except InputError:  # not even the mass matrix makes sense
-        found = None
-    if found is not None and (found.misfit <= SUSPECT or possible(found.simulation)):
-        return Learned(structure, found)
-    springs = _springs_only(structure.priors)
-    found = identify(
-        frfs, q, nominal, springs, band_hz=band_hz, starts=1, warm=found, effort=effort
-    )
+    structure = extended(stated.structure.simulation, stated.structure.priors)
+    first = stated.identified
+    penalty = 2 * structure.added * np.log(first.values)
+    if first.values * (first.misfit - BEST) < penalty:
+        return stated
+    wider = _identified(structure, frfs, q, band_hz, first if stated.fits else None)
+    gain = first.values * (first.misfit - wider.identified.misfit)
+    return wider if gain > penalty else stated
+
+
+def _identified(
+    structure: Structure,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float],
+    warm: Identification | None = None,
+) -> Learned:
+    effort, nominal, priors = _effort(len(frfs)), structure.simulation, structure.priors
+    found = identify(frfs, q, nominal, priors, band_hz=band_hz, starts=1, warm=warm, effort=effort)
     return Learned(structure, found)
-
-
-def _springs_only(priors: Priors) -> Priors:
-    return replace(priors, mass=0.0, inertia=0.0, com_m=0.0)
-
-
-def possible(simulation: Simulation) -> bool:
-    """Whether every body with mass could exist: its pseudo-inertia is positive definite.
-
-    (Wensing, Kim & Slotine 2018, eq. 20.)
-    """
-    for m, x, y, z, xx, xy, yy, xz, yz, zz in simulation.elastic.inertia:
-        if m == 0:
-            continue
-        inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        pseudo = np.empty((4, 4))
-        pseudo[:3, :3] = np.trace(inertia) / 2 * np.eye(3) - inertia
-        pseudo[:3, 3] = pseudo[3, :3] = x, y, z
-        pseudo[3, 3] = m
-        if not np.all(np.linalg.eigvalsh(pseudo) > 0):
-            return False
-    return True
 
 
 def _left_out(
@@ -249,14 +251,16 @@ def _again(
     warm: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
 ) -> Identification:
     """From fewer poses, starting where all of them led."""
-    structure, springs = warm.structure, _springs_only(warm.structure.priors)
-    priors = structure.priors if warm.identified.nuisances else springs
     # Beside an error of a percent, forty lines and no completion are exact enough.
     rough = replace(_effort(len(frfs)), last_lines=40, last_completions=0)
-    nominal, first = structure.simulation, warm.identified
-    try:
-        return identify(
-            frfs, q, nominal, priors, band_hz=band_hz, starts=1, warm=first, effort=rough
-        )
-    except InputError:
-        return identify(frfs, q, nominal, springs, band_hz=band_hz, starts=1, effort=rough)
+    structure, first = warm.structure, warm.identified
+    return identify(
+        frfs,
+        q,
+        structure.simulation,
+        structure.priors,
+        band_hz=band_hz,
+        starts=1,
+        warm=first,
+        effort=rough,
+    )

@@ -6,12 +6,20 @@ from functools import cached_property
 
 import numpy as np
 
+from planner.acquire.axes import axis_shares
+from planner.acquire.mixed import mixed
+from planner.acquire.outputs import FrequencyOutputs, Poses
+from planner.acquire.parameters import FrfNoise
+from planner.acquire.propose import DESIGNS, INFORMED, Pick, Travel
 from planner.acquire.propose import propose as choose
+from planner.acquire.repeats import repeat_gain
+from planner.acquire.stopping import Forecast, forecast
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.events import Proposal
 from planner.campaign.fidelity import LowFidelity, learn
 from planner.campaign.labels import LabelledPose, frequencies, label, observations
+from planner.campaign.outlook import cost_of, informed_candidates, outlook
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import NoPoseLeftError
 from planner.frf.types import Frf
@@ -25,6 +33,10 @@ from planner.fusion.surrogate import (
 )
 from planner.physics.dynamics import SimulatedModes
 
+# Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
+AVOIDED = 0.1
+CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
+ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
 MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
@@ -38,6 +50,7 @@ class Model:
     labelled: tuple[LabelledPose, ...]
     low: LowFidelity
     surrogate: Surrogate
+    frf_noise: FrfNoise | None = None  # None: no FRF was looked at
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Modes at poses q (n, dof) in rad."""
@@ -54,6 +67,49 @@ class Model:
         """What the low fidelity says at the candidates."""
         return self.low.simulate(self.cell.candidates.q)
 
+    @cached_property
+    def outlook(self) -> tuple[FrequencyOutputs, Poses]:
+        """The posterior as acquisitions see it, and the candidates."""
+        return self._outlook(informed=False)
+
+    @cached_property
+    def informed(self) -> tuple[FrequencyOutputs, Poses]:
+        """The same with what `informed_candidates` would tell of the simulation's parameters."""
+        return self._outlook(informed=True)
+
+    def _outlook(self, informed: bool) -> tuple[FrequencyOutputs, Poses]:
+        said = self.simulated_candidates
+        return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise, informed)
+
+    @cached_property
+    def forecast(self) -> Forecast:
+        """Predicted RMSE over the workspace, and what one more measurement would gain."""
+        outputs, poses = self.outlook
+        best = poses.one(int(np.argmax(mixed(outputs, poses[:CONSIDERED]))))
+        stop = self.cell.config.stop
+        return forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
+
+    @property
+    def done(self) -> bool:
+        """Whether the target is reached with the probability that campaign.toml asks for."""
+        stop = self.cell.config.stop
+        enough = len(self.labelled) >= stop.measurements_min
+        return enough and self.forecast.reached >= stop.probability
+
+    def repeat(self) -> tuple[str, float, float] | None:
+        """The measured pose that gains most from more hits, its gain, and that of a new pose.
+
+        None where nothing is measured. Gains are reductions of the mean relative variance.
+        """
+        if not self.labelled:
+            return None
+        outputs, poses = self.outlook
+        sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
+              for p in self.labelled]  # fmt: skip
+        gain = repeat_gain(outputs, np.array(sd) ** 2)
+        best, fresh = int(np.argmax(gain)), mixed(outputs, poses[:CONSIDERED])
+        return self.labelled[best].pose, float(gain[best]), float(np.max(fresh))
+
     def _predict(
         self, q: np.ndarray, features: np.ndarray, simulated: SimulatedModes
     ) -> ModalPrediction:
@@ -64,8 +120,14 @@ class Model:
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N."""
-        return frf_moments(self.predict(q), frequency_hz)
+        """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N.
+
+        What modes above those modelled add is a simulation's that fits the recordings, else left
+        out.
+        """
+        mean, sd = frf_moments(self.predict(q), frequency_hz)
+        above = self.low.above(q, frequency_hz)
+        return mean + above, np.hypot(sd, ABOVE_SD * np.abs(above))
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -89,16 +151,24 @@ class Model:
 
 
 def build(
-    cell: Cell, state: CampaignState, frf_of: Callable[[Measurement, ModesTable], Frf]
+    cell: Cell,
+    state: CampaignState,
+    frf_of: Callable[[Measurement, ModesTable], Frf],
+    residues: bool = True,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns.
+    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns. Without
+    `residues` only frequencies and damping are fitted, and no FRF can be predicted.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
+    noise = None
     if cell.config.fidelity.simulation == "updated" and used:
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        low = learn(low, [frf_of(m, table) for m in used], q, table.band_hz)
+        frfs = tuple(frf_of(m, table) for m in used)
+        low = learn(low, frfs, q, table.band_hz)
+        misfit = low.identified.misfit if low.identified else 1.0
+        noise = FrfNoise.of(frfs, table.band_hz, misfit)
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:
         # What lacks physics is bent by fitting it: as it stands it may be a better
@@ -108,7 +178,9 @@ def build(
             _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
-    return Model(cell, best.labelled, best.low, fit_surrogate(best.seen, primary=best.primary))
+    taught = best.low.learned is not None and best.low.learned.fits
+    surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues, taught=taught)
+    return Model(cell, best.labelled, best.low, surrogate, noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,17 +228,7 @@ def propose(
     """The next poses to measure; NoPoseLeftError when no candidate is left."""
     cell = model.cell
     candidates = cell.candidates
-    taken = [m.joints_deg for m in state.measurements.values()]
-    taken += [state.proposals[pose].joints_deg for pose in state.skipped]
-    picks = choose(
-        acquisition,
-        model.surrogate,
-        candidates.features,
-        model.simulated_candidates,
-        count=count,
-        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
-        seed=state.events,
-    )
+    picks = _picks(model, state, count, acquisition)
     if not picks:
         raise NoPoseLeftError(
             f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
@@ -179,9 +241,45 @@ def propose(
             position_m=_xyz(candidates.position_m[pick.index]),
             score=float(pick.score),
             reason=_reason(model, pick.index, acquisition),
+            hits=tuple("xyz"[axis] for axis in pick.axes),
+            minutes=round(pick.minutes, 2) if np.isfinite(pick.minutes) else None,
         )
         for i, pick in enumerate(picks)
     )
+
+
+def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
+    cell = model.cell
+    x = cell.candidates.features
+    taken = [m.joints_deg for m in state.measurements.values()]
+    at = np.deg2rad(taken[-1]) if taken else None
+    shares = None
+    if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
+        shares = axis_shares(model.simulated_candidates.residue)
+    travel = Travel(cost_of(cell), cell.candidates.q, at, shares)
+    taken += [state.proposals[pose].joints_deg for pose in state.skipped]
+    allowed = cell.allowed
+    for pose in state.avoided:
+        there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
+        allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
+    asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
+    if acquisition in INFORMED:
+        asked, seen = informed_candidates(cell), model.informed
+    elif acquisition not in DESIGNS:
+        seen = model.outlook
+    picks = choose(
+        acquisition,
+        model.surrogate,
+        x[asked],
+        SimulatedModes(said.frequency_hz[asked], said.damping_ratio[asked], said.residue[asked]),
+        count=count,
+        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
+        seed=state.events,
+        outlook=seen,
+        travel=travel.among(asked),
+        allowed=allowed[asked],
+    )
+    return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
 
 
 def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:

@@ -57,6 +57,7 @@ class CampaignState:
     stale: bool = True  # the model changed since the open proposals were made
     measurements: dict[str, Measurement] = field(default_factory=dict)
     skipped: dict[str, str] = field(default_factory=dict)
+    avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
     proposals_made: int = 0  # counts undone ones too: a name is never given twice
     events: int = 0
@@ -114,7 +115,9 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             return replace(changed, measurements={**state.measurements, event.pose: measurement})
         case Skipped():
             left = tuple(pose for pose in state.open if pose != event.pose)
-            return replace(changed, open=left, skipped={**state.skipped, event.pose: event.reason})
+            avoided = state.avoided | ({event.pose} if event.neighbours else set())
+            skipped = {**state.skipped, event.pose: event.reason}
+            return replace(changed, open=left, skipped=skipped, avoided=avoided)
         case Starred():
             return replace(state, starred=state.starred | {event.pose})
     return state

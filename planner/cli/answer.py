@@ -16,7 +16,7 @@ def respond(
 ) -> int:
     """Print the answer and return the exit code. Numbers that are not finite become null."""
     if as_json:
-        text = msgspec.json.format(msgspec.json.encode(_plain(answer)), indent=2)
+        text = msgspec.json.format(msgspec.json.encode(plain(answer)), indent=2)
         sys.stdout.write(text.decode() + "\n")
         sys.stdout.flush()
     else:
@@ -33,16 +33,16 @@ def warn(sentence: str) -> None:
     print(" ".join(sentence.split()), file=sys.stderr)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """NumPy to builtins; not-a-number to null."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, complex):
-        return [_plain(value.real), _plain(value.imag)]
+        return [plain(value.real), plain(value.imag)]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -37,7 +37,25 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> dict[str, Any]
             for i, p in enumerate(found)
         ],
         "joint_names": list(campaign.cell.robot.joint_names),
+        "forecast": _forecast(campaign.model),
+        "repeat": _repeat(campaign.model),
     }
+
+
+def _forecast(model: Model) -> dict[str, Any]:
+    """Predicted RMSE over the workspace, with what is said of it."""
+    found = model.forecast
+    return {**dataclasses.asdict(found), "text": found.text}
+
+
+def _repeat(model: Model) -> dict[str, Any] | None:
+    """The measured pose whose repetition gains most, where that is more than a new pose would."""
+    found = model.repeat()
+    if found is None or found[1] <= found[2]:
+        return None
+    pose, gain, fresh = found
+    text = f"Noise dominates: hitting {pose} again tells more than any new pose."
+    return {"pose": pose, "gain": gain, "gain_of_a_new_pose": fresh, "text": text}
 
 
 def _expected(prediction, i: int) -> list[dict[str, float]]:
@@ -126,10 +144,8 @@ def status(campaign: Campaign) -> dict[str, Any]:
         "refused": refused,
         "frequency_sd_percent": sd,
         "target_frequency_sd_percent": config.stop.frequency_sd_percent,
-        "done": bool(
-            len(state.used) >= config.stop.measurements_min
-            and np.sqrt(np.mean(sd**2)) <= config.stop.frequency_sd_percent
-        ),
+        "done": bool(model.done),
+        "forecast": _forecast(model),
         "remarks": list(model.remarks),
         "log": {"entries": state.events, "torn_bytes": campaign.torn_bytes},
         "joint_names": list(campaign.cell.robot.joint_names),

@@ -6,7 +6,10 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, respond, warn
+from planner.cli.comparison import compare
+from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
+from planner.cli.proving import prove
 from planner.cli.study import study
 
 app = typer.Typer(
@@ -144,11 +147,15 @@ def skip(
     reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
-    """Say that a proposed pose cannot be measured; it is not offered again."""
+    """Say that a proposed pose cannot be measured; it is not offered again.
+
+    With a reason its neighbours are not offered either: what stands in the way there does so
+    around it too.
+    """
     from planner.campaign.campaign import Campaign
     from planner.cli import render
 
-    Campaign(directory).skip(pose, reason)
+    Campaign(directory).skip(pose, reason, neighbours=bool(reason))
     return respond({"skipped": pose, "reason": reason}, as_json, render.skipped)
 
 
@@ -271,6 +278,9 @@ def modes(
 
 
 app.command()(identify)
+app.command()(diagnose)
+app.command()(prove)
+app.command()(compare)
 app.command()(study)
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 
 def console(quiet: bool, stderr: bool = True):
@@ -21,6 +22,34 @@ def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(verb, total=None)
         yield lambda text: bar.update(task, description=f"{verb}: {text}")
+
+
+@contextmanager
+def bars(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
+    """A function (what, done, of how many) that moves a bar for each thing that is counted."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    times = (TimeElapsedColumn(), TimeRemainingColumn())
+    screen = console(quiet)
+    shown: dict[str, Any] = {}
+    with Progress(
+        *columns, *times, console=screen, transient=True, disable=not screen.is_terminal
+    ) as progress:
+
+        def tell(what: str, done: int, total: int) -> None:
+            if what not in shown:
+                shown[what] = progress.add_task(what, total=total)
+            progress.update(shown[what], completed=done)
+
+        yield tell
 
 
 @contextmanager

@@ -51,9 +51,11 @@ def proposals(answer: dict[str, Any]) -> RenderableType:
                 _with_sd(100 * mode["damping_ratio"], 100 * mode["damping_sd"]),
             )
         x, y, z = proposal["position_m"]
-        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {proposal['reason']}"
+        hits = f"hit along {', '.join(proposal['hits'])}"
+        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal['reason']}"
         parts += [angles, Text(place), expected]
-    return Group(*parts)
+    said = [answer["forecast"]["text"], (answer["repeat"] or {"text": ""})["text"]]
+    return Group(*parts, Text(" ".join(filter(None, said))))
 
 
 def imported(answer: dict[str, Any]) -> RenderableType:
@@ -101,6 +103,7 @@ def status(answer: dict[str, Any]) -> RenderableType:
         "sd of frequencies over the workspace: "
         + ", ".join(f"mode {k + 1} {v:.2f} %" for k, v in enumerate(answer["frequency_sd_percent"]))
         + f" (target {answer['target_frequency_sd_percent']:g} %)",
+        answer["forecast"]["text"] + (" The target is reached." if answer["done"] else ""),
         f"log: {answer['log']['entries']} entries",
     ]
     if answer["log"]["torn_bytes"]:
@@ -254,6 +257,7 @@ def demo(answer: dict[str, Any]) -> RenderableType:
     )
     seconds = answer["step_seconds"]
     lines = [
+        *answer["remarks"],
         f"On {answer['unused']} poses that were never used. Refit and next proposal: first "
         f"{seconds[0]:.2f} s, then at most {max(seconds[1:], default=0.0):.2f} s.",
         f"Campaign: {answer['campaign']}",

@@ -9,6 +9,8 @@ from typer.exceptions import TyperException
 
 from planner.errors import PlannerError
 
+STOPPED = 130
+
 
 def run(arguments: list[str]) -> int:
     """Run the command line; returns the exit code, never raises on bad usage or input."""
@@ -16,13 +18,16 @@ def run(arguments: list[str]) -> int:
 
     try:
         code = app(arguments, standalone_mode=False)
+        # Typer makes an exit code of Ctrl-C.
+        if code == STOPPED:
+            raise KeyboardInterrupt
         return code if isinstance(code, int) else 0
     except PlannerError as error:
         return _say(str(error), error.exit_code)
     except typer.Exit as error:
         return error.exit_code
     except (typer.Abort, KeyboardInterrupt):
-        return _say("Stopped; everything imported so far is kept.", 130)
+        return _say("Stopped; everything imported or finished so far is kept.", STOPPED)
     except TyperException as error:
         return _usage(error)
     except BrokenPipeError:

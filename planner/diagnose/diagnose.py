@@ -1,7 +1,7 @@
 """Where simulation and recordings differ, and which effect explains it."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,26 +9,32 @@ import numpy as np
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
 from planner.diagnose.fit import Fit, Problem, fit, settle
+from planner.diagnose.search import Found, Tell, search
 from planner.diagnose.weigh import Weights, weigh
 from planner.frf.types import Frf
 from planner.identify.data import common_band
 from planner.physics.simulation import Simulation
 
-IN_QUESTION = 10.0  # times the least misfit: candidates that are followed to the end
 TIED = 0.05  # probability that keeps a candidate in the set the data cannot tell apart
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect at a place ("none" and "unknown" at None) and its probability."""
+    """An effect at a place ("none" and "unknown" at None; two effects: both) and its probability.
 
-    effect: str
-    at: str | None
+    `fit` is its best one, None for "unknown"; there may be several variants of an effect.
+    """
+
+    effects: tuple[Effect, ...]
     probability: float
-    misfit: float  # χ² per value, NaN for "unknown"
-    log_evidence: float  # tempered, NaN for "unknown"
-    parameters: dict[str, tuple[float, float, str]]
-    text: str
+    fit: Fit | None
+
+    @property
+    def places(self) -> tuple[tuple[str, str | None], ...]:
+        """(name, place) of each effect."""
+        if self.fit is None:
+            return (("unknown", None),)
+        return tuple((e.name, e.at or None) for e in self.effects)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +44,10 @@ class Diagnosis:
     verdict: str
     candidates: tuple[Candidate, ...]
     refitted: Fit
-    best: Fit
+    best: Fit  # of the candidates that are no more than fits
     temper: float
     seconds: float
+    problem: Problem
 
     @property
     def undecided(self) -> tuple[Candidate, ...]:
@@ -54,7 +61,7 @@ def diagnose(
     simulation: Simulation,
     *,
     effects: Sequence[Effect] | None = None,
-    progress: Callable[[str], None] | None = None,
+    tell: Tell = lambda text, share: None,
 ) -> Diagnosis:
     """Which effect explains FRFs at q (n, dof) in rad that the simulation does not.
 
@@ -64,31 +71,49 @@ def diagnose(
     started = time.perf_counter()
     band = common_band(frfs, simulation.robot.config.band_hz)
     problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band)
-    refitted = settle(fit(problem, Effect("")))
-    fits = [refitted]
-    for effect in library(simulation) if effects is None else effects:
-        if progress:
-            progress(f"{effect.name} at {effect.at}")
-        fits.append(fit(problem, effect, [refitted]))
-    best = min(f.per_value for f in fits)
-    fits = [settle(f) if f.per_value < IN_QUESTION * best else f for f in fits]
-    weights = weigh(fits)
-    candidates = _candidates(fits, weights)
-    verdict = {"none": "consistent", "unknown": "unexplained"}.get(
-        candidates[0].effect, "explained"
-    )
-    best = fits[int(np.argmax(weights.probabilities[:-1]))]
+    tell("refitting the simulation", 0.0)
+    refitted = settle(problem, fit(problem, Effect("")))
+    all_ = library(simulation) if effects is None else effects
+    found = search(problem, refitted, all_, tell)
+    weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
+    candidates = _candidates(found, weights, all_)
+    first = candidates[0].places[0][0]
+    verdict = {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
+    likeliest = found.finalists[int(np.argmax(weights.log_evidence))]
+    best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
-    return Diagnosis(verdict, candidates, refitted, best, weights.temper, seconds)
+    return Diagnosis(
+        verdict, candidates, found.finalists[0], best, weights.temper, seconds, problem
+    )
 
 
-def _candidates(fits: Sequence[Fit], weights: Weights) -> tuple[Candidate, ...]:
+def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
+    """Of each; variants of an effect at a place share one."""
+    places = [(e.name, e.at) for e in all_]
     out = []
-    for f, p, z in zip(fits, weights.probabilities, weights.log_evidence, strict=False):
-        values = f.parameters(weights.temper)
-        text = f.effect.text(values) if f.effect.at else "The refitted simulation is enough."
-        at = f.effect.at or None
-        out.append(Candidate(f.effect.name, at, float(p), f.per_value, float(z), values, text))
+    for effect in chosen:
+        variants = [max(places.count((p.name, p.at)), 1) for p in effect.parts()]
+        out.append(effect.prior / float(np.prod(variants)))
+    return out
+
+
+def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
+    fits = list(found.finalists)
+    shares = list(weights.probabilities[:-1])
     unknown = float(weights.probabilities[-1])
-    out.append(Candidate("unknown", None, unknown, np.nan, np.nan, {}, "No candidate explains it."))
+    leader = int(np.argmax(shares))
+    own = _priors([fits[leader].effect], all_)[0]
+    before = _priors([effect for effect, _, _ in found.left], all_)
+    for (_, behind, left), prior in zip(found.left, before, strict=True):
+        fits.append(left)
+        shares.append(shares[leader] * float(np.exp(-behind)) * prior / own)
+    total = sum(shares) + unknown
+    groups: dict[tuple, list[int]] = {}
+    for i, f in enumerate(fits):
+        groups.setdefault(tuple(sorted((p.name, p.at) for p in f.effect.parts())), []).append(i)
+    out = [Candidate((), unknown / total, None)]
+    for members in groups.values():
+        leader = fits[max(members, key=lambda i: shares[i])]
+        share = sum(shares[i] for i in members) / total
+        out.append(Candidate(leader.effect.parts(), float(share), leader))
     return tuple(sorted(out, key=lambda c: -c.probability))

@@ -1,6 +1,7 @@
 """An effect: a change of the simulation, its priors, Z, or the measured FRFs."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from planner.identify.parameters import Priors
 from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
 
-NOTHING = 40.0
+NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,16 @@ class Effect:
     def starts(self) -> np.ndarray:
         """ψ (k, p) from which it is fitted."""
         return np.array([[q.mean for q in self.quantities]])
+
+    def parts(self) -> "tuple[Effect, ...]":
+        """The effects that act together; itself where it is one."""
+        return (self,)
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """What it adds to robot.toml: entries of the lists of an [[effects]] block, by list."""
+        return {}
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """One or two plain sentences an engineer can act on."""

@@ -2,25 +2,43 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from planner.diagnose.effect import Effect, Setting
 from planner.diagnose.objective import ByPose, Misfit
 from planner.frf.types import Frf
-from planner.identify.check import MODEL_ERROR
-from planner.identify.data import stack
-from planner.identify.parameters import UNITS, Priors, parametrise
-from planner.identify.solver import minimise
+from planner.identify.data import Measured, stack
+from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
+from planner.identify.solver import Minimum, minimise
+from planner.physics.gradient import Inertias
 from planner.physics.simulation import Simulation
+from planner.robot.elastic import Matrices
 
 # Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
-PRIORS = Priors(stiffness_factor=1.2, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
-LOG_LINES, LINES = 32, 96  # a pose
-LOG_STEPS, STEPS = 10, 12
-TOLERANCE = 1e-3  # of the value, that a step must gain while all candidates are looked at
-SETTLED = 1e-6, 80  # the same, and most steps, of those that are still in question
-KEPT = 2  # starts that are followed to the end
+PRIORS = Priors(stiffness_factor=1.17, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
+
+
+@dataclass(frozen=True)
+class Grade:
+    """How closely one looks: lines a pose, relative sd of all that no simulation follows.
+
+    As in `Misfit`: whether logarithms are compared, and whether inertias are free.
+    """
+
+    lines: int
+    model_error: float = 0.003
+    logarithmic: bool = False
+    inertial: bool = True
+
+
+GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
+CLOSE, FINE = Grade(40), Grade(72)
+ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
+LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
+SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
+KEPT = 2  # starts that are followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,15 +51,48 @@ class Problem:
     band_hz: tuple[float, float]
     priors: Priors = PRIORS
 
-    def misfit(self, effect: Effect, lines: int, logarithmic: bool = False) -> Misfit:
-        """Misfit with an effect, on at most `lines` lines a pose."""
-        simulation = effect.structure(self.simulation)
-        p = parametrise(simulation, effect.priors(simulation, self.priors))
-        measured = stack(self.frfs, self.band_hz, lines, MODEL_ERROR)
-        jacobians = simulation.elastic.body_jacobians(self.q)
-        setting = Setting(simulation, self.q, measured.s, jacobians)
-        matrices = simulation.elastic.matrices(self.q)
-        return Misfit(measured, setting, matrices, p.inertias(jacobians), p, effect, logarithmic)
+    def misfit(self, effect: Effect, grade: Grade) -> Misfit:
+        """Misfit with an effect."""
+        body, measured = _prepared(self, effect), _measured(self, grade)
+        setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
+        inertias, p = body.inertias, body.parametrisation
+        kind = grade.logarithmic, grade.inertial
+        return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
+
+    def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:
+        """The simulation with an effect's structure, and its parameters."""
+        body = _prepared(self, effect)
+        return body.simulation, body.parametrisation
+
+    def at(self, poses: Sequence[int]) -> "Problem":
+        """The same with some of the poses only."""
+        kept = list(poses)
+        return replace(self, frfs=tuple(self.frfs[i] for i in kept), q=self.q[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What does not depend on the lines."""
+
+    simulation: Simulation
+    parametrisation: Parametrisation
+    matrices: Matrices
+    jacobians: np.ndarray
+    inertias: Inertias
+
+
+@lru_cache(maxsize=512)
+def _prepared(problem: Problem, effect: Effect) -> _Prepared:
+    simulation = effect.structure(problem.simulation)
+    p = parametrise(simulation, effect.priors(simulation, problem.priors))
+    jacobians = simulation.elastic.body_jacobians(problem.q)
+    matrices = simulation.elastic.matrices(problem.q)
+    return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
+
+
+@lru_cache(maxsize=16)
+def _measured(problem: Problem, grade: Grade) -> Measured:
+    return stack(problem.frfs, problem.band_hz, grade.lines, grade.model_error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,9 +111,7 @@ class Fit:
 
     def named(self) -> dict[str, float]:
         """x by name: springs, nuisances, then the effect's own."""
-        p = self.misfit.parametrisation
-        names = [*(s.name for s in p.parameters), *p.nuisances]
-        return dict(zip(names, self.x, strict=False))
+        return dict(zip(_names(self.misfit), self.x, strict=True))
 
     def precision(self, temper: float) -> np.ndarray:
         """(D, D) inverse covariance of x where χ² counts 1/temper."""
@@ -89,55 +138,114 @@ class Fit:
             out[i] = chi2 + 2 * g @ step + step @ n @ step
         return out
 
-    def parameters(self, temper: float) -> dict[str, tuple[float, float, str]]:
-        """Value, sd and unit of what belongs to the effect."""
+    def parameters(
+        self, temper: float, part: Effect | None = None
+    ) -> dict[str, tuple[float, float, str]]:
+        """Value, sd and unit of what belongs to the effect, or to one of its parts."""
+        part = part or self.effect
         sd = np.sqrt(np.diagonal(np.linalg.inv(self.precision(temper))))
-        p, b = self.misfit.parametrisation, self.misfit.split[1]
-        chosen = self.effect.springs(self.misfit.setting.simulation)
+        p, names = self.misfit.parametrisation, _names(self.misfit)
+        chosen = part.springs(self.misfit.setting.simulation)
         out = {}
         for i, s in enumerate(p.parameters):
             if s.name in chosen:
-                value = float(np.exp(self.x[i]))
-                out[s.name] = (value, value * float(sd[i]), UNITS[s.kind])
-        for i, q in enumerate(self.effect.quantities, b):
+                value, unit = float(np.exp(self.x[i])), UNITS[s.kind]
+                if " along " in s.name:
+                    unit = unit.replace("·m", "", 1).replace("rad", "m")
+                out[s.name] = (value, value * float(sd[i]), unit)
+        for q, name in zip(part.quantities, _own_names(part), strict=True):
+            i = names.index(name)
             psi = float(self.x[i])
             out[q.name] = (q.value(psi), q.value_sd(psi, float(sd[i])), q.unit)
         return out
 
 
+def _own_names(effect: Effect) -> list[str]:
+    return [f"{q.name} of {p.name} at {p.at}" for p in effect.parts() for q in p.quantities]
+
+
+def _names(misfit: Misfit) -> list[str]:
+    p = misfit.parametrisation
+    return [*(s.name for s in p.parameters), *p.nuisances, *_own_names(misfit.effect)]
+
+
 def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
-    """Fit from the prior's median and from each warm one, each from all of the effect's starts."""
-    rough = problem.misfit(effect, LOG_LINES, logarithmic=True)
-    objective = problem.misfit(effect, LINES)
-    points = [x for base in _bases(rough, warm) for x in _with_starts(rough, base)]
-    if len(points) > 1:
-        found = [minimise(rough, x, 1e-2, 3) for x in points]
-        best = sorted(found, key=lambda m: m.at.value)[:KEPT]
-        points = [m.x for m in best]
-    ends = [minimise(rough, x, 1e-3, LOG_STEPS) for x in points]
-    end = min(ends, key=lambda m: m.at.value)
-    last = minimise(objective, end.x, TOLERANCE, STEPS)
-    return Fit(effect, objective, last.x, objective.by_pose(last.x))
-
-
-def settle(found: Fit) -> Fit:
-    """The same fit, followed until nothing more is to be gained."""
-    last = minimise(found.misfit, found.x, *SETTLED)
-    return replace(found, x=last.x, data=found.misfit.by_pose(last.x))
-
-
-def _bases(misfit: Misfit, warm: Sequence[Fit]) -> list[np.ndarray]:
-    if not warm:
-        return [misfit.mean]
-    p, out = misfit.parametrisation, []
+    """From the prior's median by way of logarithms, and from each warm one; on the finest lines."""
+    coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
+    ends = [_best(coarse, [_approach(problem, effect)])]
     for earlier in warm:
-        known, x = earlier.named(), misfit.mean
-        for i, name in enumerate([*(s.name for s in p.parameters), *p.nuisances]):
-            x[i] = known.get(name, x[i])
-        out.append(x)
-    return out
+        ends.append(_best(close, points(close, earlier)))
+    fine = problem.misfit(effect, FINE)
+    return _at(fine, _minimise(fine, _best(close, ends), LOOSE, LAST_STEPS).x)
 
 
-def _with_starts(misfit: Misfit, base: np.ndarray) -> list[np.ndarray]:
-    b = misfit.split[1]
-    return [np.concatenate([base[:b], psi]) for psi in misfit.effect.starts()]
+def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """A rough fit with inertias as they are: from the prior's median, and from an earlier fit."""
+    coarse = problem.misfit(effect, COARSE)
+    ends = [_best(coarse, points(coarse, warm))]
+    if len(effect.parts()) == 1:
+        ends.append(_best(coarse, [_approach(problem, effect)]))
+    return _at(coarse, min(ends, key=lambda x: coarse(x).value))
+
+
+def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """A few steps with all that is free, from an earlier fit."""
+    close = problem.misfit(effect, CLOSE)
+    return _at(close, _best(close, points(close, warm), PROMISE_STEPS))
+
+
+def _approach(problem: Problem, effect: Effect) -> np.ndarray:
+    rough = problem.misfit(effect, GLANCE)
+    b = rough.split[1]
+    starts = [np.concatenate([rough.mean[:b], psi]) for psi in effect.starts()]
+    return _best(rough, starts)
+
+
+def _best(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> np.ndarray:
+    """Where the best of the starts leads."""
+    if len(starts) > KEPT:
+        starts = sorted(starts, key=lambda x: _hope(misfit, x))[:KEPT]
+    if len(starts) > 1:
+        tried = [_minimise(misfit, x, LOOSE, 2) for x in starts]
+        starts = [min(tried, key=lambda m: m.at.value).x]
+    return _minimise(misfit, starts[0], LOOSE, steps).x
+
+
+def _hope(misfit: Misfit, x: np.ndarray) -> float:
+    """The value, less what the best of the effect's own parameters would gain at once."""
+    at, own = misfit(x), slice(misfit.split[1], None)
+    gains = at.gradient[own] ** 2 / (2 * np.maximum(np.diagonal(at.normal)[own], 1e-300))
+    return at.value - float(gains.max(initial=0.0))
+
+
+def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
+    """The same fit on the lines of a grade, followed until nothing more is to be gained."""
+    misfit = problem.misfit(found.effect, grade)
+    return _at(misfit, _minimise(misfit, found.x, SETTLED[0], steps).x)
+
+
+def _minimise(misfit: Misfit, x: np.ndarray, tolerance: float, steps: int) -> Minimum:
+    return minimise(misfit, x, tolerance, steps, longest=misfit.longest)
+
+
+def _at(misfit: Misfit, x: np.ndarray) -> Fit:
+    return Fit(misfit.effect, misfit, x, misfit.by_pose(x))
+
+
+def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:
+    """x of an earlier fit, with what is new at its starts.
+
+    Further springs start once as they may be, and once so stiff that they change little.
+    """
+    known, b = earlier.named(), misfit.split[1]
+    names = _names(misfit)
+    there = np.array([name in known for name in names])
+    values = np.array([known.get(name, 0.0) for name in names])
+    springs = np.arange(len(names)) < misfit.split[0]
+    x = np.where(there, values, misfit.mean)
+    bases = [x]
+    if np.any(springs & ~there):
+        bases.append(x + np.where(springs & ~there, 1.5 * misfit.sd, 0.0))
+    starts = [np.where(there[b:], values[b:], psi) for psi in misfit.effect.starts()]
+    found = [np.concatenate([base[:b], psi]) for base in bases for psi in starts]
+    return list(np.unique(found, axis=0))

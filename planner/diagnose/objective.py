@@ -1,6 +1,6 @@
 """Misfit of a simulation with one effect to measured FRFs, pose by pose, with its gradient."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,8 +8,11 @@ from planner.diagnose.effect import Effect, Setting
 from planner.identify.data import Measured
 from planner.identify.objective import FARTHEST, LOG_DROP, LOG_FLOOR, LOG_PRIOR, Quadratic
 from planner.identify.parameters import Parametrisation
+from planner.identify.solver import LONGEST
 from planner.physics.gradient import Inertias, response_gradient
 from planner.robot.elastic import Matrices
+
+STRIDE = 1.5  # sds by which an effect's own parameters may move in one step
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +28,8 @@ class ByPose:
 class Misfit:
     """χ²/2 of data and prior over x: springs θ (P), inertial nuisances φ (R), the effect's ψ (p).
 
-    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`, and φ
-    stays where it is.
+    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`. Unless
+    `inertial`, φ stays where it is.
     """
 
     measured: Measured
@@ -36,6 +39,7 @@ class Misfit:
     parametrisation: Parametrisation
     effect: Effect
     logarithmic: bool = False
+    inertial: bool = True
 
     @property
     def split(self) -> tuple[int, int]:
@@ -58,6 +62,12 @@ class Misfit:
         return np.concatenate([p.log_sd, np.ones(len(p.nuisances)), own])
 
     @property
+    def longest(self) -> np.ndarray:
+        """(D,) by how much an entry of x may move in one step."""
+        b = self.split[1]
+        return np.concatenate([np.full(b, LONGEST), STRIDE * self.sd[b:]])
+
+    @property
     def weight(self) -> np.ndarray:
         """(n, 3, 3, F): one over the sd of the residual's real (and imaginary) part."""
         m = self.measured
@@ -77,7 +87,7 @@ class Misfit:
         """(D,) bool: which entries of x may move."""
         a, b = self.split
         out = np.ones(b + len(self.effect.quantities), dtype=bool)
-        out[a:b] = not self.logarithmic
+        out[a:b] = self.inertial
         return out
 
     def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,8 +97,9 @@ class Misfit:
         rate = self.effect.rate(psi)
         s = s if rate is None else s + rate
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        added = self.effect.impedance(self.setting, psi)
-        inertias = None if self.logarithmic else self.inertias
+        setting = self.setting if rate is None else replace(self.setting, s=s)
+        added = self.effect.impedance(setting, psi)
+        inertias = self.inertias if self.inertial else None
         h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
         springs, slope = len(p.held), full
         if not np.array_equal(p.spread, np.eye(springs)):

@@ -9,14 +9,18 @@ from planner.diagnose.fit import Fit
 
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
+LEAST = 0.3  # no noise is overstated by more
 BOOTSTRAPS = 400
-UNKNOWN_PARAMETERS = 20  # what an unknown effect is charged for, half a ln(count) each
+UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each
 
 
 def temper(misfit: float, shared: float = 1.0) -> float:
-    """T by which χ² is divided: `shared` at the noise; grows with the share that is not noise."""
+    """T by which χ² is divided: misfit · `shared` at the noise and below, where it was overstated.
+
+    Above, it grows with the share that is not noise.
+    """
     excess = max(0.0, 1 - 1 / max(misfit, 1e-9))
-    return max(misfit, 1.0) * (shared + ALIKE * excess)
+    return max(misfit, LEAST) * (shared + ALIKE * excess)
 
 
 def shared_noise(spacing_hz: float, rate_1_s: float) -> float:
@@ -30,41 +34,43 @@ def shared_noise(spacing_hz: float, rate_1_s: float) -> float:
     return float(np.pi / a / np.tanh(np.pi / a))
 
 
+def temper_of(fits: Sequence[Fit]) -> float:
+    """T for fits on the same lines, from the best of them."""
+    measured = fits[0].misfit.measured
+    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
+    rate = float(np.median(measured.s.real[:, 0]))
+    return temper(min(f.per_value for f in fits), shared_noise(spacing, rate))
+
+
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Probabilities of the fits, in their order, then of "unknown"; T; scores for pictures."""
+    """Probabilities of the fits, in their order, then of "unknown"; T; log evidence of the fits."""
 
     probabilities: np.ndarray
     temper: float
     log_evidence: np.ndarray
-    held_out: np.ndarray  # (fits, n) χ²
 
 
-def weigh(fits: Sequence[Fit], seed: int = 0) -> Weights:
-    """Tempered evidence, averaged over which poses might have been taken.
+def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights:
+    """Tempered evidence, averaged over which poses might have been taken; the first fit is "none".
 
     The average is a Bayesian bootstrap over poses, as in pseudo-BMA+ (Yao et al. 2018, section
     3.4), of the poses' own misfits: what rests on one pose alone gets no certainty from it.
     """
-    best = min(f.per_value for f in fits)
-    measured = fits[0].misfit.measured
-    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
-    rate = float(np.median((measured.s.real)[:, 0]))
-    t = temper(best, shared_noise(spacing, rate))
-    evidence = np.array([f.log_evidence(t) + np.log(f.effect.prior) for f in fits])
-    held = np.array([f.held_out(t) for f in fits])
+    t = temper_of(fits)
+    evidence = np.array([f.log_evidence(t) for f in fits]) + np.log(prior)
     count = float(fits[0].misfit.counts.sum())
     charge = UNKNOWN_PARAMETERS / 2 * np.log(max(count / t, 2.0))
     unknown = -TOLERATED * count / (2 * t) - charge + _volume(fits[0], t)
-    n = held.shape[1]
-    shares = np.random.default_rng(seed).dirichlet(np.ones(n), BOOTSTRAPS) * n
     chi2 = np.array([f.data.chi2 for f in fits])
+    n = chi2.shape[1]
+    shares = np.random.default_rng(seed).dirichlet(np.ones(n), BOOTSTRAPS) * n
     scores = -((shares - 1) @ (chi2 - chi2[int(np.argmax(evidence))]).T) / (2 * t)
     total = np.append(scores + evidence, np.full((BOOTSTRAPS, 1), unknown), axis=1)
     total -= total.max(axis=1, keepdims=True)
     weights = np.exp(total)
     weights /= weights.sum(axis=1, keepdims=True)
-    return Weights(weights.mean(axis=0), t, evidence, held)
+    return Weights(weights.mean(axis=0), t, evidence)
 
 
 def _volume(fit: Fit, t: float) -> float:

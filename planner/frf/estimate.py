@@ -23,7 +23,7 @@ LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
 
 
 @dataclass(frozen=True, eq=False)
-class _Spectra:
+class Spectra:
     """Transforms of one hit: force (F,), responses (3, F), and the power of their noise."""
 
     axis: int
@@ -49,18 +49,7 @@ def estimate(
     """
     if estimator not in ("h1", "h2", "hv"):
         raise ValueError(f"unknown estimator {estimator}")
-    if not hits:
-        raise RefusedError("No usable hit is left at this pose; hit again.")
-    rate = hits[0].sampling_rate_hz
-    if any(abs(hit.sampling_rate_hz / rate - 1) > 1e-6 for hit in hits):
-        raise RefusedError("The hits of this pose have different sampling rates; use one.")
-    cuts, remarks = _alignment(hits)
-    length = cuts[0][1] - cuts[0][0]
-    frequency = np.fft.rfftfreq(length, 1 / rate)
-    chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
-    frequency = frequency[chosen]
-    window = _exponential(length, _onset(hits[0]) - cuts[0][0], exponential_rate_1_s / rate)
-    spectra = [_spectra(hit, *cut, chosen, window) for hit, cut in zip(hits, cuts, strict=True)]
+    frequency, spectra, cuts, remarks = transformed(hits, band_hz, exponential_rate_1_s)
     shape = (3, 3, frequency.size)
     h, variance, coherence = (
         np.full(shape, np.nan + 0j),
@@ -81,13 +70,35 @@ def estimate(
         variance,
         coherence,
         (counts[0], counts[1], counts[2]),
-        _usable(spectra, frequency, band_hz),
+        usable(spectra, frequency, band_hz),
         exponential_rate_1_s,
         tuple(remarks),
-        _tail(hits, cuts),
+        tail(hits, cuts),
         force_share,
         float(np.mean([s.force_window_s for s in spectra])),
     )
+
+
+def transformed(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float], exponential_rate_1_s: float = 0.0
+) -> tuple[np.ndarray, list[Spectra], list[tuple[int, int]], list[str]]:
+    """Lines (F,) in Hz, spectra of all hits, the samples used of each, remarks.
+
+    Raises RefusedError if the hits do not fit together.
+    """
+    if not hits:
+        raise RefusedError("No usable hit is left at this pose; hit again.")
+    rate = hits[0].sampling_rate_hz
+    if any(abs(hit.sampling_rate_hz / rate - 1) > 1e-6 for hit in hits):
+        raise RefusedError("The hits of this pose have different sampling rates; use one.")
+    cuts, remarks = _alignment(hits)
+    length = cuts[0][1] - cuts[0][0]
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
+    frequency = frequency[chosen]
+    window = _exponential(length, _onset(hits[0]) - cuts[0][0], exponential_rate_1_s / rate)
+    spectra = [_spectra(hit, *cut, chosen, window) for hit, cut in zip(hits, cuts, strict=True)]
+    return frequency, spectra, cuts, remarks
 
 
 def _onset(hit: Hit) -> int:
@@ -115,7 +126,7 @@ def _exponential(length: int, onset: int, rate_per_sample: float) -> np.ndarray:
 
 def _spectra(
     hit: Hit, start: int, stop: int, chosen: np.ndarray, exponential: np.ndarray
-) -> _Spectra:
+) -> Spectra:
     force = np.array(hit.force_n[start:stop])
     response = np.array(hit.acceleration_m_s2[:, start:stop])
     peak = int(np.argmax(np.abs(force - np.median(force))))
@@ -132,7 +143,7 @@ def _spectra(
     window[first:last] = exponential[first:last]
     response = response * exponential
     sign = hit.sign
-    return _Spectra(
+    return Spectra(
         hit.axis_index,
         np.fft.rfft(sign * force * window)[chosen],
         np.fft.rfft(response, axis=1)[:, chosen],
@@ -167,7 +178,7 @@ def _quiet(force: np.ndarray, peak: int) -> int:
     return max(0, int(np.argmax(centred > level)) - 4)
 
 
-def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _column(group: list[Spectra], estimator: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """FRF, variance and coherence (3, F) of one hit axis."""
     force = np.array([s.force for s in group])  # (n, F)
     response = np.array([s.response for s in group])  # (n, 3, F)
@@ -194,7 +205,7 @@ def _column(group: list[_Spectra], estimator: str) -> tuple[np.ndarray, np.ndarr
     return h, np.asarray(variance), coherence
 
 
-def _force_share(group: list[_Spectra]) -> np.ndarray:
+def _force_share(group: list[Spectra]) -> np.ndarray:
     """E|δF|²/|F|² (F,) of one column: what noise of the force leaves of the scale's certainty."""
     power = np.array([np.abs(s.force) ** 2 for s in group])
     noise = np.array([s.force_noise_power for s in group])
@@ -209,8 +220,8 @@ def _smooth(values: np.ndarray) -> np.ndarray:
     return np.array([np.convolve(row, kernel, mode="same") for row in values]) / count
 
 
-def _usable(
-    spectra: list[_Spectra], frequency: np.ndarray, band_hz: tuple[float, float]
+def usable(
+    spectra: list[Spectra], frequency: np.ndarray, band_hz: tuple[float, float]
 ) -> tuple[float, float]:
     """From the first line to where the weakest pulse has lost DROP_DB, or the lines end."""
     high = float(frequency[-1])
@@ -222,7 +233,7 @@ def _usable(
     return float(frequency[0]), high
 
 
-def _tail(hits: tuple[Hit, ...], cuts: list[tuple[int, int]]) -> float:
+def tail(hits: tuple[Hit, ...], cuts: list[tuple[int, int]]) -> float:
     """Time from the centroid of the pulse to the end of the records, mean over the hits.
 
     Never left out: what looks quiet beside a loud stiff mode may be a soft one that still rings.

@@ -1,9 +1,7 @@
 """JAX as every module here wants it: float64, strict shapes, compiled code kept between runs."""
 
 import os
-import sys
 import tempfile
-from pathlib import Path
 
 # Matrices here are small: threads gain nothing, and on few cores nested parallel LAPACK calls
 # wait for each other for ever. NPROC is how XLA learns the size of its thread pool.
@@ -14,18 +12,13 @@ if _FLAG not in os.environ.get("XLA_FLAGS", ""):
 
 import jax  # noqa: E402  (reads XLA_FLAGS when it starts)
 
+from planner import cache  # noqa: E402
+
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
-
-def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    own = "Library/Caches" if sys.platform == "darwin" else ".cache"
-    return (Path(base) if base else Path.home() / own) / "planner" / "jax"
-
-
 try:
-    folder = _cache_folder()
+    folder = cache.folder("jax")
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=folder):
         pass  # JAX would warn at every compilation if it could not write there

@@ -17,15 +17,17 @@ import numpy as np
 from planner.errors import InputError
 
 Shape = Callable[[Any, Any, Any], Any]
+LARGE = 10_000  # pairs from which a matrix product pays in XLA too
 
 
 def _squared_distance(xp: Any, xa: Any, xb: Any) -> Any:
-    if xp is np:
+    if xp is np or xa.shape[-2] * xb.shape[-2] >= LARGE:
         # One matrix product. Cancellation leaves an error of 1e-16 |x|² in r²; the kernels are
         # smooth functions of r², so it stays that small.
-        own_a, own_b = np.sum(xa**2, axis=-1), np.sum(xb**2, axis=-1)
-        product = xa @ np.swapaxes(xb, -1, -2)
-        return np.maximum(own_a[..., :, None] + own_b[..., None, :] - 2 * product, 0.0)
+        one_a, one_b = xp.ones_like(xa[..., :1]), xp.ones_like(xb[..., :1])
+        a = xp.concatenate([xa, one_a, xp.sum(xa**2, axis=-1, keepdims=True)], axis=-1)
+        b = xp.concatenate([-2 * xb, xp.sum(xb**2, axis=-1, keepdims=True), one_b], axis=-1)
+        return xp.maximum(a @ xp.swapaxes(b, -1, -2), 0.0)
     total = 0.0  # small batched products are slow in XLA; differences fuse
     for i in range(xa.shape[-1]):
         total = total + (xa[..., :, None, i] - xb[..., None, :, i]) ** 2

@@ -25,6 +25,9 @@ DAMPING_KERNELS = ("bias", "cubic", "matern52")  # seed 000's, and one that can 
 REACH = -0.25, 1.25  # of coordinates, beyond which damping stays as it is: polynomials run away
 RESIDUE = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
+# Beside a simulation that was identified from these very recordings and fits them.
+DAMPING_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
+RESIDUE_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 NUGGET = 1e-3  # of ln f beside an identified simulation
 SAMPLES, KEPT = 256, 32
@@ -51,7 +54,7 @@ class Surrogate:
 
     primary: HedgedAR1  # log f of every label
     damping: KernelAverage  # log ζ of every label
-    residue: HedgedAR1  # real and imaginary parts, scaled
+    residue: HedgedAR1 | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
 
     @property
@@ -62,7 +65,8 @@ class Surrogate:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What went wrong in the fits, each once."""
-        fits = (self.primary.posterior, *self.damping.posteriors, self.residue.posterior)
+        fits = [self.primary.posterior, *self.damping.posteriors]
+        fits += [self.residue.posterior] if self.residue is not None else []
         return tuple(dict.fromkeys(remark for fit in fits for remark in fit.remarks))
 
     @property
@@ -75,13 +79,12 @@ class Surrogate:
         return self.primary.split(_log(simulated.frequency_hz))[1]
 
     def predict(self, x: np.ndarray, simulated: SimulatedModes) -> ModalPrediction:
-        """Modes at x (q, d) where the simulation says `simulated`."""
+        """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted."""
         q, k = len(x), self.count
         mean, sd = self.primary.predict(x, _log(simulated.frequency_hz))
-        log_zeta, zeta_sd = self.damping.predict(np.clip(x, *REACH), np.full((q, k), np.nan))
+        log_zeta, zeta_sd = self.damping.predict(np.clip(x, *REACH), _log(simulated.damping_ratio))
         f, zeta = np.exp(mean), np.exp(log_zeta)
-        low = _parts(simulated.residue) / np.repeat(self.scale, 18)
-        parts, parts_sd = self.residue.predict(x, low)
+        parts, parts_sd = self._parts(x, simulated)
         parts = parts.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
         parts_sd = parts_sd.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
         return ModalPrediction(
@@ -92,6 +95,13 @@ class Surrogate:
             parts[..., 0] + 1j * parts[..., 1],
             np.sqrt(np.mean(parts_sd**2, axis=-1)),
         )
+
+    def _parts(self, x: np.ndarray, simulated: SimulatedModes) -> tuple[np.ndarray, np.ndarray]:
+        """Scaled parts of the residues and their sd, (q, 18 k) each."""
+        if self.residue is None:
+            nothing = np.full((len(x), 18 * self.count), np.nan)
+            return nothing, nothing
+        return self.residue.predict(x, _parts(simulated.residue) / np.repeat(self.scale, 18))
 
 
 def _relative_sd(sd: np.ndarray) -> np.ndarray:
@@ -144,12 +154,15 @@ def fit_primary(
     )
 
 
-def fit_damping(seen: ModalObservations) -> KernelAverage:
-    """Fit log ζ of every label: no simulation knows it."""
+def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
+    """Fit log ζ of every label: no simulation knows it that was not `taught`."""
     y = _log(seen.damping_ratio)
-    nothing, priors = np.full_like(y, np.nan), (DAMPING,) * y.shape[1]
-    data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), nothing)
-    return fit_shapes(data, priors, priors, np.full(y.shape[1], np.nan), DAMPING_KERNELS)
+    count = y.shape[1]
+    low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
+    data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low)
+    centre = _centre(low, np.full(count, np.nan))
+    with_low, without_low = (DAMPING_TAUGHT,) * count, (DAMPING,) * count
+    return fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
 
 
 def fit_surrogate(
@@ -157,27 +170,34 @@ def fit_surrogate(
     has_simulation: bool = True,
     reference: SimulatedModes | None = None,
     primary: HedgedAR1 | None = None,
+    residues: bool = True,
+    taught: bool = False,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
     `reference` is as in `fit_primary`; `primary` is what that gave, where it was fitted already.
+    Without `residues` these are left out, which takes two thirds of the time. `taught`: the
+    simulation was identified from these measurements' own FRFs and fits them, so that damping and
+    residues are nearly its own.
     """
     k = seen.frequency_hz.shape[1]
     if primary is None:
         primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
     scale = _scale(seen, reference)
+    if not residues:
+        return Surrogate(primary, fit_damping(seen, taught), None, scale)
     wide = np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
     residue = fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
-        (RESIDUE,) * (18 * k),
+        (RESIDUE_TAUGHT if taught else RESIDUE,) * (18 * k),
         (RESIDUE_ALONE,) * (18 * k),
         np.zeros(18 * k) if has_simulation else np.full(18 * k, np.nan),
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
     )
-    return Surrogate(primary, fit_damping(seen), residue, scale)
+    return Surrogate(primary, fit_damping(seen, taught), residue, scale)
 
 
 def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:

@@ -70,7 +70,7 @@ def stack(
     for i, (frf, lines) in enumerate(zip(frfs, chosen, strict=True)):
         count = len(lines)
         frequency[i, :count] = frf.frequency_hz[lines]
-        values, noise = frf.accelerance[..., lines], _noise(frf)[..., lines]
+        values, noise = frf.accelerance[..., lines], noise_sd(frf)[..., lines]
         given = np.isfinite(values) & np.isfinite(noise)
         total = np.sqrt(noise**2 + (model_error * np.abs(values)) ** 2)
         given &= total > 0
@@ -91,8 +91,8 @@ def _lines(frf: Frf, band_hz: tuple[float, float], most: int) -> np.ndarray:
     return inside[np.linspace(0, len(inside) - 1, most).round().astype(int)]
 
 
-def _noise(frf: Frf) -> np.ndarray:
-    """Sd (3, 3, F): from the hits' scatter, else from the coherence, else assumed."""
+def noise_sd(frf: Frf) -> np.ndarray:
+    """Sd (3, 3, F) of an FRF: from the hits' scatter, else from the coherence, else assumed."""
     h, hits = np.abs(frf.accelerance), np.maximum(frf.hits, 1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         # Bendat & Piersol 2010, eq. 9.90, for both parts of the complex value.

@@ -47,11 +47,11 @@ def set_aside(q: np.ndarray, count: int | None = None) -> tuple[int, ...]:
         raise InputError(f"--held-out {count} leaves none of the {n} poses to fit; give fewer.")
     if count == 0:
         return ()
-    order = _farthest_first(q)
+    order = farthest_first(q)
     return tuple(sorted(order[((np.arange(count) + 1) * n) // count - 1].tolist()))
 
 
-def _farthest_first(q: np.ndarray) -> np.ndarray:
+def farthest_first(q: np.ndarray) -> np.ndarray:
     """(n,) indices: each pose is the farthest from all before it."""
     span = np.ptp(q, axis=0)
     x = q / np.where(span > 0, span, 1.0)

@@ -11,6 +11,7 @@ from planner.errors import InputError
 from planner.frf.types import Frf
 from planner.identify.check import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
 from planner.identify.data import common_band, stack
+from planner.identify.feasible import Barrier
 from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import Identification, estimates, undetermined
@@ -74,6 +75,7 @@ class _Problem:
     parametrisation: Parametrisation
     progress: Callable[[Progress], None] | None
     effort: Effort
+    barrier: Barrier | None
 
     @property
     def inertial(self) -> bool:
@@ -87,7 +89,7 @@ class _Problem:
         band = low, low + share * (high - low)
         measured = stack(self.frfs, band, lines, MODEL_ERROR)
         parts = self.matrices, self.inertias, self.parametrisation
-        return Objective(measured, *parts, logarithmic, inertia)
+        return Objective(measured, *parts, logarithmic, inertia, barrier=self.barrier)
 
     def minimise(
         self, objective: Objective, x: np.ndarray, start: int, stage: str, steps: int
@@ -132,7 +134,10 @@ def identify(
     band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
     p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
     inertias = p.inertias(elastic.body_jacobians(q))
-    problem = _Problem(tuple(frfs), band, elastic.matrices(q), inertias, p, progress, effort)
+    barrier = Barrier.around(elastic.inertia, p)
+    problem = _Problem(
+        tuple(frfs), band, elastic.matrices(q), inertias, p, progress, effort, barrier
+    )
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
@@ -256,6 +261,7 @@ def _result(
         end.x,
         covariance,
         misfit,
+        round(end.at.chi2 / misfit),
         residuals(fitted, problem.frfs, q, problem.band_hz).by_pose,
         fit_similarity(fitted, problem.frfs, q, problem.band_hz),
         undetermined(p, covariance),

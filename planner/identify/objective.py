@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.identify.data import Measured
+from planner.identify.feasible import Barrier
 from planner.identify.parameters import Parametrisation
 from planner.identify.tail import Completion, completion
 from planner.physics.gradient import Inertias, response_gradient
@@ -49,6 +50,7 @@ class Objective:
     free_inertia: bool
     completion: Completion | None = None  # what the records lack, around `completed_at`
     completed_at: np.ndarray | None = None
+    barrier: Barrier | None = None  # keeps inertias from what no body can have
 
     def completed(self, x: np.ndarray, sloped: bool = True) -> "Objective":
         """With the decays that the records cut off, as they are at x and to first order near.
@@ -91,8 +93,9 @@ class Objective:
         mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
         away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
         scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
+        beyond = self._beyond(phi)
         possible = not self.free_inertia or np.linalg.eigvalsh(mass)[:, 0].min() > 0
-        if not possible or np.abs(away).max() > FARTHEST:
+        if not possible or not np.isfinite(beyond[0]) or np.abs(away).max() > FARTHEST:
             nothing = np.zeros(len(x))
             return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
         h, slope = response_gradient(
@@ -112,12 +115,17 @@ class Objective:
         if self.logarithmic:
             away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
         chi2 = float(np.sum(residual.real**2 + residual.imag**2))
-        return Quadratic(
-            (chi2 + float(away @ away)) / 2,
-            spread.T @ gradient + scale * away,
-            spread.T @ normal @ spread + np.diag(scale**2),
-            chi2,
-        )
+        gradient = spread.T @ gradient + scale * away
+        normal = spread.T @ normal @ spread + np.diag(scale**2)
+        value = (chi2 + float(away @ away)) / 2 + beyond[0]
+        gradient[count:] += beyond[1]
+        normal[count:, count:] += beyond[2]
+        return Quadratic(value, gradient, normal, chi2)
+
+    def _beyond(self, phi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        if self.barrier is None or not self.free_inertia:
+            return 0.0, np.zeros(len(phi)), np.zeros((len(phi), len(phi)))
+        return self.barrier(phi)
 
     def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Weighted residual (n, 3, 3, F) and its derivatives, written over `slope`."""

@@ -9,6 +9,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.physics.gradient import Inertias
 from planner.physics.simulation import Elasticity, Simulation
+from planner.robot.config import Compliance
 from planner.robot.virtual import inertia_basis
 
 NEAR = 6.0
@@ -144,7 +145,12 @@ def _place(simulation: Simulation, tie: str, blocks: list[int]) -> str:
     if not tie.startswith("\0"):
         return tie
     block = simulation.robot.config.compliance[blocks[0]]
-    return f"{block.joint} about {axis_name(block.axis)}"
+    return place_name(block)
+
+
+def place_name(block: Compliance) -> str:
+    """Where an elastic degree of freedom is: "joint_2 about z", "base along x"."""
+    return f"{block.joint} {'along' if block.slide else 'about'} {axis_name(block.axis)}"
 
 
 def axis_name(axis: tuple[float, float, float]) -> str:

@@ -70,6 +70,7 @@ class Identification:
     mean: np.ndarray
     covariance: np.ndarray
     misfit: float
+    values: int  # real values that were fitted
     misfit_by_pose: np.ndarray  # (n,)
     fit: Similarity
     undetermined: tuple[Direction, ...]

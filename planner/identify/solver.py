@@ -27,10 +27,12 @@ def minimise(
     tolerance: float,
     most: int,
     progress: Callable[[int, float], None] | None = None,
+    longest: float | np.ndarray = LONGEST,
 ) -> Minimum:
     """Least value from `start`, until a step would gain less than `tolerance` of it.
 
-    Damping follows Nielsen 1999; each step is shortened so that no entry moves by over LONGEST.
+    Damping follows Nielsen 1999; each step is shortened so that no entry moves by over
+    `longest` (that of each, or one for all).
     """
     x, at = start, objective(start)
     damping, grow = 1e-2, 2.0
@@ -44,7 +46,7 @@ def minimise(
         step = -unit * scipy.linalg.solve(
             damped, unit * at.gradient, assume_a="pos", check_finite=False
         )
-        step *= min(1.0, LONGEST / max(float(np.max(np.abs(step))), 1e-300))
+        step *= min(1.0, 1 / max(float(np.max(np.abs(step) / longest)), 1e-300))
         expected = -(at.gradient @ step + step @ at.normal @ step / 2)
         if expected <= tolerance * at.value:
             return Minimum(x, at, iteration, True)

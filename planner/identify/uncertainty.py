@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.identify.parameters import Priors, parametrise
+from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import Identification
 from planner.physics.families import undamped_modes
 from planner.physics.simulation import Simulation
@@ -16,23 +16,33 @@ def frequency_sensitivity(
     By the parameters in the order of `identified.mean`: with mass-normalised shapes φ,
     ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968).
     """
-    simulation = identified.simulation
+    p = parametrise(nominal, priors if identified.nuisances else Priors())
+    return log_frequency_slope(identified.simulation, p, q, count)
+
+
+def log_frequency_slope(
+    simulation: Simulation, parametrisation: Parametrisation, q: np.ndarray, count: int
+) -> np.ndarray:
+    """The same (n, count, P + R) of a simulation, by any parameters."""
     m = simulation.elastic.matrices(q)
     stiffness = simulation.stiffness.real
     hertz, shapes, _ = undamped_modes(m.mass, stiffness + m.geometric)
     square = (2 * np.pi * hertz[:, :count]) ** 2
     phi = shapes[:, :, :count]
     springs = np.diagonal(stiffness)[None, :, None] * phi**2 / (2 * square[:, None, :])
-    out = np.zeros((len(q), count, len(identified.mean)))
-    for p, estimate in enumerate(identified.estimates):
-        if estimate.kind == "stiffness":
-            out[:, :, p] = springs[:, list(estimate.blocks)].sum(axis=1)
-    if identified.nuisances:
-        basis = parametrise(nominal, priors).basis
-        moved = np.einsum("nbie,nek->nbik", nominal.elastic.body_jacobians(q), phi, optimize=True)
+    own = len(parametrisation.parameters)
+    out = np.zeros((len(q), count, own + len(parametrisation.nuisances)))
+    for p, parameter in enumerate(parametrisation.parameters):
+        if parameter.kind == "stiffness":
+            out[:, :, p] = springs[:, list(parameter.blocks)].sum(axis=1)
+    if parametrisation.nuisances:
+        basis = parametrisation.basis
+        moved = np.einsum(
+            "nbie,nek->nbik", simulation.elastic.body_jacobians(q), phi, optimize=True
+        )
         half = np.einsum("bpij,nbjk->nbpik", basis, moved, optimize=True)
         inertial = -0.5 * np.einsum("nbik,nbpik->nkbp", moved, half, optimize=True)
-        out[:, :, len(identified.estimates) :] = inertial.reshape(len(q), count, -1)
+        out[:, :, own:] = inertial.reshape(len(q), count, -1)
     return out
 
 

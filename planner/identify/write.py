@@ -26,10 +26,13 @@ def updated_toml(
     `added` blocks, which the identification counts last, follow those in the text.
     """
     document = tomlkit.parse(text)
-    blocks = document["compliance"]
+    listed = document["compliance"]
+    blocks = [*listed]
+    blocks += [b for e in document.get("effects", ()) for b in e.get("compliance", ())]
     for block in added:
         table = tomlkit.table()
         table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
+        listed.append(table)
         blocks.append(table)
     for estimate in result.estimates:
         for number in estimate.blocks:
@@ -80,7 +83,8 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
             if elsewhere:
                 copy_meshes(robot.urdf_path, urdf)
         stated = robot.path.read_text(encoding="utf-8")
-        added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) :]
+        inside = sum(len(e.compliance) for e in robot.config.effects)
+        added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
         _write_new(out, updated_toml(stated, result, name, added))
     except OSError as error:
         raise InputError(

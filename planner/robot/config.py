@@ -13,8 +13,11 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One elastic rotation: axis in the joint's child frame, N·m/rad, N·m·s/rad.
 
     `joint` may be "base": between floor and robot, about an axis of the world, through the URDF's
-    origin. `loss_factor` η makes the stiffness K(1+iη) (structural damping). Blocks with the same
-    `tie` share their stiffness, damping and loss factor, also when those are identified.
+    origin. It may be a link: the rotation is half-way to the joint that this carries, and gives
+    with what lies beyond (the link's own mass does not). With `slide` it is no rotation but a
+    shift along the axis (N/m, N·s/m). `loss_factor` η makes the stiffness K(1+iη) (structural
+    damping). Blocks with the same `tie` share their stiffness, damping and loss factor, also when
+    those are identified.
     """
 
     joint: str
@@ -23,6 +26,7 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     damping: float
     loss_factor: float = 0.0
     tie: str = ""
+    slide: bool = False
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,6 +40,53 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     mass: float
     com_m: tuple[float, float, float]
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class Resonator(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A mass (kg) on a spring of its own, at a place of a link's joint frame, along a direction.
+
+    `frequency_hz` and `damping_ratio` are those that it has on a link that is held.
+    """
+
+    joint: str
+    position_m: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    mass: float
+    frequency_hz: float
+    damping_ratio: float
+
+
+class Harmonic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Stiffness about a joint's own axis that goes with its angle q: + c cos nq + s sin nq."""
+
+    joint: str
+    order: int
+    cosine: float
+    sine: float
+
+
+class Told(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A parameter of an effect, as the diagnosis found it."""
+
+    value: float
+    sd: float
+    unit: str
+
+
+class Effect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Physics that the diagnosis found missing, and what it adds to the simulation.
+
+    `payload` may have a negative mass here, where a stated one was too large.
+    """
+
+    effect: str
+    at: str
+    probability: float = 1.0
+    parameters: dict[str, Told] = {}
+    compliance: tuple[Compliance, ...] = ()
+    payload: tuple[Payload, ...] = ()
+    resonator: tuple[Resonator, ...] = ()
+    harmonic: tuple[Harmonic, ...] = ()
 
 
 class Obstacle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -55,7 +106,7 @@ class CollisionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of robot.toml.
+    """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
     With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
     own stiffness, of the size of weight times height, is added.
@@ -72,13 +123,33 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     collision: CollisionTable = CollisionTable()
+    effects: tuple[Effect, ...] = ()
+    resonator: tuple[Resonator, ...] = ()
+    harmonic: tuple[Harmonic, ...] = ()
 
 
 def load_config(path: Path) -> RobotConfig:
     """Read and check robot.toml; InputError with one sentence where it is wrong."""
     config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
-    return config
+    return _with_effects(config, path)
+
+
+def _with_effects(config: RobotConfig, path: Path) -> RobotConfig:
+    lists = ("compliance", "payload", "resonator", "harmonic")
+    added = {
+        name: (*getattr(config, name), *(x for e in config.effects for x in getattr(e, name)))
+        for name in lists
+    }
+    whole = msgspec.structs.replace(config, **added)
+    _check_compliances(whole, path)
+    for block in whole.resonator:
+        if not min(block.mass, block.frequency_hz, block.damping_ratio) > 0:
+            raise InputError(
+                f"{path}: the resonator at {block.joint} needs a mass, frequency_hz and "
+                f"damping_ratio above 0; correct them."
+            )
+    return whole
 
 
 def _check(config: RobotConfig, path: Path) -> None:

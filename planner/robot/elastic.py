@@ -26,7 +26,8 @@ class Matrices:
 
     `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
     s sensors; unless others were named, that is the tcp and the sensor. `geometric` (n, e, e) in
-    N·m/rad is gravity's own stiffness, 0 unless robot.toml asks for it.
+    N·m/rad is the stiffness that goes with the pose: gravity's own, harmonics of joint angles; 0
+    unless robot.toml asks for it.
     """
 
     mass: np.ndarray
@@ -49,9 +50,13 @@ class ElasticModel:
                 f'the elastic joints, or set [fidelity] simulation = "none" in campaign.toml.'
             )
         self.robot = robot
-        self.stiffness = np.array([c.stiffness for c in blocks])
-        self.damping = np.array([c.damping for c in blocks])
-        self.loss_factor = np.array([c.loss_factor for c in blocks])
+        small = robot.config.resonator
+        springs = [r.mass * (2 * np.pi * r.frequency_hz) ** 2 for r in small]
+        dampers = [4 * np.pi * r.damping_ratio * r.mass * r.frequency_hz for r in small]
+        self.stiffness = np.array([c.stiffness for c in blocks] + springs)
+        self.damping = np.array([c.damping for c in blocks] + dampers)
+        self.loss_factor = np.array([c.loss_factor for c in blocks] + [0.0] * len(small))
+        self._waves = tuple((self._own(w.joint), w) for w in robot.config.harmonic)
         self._virtual = virtual_model(robot, inertia_change)
         self._model = self._virtual.model
         self._data = self._model.createData()
@@ -67,12 +72,24 @@ class ElasticModel:
         values, vectors = np.linalg.eigh(mass / np.outer(scale, scale))
         if not values[0] > SINGULAR:
             number = int(np.argmax(np.abs(vectors[:, 0])))
-            block = self.robot.config.compliance[number]
+            blocks = self.robot.config.compliance
+            block = blocks[min(number, len(blocks) - 1)]
             raise InputError(
                 f"{self.robot.path}: [[compliance]] number {number + 1} ({block.joint}) moves no "
                 f"inertia of its own; give the links outboard of it an <inertial> in "
                 f"{self.robot.urdf_path.name}, or remove the block if its axis is listed twice."
             )
+
+    def _own(self, joint: str) -> int:
+        """Number of the block about a joint's own axis; InputError if there is none."""
+        axis = self.robot.joint_axes[self.robot.joint_names.index(joint)]
+        for number, block in enumerate(self.robot.config.compliance):
+            if block.joint == joint and not block.slide and abs(np.array(block.axis) @ axis) > 0.9:
+                return number
+        raise InputError(
+            f"{self.robot.path}: [[effects]] has a harmonic of {joint}, which has no "
+            f"[[compliance]] about its own axis; add that."
+        )
 
     @property
     def size(self) -> int:
@@ -109,6 +126,10 @@ class ElasticModel:
             full = self._standing(row)
             if robot.config.geometric_stiffness:
                 geometric[i] = self._gravity_stiffness(full)
+            for number, wave in self._waves:
+                angle = wave.order * row[robot.joint_names.index(wave.joint)]
+                change = wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
+                geometric[i, number, number] += change
             crba = pin.crba(self._model, self._data, full)
             upper = np.triu(crba)
             mass[i] = (upper + np.triu(crba, 1).T)[self._grid]

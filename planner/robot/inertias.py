@@ -7,6 +7,7 @@ import pinocchio as pin
 import scipy.linalg
 
 from planner.robot.robot import BASE, Robot
+from planner.robot.virtual import OUTER, SMALL
 
 ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 ORDER = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of moments in Pinocchio's ten numbers
@@ -28,11 +29,21 @@ def urdf_with_inertias(
     links = {link.get("name"): link for link in root.findall("link")}
     shares = {}
     for body, values in zip(bodies, change, strict=True):
-        if np.any(values):
+        if body.endswith(OUTER):
+            body, values = _of_whole(robot, body.removesuffix(OUTER), values)
+        if np.any(values) and not body.startswith(f"{SMALL} "):
             frame = _heaviest(robot, body, links)
             share = _change(links[frame.name], _seen_from(frame.placement, values))
             shares |= {body: share} if share < 1 else {}
     return text[: text.index("<robot")] + ElementTree.tostring(root, encoding="unicode"), shares
+
+
+def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndarray]:
+    """The joint that moves a link, and a change (10,) of its outer half as one of the link's."""
+    carried = robot.carries(link)
+    assert carried is not None  # otherwise the link has no halves
+    half = robot.model.jointPlacements[carried[1]].translation / 2
+    return str(robot.model.names[carried[0]]), _seen_from(pin.SE3(np.eye(3), -half), values)
 
 
 def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:

@@ -57,9 +57,16 @@ class Robot:
                     f"frame on the tool."
                 )
         for block in self.config.compliance:
-            if block.joint not in (*self.joint_names, BASE):
+            if block.joint not in (*self.joint_names, BASE) and not self.carries(block.joint):
                 raise InputError(
                     f'{self.path}: [[compliance]] joint "{block.joint}" is no actuated joint of '
+                    f"{self.urdf_path.name}, nor a link with one beyond; it has "
+                    f"{', '.join(self.joint_names)}."
+                )
+        for block in (*self.config.resonator, *self.config.harmonic):
+            if block.joint not in self.joint_names:
+                raise InputError(
+                    f'{self.path}: [[effects]] joint "{block.joint}" is no actuated joint of '
                     f"{self.urdf_path.name}; it has {', '.join(self.joint_names)}."
                 )
         for block in self.config.payload:
@@ -80,6 +87,22 @@ class Robot:
     def joint_names(self) -> tuple[str, ...]:
         """Actuated joints in order."""
         return tuple(self.model.names)[1:]
+
+    def link_of(self, joint: str) -> str:
+        """The link that a joint moves; KeyError if there is no such joint."""
+        number = (None, *self.joint_names).index(joint)
+        for frame in self.model.frames:
+            if frame.type == pin.FrameType.BODY and frame.parentJoint == number:
+                return frame.name
+        raise KeyError(joint)
+
+    def carries(self, link: str) -> tuple[int, int] | None:
+        """Numbers of the joint that moves a link and of the one that it carries, if it does."""
+        for joint, name in enumerate(self.joint_names, 1):
+            if self.link_of(name) == link:
+                beyond = [k for k in range(1, self.model.njoints) if self.model.parents[k] == joint]
+                return (joint, beyond[0]) if beyond else None
+        return None
 
     @cached_property
     def lower_rad(self) -> np.ndarray:
@@ -156,3 +179,12 @@ class Robot:
         return pin.computeFrameJacobian(
             self.model, self._data, np.asarray(q, dtype=float), self.tcp_id, pin.LOCAL
         )
+
+    def singularity(self, q: np.ndarray) -> np.ndarray:
+        """Distance (n,) from singular poses of q (n, dof) in rad; 0 at one.
+
+        Least singular value of the tcp's Jacobian, its linear part in units of the reach.
+        """
+        scale = np.repeat([1 / self.reach_m, 1.0], 3)[:, None]
+        both = [np.linalg.svd(scale * self.jacobian(row), compute_uv=False)[-1] for row in q]
+        return np.array(both)

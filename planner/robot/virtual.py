@@ -1,5 +1,6 @@
 """Virtual joints: a robot's model with one more revolute joint for each elastic rotation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,8 @@ import pinocchio as pin
 
 from planner.robot.robot import BASE, Robot
 
+SMALL = "resonator"  # and its number: a body of its own too
+OUTER = ", outer half"  # of a link that bends: a body of its own
 INERTIA_NAMES = ("m", "mx", "my", "mz", "xx", "xy", "yy", "xz", "yz", "zz")  # Pinocchio's order
 
 
@@ -14,9 +17,9 @@ INERTIA_NAMES = ("m", "mx", "my", "mz", "xx", "xy", "yy", "xz", "yz", "zz")  # P
 class VirtualModel:
     """Model in whose coordinates the robot's own joints and the elastic ones have their places.
 
-    `elastic` follows robot.toml, `bodies` names what moves (joints, and the base where it is
-    elastic), `carriers` are the joints of `model` that carry them, `frames` translates the
-    robot's frame numbers.
+    `elastic` follows robot.toml, resonators last, `bodies` names what moves (joints, the base
+    where it is elastic, the outer halves of links that bend, resonators), `carriers` are the
+    joints of `model` that carry them, `frames` translates the robot's frame numbers.
     """
 
     model: pin.Model
@@ -32,48 +35,125 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
     """The virtual model; inertia_change (bodies, 10) is added to the inertias of its bodies."""
     source, model = robot.model, pin.Model()
     model.gravity = pin.Motion(np.array([*robot.config.gravity, 0.0, 0.0, 0.0]))
-    last, rigid, elastic = _add_joints(robot, model)
-    moving = [joint for joint in range(source.njoints) if last[joint]]
-    inertia = np.array([_inertia(robot, joint) for joint in moving])
+    last, ends, rigid, elastic = _add_joints(robot, model)
+    names: list[str] = []
+    carriers: list[int] = []
+    bodies: list[np.ndarray] = []
+    for joint in (joint for joint in range(source.njoints) if last[joint]):
+        name, whole = (str(source.names[joint]) if joint else BASE), _inertia(robot, joint)
+        if ends[joint][0] == last[joint]:
+            parts = [(name, last[joint], whole)]
+        else:
+            inner, outer = _halves(whole, -ends[joint][1].translation)
+            half = robot.link_of(name) + OUTER
+            parts = [(name, last[joint], inner), (half, ends[joint][0], outer)]
+        for name, carrier, values in parts:
+            names.append(name)
+            carriers.append(carrier)
+            bodies.append(values)
+    small = _resonators(robot, model, last)
+    for number, block in enumerate(robot.config.resonator):
+        names.append(f"{SMALL} {number + 1}")
+        carriers.append(small[number])
+        bodies.append(np.array([block.mass, *np.zeros(9)]))
+    elastic = np.append(elastic, [model.joints[k].idx_q for k in small]).astype(int)
+    inertia = np.array(bodies)
     if inertia_change is not None:
         inertia = inertia + inertia_change
-    for joint, values in zip(moving, inertia, strict=True):
-        model.appendBodyToJoint(last[joint], _body(values), pin.SE3.Identity())
+    for carrier, values in zip(carriers, inertia, strict=True):
+        model.appendBodyToJoint(carrier, _body(values), pin.SE3.Identity())
     frames = tuple(
         model.addFrame(pin.Frame(f.name, last[f.parentJoint], 0, f.placement, f.type))
         for f in source.frames
     )
-    names = tuple(str(source.names[joint]) if joint else BASE for joint in moving)
-    carriers = tuple(last[joint] for joint in moving)
-    return VirtualModel(model, rigid, elastic, names, carriers, inertia, frames)
+    return VirtualModel(model, rigid, elastic, tuple(names), tuple(carriers), inertia, frames)
 
 
-def _add_joints(robot: Robot, model: pin.Model) -> tuple[list[int], np.ndarray, np.ndarray]:
-    """Outermost joint that stands for each of the robot's; places of its own and of the elastic."""
+def _resonators(robot: Robot, model: pin.Model, last: list[int]) -> list[int]:
+    """Numbers of the sliding joints that carry the resonators' masses."""
+    found = []
+    for number, block in enumerate(robot.config.resonator):
+        parent = last[robot.joint_names.index(block.joint) + 1]
+        place = pin.SE3(np.eye(3), np.array(block.position_m, dtype=float))
+        axis = np.array(block.direction, dtype=float)
+        found.append(_add_joint(model, parent, axis, place, f"{SMALL} {number + 1}", True))
+    return found
+
+
+def _halves(values: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A body (10,) cut half-way to the next joint, at `half` (3,): (10,) inner, (10,) outer.
+
+    The outer one is about that point. Mass, centre and moments of both together are the body's;
+    their centres are as far apart as those of a rod's halves, where its moments allow it.
+    """
+    body = pin.Inertia.FromDynamicParameters(values)
+    along = half / np.linalg.norm(half)
+    across = np.eye(3) - np.outer(along, along)
+    least = np.linalg.eigvalsh(across @ body.inertia @ across)[1]
+    apart = min(np.linalg.norm(half) / 2, np.sqrt(0.75 * max(least, 0.0) / body.mass))
+    moments = (body.inertia - body.mass * apart**2 * across) / 2
+    inner = pin.Inertia(body.mass / 2, body.lever - apart * along, moments)
+    outer = pin.Inertia(body.mass / 2, body.lever + apart * along - half, moments)
+    return np.array(inner.toDynamicParameters()), np.array(outer.toDynamicParameters())
+
+
+def _add_joints(
+    robot: Robot, model: pin.Model
+) -> tuple[list[int], list[tuple[int, pin.SE3]], np.ndarray, np.ndarray]:
+    """What carries each body, what hangs on it; places of the robot's joints and of the elastic."""
     source, blocks = robot.model, robot.config.compliance
-    last: list[int] = []
+    last: list[int] = []  # carries the body of the same number
+    ends: list[tuple[int, pin.SE3]] = []  # carries what hangs on it, and where the body is then
     rigid: list[int] = []
     elastic = np.zeros(len(blocks), dtype=int)
+
+    def give(outer: int, place: pin.SE3, where: str) -> int:
+        for number, block in enumerate(blocks):
+            if block.joint == where:
+                name = f"{where}/elastic_{number}"
+                axis = np.array(block.axis, dtype=float)
+                outer = _add_joint(model, outer, axis, place, name, block.slide)
+                elastic[number], place = model.joints[outer].idx_q, pin.SE3.Identity()
+        return outer
+
     for joint in range(source.njoints):
         name, outer = (str(source.names[joint]) if joint else BASE), 0
         if joint:
-            axis, place = robot.joint_axes[joint - 1], source.jointPlacements[joint]
-            outer = _add_joint(model, last[source.parents[joint]], axis, place, name)
+            parent, back = ends[source.parents[joint]]
+            axis, place = robot.joint_axes[joint - 1], back * source.jointPlacements[joint]
+            outer = _add_joint(model, parent, axis, place, name)
             rigid.append(model.joints[outer].idx_q)
-        for number, block in enumerate(blocks):
-            if block.joint == name and (joint or BASE not in robot.joint_names):
-                axis, place = np.array(block.axis, dtype=float), pin.SE3.Identity()
-                outer = _add_joint(model, outer, axis, place, f"{name}/elastic_{number}")
-                elastic[number] = model.joints[outer].idx_q
+        if joint or BASE not in robot.joint_names:
+            outer = give(outer, pin.SE3.Identity(), name)
         last.append(outer)
-    return last, np.array(rigid), elastic
+        ends.append(_end(robot, joint, outer, give))
+    return last, ends, np.array(rigid), elastic
+
+
+def _end(
+    robot: Robot, joint: int, outer: int, give: Callable[[int, pin.SE3, str], int]
+) -> tuple[int, pin.SE3]:
+    """What the joints beyond a body hang on: itself, or half-way to them where it bends."""
+    link = robot.link_of(str(robot.model.names[joint])) if joint else ""
+    bends = any(block.joint == link for block in robot.config.compliance)
+    if not bends or link in robot.joint_names:
+        return outer, pin.SE3.Identity()
+    carried = robot.carries(link)
+    assert carried is not None  # checked when the robot was loaded
+    half = robot.model.jointPlacements[carried[1]].translation / 2
+    return give(outer, pin.SE3(np.eye(3), half), link), pin.SE3(np.eye(3), -half)
 
 
 def _add_joint(
-    model: pin.Model, parent: int, axis: np.ndarray, placement: pin.SE3, name: str
+    model: pin.Model,
+    parent: int,
+    axis: np.ndarray,
+    placement: pin.SE3,
+    name: str,
+    slide: bool = False,
 ) -> int:
-    kind = pin.JointModelRevoluteUnaligned(axis / np.linalg.norm(axis))
-    return model.addJoint(parent, kind, placement, name)
+    make = pin.JointModelPrismaticUnaligned if slide else pin.JointModelRevoluteUnaligned
+    return model.addJoint(parent, make(axis / np.linalg.norm(axis)), placement, name)
 
 
 def _body(values: np.ndarray) -> pin.Inertia:

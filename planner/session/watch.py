@@ -225,8 +225,7 @@ class _Session:
                 self.history, stop.frequency_sd_percent, per_pose, stop.measurements_min
             )
         )
-        enough = len(state.used) >= stop.measurements_min
-        if enough and overall <= stop.frequency_sd_percent and not self.announced:
+        if not self.announced and report.model.done:
             self.announced = True
             self.console.print(Text("The target of campaign.toml is reached.", style="bold green"))
             self.stop = "target reached" if self.auto else ""

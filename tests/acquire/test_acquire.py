@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.acquire.integrated_variance import integrated_variance
-from planner.acquire.outputs import FrequencyOutputs
+from planner.acquire.outputs import FrequencyOutputs, Poses, Target
 from planner.acquire.propose import ACQUISITIONS, DESIGNS, propose
 from planner.errors import InputError
 from planner.fusion.surrogate import fit_surrogate
@@ -19,6 +19,24 @@ def surrogate():
     return fit_surrogate(observed(5, 0))
 
 
+def over(surrogate, x, workspace):
+    """Outputs over the first poses of x (n, 2), and all of them as poses."""
+    poses = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
+    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:workspace])), poses
+
+
+def with_parameters(surrogate, x, p=6, seed=1):
+    """The same with p open parameters of a made-up simulation."""
+    rng = np.random.default_rng(seed)
+    plain = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
+    slope = 0.3 * np.sin(x @ rng.normal(size=(2, 4 * p)) * 3).reshape(len(x), 4, p)
+    j = rng.normal(size=(len(x), 3, 2, p)) * (1 + x[:, :1, None, None])
+    information = np.swapaxes(j, 2, 3) @ j
+    poses = Poses(plain.x, plain.low, slope, information)
+    covariance = np.cov(rng.normal(size=(p, 3 * p))) * 0.01
+    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:20]), None, covariance), poses
+
+
 def conditioned_variance(outputs, k, c, low_c):
     """Mean variance over the workspace once c is measured, by adding a row to the GP itself."""
     post, total = outputs.posterior, []
@@ -31,30 +49,31 @@ def conditioned_variance(outputs, k, c, low_c):
         cross = post._prior(k, post.x[known], low[:-1], c[None], low[-1:])[s]
         own = post._prior(k, c[None], low[-1:], c[None], low[-1:])[s] + outputs.noise[k]
         grown = np.block([[noisy, cross], [cross.T, own]])
-        at = post._prior(k, x, low, outputs.x, outputs.low[:, k])[s]
-        there = post._prior(k, outputs.x, outputs.low[:, k], outputs.x, outputs.low[:, k])[s]
+        xu, lu = outputs.workspace.poses.x, outputs.workspace.poses.low[:, k]
+        at = post._prior(k, x, low, xu, lu)[s]
+        there = post._prior(k, xu, lu, xu, lu)[s]
         reduced = np.sum(at * np.linalg.solve(grown, at), axis=0)
         total.append(np.mean(np.diag(there) - reduced))
     return float(np.mean(total))
 
 
 def test_integrated_variance_is_that_of_an_actual_refit(surrogate):
-    low = surrogate.frequency_inputs(simulated(X))
-    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30])
-    score = integrated_variance(outputs, X[:4], low[:4])
+    outputs, poses = over(surrogate, X, 30)
+    low = poses.low
+    score = integrated_variance(outputs, poses[:4])
     for i in range(4):
         drop = 0.0
         for k in range(4):
-            _, _, before = outputs.covariance(k, X[:1], low[:1], outputs.x, outputs.low)
+            _, _, before = outputs.covariance(k, poses[:1], outputs.workspace.poses)
             after = conditioned_variance(outputs, k, X[i], low[i, k])
             drop += outputs.weights[k] * (np.mean(before) - after)
         assert score[i] == pytest.approx(drop, rel=1e-6)
 
 
 def test_planned_poses_count_as_if_measured(surrogate):
-    low = surrogate.frequency_inputs(simulated(X))
-    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30]).planning(X[40], low[40])
-    _, _, variance = outputs.covariance(1, X[:1], low[:1], outputs.x, outputs.low)
+    outputs, poses = over(surrogate, X, 30)
+    outputs, low = outputs.planning(poses.one(40)), poses.low
+    _, _, variance = outputs.covariance(1, poses[:1], outputs.workspace.poses)
     assert np.mean(variance) == pytest.approx(
         conditioned_variance(outputs, 1, X[40], low[40, 1]), rel=1e-6
     )
@@ -63,32 +82,29 @@ def test_planned_poses_count_as_if_measured(surrogate):
 @pytest.mark.parametrize("name", ACQUISITIONS)
 def test_a_score_belongs_to_its_candidate_alone(surrogate, name):
     """More candidates than are taken at a time, in another order: the same score for each."""
-    x = np.random.default_rng(8).random((300, 2))
-    low = surrogate.frequency_inputs(simulated(x))
-    outputs = FrequencyOutputs.of(surrogate, X[:20], surrogate.frequency_inputs(simulated(X[:20])))
+    outputs, poses = with_parameters(surrogate, np.random.default_rng(8).random((300, 2)))
     order = np.random.default_rng(9).permutation(300)
-    score = ACQUISITIONS[name](outputs, x, low)
-    again = ACQUISITIONS[name](outputs, x[order], low[order])
+    score = ACQUISITIONS[name](outputs, poses)
+    again = ACQUISITIONS[name](outputs, poses[order])
     np.testing.assert_allclose(again, score[order], rtol=1e-9)
     assert (score > 0).all()
-    assert ACQUISITIONS[name](outputs, x[:0], low[:0]).shape == (0,)
+    assert ACQUISITIONS[name](outputs, poses[:0]).shape == (0,)
 
 
 def test_variance_is_what_prediction_says_but_for_doubt_about_hyperparameters(surrogate):
-    low = surrogate.frequency_inputs(simulated(X))
-    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30])
+    outputs, poses = over(surrogate, X, 30)
     _, sd = surrogate.primary.predict(X, np.log(simulated(X).frequency_hz))
     total = np.mean(sd**2, axis=1)
-    score = ACQUISITIONS["variance"](outputs, X, low)
+    score = ACQUISITIONS["variance"](outputs, poses)
     assert (score <= total * (1 + 1e-9)).all()
     assert np.corrcoef(score, total)[0, 1] > 0.9
 
 
 def test_a_planned_pose_is_known_to_within_its_noise(surrogate):
-    low = surrogate.frequency_inputs(simulated(X))
-    outputs = FrequencyOutputs.of(surrogate, X[:30], low[:30]).planning(X[40], low[40])
+    outputs, poses = over(surrogate, X, 30)
+    outputs = outputs.planning(poses.one(40))
     for k in range(4):
-        assert outputs.variance(k, X[40:41], low[40:41])[0] <= outputs.noise[k]
+        assert outputs.variance(k, poses.one(40))[0] <= outputs.noise[k]
 
 
 @pytest.mark.parametrize("name", NAMES)

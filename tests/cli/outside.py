@@ -17,11 +17,13 @@ PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
 
 
-def planner(*arguments: object, check: bool = True) -> subprocess.CompletedProcess[str]:
+def planner(
+    *arguments: object, check: bool = True, limit_s: float = 240
+) -> subprocess.CompletedProcess[str]:
     """Run `planner …` in a process of its own."""
     command = [*PLANNER, *(str(a) for a in arguments)]
     env = {**os.environ, "PLANNER_DEBUG": "1"}
-    done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=240)
+    done = subprocess.run(command, capture_output=True, text=True, env=env, timeout=limit_s)
     if check:
         assert done.returncode == 0, f"{arguments}: {done.returncode}\n{done.stderr}"
     return done

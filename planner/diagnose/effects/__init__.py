@@ -5,6 +5,7 @@ from planner.diagnose.effects.angle import AngleDependentStiffness
 from planner.diagnose.effects.base import BaseCompliance
 from planner.diagnose.effects.channel import ChannelDelay, Polarity, SensorGain
 from planner.diagnose.effects.damping import StructuralDamping
+from planner.diagnose.effects.link import LinkFlexibility
 from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.effects.resonator import LocalResonator
 from planner.diagnose.effects.rotation import SensorRotation
@@ -17,6 +18,7 @@ KINDS: dict[str, type[Effect]] = {
     "joint_stiffness": JointStiffness,
     "transverse_compliance": TransverseCompliance,
     "base_compliance": BaseCompliance,
+    "link_flexibility": LinkFlexibility,
     "added_mass": AddedMass,
     "local_resonator": LocalResonator,
     "angle_dependent_stiffness": AngleDependentStiffness,

@@ -1,6 +1,7 @@
 """A joint's stiffness that changes with its angle: gear contact, gravity compensator."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +11,14 @@ from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
 
 SD = 0.3  # of the stiffness
+ORDERS = (1, 2)  # a turn: out of balance, or like the teeth of two halves
 
 
 @dataclass(frozen=True)
 class AngleDependentStiffness(Effect):
-    """K(q) = K₀ + a cos q + b sin q of the rotation about the joint's own axis."""
+    """K(q) = K₀ + a cos nq + b sin nq of the rotation about the joint's own axis, n = order."""
+
+    order: int = 1
 
     name = "angle_dependent_stiffness"
 
@@ -26,28 +30,49 @@ class AngleDependentStiffness(Effect):
             number = _block(simulation, joint)
             if number is not None:
                 k = float(simulation.elasticity.stiffness[number])
-                waves = ("cosine", "sine")
-                quantities = tuple(Quantity(w, "N·m/rad", 0.0, SD * k) for w in waves)
-                found.append(cls(place, quantities))
+                waves = [Quantity(w, "N·m/rad", 0.0, SD * k) for w in ("cosine", "sine")]
+                quantities = (*waves, Quantity("damping_share", "1", 1.0, 0.5))
+                found += [cls(place, quantities, order) for order in ORDERS]
         return tuple(found)
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
-        """On the diagonal, one value a pose."""
+        """On the diagonal, one value a pose; `damping_share` of the damping changes alike."""
         simulation = setting.simulation
         joint = joint_of(simulation, self.at)
         number = _block(simulation, joint)
         assert number is not None
-        angle = setting.q[:, simulation.robot.joint_names.index(joint)]
+        angle = self.order * setting.q[:, simulation.robot.joint_names.index(joint)]
         waves = np.stack([np.cos(angle), np.sin(angle)], axis=1)  # (n, 2)
-        (n, f), e = setting.s.shape, simulation.elastic.size
-        slope = np.zeros((n, 2, f, e, e), dtype=complex)
-        slope[..., number, number] = waves[:, :, None]
-        return Impedance(np.einsum("p,npfij->nfij", psi, slope), slope)
+        block = simulation.robot.config.compliance[number]
+        late = setting.s * block.damping / block.stiffness  # (n, F)
+        own = np.empty((len(angle), 3, setting.s.shape[1]), dtype=complex)
+        own[:, :2] = waves[:, :, None] * (1 + psi[2] * late)[:, None]
+        own[:, 2] = (waves @ psi[:2])[:, None] * late
+        change = np.einsum("p,npf->nf", psi[:2], own[:, :2])
+        unit = np.zeros((simulation.elastic.size, simulation.elastic.size))
+        unit[number, number] = 1.0
+        return Impedance(change[..., None, None] * unit, own[..., None, None] * unit)
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """See `Effect.elements`."""
+        block = {
+            "joint": joint_of(simulation, self.at),
+            "order": self.order,
+            "cosine": values["cosine"][0],
+            "sine": values["sine"][0],
+        }
+        return {"harmonic": [block]}
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
         size = float(np.hypot(values["cosine"][0], values["sine"][0]))
-        return f"The stiffness of {self.at} changes with its angle by ± {size:.2g} N·m/rad."
+        times = {1: "once", 2: "twice"}[self.order]
+        return (
+            f"The stiffness of {self.at} changes with its angle, {times} a turn, by ± {size:.2g} "
+            f"N·m/rad: check gear, gravity compensator and cables."
+        )
 
 
 def _block(simulation: Simulation, joint: str) -> int | None:

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from planner.diagnose.effect import Effect
-from planner.identify.parameters import axis_name
+from planner.identify.parameters import place_name
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 
@@ -40,8 +40,7 @@ class StructuralDamping(Effect):
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
         """Loss factors."""
         return tuple(
-            f"loss_factor of {b.tie or f'{b.joint} about {axis_name(b.axis)}'}"
-            for b in simulation.robot.config.compliance
+            f"loss_factor of {b.tie or place_name(b)}" for b in simulation.robot.config.compliance
         )
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:

@@ -1,6 +1,7 @@
 """A mass on a link that the simulation does not know, or a payload stated too large."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -83,6 +84,14 @@ class AddedMass(Effect):
         m = np.swapaxes(jacobian, 1, 2)[:, None] @ inertias @ jacobian[:, None]  # (n, 5, e, e)
         all_ = (setting.s**2)[:, None, :, None, None] * m[:, :, None]
         return Impedance(all_[:, 0], all_[:, 1:])
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """See `Effect.elements`."""
+        mass, *place = (values[n][0] for n in ("mass", *(f"position_{a}" for a in "xyz")))
+        link = simulation.robot.link_of(joint_of(simulation, self.at))
+        return {"payload": [{"link": link, "mass": mass, "com_m": place}]}
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""

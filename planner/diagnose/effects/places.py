@@ -35,7 +35,8 @@ def own_axis(simulation: Simulation, joint: str) -> np.ndarray:
 def listed_axes(simulation: Simulation, joint: str) -> np.ndarray:
     """(k, 3) axes of a joint's elastic rotations in robot.toml."""
     blocks = simulation.robot.config.compliance
-    return np.array([b.axis for b in blocks if b.joint == joint], dtype=float).reshape(-1, 3)
+    own = [b.axis for b in blocks if b.joint == joint and not b.slide]
+    return np.array(own, dtype=float).reshape(-1, 3)
 
 
 def missing_axes(simulation: Simulation, joint: str, wanted: np.ndarray) -> np.ndarray:
@@ -55,7 +56,7 @@ def with_blocks(simulation: Simulation, blocks: tuple[Compliance, ...]) -> Simul
 
 def stiffest(simulation: Simulation, joint: str) -> float:
     """Largest stiffness listed at a joint (N·m/rad), of the robot where it lists none."""
-    blocks = simulation.robot.config.compliance
+    blocks = [b for b in simulation.robot.config.compliance if not b.slide]
     own = [b.stiffness for b in blocks if b.joint == joint]
     return max(own or [b.stiffness for b in blocks])
 

@@ -1,6 +1,7 @@
 """Something loose on a link: a mass on a spring of its own (hose pack, bracket)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
 
 SHARE = 0.05  # of the mean mass of the links
-FREQUENCIES = 3  # starts over the band
+FREQUENCIES = 6  # starts over the band
+LITTLE = 0.3  # of the middling mass: starts change little, and their gradients tell how much
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,7 @@ class LocalResonator(Effect):
         for f in self.low_hz * ratio**shares:
             for axis in range(3):
                 start = middle.copy()
+                start[0] += np.log(LITTLE)
                 start[1] = np.log(f)
                 start[3 + axis] = 1.0
                 out.append(start)
@@ -94,6 +97,24 @@ class LocalResonator(Effect):
         slopes += [m * u * d_line[v][:, None] for v in range(3)]
         slopes += [m * (d_full[v][:, None] + u * d_line_p[v][:, None]) for v in range(3)]
         return Impedance(values, np.stack(slopes, axis=1))
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """See `Effect.elements`."""
+        place, way = (
+            np.array([values[f"{what}_{a}"][0] for a in "xyz"])
+            for what in ("position", "direction")
+        )
+        block = {
+            "joint": joint_of(simulation, self.at),
+            "position_m": place.tolist(),
+            "direction": (way / np.linalg.norm(way)).tolist(),
+            "mass": values["mass"][0],
+            "frequency_hz": values["frequency"][0],
+            "damping_ratio": values["damping_ratio"][0],
+        }
+        return {"resonator": [block]}
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""

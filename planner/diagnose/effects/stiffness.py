@@ -2,43 +2,57 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from planner.diagnose.effect import Effect
-from planner.diagnose.effects.places import joint_of, joints
-from planner.identify.parameters import Priors, axis_name
+from planner.diagnose.effects.places import joint_of, joints, own_axis
+from planner.identify.parameters import Priors, place_name
 from planner.physics.simulation import Simulation
+from planner.robot.config import Compliance
 
 FAR = 8.0  # either way
 
 
 @dataclass(frozen=True)
 class JointStiffness(Effect):
-    """Nothing new in the simulation: the prior of the joint's springs is widened."""
+    """Nothing new in the simulation: the prior of springs is widened, of one axis or of all."""
+
+    only_own: bool = False
 
     name = "joint_stiffness"
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["JointStiffness", ...]:
-        """At every joint that has a spring."""
-        there = {b.joint for b in simulation.robot.config.compliance}
-        return tuple(cls(place) for place, joint in joints(simulation) if joint in there)
+        """At every joint that has a spring: about its own axis, and where there are more, all."""
+        found = []
+        for place, _ in joints(simulation):
+            own, every = cls(place, (), True), cls(place)
+            count = len(every._blocks(simulation))
+            if 0 < len(own._blocks(simulation)) < count:
+                found.append(own)
+            if count:
+                found.append(every)
+        return tuple(found)
+
+    def _blocks(self, simulation: Simulation) -> list[Compliance]:
+        joint = joint_of(simulation, self.at)
+        axis = own_axis(simulation, joint)
+        there = [b for b in simulation.robot.config.compliance if b.joint == joint]
+        return [b for b in there if not self.only_own or abs(np.array(b.axis) @ axis) > 0.9]
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
         """Stiffnesses of the joint."""
-        joint = joint_of(simulation, self.at)
-        blocks = simulation.robot.config.compliance
-        return tuple(
-            f"stiffness of {b.tie or f'{joint} about {axis_name(b.axis)}'}"
-            for b in blocks
-            if b.joint == joint
-        )
+        return tuple(f"stiffness of {b.tie or place_name(b)}" for b in self._blocks(simulation))
 
     def priors(self, simulation: Simulation, priors: Priors) -> Priors:
-        """Log-uniform within a factor FAR."""
-        joint = joint_of(simulation, self.at)
-        stated = [b.stiffness for b in simulation.robot.config.compliance if b.joint == joint]
-        names = self.springs(simulation)
-        wide = {n: (k / FAR, k * FAR) for n, k in zip(names, stated, strict=True)}
-        return replace(priors, bounds={**priors.bounds, **wide})
+        """Log-uniform within a factor FAR; what is loose or stiff is damped otherwise too."""
+        bounds = dict(priors.bounds)
+        for block in self._blocks(simulation):
+            for kind, value in (("stiffness", block.stiffness), ("damping", block.damping)):
+                if value > 0:
+                    name = f"{kind} of {block.tie or place_name(block)}"
+                    bounds[name] = (value / FAR, value * FAR)
+        return replace(priors, bounds=bounds)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""

@@ -1,0 +1,116 @@
+"""What measuring a candidate takes from the variance over a target, in closed form and compiled.
+
+Measuring at c lowers the variance at u by cov(u, c)²/(var(c) + noise) (Sacks et al. 1989; Cohn
+1996). The posterior covariance is a kernel of x plus an inner product of few features (the
+simulation's slope and bias, minus what was measured and what is planned), so that one compiled
+loop over blocks of candidates makes it, squares it and sums it without keeping it.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from planner.acquire.outputs import FrequencyOutputs, Poses, Target
+from planner.fusion import jaxsetup  # noqa: F401
+from planner.fusion.kernels import parse
+
+BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
+TASK = 16  # blocks a call where there are many; calls of equal shape are compiled once
+WIDTH = 4  # the number of features is rounded up to a multiple of it, for the same reason
+WORTH_THREADS = 20_000_000  # covariances
+
+
+def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.ndarray:
+    """Expected reduction (n,) of the GP's variance over a target, labels weighed as it says.
+
+    Averaged over the hyperparameters, which are held.
+    """
+    return np.sum(reduction_by_label(outputs, poses, target)[0], axis=0)
+
+
+def reduction_by_label(
+    outputs: FrequencyOutputs, poses: Poses, target: Target
+) -> tuple[np.ndarray, np.ndarray]:
+    """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
+    size = len(poses) * len(target.poses) * outputs.count * outputs.posterior.theta.shape[1]
+    labels = range(outputs.count)
+    if size < WORTH_THREADS:
+        both = [_label(outputs, poses, target, k, map) for k in labels]
+    else:
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            both = [_label(outputs, poses, target, k, pool.map) for k in labels]
+    return np.array([r for r, _ in both]), np.array([v for _, v in both])
+
+
+def _label(
+    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapped
+) -> tuple[np.ndarray, np.ndarray]:
+    """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
+    weight = target.importance[:, k]
+    if not weight.any() or not len(poses):
+        return np.zeros(len(poses)), np.ones(len(poses))
+    a, va = _features(outputs, k, poses, sign=-1.0)
+    b, _ = _features(outputs, k, target.poses, sign=1.0)
+    scale = va + outputs.noise[k]
+    n = len(poses)
+    step = BLOCK * TASK if n > 4 * BLOCK * TASK else BLOCK
+    x = _filled(poses.x, step)
+    a = np.stack([_filled(one, step) for one in a])
+    theta, xu = outputs.posterior.theta[k], target.poses.x
+    jobs = [(s, i) for s in range(len(theta)) for i in range(0, len(x), step)]
+
+    def run(job: tuple[int, int]) -> np.ndarray:
+        s, i = job
+        part = slice(i, i + step)
+        kernel = outputs.posterior.kernel
+        return np.asarray(_squares(kernel, theta[s], x[part], a[s, part], xu, b[s], weight))
+
+    done = np.concatenate(list(mapped(run, jobs))).reshape(len(theta), -1)[:, :n]
+    return np.mean(done / scale, axis=0), np.mean(scale, axis=0)
+
+
+@partial(jax.jit, static_argnums=0, compiler_options={"xla_cpu_prefer_vector_width": "512"})
+def _squares(
+    kernel: str, theta: Array, x: Array, a: Array, xu: Array, b: Array, weight: Array
+) -> Array:
+    """Σ_u weight_u cov(c, u)² of candidates c, block by block."""
+    delta = parse(kernel, x.shape[1])
+
+    def block(one: tuple[Array, Array]) -> Array:
+        xc, ac = one
+        return (delta.covariance(jnp, theta, xc, xu) + ac @ b.T) ** 2 @ weight
+
+    blocks = x.reshape(-1, BLOCK, x.shape[1]), a.reshape(-1, BLOCK, a.shape[1])
+    return jax.lax.map(block, blocks).reshape(-1)
+
+
+def _features(
+    outputs: FrequencyOutputs, k: int, poses: Poses, sign: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Features (s, n, r) whose inner product is the covariance but for δ's kernel; variance (s, n).
+
+    `sign` −1 on one side takes off what is measured.
+    """
+    post, prior = outputs.posterior, outputs.posterior.prior
+    low = poses.low[:, k]
+    known = np.flatnonzero(post.mask[k])
+    cross = post._prior(k, post.x[known], post.low[k][known], poses.x, low)
+    white = post.whiten[k][:, known[:, None], known[None, :]] @ cross
+    if len(outputs.planned):
+        white = np.concatenate([white, outputs.whitened_planned(k, poses)], axis=1)
+    own = post._own(k, poses.x, low) - np.sum(white**2, axis=1)
+    linear = np.stack([np.full(len(low), prior.bias_sd[k]), prior.slope_sd[k] * low])
+    linear = np.broadcast_to(linear, (len(white), *linear.shape))
+    both = np.swapaxes(np.concatenate([linear, sign * white], axis=1), 1, 2)
+    empty = np.zeros((*both.shape[:2], -both.shape[2] % WIDTH))
+    return np.concatenate([both, empty], axis=2), np.maximum(own, 0.0)
+
+
+def _filled(rows: np.ndarray, step: int) -> np.ndarray:
+    """Rows up to a multiple of `step`, the last one repeated."""
+    return np.concatenate([rows, np.repeat(rows[-1:], -len(rows) % step, axis=0)])

@@ -1,0 +1,208 @@
+"""Diagnosis of recordings that differ from the simulation (`planner diagnose`)."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from planner.cli.answer import AsJson, respond, warn
+
+if TYPE_CHECKING:
+    from planner.diagnose.diagnose import Candidate, Diagnosis
+    from planner.diagnose.predict import Agreement
+    from planner.diagnose.recorded import Recorded
+    from planner.robot.robot import Robot
+
+
+def diagnose(
+    recordings: Annotated[
+        Path, typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv.")
+    ],
+    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    predict: Annotated[
+        Path | None, typer.Option(metavar="POSES_CSV", help="Poses whose FRFs are wanted.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Write robot, FRFs and pictures here.")
+    ] = None,
+    window_rate_1_s: Annotated[
+        float,
+        typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
+    ] = 0.0,
+    as_json: AsJson = False,
+) -> int:
+    """Locate where simulation and recordings differ, name the missing physics, show the fit."""
+    from planner.cli import modal
+    from planner.cli.progress import counting
+    from planner.cli.render_diagnosis import diagnosed
+    from planner.diagnose.diagnose import diagnose as run
+    from planner.diagnose.recorded import read_recorded
+    from planner.physics.simulation import Simulation
+    from planner.recording.folder import read_poses
+    from planner.robot.robot import Robot
+
+    started = time.perf_counter()
+    modal.check(None, "h1", None, window_rate_1_s)
+    nominal = Robot.load(robot)
+    wanted = read_poses(predict, nominal.joint_names) if predict else ()
+    with counting(quiet=as_json) as tell:
+        recorded = read_recorded(
+            recordings,
+            nominal.joint_names,
+            nominal.config.band_hz,
+            window_rate_1_s,
+            lambda text: tell(text, 0.0),
+        )
+        found = run(
+            recorded.frfs,
+            recorded.q,
+            Simulation(nominal),
+            tell=lambda text, share: tell(text, 0.02 + 0.93 * share),
+        )
+        tell("judging at poses set aside", 0.95)
+        answer = _answer(recorded, found)
+        answer |= {"npz": None, "robot": None, "plots": []}
+        if wanted:
+            rows = [(row.pose, row.joints_deg) for row in wanted]
+            answer["npz"] = str(_predict(found, rows, _target(out, predict, recordings)))
+        if out is not None:
+            answer |= _written(out, nominal, recorded, found)
+    answer["seconds"] = time.perf_counter() - started
+    for file, reason in recorded.refused:
+        warn(f"Refused {file}: {reason}")
+    return respond(answer, as_json, diagnosed, 3 if recorded.refused else 0)
+
+
+def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
+    """Where predictions go: FOLDER, or beside the recordings' folder."""
+    assert predict is not None
+    folder = out if out is not None else recordings.absolute().parent / "predictions"
+    return folder.absolute() / f"{predict.stem}.npz"
+
+
+def _answer(recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
+    from planner.diagnose.predict import agreement, held_out
+    from planner.diagnose.where import where
+
+    place = where(found.problem, found.refitted)
+    aside, judged = held_out(found.problem, found.refitted, found.best)
+    fitted = agreement(found.problem, found.refitted, found.best)
+    return {
+        "verdict": found.verdict,
+        "findings": _findings(found),
+        "candidates": _candidates(found),
+        "undecided": [list(c.places) for c in found.undecided],
+        "where": {
+            "bands_hz": place.bands_hz(),
+            "poses": [recorded.poses[i] for i in place.poses()],
+            "directions": place.directions(),
+        },
+        "fit": _agreement(fitted),
+        "held_out": {"poses": [recorded.poses[i] for i in aside], **_agreement(judged)},
+        "misfit": {"refitted": found.refitted.per_value, "explained": found.best.per_value},
+        "refused": [{"file": file, "reason": reason} for file, reason in recorded.refused],
+        "remarks": list(recorded.remarks),
+        "simulated": recorded.simulated,
+    }
+
+
+def _findings(found: "Diagnosis") -> list[dict[str, Any]]:
+    """The effects of the best candidate, where there is one better than "none" and "unknown"."""
+    if found.verdict != "explained":
+        return []
+    first = found.candidates[0]
+    assert first.fit is not None
+    entries = []
+    for effect in first.effects:
+        values = first.fit.parameters(found.temper, effect)
+        entries.append(
+            {
+                "effect": effect.name,
+                "at": effect.at,
+                "probability": _marginal(found, effect.name, effect.at),
+                "parameters": {
+                    n: {"value": v, "sd": sd, "unit": unit} for n, (v, sd, unit) in values.items()
+                },
+                "text": _text(found, first, effect.text(values)),
+            }
+        )
+    return entries
+
+
+def _marginal(found: "Diagnosis", name: str, at: str) -> float:
+    """Probability that an effect is there, alone or with another."""
+    return min(1.0, sum(c.probability for c in found.candidates if (name, at) in c.places))
+
+
+def _text(found: "Diagnosis", first: "Candidate", text: str) -> str:
+    others = [c for c in found.undecided if c is not first]
+    if not others:
+        return f"{text} ({100 * first.probability:.0f} %)"
+    names = "; ".join(_words(c) for c in others)
+    return (
+        f"{text} ({100 * first.probability:.0f} %) These recordings cannot tell it from: {names}."
+    )
+
+
+def _words(candidate: "Candidate") -> str:
+    said = [
+        "no effect at all"
+        if name == "none"
+        else "something unknown"
+        if at is None
+        else f"{name.replace('_', ' ')} at {at}"
+        for name, at in candidate.places
+    ]
+    return f"{' and '.join(said)} ({100 * candidate.probability:.0f} %)"
+
+
+def _candidates(found: "Diagnosis") -> list[dict[str, Any]]:
+    """All of them; a pair is one entry that names both."""
+    return [
+        {
+            "effect": " + ".join(name for name, _ in c.places),
+            "at": " + ".join(at for _, at in c.places if at) or None,
+            "probability": c.probability,
+            "effects": [{"effect": name, "at": at} for name, at in c.places],
+        }
+        for c in found.candidates
+    ]
+
+
+def _agreement(of: "Agreement | None") -> dict[str, Any]:
+    names = ("nominal", "refitted", "explained")
+    if of is None:
+        return {name: {"frac": None, "frobenius": None} for name in names}
+    sides = {name: getattr(of, name) for name in names}
+    return {n: {"frac": s.frac, "frobenius": s.frobenius} for n, s in sides.items()}
+
+
+def _predict(found: "Diagnosis", rows: list[tuple[str, tuple[float, ...]]], path: Path) -> Path:
+    import numpy as np
+
+    from planner.cli.answers import frequency_lines, save_npz
+    from planner.diagnose.predict import predicted
+
+    lines = frequency_lines(found.problem.band_hz)
+    angles = np.array([joints for _, joints in rows])
+    mean, sd = predicted(found.problem, found.best, np.deg2rad(angles), lines, found.temper)
+    names = np.array([name for name, _ in rows])
+    save_npz(path, frequency_hz=lines, frf_mean=mean, frf_sd=sd, pose=names, joints_deg=angles)
+    return path
+
+
+def _written(out: Path, robot: "Robot", recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
+    """The explained robot and the pictures, in a folder."""
+    from planner.diagnose.write import write_explained
+    from planner.show.diagnosis_plots import diagnosis_figures
+    from planner.show.pictures import Pictures
+
+    best = next(
+        c for c in found.candidates if c.fit is not None and c.fit.effect is found.best.effect
+    )
+    path = write_explained(out, robot, found, best)
+    mark = "SIMULATED recordings · " if recorded.simulated else ""
+    figures = diagnosis_figures(found, recorded.poses, mark)
+    plots = Pictures(out).write(figures, robot.name)["plots"]
+    return {"robot": str(path), "plots": plots}

@@ -1,0 +1,1 @@
+"""Sampling strategies compared on a pool of recordings: which needs fewer measurements?"""

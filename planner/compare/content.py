@@ -1,0 +1,29 @@
+"""What results depend on, as a hash: they are kept under it and found again by it."""
+
+import hashlib
+from functools import cache
+from pathlib import Path
+
+import msgspec
+
+
+def digest(*parts: bytes | str) -> str:
+    """SHA-256 of the parts, each told from the next."""
+    whole = hashlib.sha256()
+    for part in parts:
+        data = part.encode() if isinstance(part, str) else part
+        whole.update(len(data).to_bytes(8, "big") + data)
+    return whole.hexdigest()
+
+
+def of(value: object) -> bytes:
+    """Canonical JSON of structs, dataclasses and builtins."""
+    return msgspec.json.encode(value, order="deterministic")
+
+
+@cache
+def program() -> str:
+    """Hash of this program's own text: another version may come to other numbers."""
+    root = Path(__file__).parents[1]
+    files = sorted(p for p in root.rglob("*.py") if "campaigns" not in p.relative_to(root).parts)
+    return digest(*(p.relative_to(root).as_posix() + "\n" + p.read_text("utf-8") for p in files))

@@ -1,0 +1,87 @@
+"""Learning curves of strategies over seeds, and how they differ where all else is the same."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.compare.study import Run
+
+GOAL_PERCENT = 1.0
+RESAMPLES = 2000
+BASELINE = "maximin_lhs"
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """One strategy's runs (s) by number of measurements n (t,): arrays (s, t)."""
+
+    seeds: tuple[int, ...]
+    n: np.ndarray
+    frequency_rmse_percent: np.ndarray
+    r2: np.ndarray
+    coverage95: np.ndarray
+    wall_seconds: np.ndarray  # (s,)
+    process_seconds: np.ndarray  # (s,)
+
+    @classmethod
+    def of(cls, runs: Sequence[Run]) -> "Curves":
+        """Of runs with the same initial poses and budget, one at least."""
+        runs = sorted(runs, key=lambda run: run.seed)
+        names = "frequency_rmse_percent", "r2", "coverage95", "wall_seconds", "process_seconds"
+        columns = (np.array([getattr(run, name) for run in runs], dtype=float) for name in names)
+        return cls(tuple(run.seed for run in runs), np.array(runs[0].n), *columns)
+
+    @property
+    def to_goal(self) -> int | None:
+        """Fewest measurements with a median RMSE of at most 1 %; None: not within the budget."""
+        reached = np.flatnonzero(np.median(self.frequency_rmse_percent, axis=0) <= GOAL_PERCENT)
+        return int(self.n[reached[0]]) if reached.size else None
+
+    @property
+    def each_to_goal(self) -> np.ndarray:
+        """(s,) measurements of each run to 1 %; one more than the budget where it did not."""
+        reached = self.frequency_rmse_percent <= GOAL_PERCENT
+        first = np.where(reached.any(axis=1), reached.argmax(axis=1), len(self.n))
+        return np.append(self.n, self.n[-1] + 1)[first]
+
+    def only(self, seeds: Sequence[int]) -> "Curves":
+        """The runs of some seeds."""
+        rows = [self.seeds.index(seed) for seed in seeds]
+        columns = [c[rows] for c in list(vars(self).values())[2:]]
+        return Curves(tuple(seeds), self.n, *columns)
+
+
+@dataclass(frozen=True, eq=False)
+class Paired:
+    """A strategy less the baseline over the seeds (initial poses) of both; 95 % intervals.
+
+    `difference` (t,) is the median difference of the RMSE in percentage points, `interval` (t, 2)
+    its bootstrap interval over seeds; `to_goal` and `to_goal_interval` are the mean difference in
+    measurements to 1 %, where a run that did not get there counts as one more than the budget.
+    """
+
+    seeds: int
+    difference: np.ndarray
+    interval: np.ndarray
+    to_goal: float
+    to_goal_interval: np.ndarray
+
+
+def paired(strategy: Curves, baseline: Curves) -> Paired | None:
+    """The difference of two strategies seed by seed; None if they share no seed."""
+    shared = [seed for seed in strategy.seeds if seed in baseline.seeds]
+    if not shared:
+        return None
+    a, b = strategy.only(shared), baseline.only(shared)
+    apart = a.frequency_rmse_percent - b.frequency_rmse_percent
+    saved = (a.each_to_goal - b.each_to_goal).astype(float)
+    picks = np.random.default_rng(0).integers(len(shared), size=(RESAMPLES, len(shared)))
+    interval = np.percentile(np.median(apart[picks], axis=1), (2.5, 97.5), axis=0).T
+    goal = np.percentile(np.mean(saved[picks], axis=1), (2.5, 97.5))
+    return Paired(len(shared), np.median(apart, axis=0), interval, float(saved.mean()), goal)
+
+
+def baseline_of(strategies: Sequence[str]) -> str:
+    """What others are compared with: the maximin Latin hypercube, or the first one named."""
+    return BASELINE if BASELINE in strategies else strategies[0]

@@ -1,0 +1,87 @@
+"""One run of a strategy on a bench: a pure function, the same numbers on every machine."""
+
+import threading
+import time
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from planner.acquire.designs import NESTED
+from planner.campaign.model import Model, build, propose
+from planner.campaign.state import CampaignState
+from planner.compare import content
+from planner.compare.bench import Bench, PoolCell, cell_of
+from planner.compare.score import Score, score
+from planner.compare.study import Run, Task
+from planner.errors import InputError
+
+INITIAL = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself
+
+# A cell's robot and the BLAS threads belong to the whole process, of which a cluster's worker may
+# use several threads.
+_one_at_a_time = threading.Lock()
+
+
+def run(bench: Bench, task: Task) -> Run:
+    """Measure, refit and judge from the initial poses to the budget.
+
+    Poses are chosen, and the model refitted, as a campaign does it; only that they come from the
+    pool. Raises InputError if this machine runs another version of the program.
+    """
+    if bench.program != content.program():
+        raise InputError("This worker runs another version of planner; install the same one.")
+    with _one_at_a_time, threadpool_limits(1):
+        return _run(bench, task)
+
+
+def _run(bench: Bench, task: Task) -> Run:
+    wall, process = time.perf_counter(), time.process_time()
+    cell = cell_of(bench)
+    used, planned = _planned(cell, task)
+    counts, scores = [], []
+    while True:
+        model, state = _fitted(bench, cell, used, task.seed)
+        counts.append(len(used))
+        scores.append(_judged(bench, model, used))
+        if len(used) == task.budget:
+            break
+        used = [*used, planned.pop(0) if planned else _chosen(bench, model, state, task.strategy)]
+    rmse_percent, r2, coverage95 = zip(*scores, strict=True)
+    names = tuple(bench.measurements[i].pose for i in used)
+    seconds = time.perf_counter() - wall, time.process_time() - process
+    return Run(
+        task.strategy, task.seed, names, tuple(counts), rmse_percent, r2, coverage95, *seconds
+    )
+
+
+def _planned(cell: PoolCell, task: Task) -> tuple[list[int], list[int]]:
+    """Initial poses, and those to follow if the strategy does not look at the model."""
+    x = cell.candidates.features
+    first = NESTED[INITIAL](x, task.budget, task.seed)[: task.initial].tolist()
+    if task.strategy not in NESTED:
+        return first, []
+    whole = NESTED[task.strategy](x, task.budget, task.seed).tolist()
+    rest = [i for i in whole if i not in first]
+    return first, rest[: task.budget - task.initial]
+
+
+def _fitted(
+    bench: Bench, cell: PoolCell, used: list[int], seed: int
+) -> tuple[Model, CampaignState]:
+    measured = [bench.measurements[i] for i in used]
+    frfs = {bench.measurements[i].pose: bench.frfs[i] for i in used}
+    state = CampaignState(measurements={m.pose: m for m in measured}, events=seed)
+    return build(cell, state, lambda m, _: frfs[m.pose], residues=False), state
+
+
+def _judged(bench: Bench, model: Model, used: list[int]) -> Score:
+    unused = np.setdiff1d(np.arange(len(bench.measurements)), used)
+    found = model.predict(bench.q[unused])
+    truth = bench.frequency_hz[unused], bench.frequency_sd_hz[unused]
+    return score(found.frequency_hz, found.frequency_sd_hz, *truth)
+
+
+def _chosen(bench: Bench, model: Model, state: CampaignState, acquisition: str) -> int:
+    (proposal,) = propose(model, state, 1, acquisition)
+    away = np.abs(np.rad2deg(bench.q) - np.array(proposal.joints_deg)).max(axis=1)
+    return int(np.argmin(away))

@@ -1,0 +1,17 @@
+"""What a screen found: an effect of the contract at a place, with odds and parameters."""
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Finding:
+    """`log_evidence` is the gain over "nothing of this kind" (natural logarithm).
+
+    `parameters` maps a name to value, standard deviation and unit.
+    """
+
+    effect: str
+    at: str | None
+    log_evidence: float
+    parameters: dict[str, tuple[float, float, str]] = field(default_factory=dict)
+    text: str = ""

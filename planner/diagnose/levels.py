@@ -1,0 +1,223 @@
+"""The screen for what depends on the force level: nonlinear joints, and what no joint explains."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.diagnose.drift import problem_of
+from planner.diagnose.effect import Effect
+from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
+from planner.diagnose.finding import Finding
+from planner.diagnose.fit import FINE, GLANCE, Fit
+from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
+from planner.diagnose.nonlinear import Candidate, descend
+from planner.diagnose.starts import starts
+from planner.diagnose.tone import screen_tone
+from planner.diagnose.visits import Recorded
+from planner.identify.solver import minimise
+from planner.physics.simulation import Simulation
+
+PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same
+ALSO = 2.5  # joints whose equivalent stiffness explains nearly as much are fitted too
+JOINTS = 2
+LOG_STEPS = 20
+STARTS = 2  # of each law at a joint, that are followed
+ROUNDS, MORE, LAST, AGAIN = 3, 6, 4, 2
+HOPELESS = 10.0  # times the best χ² after ROUNDS
+ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
+EXPLAINED = 0.9  # of the excess of χ² of the levels' differences, that a law has to take away
+WEAKEST = 1e-10  # damping in the last rounds
+TOLERANCE = 1e-5  # of the objective, that a last round must gain
+CLEAR = 8.0
+LINEARISED = 0.4  # of the same, by an equivalent stiffness for each hit: below, no joint it is
+# Relative sd of k and a: what derivatives by springs and inertias leave that neglect how a swing
+# fades, as found on concealed cases of seeds 1 to 6.
+INEXACT = 0.02, 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A law at a joint: its log evidence over a linear joint, and the share that it explains."""
+
+    candidate: Candidate
+    at: str
+    log_evidence: float
+    explained: float
+    per_value: float
+    parameters: dict[str, tuple[float, float, str]]
+
+
+def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
+    """Nonlinear joints; `unknown` where the level matters and no joint's law explains it."""
+    if len(recorded.level_n) < 2:
+        return ()
+    plain = base(recorded, nominal)
+    system = system_of(plain)
+    found = equivalent(recorded, system)
+    if not len(found.count) or disproportion(found) < PROPORTIONAL:
+        return ()
+    if equivalent_share(found) < LINEARISED:
+        tone = screen_tone(recorded)
+        if tone is not None:
+            return (tone,)
+        return (_unknown(found, "even with a stiffness of its own for every hit"),)
+    weighed = weigh(recorded, plain, system, found)
+    best = weighed[0]
+    if best.log_evidence > CLEAR and best.explained > EXPLAINED:
+        return (_finding(best),)
+    law = best.candidate.law.effect.replace("_", " ")
+    return (
+        _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),
+    )
+
+
+def base(recorded: Recorded, nominal: Simulation) -> Fit:
+    """The springs that fit best with the stated inertias, by logarithms.
+
+    A full fit would bend inertias until they imitate what is not linear, and does not come back.
+    """
+    problem = problem_of(recorded, nominal)
+    rough = problem.misfit(Effect(""), GLANCE)
+    found = minimise(rough, rough.mean, 1e-4, LOG_STEPS)
+    misfit = problem.misfit(Effect(""), FINE)
+    return Fit(Effect(""), misfit, found.x, misfit.by_pose(found.x))
+
+
+def _unknown(found: Equivalent, how: str) -> Finding:
+    text = (
+        "The response is not proportional to the force, and no single joint describes how: "
+        f"{how}. Look for contact with the surroundings, loose parts or clearance."
+    )
+    return Finding("unknown", None, _excess(found) / 2, {}, text)
+
+
+def equivalent_share(found: Equivalent) -> float:
+    """Share of the levels' differences that a stiffness of its own a hit explains, best joint."""
+    left = float(found.chi2.sum(axis=0).min() - found.count.sum())
+    return 1 - max(left, 0.0) / max(_excess(found), 1e-9)
+
+
+def disproportion(found: Equivalent) -> float:
+    """χ² per value of the differences between force levels, 1 if the structure is linear."""
+    return float(found.before.sum() / max(found.count.sum(), 1))
+
+
+def _excess(found: Equivalent) -> float:
+    return float(found.before.sum() - found.count.sum())
+
+
+def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> tuple[Weighed, ...]:
+    """Every law at the joints that come into question, fitted in time, most probable first."""
+    data = data_of(recorded, plain)
+    left = found.chi2.sum(axis=0)
+    order = np.argsort(left)[:JOINTS]
+    ports = [int(j) for j in order if left[j] < ALSO * left[order[0]]]
+    begin: list[Candidate] = []
+    for port in ports:
+        own = own_parameter(plain, int(system.blocks[port]))
+        begin += starts(found, system, port, plain.x, own)
+    begun = _best_of_each(descend(data, plain, begin, 0), STARTS)
+    rough = _best_of_each(descend(data, plain, begun, ROUNDS), 1)
+    best = min(c.chi2 for c in rough)
+    kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
+    first = min(kept, key=lambda c: c.value)
+    last = first
+    for _ in range(AGAIN):
+        whole = relinearised(data, plain, found, last.port, last.x)
+        again = [replace(last, normal=None, gradient=None, damping=1e-7)]
+        last = descend(whole, plain, again, LAST, TOLERANCE, WEAKEST)[0]
+    kept = [last if c is first else c for c in kept]
+    return _weighed(data, plain, system, kept)
+
+
+def _best_of_each(candidates: list[Candidate], most: int) -> list[Candidate]:
+    """The best of each port and law."""
+    out: list[Candidate] = []
+    for c in sorted(candidates, key=lambda c: c.value):
+        if sum((o.port, o.law.effect) == (c.port, c.law.effect) for o in out) < most:
+            out.append(c)
+    return out
+
+
+def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> tuple[Weighed, ...]:
+    count = 2 * int(np.count_nonzero(data.weight))
+    misfit = max(1.0, min(2 * c.chi2 for c in kept) / count)
+    temper = misfit * (1 + ALIKE * (1 - 1 / misfit))
+    linear = _linear(data, plain)
+    weaker = (data.best != np.arange(len(data.h)))[:, None, None]
+    values = np.count_nonzero(data.weight * weaker)
+    excess = max(linear[1] - values, 1e-9)
+    out = []
+    for c in kept:
+        evidence = (linear[0] - c.chi2) / temper - _volume(plain, c, temper)
+        explained = 1 - max(c.chi2 - linear[2] - values, 0.0) / excess
+        parameters = _parameters(plain, c, temper)
+        out.append(
+            Weighed(c, system.ports[c.port], evidence, explained, 2 * c.chi2 / count, parameters)
+        )
+    return tuple(sorted(out, key=lambda w: -w.log_evidence))
+
+
+def _linear(data: Data, plain: Fit) -> tuple[float, float, float]:
+    """Σ weight |error|² of the linear fit: in all, of the weaker columns, of the strongest.
+
+    A linear simulation says that levels do not differ; of the strongest only the noise is counted,
+    because a linear fit could still follow them.
+    """
+    weaker = (data.best != np.arange(len(data.h)))[:, None, None]
+    change = np.where(weaker, np.abs(data.h - data.h[data.best]) ** 2, 0.0)
+    levels = float(np.sum(data.weight * change))
+    strongest = float(np.count_nonzero(data.weight * ~weaker))
+    return levels + strongest, levels, strongest
+
+
+def _volume(plain: Fit, candidate: Candidate, temper: float) -> float:
+    """What ν costs: ln of how much narrower the data make it than the prior, and its distance."""
+    mean, sd = candidate.prior
+    spread = np.sqrt(np.diagonal(_covariance(candidate, temper))[-2:])
+    away = (candidate.nu - mean) / sd
+    return float(away @ away) / 2 + float(np.sum(np.log(sd / np.minimum(spread, sd))))
+
+
+def _covariance(candidate: Candidate, temper: float) -> np.ndarray:
+    """Of (x, ν)."""
+    assert candidate.normal is not None
+    return np.linalg.inv(2 * candidate.normal / temper)
+
+
+def _parameters(
+    plain: Fit, candidate: Candidate, temper: float
+) -> dict[str, tuple[float, float, str]]:
+    c = candidate
+    spread = _covariance(c, temper)[-2:, -2:]
+    share = c.nu[0] if c.law.signed else 1.0
+    to_k = np.array([c.k / share if c.law.signed else c.k, 0.0])
+    to_a = np.array([0.0, c.a])
+    second, value = (to_a, c.a)
+    if c.law.effect == "friction":
+        second, value = c.a * to_k + c.k * to_a, c.k * c.a
+    out = {}
+    numbers = zip(c.law.names, (c.k, value), (to_k, second), INEXACT, strict=True)
+    for (name, unit), v, slope, rough in numbers:
+        sd = float(np.hypot(np.sqrt(slope @ spread @ slope), rough * v))
+        out[name] = (float(v), sd, unit)
+    return out
+
+
+def _finding(best: Weighed) -> Finding:
+    (first, (k, k_sd, unit)), (second, (a, a_sd, other)) = best.parameters.items()
+    name = best.candidate.law.effect
+    how = {
+        "friction": "sticks and slides: presliding friction",
+        "backlash": "has play",
+        "nonlinear_stiffness": "grows stiffer as it swings"
+        if k > 0
+        else "grows softer as it swings",
+    }[name]
+    text = (
+        f"{best.at.replace('_', ' ').capitalize()} {how} "
+        f"({first.replace('_', ' ')} {k:.3g} ± {k_sd:.1g} {unit}, {second.replace('_', ' ')} "
+        f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
+        "change with the force."
+    )
+    return Finding(name, best.at, best.log_evidence, best.parameters, text)

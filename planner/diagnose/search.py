@@ -1,0 +1,97 @@
+"""The search for what explains FRFs: all candidates roughly, few of them closely."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnose.both import together
+from planner.diagnose.effect import Effect
+from planner.diagnose.fit import CLOSE, Fit, Problem, glance, promise, settle
+from planner.diagnose.weigh import temper_of
+from planner.identify.held_out import farthest_first
+
+REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
+FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
+STEPS, LAST_STEPS = 12, 30
+FEW = 5  # poses on which all are looked at where something is clearly wrong
+CLEARLY = 3.0  # misfit from which that is so
+ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
+HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
+LEADERS = 2  # whose company is looked for
+Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """All fits on the finest lines, "none" first, and how far behind the others were left."""
+
+    finalists: tuple[Fit, ...]
+    left: tuple[tuple[Effect, float, Fit], ...]  # log evidence behind the best when it was left
+
+
+def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
+    """Fit all effects beside `refitted`, the fit of none, and pairs where one is not enough."""
+    found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
+    best = min(f.per_value for f in found.finalists)
+    if best <= ENOUGH:
+        return found
+    ranked = [found.finalists[i] for i in np.argsort(_behind(found.finalists))]
+    leaders = [f for f in ranked if f.effect.at][:LEADERS]
+    for number, leader in enumerate(leaders):
+        pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
+
+        def along(text: str, share: float, number: int = number) -> None:
+            tell(text, 0.6 + 0.4 * (number + share) / len(leaders))
+
+        more = _round(problem, leader, pairs, along)
+        kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
+        found = Found((*found.finalists, *kept), (*found.left, *more.left))
+    return found
+
+
+def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
+    """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
+    none = settle(problem, warm, CLOSE, STEPS)
+    clearly = none.per_value > CLEARLY
+    few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
+    fits = []
+    for number, effect in enumerate(effects):
+        tell(_words(effect), 0.6 * number / max(len(effects), 1))
+        fits.append((glance if clearly else promise)(few, effect, none))
+    if clearly:
+        order = np.argsort([f.misfit(f.x).value for f in fits])
+        close = [settle(problem, fits[i], CLOSE, STEPS) for i in order[:FIRST]]
+        worst = max(_behind([none, *close]))
+        left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
+    else:
+        kept, left = _cut([none, *fits], FIRST)
+        if min(_behind([none, *fits])[1:]) - _behind([none, *fits])[0] > -HOPELESS:
+            kept, more = _cut([none, *fits], 1)
+            return Found((settle(problem, none),), tuple(more))
+        close = [settle(problem, f, CLOSE, STEPS) for f in kept[1:]]
+    tell("following the best", 0.8)
+    kept, more = _cut([none, *close], LAST)
+    tell("settling", 0.9)
+    ends = tuple(settle(problem, f, steps=LAST_STEPS) for f in kept)
+    return Found(ends, (*left, *more))
+
+
+def _words(effect: Effect) -> str:
+    return " and ".join(f"{p.name.replace('_', ' ')} at {p.at}" for p in effect.parts())
+
+
+def _behind(fits: Sequence[Fit]) -> np.ndarray:
+    """By how much the tempered log evidence of fits on the same lines is behind the best's."""
+    t = temper_of(fits)
+    evidence = np.array([f.log_evidence(t) for f in fits])
+    return evidence.max() - evidence
+
+
+def _cut(fits: Sequence[Fit], most: int) -> tuple[list[Fit], list[tuple[Effect, float, Fit]]]:
+    """The first, and up to `most` in all; those that are left, by how far they are behind."""
+    behind = _behind(fits)
+    order = [0, *(int(i) for i in np.argsort(behind) if i)]
+    kept = {i for place, i in enumerate(order) if i == 0 or (place < most and behind[i] < REACH)}
+    left = [(fits[i].effect, float(behind[i]), fits[i]) for i in order if i not in kept]
+    return [fits[i] for i in order if i in kept], left

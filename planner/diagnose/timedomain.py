@@ -1,0 +1,191 @@
+"""Hits on a simulation with one nonlinear joint, integrated in time, many at once.
+
+The linear part is propagated exactly pole by pole, for torques that are linear between steps; each
+step solves for the joint's angle by Newton's method. The response follows from the spectrum of the
+torque, so that only the joint itself is integrated.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import signal
+
+from planner.diagnose.columns import Column, pulse
+from planner.diagnose.equivalent import System
+from planner.diagnose.laws import Law
+
+FINER = 5  # steps a sample
+LASTS_S = 1.3  # after the pulse; the window makes the rest of no account
+FASTEST = 3.0  # times the band's end: poles beyond follow at once
+NEWTON = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Strokes:
+    """Forces (c, n) in N of c hits on a fine grid; time 0 of each is `zero_s` (c,) after step 0."""
+
+    step_s: float
+    force: np.ndarray
+    zero_s: np.ndarray
+    visit: np.ndarray
+    axis: np.ndarray
+
+
+def strokes(visits: Sequence[int], columns: Sequence[Column]) -> Strokes:
+    """One hit of each column; `visits` (c,) says where."""
+    rate = columns[0].hits[0].sampling_rate_hz
+    count = int(LASTS_S * rate) * FINER
+    force, zero = np.zeros((len(columns), count)), np.zeros(len(columns))
+    for row, column in enumerate(columns):
+        hit = column.hits[0]
+        at = pulse(hit)
+        part = hit.sign * (hit.force_n[at.first : at.last] - np.median(hit.force_n))
+        fine = np.asarray(signal.resample(part, FINER * len(part)))
+        force[row, : min(len(fine), count)] = fine[:count]
+        zero[row] = (at.peak - at.first) / rate
+    axes = np.array([column.axis for column in columns])
+    return Strokes(1 / (rate * FINER), force, zero, np.asarray(visits), axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a port sees of a system: own response pole by pole, and its angles without a torque.
+
+    grow, drive (p, c): z ← grow z + drive τ gives what earlier torques leave; `gives` (c,) is the
+    angle that a torque gives within its own step; `free` (n, c) in rad.
+    """
+
+    grow: np.ndarray
+    drive: np.ndarray
+    gives: np.ndarray
+    free: np.ndarray
+
+
+def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
+    """Of every hit, at the port with this number."""
+    n = len(system.mass)
+    e = len(system.elasticity.stiffness)
+    block = int(system.blocks[port])
+    most = e
+    poles = np.full((n, most), -1.0 + 0j)
+    own, struck = np.zeros((n, most), dtype=complex), np.zeros((n, most, 3), dtype=complex)
+    static, static_hit = np.zeros(n), np.zeros((n, 3))
+    for i in range(n):
+        lam, shapes, entry = _poles(system, i)
+        at = shapes[block]
+        mine, hit = at * entry[:, block], at[:, None] * (entry @ system.hit[i].T)
+        slow = np.abs(lam) < 2 * np.pi * fastest_hz
+        static[i] = float(np.sum((-mine / lam)[~slow]).real)
+        static_hit[i] = np.sum((-hit / lam[:, None])[~slow], axis=0).real
+        count = min(int(slow.sum()), most)
+        order = np.argsort(np.abs(lam[slow]))[:count]
+        poles[i, :count] = lam[slow][order]
+        own[i, :count], struck[i, :count] = mine[slow][order], hit[slow][order]
+    used = np.any(own != 0, axis=0)
+    poles, own, struck = poles[:, used], own[:, used], struck[:, used]
+    grow, older, newer = _weights(poles, hits.step_s)
+    free = np.empty((hits.force.shape[1], len(hits.visit)))
+    for i in range(n):
+        here = np.flatnonzero(hits.visit == i)
+        weight = struck[i][:, hits.axis[here]]  # (p, c)
+        free[:, here] = _free(hits, here, poles[i], weight, (grow[i], older[i], newer[i]))
+        free[:, here] += static_hit[i, hits.axis[here]] * hits.force[here].T
+    v = hits.visit
+    drive = own * (newer + older / grow)
+    gives = np.sum(own * newer, axis=1).real + static
+    return Seen(grow[v].T.copy(), drive[v].T.copy(), gives[v], free)
+
+
+def _free(
+    hits: Strokes,
+    here: np.ndarray,
+    poles: np.ndarray,
+    weight: np.ndarray,
+    rule: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Angles (n, c) of hits `here` on poles (p,), with weights (p, c): driven, then free."""
+    force = hits.force[here]
+    n = force.shape[1]
+    last = 1 + int(np.max(np.flatnonzero(np.any(force != 0, axis=0)), initial=1))
+    out, left = np.zeros((n, len(here))), np.zeros((len(poles), len(here)), dtype=complex)
+    for k, (grow, older, newer) in enumerate(zip(*rule, strict=True)):
+        driven = force[:, :last].astype(complex)
+        y = np.asarray(signal.lfilter([newer, older], [1.0, -grow], driven, axis=1))
+        out[:last] += (y.T * weight[k]).real
+        left[k] = y[:, -1] * weight[k]
+    decay = np.exp(np.outer(np.arange(1, n - last + 1) * hits.step_s, poles))
+    out[last:] = decay.real @ left.real - decay.imag @ left.imag
+    return out
+
+
+def _poles(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Poles (p,), shapes (e, p), entries (p, e); conjugates are in the shapes' factor 2."""
+    springs = system.elasticity
+    e = len(springs.stiffness)
+    inverse = np.linalg.inv(system.mass[visit])
+    stiffness = np.diag(springs.stiffness) + system.geometric[visit]
+    state = np.zeros((2 * e, 2 * e))
+    state[:e, e:] = np.eye(e)
+    state[e:, :e] = -inverse @ stiffness
+    state[e:, e:] = -inverse * springs.damping
+    poles, vectors = np.linalg.eig(state)
+    entry = np.linalg.inv(vectors)[:, e:] @ inverse
+    one = poles.imag >= 0
+    twice = np.where(poles.imag[one] > 0, 2.0, 1.0)
+    return poles[one], vectors[:e, one] * twice, entry[one]
+
+
+def _weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """y(t+h) = grow y(t) + older f(t) + newer f(t+h) for y' = λy + f, f linear between."""
+    z = pole * step_s
+    grow = np.exp(z)
+    newer = (grow - 1 - z) / (z * pole)
+    return grow, (grow - 1) / pole - newer, newer
+
+
+def torques(
+    laws: Sequence[tuple[Law, slice]],
+    k: np.ndarray,
+    a: np.ndarray,
+    extra: np.ndarray,
+    port: Seen,
+) -> np.ndarray:
+    """Torque (n, c) of every hit: its law's, and `extra` (c,) times the angle.
+
+    `laws` says which columns follow which law; k, a (c,) are its numbers.
+    """
+    n, c = port.free.shape
+    out = np.zeros((n, c))
+    least = np.where(np.abs(port.gives) > 0, port.gives, 1e-30)
+    z = np.zeros(port.grow.shape, dtype=complex)
+    before, state = np.zeros(c), np.zeros(c)
+    value, slope, after = np.zeros(c), np.zeros(c), np.zeros(c)
+    rise = np.zeros(c)
+    for i in range(n):
+        z *= port.grow
+        free = port.free[i] - z.real.sum(axis=0)
+        now = before + rise
+        for _ in range(NEWTON):
+            for law, part in laws:
+                value[part], slope[part], after[part] = law.step(
+                    k[part], a[part], state[part], before[part], now[part]
+                )
+            error = now + port.gives * (value + extra * now) - free
+            now = now - error / np.maximum(1 + port.gives * (slope + extra), 0.2)
+        torque = (free - now) / least
+        z += port.drive * torque
+        out[i] = torque
+        rise, before, state = now - before, now, after.copy()
+    return out
+
+
+def spectra(torque: np.ndarray, hits: Strokes, s: np.ndarray) -> np.ndarray:
+    """∫ τ e^(−st) dt (c, F) of torques (n, c) that are linear between steps; s (F,)."""
+    n = len(torque)
+    t = np.arange(n) * hits.step_s
+    kernel = np.exp(-np.outer(s, t))
+    half = s * hits.step_s / 2
+    linear = (np.sinh(half) / half) ** 2 * hits.step_s
+    both = kernel.real @ torque + 1j * (kernel.imag @ torque)
+    return both.T * linear * np.exp(np.outer(hits.zero_s, s))

@@ -1,0 +1,55 @@
+"""A tone that sounds without any hit: a pump, a fan, the mains. No physics of the robot."""
+
+import numpy as np
+
+from planner.diagnose.columns import Column
+from planner.diagnose.finding import Finding
+from planner.diagnose.visits import Recorded
+
+WIDTH_HZ = 1.0  # half of what a tone takes up under the window
+CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together
+LEAST = 1.5  # χ² per value: below it levels do not differ
+
+
+def screen_tone(recorded: Recorded) -> Finding | None:
+    """`unknown`, naming the frequency, where levels differ at one frequency, whatever the pose.
+
+    A tone adds the same to weak and strong hits, so that their FRFs differ there. Resonances,
+    where a nonlinear joint shows, move with the pose.
+    """
+    pairs = [pair for columns in recorded.columns for pair in _pairs(columns)]
+    if not pairs:
+        return None
+    frequency = pairs[0][0].frequency_hz
+    excess, noise = np.zeros(len(frequency)), np.zeros(len(frequency))
+    for weak, strong in pairs:
+        variance = weak.variance + strong.variance
+        used = np.all(np.isfinite(variance), axis=0)
+        square = np.abs(weak.accelerance - strong.accelerance) ** 2 * np.abs(weak.force) ** 2
+        scale = np.where(used, variance * np.abs(weak.force) ** 2, 1.0).mean()
+        excess += np.where(used, square.sum(axis=0) / scale, 0.0)
+        noise += np.where(used, (variance * np.abs(weak.force) ** 2).sum(axis=0) / scale, 0.0)
+    over = np.maximum(excess - noise, 0.0)
+    line = int(np.argmax(over))
+    near = np.abs(frequency - frequency[line]) <= WIDTH_HZ
+    share = float(over[near].sum() / max(over.sum(), 1e-300))
+    if excess.sum() < LEAST * noise.sum() or share < CONCENTRATED:
+        return None
+    hz = float(np.sum(frequency[near] * over[near]) / over[near].sum())
+    spacing = float(frequency[1] - frequency[0])
+    text = (
+        f"Something sounds at {hz:.1f} Hz however hard the robot is hit: look for a pump, a fan or "
+        "a drive that runs during the test."
+    )
+    evidence = float(over[near].sum() / 2)
+    return Finding("unknown", None, evidence, {"frequency": (hz, spacing / 2, "Hz")}, text)
+
+
+def _pairs(columns: tuple[Column, ...]) -> list[tuple[Column, Column]]:
+    """Weakest and strongest column of each hit axis."""
+    out = []
+    for axis in range(3):
+        group = [c for c in columns if c.axis == axis]
+        if len(group) > 1:
+            out.append((group[0], group[-1]))
+    return out

@@ -1,0 +1,100 @@
+"""Integrated variance beside emukit's on the same posterior, and at full size.
+
+`PEERS_PYTHON=… pytest -m slow -s tests/benchmarks/test_acquisition_speed.py` prints the times.
+"""
+
+import importlib.util
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.acquire.outputs import FrequencyOutputs, Poses, Target
+from planner.acquire.reduction import reduction
+from planner.fusion.gp import Posterior, Prior
+from planner.fusion.kernels import matern52
+
+PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
+HAS_PEERS = "PEERS_PYTHON" in os.environ or importlib.util.find_spec("emukit") is not None
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
+D, N, NOISE = 4, 15, 1e-4
+JITTER = 1e-8  # that GPy adds to the diagonal of the training covariance
+LENGTHS = np.array([0.5, 0.8, 1.1, 0.6])
+
+
+def posterior(outputs: int) -> Posterior:
+    """A GP with a Matérn kernel and no linear terms, one hyperparameter sample, N points."""
+    rng = np.random.default_rng(0)
+    x = rng.random((N, D))
+    lengths = LENGTHS * np.linspace(1, 1.5, outputs)[:, None]
+    k = np.stack([matern52(np, x / one, x / one) for one in lengths]) + (NOISE + JITTER) * np.eye(N)
+    whiten = np.linalg.inv(np.linalg.cholesky(k))
+    theta = np.column_stack([np.zeros(outputs), np.full(outputs, -50.0), np.log(lengths)])
+    none = np.zeros(outputs)
+    prior = Prior(none, none, none, theta, theta)
+    return Posterior(
+        x, np.zeros((outputs, N)), np.ones((outputs, N)), theta[:, None], whiten[:, None],
+        np.zeros((outputs, 1, N)), prior, "matern52", none,
+    )  # fmt: skip
+
+
+def problem(outputs: int, points: int, candidates: int):
+    rng = np.random.default_rng(1)
+    at, x = rng.random((points, D)), rng.random((candidates, D))
+    target = Target.evenly(Poses.plain(at, np.zeros((points, outputs))))
+    seen = FrequencyOutputs(
+        posterior(outputs), target, target, np.full(outputs, NOISE), target.poses[:0],
+        np.ones(outputs), np.zeros((0, 0)),
+    )  # fmt: skip
+    return seen, Poses.plain(x, np.zeros((candidates, outputs)))
+
+
+def timed(call):
+    call()
+    start, own = time.perf_counter(), time.process_time()
+    value = call()
+    return value, time.perf_counter() - start, time.process_time() - own
+
+
+@pytest.mark.skipif(not HAS_PEERS, reason="pip install 'planner[peers]', or set PEERS_PYTHON")
+def test_beside_emukit(tmp_path: Path):
+    seen, poses = problem(1, 1000, 10_000)
+    post = seen.posterior
+    y = np.random.default_rng(2).standard_normal(N)
+    np.savez(
+        tmp_path / "job.npz", x=post.x, y=y, variance=1.0, lengths=LENGTHS, noise=NOISE,
+        candidates=poses.x, points=seen.workspace.poses.x,
+    )  # fmt: skip
+    script = Path(__file__).with_name("acquisition_peers.py")
+    environment = {**os.environ, "PYTHONPATH": "", "OMP_NUM_THREADS": "1"}
+    subprocess.run(
+        [PYTHON, script, tmp_path / "job.npz", tmp_path / "answer.npz"],
+        check=True, env=environment, capture_output=True,
+    )  # fmt: skip
+    answer = np.load(tmp_path / "answer.npz")
+    score, wall, own = timed(lambda: reduction(seen, poses, seen.workspace))
+    theirs, theirs_own = float(answer["seconds"]), float(answer["processor"])
+    worst = np.max(np.abs(score / answer["scores"] - 1))
+    print(
+        f"\n10^4 candidates × 10^3 points × 1 output: ours {wall:.3f} s (processor {own:.3f}), "
+        f"emukit {theirs:.1f} s ({theirs_own:.1f}): {theirs / wall:.0f} × faster, "
+        f"{theirs_own / own:.0f} × less processor time; scores differ by {worst:.1e} at most"
+    )
+    assert worst < 1e-6
+    assert theirs_own >= 100 * own
+
+
+def test_full_size():
+    seen, poses = problem(8, 2000, 100_000)
+    score, wall, own = timed(lambda: reduction(seen, poses, seen.workspace))
+    cores = min(os.cpu_count() or 1, 2)
+    print(
+        f"\n10^5 × 2·10^3 × 8 outputs: {wall:.2f} s, processor {own:.2f} s, "
+        f"{own / cores:.2f} s on {cores} cores of their own"
+    )
+    assert np.isfinite(score).all()
+    assert own / cores <= 3.0

@@ -1,0 +1,188 @@
+"""`planner compare` from outside, and its runs from inside: small pools, few measurements."""
+
+import json
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from outside import PLANNER, planner
+from planner.campaign.model import build, propose
+from planner.campaign.state import CampaignState
+from planner.cli.run import run as call
+from planner.compare.bench import assemble, cell_of, decide
+from planner.compare.conduct import recorded
+from planner.compare.run import run
+from planner.compare.study import Task
+from planner.robot.robot import Robot
+from pools import make_pool
+
+POSES, STRATEGIES = 12, "maximin_lhs,random,default"
+SMALL = ("--repeats", "2", "--initial", "2", "--budget", "4", "--simulation", "frozen")
+
+
+@pytest.fixture(scope="module")
+def pool(tmp_path_factory):
+    return make_pool(tmp_path_factory.mktemp("pool"), POSES, seed=4)
+
+
+@pytest.fixture(scope="module")
+def bench(pool, tmp_path_factory):
+    recordings, robot_toml, campaign = pool
+    robot = Robot.load(robot_toml)
+    config = decide(robot, [], campaign, "frozen")
+    folder = tmp_path_factory.mktemp("kept")
+    poses = recorded(recordings, robot.joint_names, config.modes, folder, 1, lambda *_: None)
+    return assemble(robot, config, poses)[0]
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    return tmp_path_factory.mktemp("study")
+
+
+def command(pool, out: Path, *more: str) -> list[str]:
+    recordings, robot, campaign = pool
+    named = ["--robot", str(robot), "--campaign", str(campaign), "--strategies", STRATEGIES]
+    return ["compare", str(recordings), *named, *SMALL, "--out", str(out), *more]
+
+
+@pytest.fixture(scope="module")
+def first(pool, out):
+    rrd = out / "curves.rrd"
+    return json.loads(planner(*command(pool, out, "--rrd", str(rrd), "--json")).stdout)
+
+
+def test_the_answer_has_what_the_contract_names(first):
+    assert set(first["strategies"]) == {"maximin_lhs", "random", "default"}
+    for curve in first["strategies"].values():
+        assert curve["n"] == [2, 3, 4]
+        for key in ("frequency_rmse_percent", "r2", "coverage95"):
+            assert len(curve[key]) == 3
+            assert np.all(np.isfinite(curve[key]))
+        assert curve["wall_seconds"] > 0
+    assert set(first["measurements_to_one_percent"]) == set(first["strategies"])
+    assert first["simulated"]
+    assert first["pool"] == POSES
+    assert first["acquisitions"]["default"] == "variance"
+
+
+def test_strategies_begin_alike_and_are_compared_in_pairs(first):
+    started = [c["frequency_rmse_percent"][0] for c in first["strategies"].values()]
+    assert len(set(started)) == 1
+    assert first["paired"]["baseline"] == "maximin_lhs"
+    for found in first["paired"]["against"].values():
+        assert found["seeds"] == 2
+        assert found["difference_percent"][0] == 0
+        low, high = found["difference_percent_interval95"][-1]
+        assert low <= found["difference_percent"][-1] <= high
+
+
+def test_picture_table_and_rerun_recording_are_written(first, out):
+    for file in (*first["plots"], first["rrd"]):
+        assert Path(file).is_absolute()
+        assert Path(file).stat().st_size > 10_000
+    assert json.loads((out / "comparison.json").read_text())["strategies"] == first["strategies"]
+
+
+def test_what_is_done_is_not_done_again(pool, out, first):
+    kept = {path: path.stat().st_mtime_ns for path in out.glob("[pr]*s/*")}
+    assert len(kept) == POSES + 6
+    runs = sorted((out / "runs").iterdir())
+    runs[0].unlink()
+    again = json.loads(planner(*command(pool, out, "--json")).stdout)
+    for name, curve in first["strategies"].items():
+        for key in ("n", "frequency_rmse_percent", "r2", "coverage95"):
+            assert again["strategies"][name][key] == curve[key]
+    after = {path: path.stat().st_mtime_ns for path in kept}
+    assert [path for path in kept if after[path] != kept[path]] == [runs[0]]
+
+
+def test_more_repeats_take_up_those_that_are_there(pool, out, first):
+    text = planner(*command(pool, out, "--repeats", "3")).stdout
+    assert "SIMULATED" in text
+    assert "to 1 %" in text
+    assert len(list((out / "runs").iterdir())) == 9
+
+
+def test_ctrl_c_keeps_what_is_finished(pool, tmp_path):
+    long = command(pool, tmp_path, "--repeats", "500")
+    process = subprocess.Popen(
+        [*PLANNER, *long], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    until = time.monotonic() + 200
+    while len(list((tmp_path / "runs").glob("*.json"))) < 2 and time.monotonic() < until:
+        time.sleep(0.1)
+    os.kill(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.count("\n") == 1
+    assert "kept" in said
+    done = list((tmp_path / "runs").glob("*.json"))
+    assert 2 <= len(done) < 500
+    assert all(json.loads(path.read_bytes())["n"] == [2, 3, 4] for path in done)
+    assert not list((tmp_path / "runs").glob(".*"))
+
+
+def test_a_run_is_the_campaign_s(bench):
+    found = run(bench, Task("variance", 1, 2, 4))
+    assert len(set(found.poses)) == 4
+    by_name = {m.pose: m for m in bench.measurements}
+    frfs = {m.pose: f for m, f in zip(bench.measurements, bench.frfs, strict=True)}
+    for n in (2, 3):
+        state = CampaignState(measurements={p: by_name[p] for p in found.poses[:n]}, events=1)
+        model = build(cell_of(bench), state, lambda m, _: frfs[m.pose])
+        (proposal,) = propose(model, state, 1, "variance")
+        chosen = by_name[found.poses[n]].joints_deg
+        assert np.allclose(proposal.joints_deg, chosen, atol=1e-3)
+        unused = [i for i, m in enumerate(bench.measurements) if m.pose not in found.poses[:n]]
+        predicted = model.predict(bench.q[unused]).frequency_hz
+        error = predicted / bench.frequency_hz[unused] - 1
+        rmse = 100 * np.sqrt(np.nanmean(error**2))
+        assert found.frequency_rmse_percent[n - 2] == pytest.approx(rmse, rel=1e-9)
+
+
+def test_the_pool_is_judged_by_its_own_modes(bench, pool):
+    from planner.truth.deviation import Deviation
+    from planner.truth.model import load_truth
+
+    truth = load_truth(pool[1], Deviation(4, 0.15, 0.1, 0.04, 0.003))
+    right = np.array([truth.modes(q, 3)[0] for q in bench.q])
+    known = np.isfinite(bench.frequency_hz)
+    assert known.mean() > 0.9
+    assert np.max(np.abs(bench.frequency_hz / right - 1)[known]) < 0.005
+
+
+def test_other_versions_of_the_program_are_refused(bench):
+    from dataclasses import replace
+
+    from planner.errors import InputError
+
+    with pytest.raises(InputError, match="another version"):
+        run(replace(bench, program="older"), Task("random", 0, 2, 4))
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (("--strategies", "astrology"), "astrology"),
+        (("--strategies", ","), "--strategies names none"),
+        (("--budget", "11"), "--budget 11"),
+        (("--initial", "9"), "--initial 9"),
+        (("--simulation", "frosted"), "frosted"),
+        (("--repeats", "9", "--scheduler", "tcp://127.0.0.1:9"), "No Dask scheduler"),
+        (("--campaign", "nowhere.toml"), "nowhere.toml"),
+        (("--robot", "nowhere.toml"), "nowhere.toml"),
+        (("--repeats", "0"), "repeats"),
+    ],
+)
+def test_bad_input_is_one_sentence(pool, out, first, more, said, capsys):
+    assert call([*command(pool, out), *more, "--json"]) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1
+    assert said in shown.err

@@ -1,0 +1,44 @@
+"""Work on processes: all of it is done once, whatever dies."""
+
+import os
+
+import items
+from planner.compare.local import Failure, each
+
+
+def test_every_item_is_done_by_other_processes():
+    found = dict(each(items.doubled, 10, [3, 4, 5]))
+    assert found == {0: 30, 1: 40, 2: 50}
+    processes = set(dict(each(items.process_of, None, [0, 1, 2, 3])).values())
+    assert os.getpid() not in processes
+    assert len(processes) <= 2
+
+
+def test_a_death_costs_one_item_which_is_done_again(tmp_path):
+    found = dict(each(items.dying_once, str(tmp_path), [0, 1, 2, 3]))
+    assert found == {0: 0, 1: 1, 2: 2, 3: 3}
+    assert (tmp_path / "killed").exists()
+
+
+def test_what_kills_every_process_is_given_up_and_the_rest_done():
+    found = dict(each(items.deadly, None, [0, 1, 2]))
+    assert found[0] == 0
+    assert found[2] == 2
+    assert isinstance(found[1], Failure)
+    assert "died" in found[1].reason
+
+
+def test_a_fault_of_one_item_is_said_and_the_rest_done():
+    found = dict(each(items.failing, None, [0, 1, 2], workers=1))
+    assert found[0] == 0
+    assert found[2] == 2
+    assert "too odd" in found[1].reason
+
+
+def test_stopping_early_leaves_no_process():
+    import multiprocessing
+
+    work = each(items.doubled, 1, list(range(50)))
+    next(work)
+    work.close()
+    assert multiprocessing.active_children() == []

@@ -1,0 +1,36 @@
+"""The public command on a case from the other engine: pytest -m slow tests/diagnose -s"""
+
+import json
+
+import numpy as np
+import pytest
+
+from planner.cli.run import run
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from planner.truth.cases import make_case
+
+pytestmark = pytest.mark.slow
+
+
+def test_found_effect_is_written_read_back_and_predicts(tmp_path, capsys):
+    case = make_case("added_mass", "kr210", 5, tmp_path / "case")
+    command = ["diagnose", str(case.recordings), "--robot", str(case.robot_toml), "--json"]
+    command += ["--predict", str(case.recordings / "predict.csv"), "--out", str(tmp_path / "out")]
+    assert run(command) in (0, 3)
+    answer = json.loads(capsys.readouterr().out)
+    true = json.loads(case.answer)["effects"][0]
+    assert answer["verdict"] == "explained"
+    assert (answer["findings"][0]["effect"], answer["findings"][0]["at"]) == (
+        true["effect"],
+        true["at"],
+    )
+    assert sum(c["probability"] for c in answer["candidates"]) == pytest.approx(1.0)
+    assert answer["held_out"]["explained"]["frac"] > answer["held_out"]["refitted"]["frac"]
+    robot = Robot.load(tmp_path / "out" / "robot.toml")
+    assert robot.config.effects[0].effect == "added_mass"
+    with np.load(answer["npz"]) as file:
+        q = np.deg2rad(file["joints_deg"])
+        h = Simulation(robot).accelerance(q, file["frequency_hz"])
+        assert np.linalg.norm(h - file["frf_mean"]) < 0.01 * np.linalg.norm(h)
+    assert all((tmp_path / "out" / name).is_file() for name in ("residuals.png", "robot.urdf"))

@@ -1,0 +1,113 @@
+"""Nonlinear joints: laws against their theory, and hits in time against the frequency domain."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from known_robots import KR210
+from planner.diagnose.columns import column
+from planner.diagnose.equivalent import System, receptances
+from planner.diagnose.laws import LAWS
+from planner.diagnose.timedomain import seen, spectra, strokes, torques
+from planner.physics.simulation import Elasticity, Simulation
+from planner.recording.types import Hit
+from planner.robot.robot import Robot
+
+STIFFENING, DAHL, DEAD_ZONE = LAWS
+AMPLITUDES = np.array([1e-3, 0.1, 0.5, 2.0, 20.0])
+
+
+def test_dead_zone_has_its_describing_function():
+    found = DEAD_ZONE.slow(AMPLITUDES, 0.3)
+    ratio = np.minimum(0.3 / AMPLITUDES, 1.0)
+    expected = -2 / np.pi * (np.arcsin(ratio) + ratio * np.sqrt(1 - ratio**2))
+    assert np.allclose(found, expected, atol=3e-3)
+
+
+def test_friction_sticks_when_small_and_slides_when_large():
+    found = DAHL.slow(AMPLITUDES, 0.3)
+    assert found[0] == pytest.approx(1.0, abs=2e-2)
+    assert found[-1].imag == pytest.approx(4 * 0.3 / (np.pi * AMPLITUDES[-1]), rel=2e-2)
+    assert np.all(np.diff(found.real) < 0)
+    assert np.all(found.imag > 0)
+
+
+def test_stiffening_goes_from_nothing_to_all():
+    found = STIFFENING.slow(AMPLITUDES, 0.3)
+    assert np.allclose(found.imag, 0, atol=1e-12)
+    assert np.all(np.diff(found.real) > 0)
+    assert abs(found[0]) < 1e-4
+    assert found[-1].real == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.effect)
+def test_slope_of_the_torque(law):
+    now = np.linspace(-0.9, 0.9, 14)
+    k, a, state, before = np.full(14, 2.0), np.full(14, 0.25), np.full(14, 0.05), np.zeros(14)
+    slope = law.step(k, a, state, before, now)[1]
+    up = law.step(k, a, state, before, now + 1e-6)[0]
+    down = law.step(k, a, state, before, now - 1e-6)[0]
+    assert np.allclose(slope, (up - down) / 2e-6, atol=1e-6)
+
+
+def test_friction_never_gives_energy():
+    rng = np.random.default_rng(0)
+    angle = np.cumsum(0.1 * rng.standard_normal((400, 20)), axis=0)
+    angle = np.concatenate([angle, angle[::-1]])
+    state, work, before = np.zeros(20), np.zeros(20), angle[0]
+    for now in angle:
+        torque, _, after = DAHL.step(np.ones(20), np.full(20, 0.2), state, before, now)
+        work += (torque + state) / 2 * (now - before)
+        state, before = after, now
+    assert np.all(work > 0)
+
+
+@pytest.fixture(scope="module")
+def struck(tmp_path_factory):
+    """A system, and one hit along each axis at two poses."""
+    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
+    q = KR210.poses(2, 8)
+    m, springs = simulation.elastic.matrices(q), simulation.elasticity
+    ports = tuple(f"joint_{i}" for i in range(1, 7))
+    system = System(m.mass, m.geometric, m.hit, m.sensor, springs, ports, np.arange(6))
+    t = np.arange(1024) / 400.0
+    rng = np.random.default_rng(1)
+    columns = []
+    for axis in range(3):
+        force = 900 * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
+        force = force + 0.1 * rng.standard_normal(1024)
+        hit = Hit(Path("hit"), "+" + "xyz"[axis], 400.0, force, rng.standard_normal((3, 1024)))
+        columns.append(column((hit,), axis, 0, 1024, (5.0, 50.0), 4.0, 0.0))
+    return system, strokes([0, 0, 0, 1, 1, 1], columns * 2), 2j * np.pi * np.linspace(6, 45, 9) + 4
+
+
+def test_a_linear_torque_in_time_is_a_stiffer_spring_in_frequency(struck):
+    system, hits, s = struck
+    port, more = 2, 0.4 * system.elasticity.stiffness[2]
+    view = seen(system, port, hits, 500.0)
+    none = np.zeros(6)
+    torque = torques([(STIFFENING, slice(0, 6))], none, none + 1, none + more, view)
+    k = system.elasticity.stiffness.copy()
+    k[port] += more
+    springs = Elasticity(k, system.elasticity.damping, system.elasticity.loss_factor)
+    stiffer = System(system.mass, system.geometric, system.hit, system.sensor, springs,
+                     system.ports, system.blocks)  # fmt: skip
+    ratio = spectra(torque, hits, s) / spectra(hits.force.T, hits, s)
+    for c in range(6):
+        expected = (
+            more * receptances(stiffer, int(hits.visit[c]), s).port_hit[:, port, hits.axis[c]]
+        )
+        assert np.allclose(ratio[c], expected, atol=0.02 * np.abs(expected).max())
+
+
+def test_weak_hits_on_a_stiffening_joint_are_linear_ones(struck):
+    system, hits, _ = struck
+    view = seen(system, 2, hits, 500.0)
+    k = np.full(6, 0.5 * system.elasticity.stiffness[2])
+    law = [(STIFFENING, slice(0, 6))]
+    weak = torques(law, k, np.full(6, 1.0), np.zeros(6), view)
+    strong = torques(law, k, np.full(6, 1e-9), np.zeros(6), view)
+    plainly = torques(law, 0 * k, np.full(6, 1.0), k, view)
+    assert np.abs(weak).max() < 1e-4 * np.abs(plainly).max()
+    assert np.allclose(strong, plainly, atol=1e-3 * np.abs(plainly).max())

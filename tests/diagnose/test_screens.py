@@ -1,0 +1,186 @@
+"""Screens on hits whose cause is known because the planner's own simulation made them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from known_robots import KR210
+from planner.diagnose import artefacts, drift, levels, screens
+from planner.diagnose.chain import SensorChain
+from planner.diagnose.effect import Effect
+from planner.diagnose.equivalent import equivalent, system_of
+from planner.diagnose.finding import Finding
+from planner.diagnose.fit import Grade, fit
+from planner.diagnose.locate import locate
+from planner.diagnose.visits import Recorded
+from planner.diagnose.window import screen_window
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from synthetic_hits import RATE_HZ, recorded
+
+POSES = 5
+
+
+@pytest.fixture(scope="module")
+def simulation(tmp_path_factory):
+    return Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
+
+
+@pytest.fixture(scope="module")
+def plain(simulation):
+    return recorded(simulation, KR210.poses(POSES, 3))
+
+
+def disturbed(plain: Recorded, change) -> Recorded:
+    visits = [replace(v, hits=tuple(replace(h, **change(h)) for h in v.hits)) for v in plain.visits]
+    return Recorded(tuple(visits), plain.band_hz)
+
+
+def mixed(matrix: np.ndarray):
+    return lambda hit: {"acceleration_m_s2": matrix @ hit.acceleration_m_s2}
+
+
+def windowed(hit, rate=2.0):
+    fade = np.exp(-rate * np.maximum(np.arange(len(hit.force_n)) / RATE_HZ - 0.06, 0))
+    return {"force_n": fade * hit.force_n, "acceleration_m_s2": fade * hit.acceleration_m_s2}
+
+
+def test_recordings_in_order_give_no_finding(plain, simulation):
+    assert screens.screen(plain, simulation).findings == ()
+
+
+TURNED = artefacts.Rotation.from_rotvec([0.1, -0.3, 0.2]).as_matrix()
+CHANNELS = {
+    "sensor_rotation sensor": TURNED,
+    "sensor_gain sensor_y": np.diag([1.0, 0.7, 1.0]),
+    "polarity sensor_x": np.diag([-1.0, 1.0, 1.0]),
+    "swapped_axes sensor_yz": np.eye(3)[[0, 2, 1]],
+}
+
+
+@pytest.mark.parametrize("wanted", CHANNELS)
+def test_a_chain_out_of_order_is_named_and_put_right(plain, simulation, wanted):
+    wrong = disturbed(plain, mixed(CHANNELS[wanted]))
+    (found,) = artefacts.screen(wrong, simulation)
+    assert f"{found.effect} {found.at}" == wanted
+    right = artefacts.correct(wrong, [found])
+    for was, now in zip(plain.visits, right.visits, strict=True):
+        a, b = was.hits[0].acceleration_m_s2, now.hits[0].acceleration_m_s2
+        assert np.linalg.norm(a - b) < 0.03 * np.linalg.norm(a)
+
+
+def test_delay_is_measured_and_taken_back(plain, simulation):
+    late = 1.5e-3
+    told = Finding("channel_delay", "sensor", 99.0, {"delay": (-late, 0.0, "s")})
+    wrong = artefacts.correct(plain, [told])  # the correction of a negative delay delays
+    (found,) = artefacts.screen(wrong, simulation)
+    value, sd, _ = found.parameters["delay"]
+    assert found.effect == "channel_delay"
+    assert abs(value - late) < 4 * sd < 2e-4
+
+
+@pytest.mark.parametrize("rate", [0.8, 2.0, 5.0])
+def test_window_shows_in_the_noise_of_the_force(plain, rate):
+    found = screen_window(disturbed(plain, lambda hit: windowed(hit, rate)))
+    assert found is not None
+    value, sd, _ = found.parameters["rate"]
+    assert abs(value - rate) < 4 * sd < 0.2
+    assert screen_window(plain) is None
+
+
+def test_a_blanked_force_tells_nothing_of_windows(plain):
+    def blanked(hit):
+        force = hit.force_n.copy()
+        force[60:] = 0.0
+        return {"force_n": force}
+
+    assert screen_window(disturbed(plain, blanked)) is None
+
+
+def test_drift_is_told_from_what_goes_with_the_pose(simulation):
+    course = np.array([0.0, 0.3, 0.5, 0.75, 0.9, 1.0])
+    q = KR210.poses(6, 4)
+    (found,) = drift.screen(recorded(simulation, q, lambda i, _: 1 + 0.2 * course[i]), simulation)
+    value, sd, _ = found.parameters["change"]
+    assert found.effect == "drift"
+    assert abs(value - 0.2) < 0.01
+    assert sd < 0.01
+
+
+def test_a_pose_that_answers_as_before_has_not_drifted(plain):
+    first = plain.visits[0]
+    again = replace(first, order=1.0)
+    back = Recorded((*plain.visits, again), plain.band_hz)
+    assert drift.returned(back) == 0.0
+    assert drift.returned(plain) is None
+
+
+def test_without_drift_its_misfit_is_the_plain_one_and_gradients_agree(plain, simulation):
+    problem = drift.problem_of(plain, simulation)
+    quantities = (drift.Quantity("change", "1", 0.0, 0.2), drift.Quantity("bend", "1", 0.0, 3.0))
+    misfit = problem.misfit(drift.Drift("campaign", quantities), Grade(8))
+    still = problem.misfit(Effect(""), Grade(8))
+    x = misfit.mean
+    assert np.allclose(misfit.response(x)[0], still.response(still.mean)[0], rtol=1e-12)
+    x = x + 0.1 * misfit.sd * np.random.default_rng(0).standard_normal(len(x))
+    check_gradient(misfit, x, range(len(x) - 2, len(x)))
+
+
+def test_gradient_of_the_chain(plain, simulation):
+    problem = drift.problem_of(plain, simulation)
+    misfit = problem.misfit(SensorChain.build([np.eye(3)], windowed=True), Grade(8))
+    x = misfit.mean + 0.05 * misfit.sd * np.random.default_rng(1).standard_normal(len(misfit.sd))
+    check_gradient(misfit, x, range(len(x) - 11, len(x)))
+
+
+def check_gradient(misfit, x, which):
+    slope = misfit.response(x)[1]
+    for i in which:
+        step = np.zeros(len(x))
+        step[i] = 1e-5 * misfit.sd[i]
+        moved = misfit.response(x + step)[0] - misfit.response(x - step)[0]
+        expected = moved / (2 * step[i])
+        assert np.abs(slope[:, i] - expected).max() <= 2e-5 * max(np.abs(expected).max(), 1e-9)
+
+
+@given(st.floats(-8, 8), st.floats(0, 1))
+def test_bend_of_a_course_keeps_its_ends(bend, order):
+    shape = drift._bent(np.array([0.0, order, 1.0]), bend)[0]
+    assert shape[0] == 0
+    assert shape[2] == pytest.approx(1)
+    assert -1e-12 <= shape[1] <= 1 + 1e-12
+
+
+def test_equivalent_stiffness_is_that_of_the_joint_that_changed(simulation):
+    softer = np.ones(6)
+    softer[2] = 0.8
+    q = KR210.poses(4, 5)
+    data = recorded(simulation, q, lambda _, level: softer if level == 0 else np.ones(6))
+    system = system_of(fit(drift.problem_of(data, simulation), Effect("")))
+    found = equivalent(data, system)
+    assert levels.disproportion(found) > 5
+    assert levels.equivalent_share(found) > 0.9
+    assert system.ports[int(np.argmin(found.chi2.sum(axis=0)))] == "joint_3"
+    weight = found.precision[:, 2]
+    delta = np.sum(weight * found.delta[:, 2]) / weight.sum()
+    expected = -0.2 * simulation.elasticity.stiffness[2]
+    assert delta.real == pytest.approx(expected, rel=0.1)
+    assert abs(delta.imag) < 0.1 * abs(expected)
+
+
+def test_where_names_the_pose_that_differs(simulation):
+    q = KR210.poses(6, 6)
+    data = recorded(simulation, q, lambda i, _: 0.7 if i == 2 else 1.0)
+    problem = drift.problem_of(data, simulation)
+    found = fit(problem, Effect(""))
+    same = replace(found, x=found.misfit.mean)
+    told = locate(same, [v.pose for v in data.visits])
+    assert told.where["poses"] == ["P3"]
+    assert told.where["directions"]
+    low, high = simulation.robot.config.band_hz
+    assert all(low - 1 <= a < b <= high + 1 for a, b in told.bands_hz)
+    assert told.by_visit[2] > 5 * np.median(told.by_visit)
+    assert told.frac[2].mean() < told.frac[0].mean()
