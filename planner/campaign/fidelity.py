@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.frf import modal
 from planner.frf.types import Frf
 from planner.fusion.hedged import BELIEF
 from planner.identify.extended import FLOOR, Structure, extended
@@ -108,6 +109,23 @@ class LowFidelity:
             residue = np.full((len(q), count, 3, 3), np.nan + 0j)
             return SimulatedModes(empty, empty, residue)
         return self.simulation.modes(q, count)
+
+    def above(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
+        """What modes above those modelled add to the accelerance, (n, 3, 3, F) in m/s²/N.
+
+        0 unless the simulation was identified and fits: it is not known then.
+        """
+        if self.learned is None or not self.learned.fits:
+            return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
+        simulation = self.learned.identified.simulation
+        modes = simulation.modes(q, self.count)
+        known = np.isfinite(modes.frequency_hz)
+        pole = modal.pole(
+            np.where(known, modes.frequency_hz, 1.0), np.where(known, modes.damping_ratio, 0.1)
+        )
+        residue = np.where(known[..., None, None], modes.residue, 0.0)
+        below = modal.accelerance(frequency_hz, pole, residue)
+        return simulation.accelerance(q, frequency_hz) - below
 
     def discrepancy(self, measured_hz: np.ndarray) -> np.ndarray | None:
         """Size of ln f's error (count,) where the simulation was not fitted; None: not known.

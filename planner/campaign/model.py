@@ -36,6 +36,7 @@ from planner.physics.dynamics import SimulatedModes
 # Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
 AVOIDED = 0.1
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
+ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
 MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
@@ -119,8 +120,14 @@ class Model:
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N."""
-        return frf_moments(self.predict(q), frequency_hz)
+        """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N.
+
+        What modes above those modelled add is a simulation's that fits the recordings, else left
+        out.
+        """
+        mean, sd = frf_moments(self.predict(q), frequency_hz)
+        above = self.low.above(q, frequency_hz)
+        return mean + above, np.hypot(sd, ABOVE_SD * np.abs(above))
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -171,7 +178,8 @@ def build(
             _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
-    surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues)
+    taught = best.low.learned is not None and best.low.learned.fits
+    surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues, taught=taught)
     return Model(cell, best.labelled, best.low, surrogate, noise)
 
 

@@ -25,6 +25,9 @@ DAMPING_KERNELS = ("bias", "cubic", "matern52")  # seed 000's, and one that can 
 REACH = -0.25, 1.25  # of coordinates, beyond which damping stays as it is: polynomials run away
 RESIDUE = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
+# Beside a simulation that was identified from these very recordings and fits them.
+DAMPING_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
+RESIDUE_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 NUGGET = 1e-3  # of ln f beside an identified simulation
 SAMPLES, KEPT = 256, 32
@@ -79,7 +82,7 @@ class Surrogate:
         """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted."""
         q, k = len(x), self.count
         mean, sd = self.primary.predict(x, _log(simulated.frequency_hz))
-        log_zeta, zeta_sd = self.damping.predict(np.clip(x, *REACH), np.full((q, k), np.nan))
+        log_zeta, zeta_sd = self.damping.predict(np.clip(x, *REACH), _log(simulated.damping_ratio))
         f, zeta = np.exp(mean), np.exp(log_zeta)
         parts, parts_sd = self._parts(x, simulated)
         parts = parts.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
@@ -151,12 +154,15 @@ def fit_primary(
     )
 
 
-def fit_damping(seen: ModalObservations) -> KernelAverage:
-    """Fit log ζ of every label: no simulation knows it."""
+def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
+    """Fit log ζ of every label: no simulation knows it that was not `taught`."""
     y = _log(seen.damping_ratio)
-    nothing, priors = np.full_like(y, np.nan), (DAMPING,) * y.shape[1]
-    data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), nothing)
-    return fit_shapes(data, priors, priors, np.full(y.shape[1], np.nan), DAMPING_KERNELS)
+    count = y.shape[1]
+    low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
+    data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low)
+    centre = _centre(low, np.full(count, np.nan))
+    with_low, without_low = (DAMPING_TAUGHT,) * count, (DAMPING,) * count
+    return fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
 
 
 def fit_surrogate(
@@ -165,30 +171,33 @@ def fit_surrogate(
     reference: SimulatedModes | None = None,
     primary: HedgedAR1 | None = None,
     residues: bool = True,
+    taught: bool = False,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
     `reference` is as in `fit_primary`; `primary` is what that gave, where it was fitted already.
-    Without `residues` these are left out, which takes two thirds of the time.
+    Without `residues` these are left out, which takes two thirds of the time. `taught`: the
+    simulation was identified from these measurements' own FRFs and fits them, so that damping and
+    residues are nearly its own.
     """
     k = seen.frequency_hz.shape[1]
     if primary is None:
         primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
     scale = _scale(seen, reference)
     if not residues:
-        return Surrogate(primary, fit_damping(seen), None, scale)
+        return Surrogate(primary, fit_damping(seen, taught), None, scale)
     wide = np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
     residue = fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
-        (RESIDUE,) * (18 * k),
+        (RESIDUE_TAUGHT if taught else RESIDUE,) * (18 * k),
         (RESIDUE_ALONE,) * (18 * k),
         np.zeros(18 * k) if has_simulation else np.full(18 * k, np.nan),
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
     )
-    return Surrogate(primary, fit_damping(seen), residue, scale)
+    return Surrogate(primary, fit_damping(seen, taught), residue, scale)
 
 
 def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:
