@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis: FRFs before and after, Campbell maps, residuals beside the noise."""
+"""Pictures of a diagnosis: FRFs before and after, FRF maps, residuals beside the noise."""
 
 import re
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from planner.diagnose.effect import Effect
 from planner.diagnose.fit import Fit
 from planner.diagnose.predict import ALL
 from planner.diagnose.where import Where, where
-from planner.show.campbell import campbell_map
+from planner.show.frf_map import frf_map
 from planner.show.plots import AXES
 
 MOST = 4  # poses whose FRFs are shown, those that differed most
@@ -24,7 +24,7 @@ SIDES = (
 
 
 def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") -> dict[str, Figure]:
-    """Residuals by band, pose and direction; Campbell maps; direct FRFs of the worst poses."""
+    """Residuals by band, pose and direction; FRF maps; direct FRFs of the worst poses."""
     before, after = where(found.problem, found.refitted), where(found.problem, found.best)
     figures = {"residuals": _residuals(before, after, names, mark)}
     misfit = found.problem.misfit(Effect(""), ALL)
@@ -34,8 +34,8 @@ def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") ->
     number = np.arange(1.0, len(names) + 1)
     for i, axis in enumerate(AXES):
         for (side, _, _), h in zip(SIDES, sides, strict=True):
-            title = f"{mark}Campbell map of H {axis}{axis}, simulation {side}"
-            figures[f"campbell_{axis}{axis}_{side.replace(' ', '_')}"] = campbell_map(
+            title = f"{mark}Map of H {axis}{axis}, simulation {side}"
+            figures[f"map_{axis}{axis}_{side.replace(' ', '_')}"] = frf_map(
                 number, measured[:, i, i], h[:, i, i], lines[0], "pose, in recorded order", title
             )
     for k in np.argsort(-before.by_pose)[:MOST].tolist():
