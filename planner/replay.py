@@ -15,7 +15,8 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.events import Configured, Entry, Imported, MeasuredMode, Proposed
 from planner.campaign.logged import from_modal
-from planner.campaign.model import Model, build, propose
+from planner.campaign.model import Model, build
+from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, fold
 from planner.errors import InputError, PlannerError
 from planner.modes.measure import MeasuredPose, measure

@@ -38,7 +38,8 @@ from planner.campaign.importing import (
 from planner.campaign.intake import Delivery, sort_paths
 from planner.campaign.journal import Journal
 from planner.campaign.logged import from_homogeneity, from_modal
-from planner.campaign.model import Model, build, propose
+from planner.campaign.model import Model, build
+from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, Measurement, fold, last_act
 from planner.errors import InputError
 from planner.frf.types import Frf
@@ -107,7 +108,7 @@ class Campaign:
 
     def frf_of(self, measurement: Measurement, table: ModesTable) -> Frf:
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
-        key = (*(hit.sha256 for hit in measurement.accepted), table.band_hz, table.window_rate_1_s)
+        key = _frf_key(measurement.accepted, table)
         if key not in self._frfs:
             sources = tuple(self.source_of(hit) for hit in measurement.accepted)
             self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
@@ -235,6 +236,9 @@ class Campaign:
             amplitude=from_homogeneity(measured.homogeneity),
         )
         self._append(event)
+        if measured.frf is not None:
+            accepted = self.state.measurements[delivery.pose].accepted
+            self._frfs[_frf_key(accepted, self.cell.config.modes)] = measured.frf
         model = self.model
         return ImportReport(
             pose=delivery.pose,
@@ -276,6 +280,11 @@ class _Acting:
 
     def __exit__(self, *error: object) -> None:
         self._lock.__exit__(None, None, None)
+
+
+def _frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:
+    """What an FRF depends on."""
+    return (*(hit.sha256 for hit in hits), table.band_hz, table.window_rate_1_s)
 
 
 def _as_logged(config: CampaignConfig) -> dict:

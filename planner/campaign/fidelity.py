@@ -22,6 +22,7 @@ PRIORS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
 # robot.toml does not state do not mend that, what it says of a pose is tested by identifying it
 # without that pose; into so many parts at most.
 SUSPECT, FOLDS = 3.0, 2
+HOPELESS = 10.0  # misfit above which springs are not fitted more exactly
 BEST = 0.95  # misfit below which no springs that are added can bring it
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
@@ -34,7 +35,8 @@ def _effort(poses: int) -> Effort:
     """Lines a pose that keep the time about the same however many poses there are."""
     lines, log_lines = (max(12, min(QUICK.lines, LINES // poses)), max(12, LOG_LINES // poses))
     last = max(20, min(QUICK.last_lines, LAST_LINES // poses))
-    return replace(QUICK, lines=lines, log_lines=min(QUICK.log_lines, log_lines), last_lines=last)
+    log_lines = min(QUICK.log_lines, log_lines)
+    return replace(QUICK, lines=lines, log_lines=log_lines, last_lines=last, hopeless=HOPELESS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +96,11 @@ class LowFidelity:
         return self.learned.identified if self.learned else None
 
     @property
+    def taught(self) -> bool:
+        """Whether it was identified from the recordings and fits them to their noise."""
+        return self.learned is not None and self.learned.fits
+
+    @property
     def simulation(self) -> Simulation | None:
         """The identified simulation where there is one."""
         return self.learned.identified.simulation if self.learned else self.nominal
@@ -110,12 +117,18 @@ class LowFidelity:
             return SimulatedModes(empty, empty, residue)
         return self.simulation.modes(q, count)
 
+    def frequencies(self, q: np.ndarray) -> SimulatedModes:
+        """The same without residues, for many poses."""
+        if self.simulation is None:
+            return self.simulate(q)
+        return self.simulation.frequencies(q, self.count)
+
     def above(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
         """What modes above those modelled add to the accelerance, (n, 3, 3, F) in m/s²/N.
 
         0 unless the simulation was identified and fits: it is not known then.
         """
-        if self.learned is None or not self.learned.fits:
+        if self.learned is None or not self.taught:
             return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
         simulation = self.learned.identified.simulation
         modes = simulation.modes(q, self.count)
@@ -164,7 +177,7 @@ class LowFidelity:
     @property
     def belief(self) -> float:
         """Probability that it is of use, by the FRFs: a whole matrix of them is hard to fit."""
-        return BELIEVED if self.learned is not None and self.learned.fits else BELIEF
+        return BELIEVED if self.taught else BELIEF
 
     def frequency_sd(self, q: np.ndarray) -> np.ndarray:
         """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation."""

@@ -6,22 +6,17 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.acquire.axes import axis_shares
 from planner.acquire.mixed import mixed
 from planner.acquire.outputs import FrequencyOutputs, Poses
 from planner.acquire.parameters import FrfNoise
-from planner.acquire.propose import DESIGNS, INFORMED, Pick, Travel
-from planner.acquire.propose import propose as choose
 from planner.acquire.repeats import repeat_gain
 from planner.acquire.stopping import Forecast, forecast
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.events import Proposal
 from planner.campaign.fidelity import LowFidelity, learn
 from planner.campaign.labels import LabelledPose, frequencies, label, observations
-from planner.campaign.outlook import cost_of, informed_candidates, outlook
+from planner.campaign.outlook import outlook
 from planner.campaign.state import CampaignState, Measurement
-from planner.errors import NoPoseLeftError
 from planner.frf.types import Frf
 from planner.fusion.frf_bands import ModalPrediction, frf_moments
 from planner.fusion.hedged import HedgedAR1
@@ -33,8 +28,6 @@ from planner.fusion.surrogate import (
 )
 from planner.physics.dynamics import SimulatedModes
 
-# Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
-AVOIDED = 0.1
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
@@ -49,12 +42,18 @@ class Model:
     cell: Cell
     labelled: tuple[LabelledPose, ...]
     low: LowFidelity
-    surrogate: Surrogate
+    seen: ModalObservations
+    surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
-        """Modes at poses q (n, dof) in rad."""
+        """Frequencies and damping at poses q (n, dof) in rad."""
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
+
+    @cached_property
+    def with_residues(self) -> Surrogate:
+        """The surrogate of residues too, which FRFs alone need: fitted when asked for."""
+        return self.surrogate.with_residues(self.seen, self.low.taught)
 
     @cached_property
     def workspace_prediction(self) -> ModalPrediction:
@@ -62,10 +61,17 @@ class Model:
         candidates = self.cell.candidates
         return self._predict(candidates.q, candidates.features, self.simulated_candidates)
 
+    def expected(self, index: int) -> ModalPrediction:
+        """Modes (1, count) at the candidate of that index."""
+        one = slice(index, index + 1)
+        candidates = self.cell.candidates
+        simulated = self.simulated_candidates[one]
+        return self._predict(candidates.q[one], candidates.features[one], simulated)
+
     @cached_property
     def simulated_candidates(self) -> SimulatedModes:
-        """What the low fidelity says at the candidates."""
-        return self.low.simulate(self.cell.candidates.q)
+        """What the low fidelity says at the candidates; without residues."""
+        return self.low.frequencies(self.cell.candidates.q)
 
     @cached_property
     def outlook(self) -> tuple[FrequencyOutputs, Poses]:
@@ -111,10 +117,14 @@ class Model:
         return self.labelled[best].pose, float(gain[best]), float(np.max(fresh))
 
     def _predict(
-        self, q: np.ndarray, features: np.ndarray, simulated: SimulatedModes
+        self,
+        q: np.ndarray,
+        features: np.ndarray,
+        simulated: SimulatedModes,
+        surrogate: Surrogate | None = None,
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
-        found = self.surrogate.predict(features, simulated)
+        found = (surrogate or self.surrogate).predict(features, simulated)
         share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
         sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
         return replace(found, frequency_sd_hz=sd)
@@ -125,7 +135,9 @@ class Model:
         What modes above those modelled add is a simulation's that fits the recordings, else left
         out.
         """
-        mean, sd = frf_moments(self.predict(q), frequency_hz)
+        x, simulated = self.cell.features(q), self.low.simulate(q)
+        modes = self._predict(q, x, simulated, self.with_residues)
+        mean, sd = frf_moments(modes, frequency_hz)
         above = self.low.above(q, frequency_hz)
         return mean + above, np.hypot(sd, ABOVE_SD * np.abs(above))
 
@@ -154,12 +166,10 @@ def build(
     cell: Cell,
     state: CampaignState,
     frf_of: Callable[[Measurement, ModesTable], Frf],
-    residues: bool = True,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns. Without
-    `residues` only frequencies and damping are fitted, and no FRF can be predicted.
+    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     noise = None
@@ -178,9 +188,10 @@ def build(
             _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
-    taught = best.low.learned is not None and best.low.learned.fits
-    surrogate = fit_surrogate(best.seen, primary=best.primary, residues=residues, taught=taught)
-    return Model(cell, best.labelled, best.low, surrogate, noise)
+    surrogate = fit_surrogate(
+        best.seen, primary=best.primary, residues=False, taught=best.low.taught
+    )
+    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,81 +231,3 @@ class _Guided:
             free = [m.frequency_hz for m in measurement.modes if m.likely]
             count += sum(f not in given and f < max(given, default=0.0) for f in free)
         return count
-
-
-def propose(
-    model: Model, state: CampaignState, count: int, acquisition: str
-) -> tuple[Proposal, ...]:
-    """The next poses to measure; NoPoseLeftError when no candidate is left."""
-    cell = model.cell
-    candidates = cell.candidates
-    picks = _picks(model, state, count, acquisition)
-    if not picks:
-        raise NoPoseLeftError(
-            f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
-            f"widen [workspace] or raise candidates in campaign.toml."
-        )
-    return tuple(
-        Proposal(
-            pose=f"P{state.proposals_made + i + 1:03d}",
-            joints_deg=tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])),
-            position_m=_xyz(candidates.position_m[pick.index]),
-            score=float(pick.score),
-            reason=_reason(model, pick.index, acquisition),
-            hits=tuple("xyz"[axis] for axis in pick.axes),
-            minutes=round(pick.minutes, 2) if np.isfinite(pick.minutes) else None,
-        )
-        for i, pick in enumerate(picks)
-    )
-
-
-def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
-    cell = model.cell
-    x = cell.candidates.features
-    taken = [m.joints_deg for m in state.measurements.values()]
-    at = np.deg2rad(taken[-1]) if taken else None
-    shares = None
-    if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
-        shares = axis_shares(model.simulated_candidates.residue)
-    travel = Travel(cost_of(cell), cell.candidates.q, at, shares)
-    taken += [state.proposals[pose].joints_deg for pose in state.skipped]
-    allowed = cell.allowed
-    for pose in state.avoided:
-        there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
-        allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
-    asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
-    if acquisition in INFORMED:
-        asked, seen = informed_candidates(cell), model.informed
-    elif acquisition not in DESIGNS:
-        seen = model.outlook
-    picks = choose(
-        acquisition,
-        model.surrogate,
-        x[asked],
-        SimulatedModes(said.frequency_hz[asked], said.damping_ratio[asked], said.residue[asked]),
-        count=count,
-        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
-        seed=state.events,
-        outlook=seen,
-        travel=travel.among(asked),
-        allowed=allowed[asked],
-    )
-    return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
-
-
-def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (round(float(v), 5) for v in position_m)
-    return x, y, z
-
-
-def _reason(model: Model, index: int, acquisition: str) -> str:
-    p = model.workspace_prediction
-    sd = 100 * p.frequency_sd_hz[index] / p.frequency_hz[index]
-    k = int(np.argmax(sd))
-    text = f"mode {k + 1} is expected at {p.frequency_hz[index, k]:.2f} Hz ± {sd[k]:.1f} %"
-    if model.labelled:
-        x = model.cell.features(np.array([pose.q for pose in model.labelled]))
-        distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)
-        near = model.labelled[int(np.argmin(distance))].pose
-        text += f" here, nearest measured pose {near}"
-    return f"{acquisition.replace('_', ' ')}: {text}"

@@ -7,7 +7,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.acquire.designs import NESTED
-from planner.campaign.model import Model, build, propose
+from planner.campaign.model import Model, build
+from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState
 from planner.compare import content
 from planner.compare.bench import Bench, PoolCell, cell_of
@@ -71,7 +72,7 @@ def _fitted(
     measured = [bench.measurements[i] for i in used]
     frfs = {bench.measurements[i].pose: bench.frfs[i] for i in used}
     state = CampaignState(measurements={m.pose: m for m in measured}, events=seed)
-    return build(cell, state, lambda m, _: frfs[m.pose], residues=False), state
+    return build(cell, state, lambda m, _: frfs[m.pose]), state
 
 
 def _judged(bench: Bench, model: Model, used: list[int]) -> Score:

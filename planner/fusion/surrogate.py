@@ -74,6 +74,10 @@ class Surrogate:
         """(k,) weight of the simulation in each label's frequency."""
         return np.where(self.primary.uses_low, self.primary.weight, 1 - self.primary.weight)
 
+    def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
+        """The same with the residues fitted too, to what `fit_surrogate` was given."""
+        return replace(self, residue=_fit_residues(seen, self.scale, True, taught))
+
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
         return self.primary.split(_log(simulated.frequency_hz))[1]
@@ -180,16 +184,21 @@ def fit_surrogate(
     simulation was identified from these measurements' own FRFs and fits them, so that damping and
     residues are nearly its own.
     """
-    k = seen.frequency_hz.shape[1]
     if primary is None:
         primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
     scale = _scale(seen, reference)
-    if not residues:
-        return Surrogate(primary, fit_damping(seen, taught), None, scale)
-    wide = np.repeat(scale, 18)
+    residue = _fit_residues(seen, scale, has_simulation, taught) if residues else None
+    return Surrogate(primary, fit_damping(seen, taught), residue, scale)
+
+
+def _fit_residues(
+    seen: ModalObservations, scale: np.ndarray, has_simulation: bool, taught: bool
+) -> HedgedAR1:
+    """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
+    k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
-    residue = fit_hedged(
+    return fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
         (RESIDUE_TAUGHT if taught else RESIDUE,) * (18 * k),
         (RESIDUE_ALONE,) * (18 * k),
@@ -197,7 +206,6 @@ def fit_surrogate(
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
     )
-    return Surrogate(primary, fit_damping(seen, taught), residue, scale)
 
 
 def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:

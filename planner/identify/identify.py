@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import qmc
@@ -45,6 +45,7 @@ class Effort:
     log_lines: int = 64  # a pose, in the logarithmic stages
     log_steps: int = 40
     steps: int = 80
+    hopeless: float = np.inf  # misfit above which the last fit changes nothing that matters
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
 
 
@@ -142,6 +143,8 @@ def identify(
     misfits: tuple[float, ...] = ()
     if best is None:
         x, misfits = _search(problem, _starting_points(p, starts, seed))
+        if min(misfits) > effort.hopeless:
+            problem = replace(problem, effort=replace(effort, steps=0, last_completions=0))
         best = _refine(problem, x)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)

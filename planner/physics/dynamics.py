@@ -5,6 +5,7 @@ of the undamped modes, real (overdamped) poles included (Géradin & Rixen 2015, 
 structural damping K is complex; FRFs then hold for positive frequencies, as they are measured.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ PROPORTIONAL = 1e-10  # off-diagonal modal damping below this is rounding
 SPLIT = 5e-6
 # Structural damping turns the real poles of overdamped motion by less than η/4: not oscillations.
 STRUCTURAL = 0.05  # |Im λ| / |λ| that makes an oscillation then
+MANY = 100  # poses from which two threads are quicker than one
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +44,11 @@ class SimulatedModes:
     damping_ratio: np.ndarray
     residue: np.ndarray
 
+    def __getitem__(self, poses: np.ndarray | slice) -> "SimulatedModes":
+        return SimulatedModes(
+            self.frequency_hz[poses], self.damping_ratio[poses], self.residue[poses]
+        )
+
     @property
     def shape(self) -> np.ndarray:
         """Response shapes (n, count, 3) of unit length; NaN where there is no mode."""
@@ -60,12 +67,9 @@ def solve_poles(
     """Poles and residues of n poses.
 
     M (n, e, e); C (e, e); K (e, e) or (n, e, e), complex where damping is structural; Jacobians
-    of hit (n, 3h, e) and sensor (n, 3s, e).
+    of hit (n, 3h, e) and sensor (n, 3s, e); without points residues are empty, which is quicker.
     """
-    lower = np.linalg.cholesky(mass)
-    scaled = _whiten(lower, stiffness.real)
-    square, vectors = np.linalg.eigh(scaled)
-    phi = np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)  # mass-normalised modes
+    square, phi = normal_modes(mass, stiffness.real)
     gamma = np.swapaxes(phi, 1, 2) @ damping @ phi
     off = gamma - gamma * np.eye(gamma.shape[1])
     scale = np.max(np.abs(gamma), axis=(1, 2)) + 1e-300
@@ -78,6 +82,13 @@ def solve_poles(
         solve = _proportional if proportional else _state_space
         poles, output, entry = solve(square, gamma, hit @ phi, sensor @ phi)
     return Poles(poles, np.einsum("nik,nkj->nkij", output, entry), structural)
+
+
+def normal_modes(mass: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Undamped modes of M and K (n, e, e): ω² (n, e), ascending, and mass-normalised shapes."""
+    lower = np.linalg.cholesky(mass)
+    square, vectors = np.linalg.eigh(_whiten(lower, stiffness))
+    return square, np.linalg.solve(np.swapaxes(lower, 1, 2), vectors)
 
 
 def _whiten(lower: np.ndarray, matrix: np.ndarray) -> np.ndarray:
@@ -124,10 +135,35 @@ def _state_space(
     state[:, e:, e:] = -gamma
     if loss is not None:
         state[:, e:, :e] -= 1j * loss / omega[:, None, :]
-    poles, vectors = np.linalg.eig(state)
     force = np.concatenate([np.zeros((n, e, hit.shape[1])), np.swapaxes(hit, 1, 2)], axis=1)
-    output = (sensor / omega[:, None, :]) @ vectors[:, :e]
-    return poles.astype(complex), output, np.linalg.solve(vectors, force.astype(vectors.dtype))
+    poles, vectors, entry = _eigen(state, force)
+    return poles, (sensor / omega[:, None, :]) @ vectors[:, :e], entry
+
+
+def _eigen(state: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues, eigenvectors V and V⁻¹ force of many matrices, on as many cores as pay.
+
+    Without columns of force the vectors are left out: 0.
+    """
+
+    def solve(part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        if not force.shape[2]:
+            return np.linalg.eigvals(state[part]).astype(complex), 0 * state[part], force[part]
+        values, vectors = np.linalg.eig(state[part])
+        vectors = vectors.astype(complex)
+        return (
+            values.astype(complex),
+            vectors,
+            np.linalg.solve(vectors, force[part].astype(complex)),
+        )
+
+    if len(state) < MANY:
+        return solve(slice(None))
+    half = len(state) // 2
+    with ThreadPoolExecutor(2) as pool:  # LAPACK lets other threads run
+        first, second = pool.map(solve, (slice(half), slice(half, None)))
+    values, vectors, entry = (np.concatenate(pair) for pair in zip(first, second, strict=True))
+    return values, vectors, entry
 
 
 def oscillatory(solved: Poles, count: int) -> SimulatedModes:

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import scipy.linalg
 from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-from planner.physics.dynamics import SimulatedModes
+from planner.physics.dynamics import SimulatedModes, normal_modes
 
 # Between poses whose shapes are compared. Modes that exchange their shapes over less than this
 # are taken to cross; over more, to veer and keep their order. In longer steps veering looks like
@@ -133,7 +132,5 @@ def undamped_modes(
     mass: np.ndarray, stiffness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of M and K (n, e, e): frequencies (n, e), mass-normalised shapes, and M again."""
-    out = [scipy.linalg.eigh(k, m) for k, m in zip(stiffness, mass, strict=True)]
-    square = np.array([values for values, _ in out])
-    shapes = np.array([vectors for _, vectors in out])
+    square, shapes = normal_modes(mass, stiffness)
     return np.sqrt(np.maximum(square, 0.0)) / (2 * np.pi), shapes, mass

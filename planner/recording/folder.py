@@ -29,10 +29,11 @@ def read_recordings(folder: Path, joint_names: tuple[str, ...]) -> RecordingsFol
     for name in ("pose", "hit", "file"):
         if name not in header:
             raise InputError(f"{path} has no column {name}; add it (see its first row).")
+    inside = folder.resolve()
     rows: list[PoseRow] = []
     seen: dict[tuple[str, str, int], int] = {}
     for number, cells in lines:
-        row = _recording_row(path, folder, number, dict(zip(header, cells, strict=True)), joints)
+        row = _recording_row(path, inside, number, dict(zip(header, cells, strict=True)), joints)
         key = (row.pose, str(row.hit), row.repeat or 0)
         if row.repeat is not None and key in seen:
             raise InputError(
@@ -197,7 +198,7 @@ def _file(path: Path, folder: Path, number: int, name: str) -> Path:
         raise InputError(f"{path}, row {number}: no file is named; add it.")
     try:
         file = (folder / name).resolve()
-        inside = file.is_relative_to(folder.resolve())
+        inside = file.is_relative_to(folder)
         found = inside and file.is_file()
     except (OSError, ValueError):
         raise InputError(f"{path}, row {number}: {name!r} is no file name; correct it.") from None

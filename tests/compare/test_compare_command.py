@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from outside import PLANNER, planner
-from planner.campaign.model import build, propose
+from planner.campaign.model import build
+from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState
 from planner.cli.run import run as call
 from planner.compare.bench import assemble, cell_of, decide

@@ -10,8 +10,9 @@ from known_robots import IRB6640, KR10, KR210
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.logged import from_mode
-from planner.campaign.model import Model, build, propose
+from planner.campaign.model import Model, build
 from planner.campaign.outlook import cost_of
+from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, Measurement
 from planner.frf.types import Frf
 from planner.modes.types import Mode
@@ -141,7 +142,7 @@ def campaign(
             q = candidates.q[planned[n - 1]]
         else:
             state = CampaignState(measurements=measurements, events=n)
-            model = model or build(case.cell, state, frf_of, residues=False)
+            model = model or build(case.cell, state, frf_of)
             (proposal,) = propose(model, state, 1, str(strategy))
             q = np.deg2rad(np.array(proposal.joints_deg))
             axes = tuple("xyz".index(hit) for hit in proposal.hits)
@@ -151,6 +152,6 @@ def campaign(
         measurements = {**measurements, measurement.pose: measurement}
         frfs[measurement.pose] = frf
         state = CampaignState(measurements=measurements, events=n)
-        model = build(case.cell, state, frf_of, residues=False)
+        model = build(case.cell, state, frf_of)
         found = np.sort(model.predict(case.unused).frequency_hz, axis=1)
         yield Step(n, model, np.log(found / case.true_hz), minutes)
