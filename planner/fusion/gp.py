@@ -19,7 +19,7 @@ from jax.scipy.linalg import cho_solve, solve_triangular
 from scipy.stats import norm, qmc
 
 from planner.errors import InputError
-from planner.fusion import jaxsetup  # noqa: F401
+from planner.fusion import jaxsetup
 from planner.fusion.data import Padded
 from planner.fusion.kernels import Kernel, parse
 from planner.fusion.predictive import Predictive
@@ -213,7 +213,7 @@ def _log_normal(z: Array) -> Array:
     return -0.5 * jnp.sum(z**2, axis=-1)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
+@partial(jaxsetup.quickly_compiled, static_argnums=(0, 1))
 def _fit(
     kernel: str, kept: int, x: Array, low: Array, mask: Array, y: Array, variance: Array,
     bias: Array, slope: Array, mean: Array, sd: Array, first: Array, rounds: Array, jitter: Array,

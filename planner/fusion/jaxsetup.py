@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from functools import partial
 
 # Matrices here are small: threads gain nothing, and on few cores nested parallel LAPACK calls
 # wait for each other for ever. NPROC is how XLA learns the size of its thread pool.
@@ -27,3 +28,18 @@ try:
     jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
 except (OSError, RuntimeError):  # RuntimeError: a user without a home
     pass  # a cache that cannot be kept costs seconds, nothing else
+
+# They more than halve the time of compiling, and change that of running small matrices little.
+_QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+
+
+def _understood(options: dict[str, bool | int]) -> bool:
+    try:
+        jax.jit(lambda x: -x, compiler_options=options)(0.0)
+    except RuntimeError:
+        return False
+    return True
+
+
+# As jax.jit, for what the first fit of a campaign waits for; another XLA may lack the options.
+quickly_compiled = partial(jax.jit, compiler_options=_QUICK if _understood(_QUICK) else None)

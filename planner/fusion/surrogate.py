@@ -23,6 +23,7 @@ FREQUENCY_ALONE = OutputPrior(1.0, 0.0, amplitude=0.2, nugget=0.002, mean=float(
 DAMPING = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0.03)))
 DAMPING_KERNELS = ("bias", "cubic", "matern52")  # seed 000's, and one that can follow anything
 REACH = -0.25, 1.25  # of coordinates, beyond which damping stays as it is: polynomials run away
+VAGUEST = 10.0  # sd of a logarithm that is told from larger ones: their exponentials overflow
 RESIDUE = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
 RESIDUE_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 # Beside a simulation that was identified from these very recordings and fits them.
@@ -110,6 +111,7 @@ class Surrogate:
 
 def _relative_sd(sd: np.ndarray) -> np.ndarray:
     """Sd of a log-normal variable over its median."""
+    sd = np.minimum(sd, VAGUEST)
     return np.sqrt(np.expm1(sd**2)) * np.exp(sd**2 / 2)
 
 

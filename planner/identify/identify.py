@@ -45,7 +45,7 @@ class Effort:
     log_lines: int = 64  # a pose, in the logarithmic stages
     log_steps: int = 40
     steps: int = 80
-    hopeless: float = np.inf  # misfit above which the last fit changes nothing that matters
+    hopeless: float = np.inf  # misfit of a minimum that no last fit is worth
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
 
 
@@ -142,8 +142,8 @@ def identify(
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
-        x, misfits = _search(problem, _starting_points(p, starts, seed))
-        if min(misfits) > effort.hopeless:
+        x, misfits, settled = _search(problem, _starting_points(p, starts, seed))
+        if settled and min(misfits) > effort.hopeless:
             problem = replace(problem, effort=replace(effort, steps=0, last_completions=0))
         best = _refine(problem, x)
     seconds = time.perf_counter() - started
@@ -169,8 +169,8 @@ def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) ->
     return np.vstack([p.mean, lower + unit * (upper - lower)])
 
 
-def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """Best (θ, φ) of all starts, and the misfit of each."""
+def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...], bool]:
+    """Best (θ, φ) of all starts, the misfit of each, and whether the best had come to rest."""
     found: list[Minimum] = []
     misfits: list[float] = []
     for number, point in enumerate(points, 1):
@@ -184,7 +184,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
         if met or min(misfits) < AT_NOISE:
             break
     best = min(found, key=lambda m: m.at.value)
-    return best.x, tuple(misfits)
+    return best.x, tuple(misfits), best.converged
 
 
 def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
