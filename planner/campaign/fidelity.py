@@ -22,7 +22,6 @@ PRIORS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
 # robot.toml does not state do not mend that, what it says of a pose is tested by identifying it
 # without that pose; into so many parts at most.
 SUSPECT, FOLDS = 3.0, 2
-HOPELESS = 10.0  # misfit of a minimum that is not looked at on more lines
 BEST = 0.95  # misfit below which no springs that are added can bring it
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
@@ -36,7 +35,7 @@ def _effort(poses: int) -> Effort:
     lines, log_lines = (max(12, min(QUICK.lines, LINES // poses)), max(12, LOG_LINES // poses))
     last = max(20, min(QUICK.last_lines, LAST_LINES // poses))
     log_lines = min(QUICK.log_lines, log_lines)
-    return replace(QUICK, lines=lines, log_lines=log_lines, last_lines=last, hopeless=HOPELESS)
+    return replace(QUICK, lines=lines, log_lines=log_lines, last_lines=last)
 
 
 @dataclass(frozen=True, eq=False)

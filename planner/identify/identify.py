@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import qmc
@@ -45,7 +45,6 @@ class Effort:
     log_lines: int = 64  # a pose, in the logarithmic stages
     log_steps: int = 40
     steps: int = 80
-    hopeless: float = np.inf  # misfit of a minimum that no last fit is worth
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
 
 
@@ -142,9 +141,7 @@ def identify(
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
-        x, misfits, settled = _search(problem, _starting_points(p, starts, seed))
-        if settled and min(misfits) > effort.hopeless:
-            problem = replace(problem, effort=replace(effort, steps=0, last_completions=0))
+        x, misfits = _search(problem, _starting_points(p, starts, seed))
         best = _refine(problem, x)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
@@ -169,8 +166,8 @@ def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) ->
     return np.vstack([p.mean, lower + unit * (upper - lower)])
 
 
-def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...], bool]:
-    """Best (θ, φ) of all starts, the misfit of each, and whether the best had come to rest."""
+def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
+    """Best (θ, φ) of all starts, and the misfit of each."""
     found: list[Minimum] = []
     misfits: list[float] = []
     for number, point in enumerate(points, 1):
@@ -184,7 +181,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
         if met or min(misfits) < AT_NOISE:
             break
     best = min(found, key=lambda m: m.at.value)
-    return best.x, tuple(misfits), best.converged
+    return best.x, tuple(misfits)
 
 
 def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
