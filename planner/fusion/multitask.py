@@ -24,6 +24,8 @@ from planner.fusion.kernels import parse
 
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd
 LENGTH, LENGTH_SPREAD = 0.8, 1.0  # of k's scales, times √d
+REACH = 6.0  # sds of the prior beyond which nothing is looked for
+FTOL = 1e-5  # of the log density: less changes no prediction
 TASK_SD = 1.0  # of L's entries around those of the data's own covariance
 RELATIVE_JITTER = 1e-9
 
@@ -208,13 +210,13 @@ def fit_multitask(
         off = (vector - middle) / width
         return -value + 0.5 * float(off @ off), -slope + off / width
 
-    found = _climb(negative, middle, 6 * width, middle, iterations)
+    found = _climb(negative, middle, REACH * width, middle, iterations)
     if np.any(start.like(found).noise > 1):
         # More noise than the output varies at all: a long first step has ended where an output
         # is given up. So first the poses' kernel and the noise, then the rest.
         tasks_only = np.arange(len(middle)) < len(_lower(start.root)[0])
-        found = _climb(negative, middle, np.where(tasks_only, 0.0, 6 * width), middle, 20)
-        found = _climb(negative, middle, 6 * width, found, iterations)
+        found = _climb(negative, middle, np.where(tasks_only, 0.0, REACH * width), middle, 20)
+        found = _climb(negative, middle, REACH * width, found, iterations)
     h = start.like(found)
     return MultiTaskGP(tasks, h, solve(tasks, h), centre, scale)
 
@@ -223,12 +225,20 @@ def _climb(
     negative: Callable[[np.ndarray], tuple[float, np.ndarray]], middle: np.ndarray,
     reach: np.ndarray, start: np.ndarray, iterations: int,
 ) -> np.ndarray:  # fmt: skip
+    # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
+    unit = np.where(reach > 0, reach / REACH, 1.0)
+
+    def scaled(z: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = negative(start + unit * z)
+        return value, slope * unit
+
+    lower, upper = (middle - reach - start) / unit, (middle + reach - start) / unit
     done = minimize(
-        negative, start, jac=True, method="L-BFGS-B",
-        bounds=list(zip(middle - reach, middle + reach, strict=True)),
-        options={"maxiter": iterations, "ftol": 1e-9},
+        scaled, np.zeros_like(start), jac=True, method="L-BFGS-B",
+        bounds=list(zip(lower, upper, strict=True)),
+        options={"maxiter": iterations, "ftol": FTOL},
     )  # fmt: skip
-    return done.x
+    return start + unit * done.x
 
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
