@@ -15,7 +15,7 @@ from planner.identify.feasible import Barrier
 from planner.identify.objective import Objective
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import Identification, estimates, undetermined
-from planner.identify.solver import Minimum, minimise
+from planner.identify.solver import Minimum, inverse, minimise
 from planner.physics.gradient import Inertias
 from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
@@ -251,7 +251,7 @@ def _result(
     scale = np.concatenate([1 / p.log_sd**2, np.ones(len(p.nuisances))])
     # Where the misfit is above the noise, the noise is at least as large as the misfit.
     data = (end.at.normal - np.diag(scale)) / max(misfit, 1.0)
-    covariance = np.linalg.inv(data + np.diag(scale))
+    covariance = inverse(data + np.diag(scale))
     change = p.inertia_change(end.x[count:]) if p.nuisances else None
     fitted = simulation.changed(p.elasticity(end.x[:count]), change)
     return Identification(
