@@ -11,6 +11,7 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
+    from planner.cli.material import Material
     from planner.diagnose.diagnose import Candidate, Diagnosis
     from planner.diagnose.finding import Finding
     from planner.diagnose.predict import Agreement
@@ -22,9 +23,13 @@ if TYPE_CHECKING:
 
 def diagnose(
     recordings: Annotated[
-        Path, typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv.")
+        Path,
+        typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv, or a campaign."),
     ],
-    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    robot: Annotated[
+        Path | None,
+        typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml (a campaign has its own)."),
+    ] = None,
     predict: Annotated[
         Path | None, typer.Option(metavar="POSES_CSV", help="Poses whose FRFs are wanted.")
     ] = None,
@@ -39,6 +44,7 @@ def diagnose(
 ) -> int:
     """Locate where simulation and recordings differ, name the missing physics, show the fit."""
     from planner.cli import modal
+    from planner.cli.material import material
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
     from planner.diagnose.diagnose import diagnose as run
@@ -50,7 +56,9 @@ def diagnose(
 
     started = time.perf_counter()
     modal.check(None, "h1", None, window_rate_1_s)
-    nominal = Robot.load(robot)
+    given = material(recordings, robot, window_rate_1_s)
+    recordings, window_rate_1_s = given.recordings, given.window_rate_1_s
+    nominal = Robot.load(given.robot)
     wanted = read_poses(predict, nominal.joint_names) if predict else ()
     with counting(quiet=as_json) as tell:
         recorded = read_recorded(
@@ -73,6 +81,7 @@ def diagnose(
         tell("judging at poses set aside", 0.95)
         answer = _answer(recorded, found, together(screened.findings, found))
         answer |= {"npz": None, "robot": None, "plots": []}
+        answer["next"] = _next(found, given.with_poses(wanted))
         if wanted:
             rows = [(row.pose, row.joints_deg) for row in wanted]
             answer["npz"] = str(_predict(found, rows, _target(out, predict, recordings)))
@@ -162,6 +171,28 @@ def _answer(recorded: "Recorded", found: "Diagnosis", whole: "Together") -> dict
         "refused": [{"file": file, "reason": reason} for file, reason in recorded.refused],
         "remarks": list(recorded.remarks),
         "simulated": recorded.simulated,
+    }
+
+
+def _next(found: "Diagnosis", given: "Material") -> dict[str, Any] | None:
+    """The pose and axis of a hit that best tells tied candidates apart; None if none are tied."""
+    import numpy as np
+
+    from planner.acquire.separate import separation
+
+    tied = [c for c in found.undecided if c.fit is not None]
+    fits = [c.fit for c in tied if c.fit is not None]
+    if len(fits) < 2 or not len(given.offered):
+        return None
+    shares = [c.probability for c in tied]
+    gain = separation(found.problem, fits, shares, given.offered, found.temper)
+    pose, axis = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    return {
+        "pose": given.names[pose],
+        "joints_deg": [round(float(v), 3) for v in np.rad2deg(given.offered[pose])],
+        "hit": "xyz"[axis],
+        "log_odds": float(gain[pose, axis]),
+        "between": [_words(c) for c in tied],
     }
 
 

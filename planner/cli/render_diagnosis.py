@@ -26,6 +26,8 @@ def diagnosed(answer: dict[str, Any]) -> RenderableType:
             c["effect"].replace("_", " "), c["at"] or "–", f"{100 * c['probability']:.1f} %"
         )
     parts += [made, _agreement(answer)]
+    if answer["next"]:
+        parts.append(Text(_next(answer["next"]), style="bold"))
     parts += [Text(f"  {remark}", style="yellow") for remark in answer["remarks"]]
     for key, what in (("npz", "Predictions"), ("robot", "Robot with what was found")):
         if answer[key]:
@@ -35,6 +37,14 @@ def diagnosed(answer: dict[str, Any]) -> RenderableType:
     if answer["simulated"]:
         parts.append(SIMULATED)
     return Group(*parts)
+
+
+def _next(told: dict[str, Any]) -> str:
+    angles = ", ".join(f"{v:.1f}" for v in told["joints_deg"])
+    return (
+        f"To tell apart {' from '.join(told['between'])}: hit along {told['hit']} at "
+        f"{told['pose']} ({angles}°); the odds are expected to become e^{told['log_odds']:.1f}."
+    )
 
 
 def _where(where: dict[str, Any]) -> str:

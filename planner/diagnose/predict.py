@@ -25,7 +25,7 @@ def predicted(
     kept = _columns(found)
     means, sds = [], []
     for row in np.atleast_2d(q):
-        h, slope = _misfit_at(problem, cleaned, row[None], frequency_hz).response(found.x[kept])
+        h, slope = misfit_at(problem, cleaned, row[None], frequency_hz).response(found.x[kept])
         moved = np.tensordot(root[kept].T, slope[0], axes=(1, 0))
         means.append(h[0])
         sds.append(np.sqrt(np.sum(np.abs(moved) ** 2, axis=0)))
@@ -46,7 +46,8 @@ def _columns(found: Fit) -> np.ndarray:
     return np.flatnonzero(np.concatenate([np.ones(b, dtype=bool), np.array(own, dtype=bool)]))
 
 
-def _misfit_at(problem: Problem, effect: Effect, q: np.ndarray, frequency_hz: np.ndarray) -> Misfit:
+def misfit_at(problem: Problem, effect: Effect, q: np.ndarray, frequency_hz: np.ndarray) -> Misfit:
+    """Misfit to nothing measured at q (n, dof) in rad and frequency_hz (F,): for its response."""
     simulation, p = problem.parametrised(effect)
     lines = np.tile(frequency_hz, (len(q), 1))
     shape = (len(q), 3, 3, len(frequency_hz))

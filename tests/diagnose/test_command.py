@@ -34,3 +34,19 @@ def test_found_effect_is_written_read_back_and_predicts(tmp_path, capsys):
         h = Simulation(robot).accelerance(q, file["frequency_hz"])
         assert np.linalg.norm(h - file["frf_mean"]) < 0.01 * np.linalg.norm(h)
     assert all((tmp_path / "out" / name).is_file() for name in ("residuals.png", "robot.urdf"))
+
+
+def test_the_shipped_campaign_names_what_its_simulation_lacks(tmp_path, capsys):
+    folder = tmp_path / "campaign"
+    assert run(["demo", "--dir", str(folder), "--measurements", "4", "--json"]) == 0
+    capsys.readouterr()
+    assert run(["diagnose", str(folder), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    finding = answer["findings"][0]
+    assert (finding["effect"], finding["at"]) == ("base_compliance", "base")
+    # Of the truth that made the shipped recordings; see campaigns/.
+    for axis, true in (("x", 2.2e7), ("y", 1.9e7)):
+        told = finding["parameters"][f"stiffness of base about {axis}"]
+        assert abs(told["value"] - true) < 3 * told["sd"]
+    assert answer["simulated"]
+    assert answer["next"] is None  # nothing is tied

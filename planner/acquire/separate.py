@@ -1,0 +1,72 @@
+"""What one more measurement would do to tell apart candidates that the recordings leave tied.
+
+Of each pair, the χ² by which one candidate's FRFs would miss the other's even if it were fitted to
+them too, its posterior being the prior: T-optimality (Atkinson & Fedorov 1975), after which what
+mere refitting follows counts for nothing, as it still does in Hunter & Reiner (1965).
+"""
+
+from collections.abc import Sequence
+from itertools import permutations
+
+import numpy as np
+
+from planner.acquire.parameters import FrfNoise
+from planner.diagnose.fit import Fit, Problem
+from planner.diagnose.predict import misfit_at
+
+LINES = 96  # evenly over the band
+AXES = 3
+
+
+def separation(
+    problem: Problem,
+    fits: Sequence[Fit],
+    probability: Sequence[float],
+    q: np.ndarray,
+    temper: float,
+) -> np.ndarray:
+    """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
+
+    q in rad; of the true one of the fits to each other one, averaged as probable as they are.
+    0 where there are fewer than two.
+    """
+    q = np.atleast_2d(q)
+    gain = np.zeros((len(q), AXES))
+    if len(fits) < 2:
+        return gain
+    share = np.array(probability) / np.sum(probability)
+    noise = FrfNoise.of(problem.frfs, problem.band_hz, temper)
+    lines = np.linspace(*problem.band_hz, LINES)
+    # Lines closer than those of a record are not measured apart; farther ones stand for several.
+    each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
+    known = [fit.precision(temper) for fit in fits]
+    for place, row in enumerate(q):
+        told = [
+            tuple(one[0] for one in misfit_at(problem, f.effect, row[None], lines).response(f.x))
+            for f in fits
+        ]
+        for true, other in permutations(range(len(fits)), 2):
+            weight = share[true] * share[other] / (1 - share[true])
+            (h, _), (rival, slope) = told[true], told[other]
+            scale = np.sqrt(2 * each / noise.misfit) / _sd(noise, h)
+            for axis in range(AXES):
+                missed = (scale * (h - rival))[:, axis]
+                moved = (scale * slope)[:, :, axis]
+                gain[place, axis] += weight * _left(missed, moved, known[other]) / 2
+    return gain
+
+
+def _sd(noise: FrfNoise, h: np.ndarray) -> np.ndarray:
+    """Root of E|δH|² of an FRF h (3, 3, F)."""
+    floor = noise.floor
+    if floor is None:
+        floor = noise.relative * np.sqrt(np.mean(np.abs(h) ** 2))
+    return np.hypot(noise.relative * np.abs(h), floor)
+
+
+def _left(missed: np.ndarray, slope: np.ndarray, precision: np.ndarray) -> float:
+    """χ² of `missed` (3, F) that moving along `slope` (D, 3, F) leaves; prior `precision`."""
+    r = np.ascontiguousarray(missed).reshape(-1).view(float)
+    j = np.ascontiguousarray(slope).reshape(len(slope), -1).view(float)
+    pull = j @ r
+    return float(r @ r - pull @ np.linalg.solve(precision + j @ j.T, pull))
