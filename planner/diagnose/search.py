@@ -18,7 +18,9 @@ FEW = 5  # poses on which all are looked at where something is clearly wrong
 CLEARLY = 3.0  # misfit from which that is so
 ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
-LEADERS = 2  # whose company is looked for
+MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
+STRAYED = 2.5  # prior sds that a spring does not move by chance
+Place = tuple[str, str]
 Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
 
 
@@ -36,20 +38,78 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
     best = min(f.per_value for f in found.finalists)
+    leaders = _leaders(found)
     if best <= ENOUGH:
-        return found
-    ranked = [found.finalists[i] for i in np.argsort(_behind(found.finalists))]
-    leaders = [f for f in ranked if f.effect.at][:LEADERS]
-    for number, leader in enumerate(leaders):
+        leaders = leaders[:1]
+        effects = [e for e in effects if leaders and _strayed(leaders[0], e)]
+    led: list[Place] = []
+    while effects and (leader := _next(leaders, led, found)) is not None:
+        first = 0.6 + 0.4 * len(led) / MOST_LEADERS
+        led.append(_place(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
 
-        def along(text: str, share: float, number: int = number) -> None:
-            tell(text, 0.6 + 0.4 * (number + share) / len(leaders))
+        def along(text: str, share: float, first: float = first) -> None:
+            tell(text, first + 0.4 * share / MOST_LEADERS)
 
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
-    return found
+    return _distinct(found)
+
+
+def _distinct(found: Found) -> Found:
+    """Each set of effects once, at its best, though it was come upon from several sides."""
+    best: dict[frozenset[Effect], Fit] = {}
+    for f in found.finalists:
+        key = frozenset(f.effect.parts())
+        if key not in best or f.misfit(f.x).value < best[key].misfit(best[key].x).value:
+            best[key] = f
+    left = tuple(entry for entry in found.left if frozenset(entry[0].parts()) not in best)
+    return Found(tuple(best.values()), left)
+
+
+def _place(effect: Effect) -> Place:
+    return effect.name, effect.at
+
+
+def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
+    """The next single effect whose company is looked for.
+
+    Once two explain everything, their company is looked for from the other side too: the first
+    may have been the best only as long as it was alone.
+    """
+    waiting = [f for f in leaders if _place(f.effect) not in led]
+    best = min(found.finalists, key=lambda f: f.per_value)
+    if best.per_value <= ENOUGH:
+        members = [_place(e) for e in best.effect.parts()]
+        waiting = [f for f in waiting if _place(f.effect) in members]
+    return waiting[0] if waiting and len(led) < MOST_LEADERS else None
+
+
+def _leaders(found: Found) -> list[Fit]:
+    """Single effects whose company is looked for, the best first; of a place and kind once.
+
+    Beside a second effect the best of them need not be right, so that others get their turn.
+    """
+    ranked = [found.finalists[i] for i in np.argsort(_behind(found.finalists))]
+    ranked += [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
+    leaders: dict[Place, Fit] = {}
+    for f in ranked:
+        if f.effect.at:
+            leaders.setdefault(_place(f.effect), f)
+    return list(leaders.values())
+
+
+def _strayed(fit: Fit, effect: Effect) -> bool:
+    """Whether an effect would spare springs that a fit has moved far from where they are stated.
+
+    That costs no χ² that would be left to explain, but the prior's.
+    """
+    misfit = fit.misfit
+    springs = effect.springs(misfit.setting.simulation) if effect.name == "joint_stiffness" else ()
+    away = np.abs(fit.x - misfit.mean) / misfit.sd
+    names = [p.name for p in misfit.parametrisation.parameters]
+    return any(away[names.index(name)] > STRAYED for name in springs if name in names)
 
 
 def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
