@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.diagnose.both import together
 from planner.diagnose.effect import Effect
-from planner.diagnose.fit import CLOSE, Fit, Problem, glance, promise, settle
+from planner.diagnose.fit import CLOSE, FINE, Fit, Problem, glance, points, promise, settle
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
 
@@ -19,6 +19,7 @@ CLEARLY = 3.0  # misfit from which that is so
 ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
+LESSENED = 3  # pairs that are looked at without one of them
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
 Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
@@ -54,7 +55,23 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
-    return _distinct(found)
+    return _distinct(_lessened(problem, found))
+
+
+def _lessened(problem: Problem, found: Found) -> Found:
+    """With what is left of the best pairs when an effect is dropped again, fitted from there.
+
+    A second effect may have led the fit out of a wrong minimum, and then explain nothing itself.
+    """
+    pairs = [f for f in found.finalists if len(f.effect.parts()) > 1]
+    again = []
+    for pair in sorted(pairs, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
+        for part in pair.effect.parts():
+            misfit = problem.misfit(part, FINE)
+            x = points(misfit, pair)[0]
+            start = Fit(part, misfit, x, misfit.by_pose(x))
+            again.append(settle(problem, start, steps=LAST_STEPS))
+    return Found((*found.finalists, *again), found.left)
 
 
 def _distinct(found: Found) -> Found:
