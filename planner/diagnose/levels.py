@@ -12,6 +12,7 @@ from planner.diagnose.fit import FINE, GLANCE, Fit
 from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
 from planner.diagnose.nonlinear import Candidate, descend
 from planner.diagnose.starts import starts
+from planner.diagnose.strayed import strayed
 from planner.diagnose.tone import screen_tone
 from planner.diagnose.visits import Recorded
 from planner.identify.solver import minimise
@@ -45,26 +46,29 @@ class Weighed:
     explained: float
     per_value: float
     parameters: dict[str, tuple[float, float, str]]
+    temper: float
 
 
 def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it."""
     if len(recorded.level_n) < 2:
         return ()
+    tone = screen_tone(recorded)
+    if tone is not None:
+        return (tone,)
     plain = base(recorded, nominal)
     system = system_of(plain)
     found = equivalent(recorded, system)
     if not len(found.count) or disproportion(found) < PROPORTIONAL:
         return ()
     if equivalent_share(found) < LINEARISED:
-        tone = screen_tone(recorded)
-        if tone is not None:
-            return (tone,)
         return (_unknown(found, "even with a stiffness of its own for every hit"),)
     weighed = weigh(recorded, plain, system, found)
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
-        return (_finding(best),)
+        c = best.candidate
+        sd = np.sqrt(np.diagonal(_covariance(c, best.temper))[: len(c.x)])
+        return (_finding(best), *strayed(plain, c.x, sd, best.at))
     law = best.candidate.law.effect.replace("_", " ")
     return (
         _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),
@@ -153,7 +157,9 @@ def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> t
         explained = 1 - max(c.chi2 - linear[2] - values, 0.0) / excess
         parameters = _parameters(plain, c, temper)
         out.append(
-            Weighed(c, system.ports[c.port], evidence, explained, 2 * c.chi2 / count, parameters)
+            Weighed(
+                c, system.ports[c.port], evidence, explained, 2 * c.chi2 / count, parameters, temper
+            )
         )
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 

@@ -69,6 +69,8 @@ def _lessened(problem: Problem, found: Found) -> Found:
         for part in pair.effect.parts():
             misfit = problem.misfit(part, FINE)
             x = points(misfit, pair)[0]
+            if not np.isfinite(misfit(x).value):
+                continue  # inertias that no body has without the other effect
             start = Fit(part, misfit, x, misfit.by_pose(x))
             again.append(settle(problem, start, steps=LAST_STEPS))
     return Found((*found.finalists, *again), found.left)
