@@ -1,6 +1,6 @@
 """Two or more effects at once."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,6 +102,25 @@ class Both(Effect):
         last = self.members[-1].starts()
         middle = [q.mean for m in self.members[:-1] for q in m.quantities]
         return np.hstack([np.tile(middle, (len(last), 1)), last])
+
+
+@dataclass(frozen=True)
+class Family(Both):
+    """One kind of effect at all its places: one cause, as that robot.toml leaves out bearings."""
+
+    @property
+    def prior(self) -> float:
+        """As one more effect than one."""
+        return SECOND
+
+
+def families(effects: Sequence[Effect]) -> list[Effect]:
+    """Transverse compliance of all joints that have it, where there are several."""
+    kin = [e for e in effects if e.name == "transverse_compliance"]
+    if len(kin) < 2:
+        return []
+    quantities = tuple(q for m in kin for q in m.quantities)
+    return [Family(" and ".join(m.at for m in kin), quantities, tuple(kin))]
 
 
 def together(a: Effect, b: Effect) -> Both | None:

@@ -104,9 +104,13 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     leader = int(np.argmax(shares))
     own = _priors([fits[leader].effect], all_)[0]
     before = _priors([effect for effect, _, _ in found.left], all_)
+    best = fits[leader]
+    half = float(best.misfit.counts.sum()) / (2 * weights.temper)
     for (_, behind, left), prior in zip(found.left, before, strict=True):
         fits.append(left)
-        shares.append(shares[leader] * float(np.exp(-behind)) * prior / own)
+        # It was left while nothing fitted, when little told apart; by now more would.
+        since = max(behind, half * (left.per_value - best.per_value))
+        shares.append(shares[leader] * float(np.exp(-since)) * prior / own)
     total = sum(shares) + unknown
     groups: dict[tuple, list[int]] = {}
     for i, f in enumerate(fits):

@@ -10,6 +10,7 @@ from planner.diagnose.effect import Effect, Setting
 from planner.diagnose.objective import ByPose, Misfit
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
+from planner.identify.identify import QUICK, identify
 from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.identify.solver import Minimum, minimise
 from planner.physics.gradient import Inertias
@@ -177,6 +178,20 @@ def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
         ends.append(_best(close, points(close, earlier)))
     fine = problem.misfit(effect, FINE)
     return _at(fine, _minimise(fine, _best(close, ends), LOOSE, LAST_STEPS).x)
+
+
+def staged(problem: Problem, effect: Effect) -> Fit:
+    """Of many springs at once, by an identification in bands that widen; settled on all lines.
+
+    Only for effects without parameters but springs.
+    """
+    body = _prepared(problem, effect)
+    priors = effect.priors(body.simulation, problem.priors)
+    found = identify(
+        problem.frfs, problem.q, body.simulation, priors,
+        band_hz=problem.band_hz, starts=1, effort=QUICK,
+    )  # fmt: skip
+    return settle(problem, _at(problem.misfit(effect, FINE), found.mean))
 
 
 def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:

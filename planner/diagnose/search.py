@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.both import together
+from planner.diagnose.both import Both, families, together
 from planner.diagnose.effect import Effect
-from planner.diagnose.fit import CLOSE, FINE, Fit, Problem, glance, points, promise, settle
+from planner.diagnose.fit import CLOSE, FINE, Fit, Problem, glance, points, promise, settle, staged
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
 
@@ -19,7 +19,8 @@ CLEARLY = 3.0  # misfit from which that is so
 ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
-LESSENED = 3  # pairs that are looked at without one of them
+LESSENED = 3  # of several effects that are looked at without one of them
+MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
 Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
@@ -39,12 +40,16 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
     best = min(f.per_value for f in found.finalists)
+    if best > ENOUGH and (kin := families(effects)):
+        tell("one kind of effect everywhere", 0.6)
+        found = Found((*found.finalists, *(staged(problem, e) for e in kin)), found.left)
+        best = min(f.per_value for f in found.finalists)
     leaders = _leaders(found)
     if best <= ENOUGH:
         leaders = leaders[:1]
         effects = [e for e in effects if leaders and _strayed(leaders[0], e)]
     led: list[Place] = []
-    while effects and (leader := _next(leaders, led, found)) is not None:
+    while effects and leaders and (leader := _next(leaders, led, found)) is not None:
         first = 0.6 + 0.4 * len(led) / MOST_LEADERS
         led.append(_place(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
@@ -55,23 +60,43 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
+    found = _composed(problem, found, effects, tell)
     return _distinct(_lessened(problem, found))
 
 
-def _lessened(problem: Problem, found: Found) -> Found:
-    """With what is left of the best pairs when an effect is dropped again, fitted from there.
+def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
+    """With one more effect after the other, as long as each pays and the noise is not reached."""
+    single = min(f.per_value for f in found.finalists if len(f.effect.parts()) == 1)
+    best, before = min(found.finalists, key=lambda f: f.per_value), single
+    while effects and ENOUGH < best.per_value < 1 + (before - 1) / PAYS:
+        if len(best.effect.parts()) == MOST_EFFECTS:
+            break
+        more = [t for e in effects if (t := together(best.effect, e)) is not None]
+        tell("looking for more effects", 0.97)
+        grown = _round(problem, best, more, lambda text, share: None)
+        before = best.per_value
+        found = Found((*found.finalists, *grown.finalists[1:]), (*found.left, *grown.left))
+        best = min(found.finalists, key=lambda f: f.per_value)
+    return found
 
-    A second effect may have led the fit out of a wrong minimum, and then explain nothing itself.
+
+def _lessened(problem: Problem, found: Found) -> Found:
+    """With what is left of the best that are several when one is dropped again, fitted from there.
+
+    It may have led the fit out of a wrong minimum, and then explain nothing itself.
     """
-    pairs = [f for f in found.finalists if len(f.effect.parts()) > 1]
+    several = [f for f in found.finalists if len(f.effect.parts()) > 1]
     again = []
-    for pair in sorted(pairs, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
-        for part in pair.effect.parts():
-            misfit = problem.misfit(part, FINE)
-            x = points(misfit, pair)[0]
+    for whole in sorted(several, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
+        parts = whole.effect.parts()
+        for part in parts:
+            kept = [p for p in parts if p is not part]
+            effect = kept[0] if len(kept) == 1 else Both.of(*kept)
+            misfit = problem.misfit(effect, FINE)
+            x = points(misfit, whole)[0]
             if not np.isfinite(misfit(x).value):
                 continue  # inertias that no body has without the other effect
-            start = Fit(part, misfit, x, misfit.by_pose(x))
+            start = Fit(effect, misfit, x, misfit.by_pose(x))
             again.append(settle(problem, start, steps=LAST_STEPS))
     return Found((*found.finalists, *again), found.left)
 
@@ -114,7 +139,7 @@ def _leaders(found: Found) -> list[Fit]:
     ranked += [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
     leaders: dict[Place, Fit] = {}
     for f in ranked:
-        if f.effect.at:
+        if f.effect.at and len(f.effect.parts()) == 1:
             leaders.setdefault(_place(f.effect), f)
     return list(leaders.values())
 

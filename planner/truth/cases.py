@@ -35,7 +35,11 @@ LEVELS = (0.4, 1.0, 2.5)
 POSES, PREDICTED = 9, 4
 DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
-ATTEMPTS = 40
+ATTEMPTS, SCENES = 40, 5
+
+
+class NothingShowsError(InputError):
+    """A scene whose noise hides whatever was drawn of an effect."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +122,9 @@ def _conceal(
                 secret = drawn.secret
                 break
         else:
-            raise InputError(f"No {name} of this robot shows in the noise; take another seed.")
+            raise NothingShowsError(
+                f"No {name} of this robot shows in the noise; take another seed."
+            )
     return found, measures
 
 
@@ -174,6 +180,17 @@ def _held_out(
     }
 
 
+def _made(kind: str, robot: str, seed: int, folder: Path) -> Case:
+    """A case; of another scene where nothing drawn for this one shows in its noise."""
+    for attempt in range(SCENES):
+        try:
+            return make_case(kind, robot, seed + attempt * 1_000_003, folder)
+        except NothingShowsError:
+            if attempt == SCENES - 1:
+                raise
+    raise AssertionError
+
+
 def main() -> None:
     """Make cases of all kinds in turn, robots in turn; print the seals."""
     parser = argparse.ArgumentParser(prog="python -m planner.truth.cases", description=__doc__)
@@ -186,9 +203,8 @@ def main() -> None:
     order = np.random.default_rng(options.seed).permutation(options.cases)
     for number, kind in enumerate(order):
         name, robot = f"case_{number + 1:03d}", sorted(ARMS)[number % len(ARMS)]
-        case = make_case(
-            KINDS[kind % len(KINDS)], robot, options.seed + number, options.folder / name
-        )
+        wanted = KINDS[kind % len(KINDS)], robot
+        case = _made(*wanted, options.seed + number, options.folder / name)
         (answers / f"{name}.json").write_text(case.answer, encoding="utf-8")
         print(f"{name} {case.seal}", flush=True)
 
