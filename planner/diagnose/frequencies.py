@@ -7,6 +7,7 @@ would be as small as the noise.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -147,7 +148,8 @@ def _fit(
         moved = STEP * np.eye(len(z))
         return np.stack([residual(z + d) - residual(z - d) for d in moved], axis=1) / (2 * STEP)
 
-    ends = [least_squares(residual, start, jac=slope) for start in starts]
+    solve = partial(least_squares, residual, jac=slope)  # pyright: ignore[reportArgumentType]
+    ends = [solve(start) for start in starts]
     best = min(ends, key=lambda end: end.cost)
     data, jacobian = best.fun[: -len(free)], best.jac[: -len(free)]
     return _Fit(chosen, free, best.x, float(data @ data), jacobian.T @ jacobian)

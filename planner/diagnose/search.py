@@ -19,7 +19,7 @@ CLEARLY = 3.0  # misfit from which that is so
 ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
-LESSENED = 3  # of several effects that are looked at without one of them
+LESSENED = 3  # explanations that are looked at without one of their effects
 MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
@@ -81,17 +81,17 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
 
 
 def _lessened(problem: Problem, found: Found) -> Found:
-    """With what is left of the best that are several when one is dropped again, fitted from there.
+    """With what is left of the best when an effect is dropped again, fitted from there.
 
     It may have led the fit out of a wrong minimum, and then explain nothing itself.
     """
-    several = [f for f in found.finalists if len(f.effect.parts()) > 1]
+    there = [f for f in found.finalists if f.effect.at]
     again = []
-    for whole in sorted(several, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
+    for whole in sorted(there, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
         parts = whole.effect.parts()
         for part in parts:
             kept = [p for p in parts if p is not part]
-            effect = kept[0] if len(kept) == 1 else Both.of(*kept)
+            effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
             misfit = problem.misfit(effect, FINE)
             x = points(misfit, whole)[0]
             if not np.isfinite(misfit(x).value):
