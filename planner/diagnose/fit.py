@@ -10,7 +10,7 @@ from planner.diagnose.effect import Effect, Setting
 from planner.diagnose.objective import ByPose, Misfit
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
-from planner.identify.identify import QUICK, identify
+from planner.identify.identify import QUICK, STAGES, identify
 from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.identify.solver import Minimum, minimise
 from planner.physics.gradient import Inertias
@@ -39,6 +39,8 @@ CLOSE, FINE = Grade(40), Grade(72)
 ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
+# The way home from afar: all bands, and every step that logarithms need.
+PATIENT = replace(QUICK, stages=STAGES, log_steps=40)
 KEPT = 2  # starts that are followed
 
 
@@ -187,11 +189,14 @@ def staged(problem: Problem, effect: Effect) -> Fit:
     """
     body = _prepared(problem, effect)
     priors = effect.priors(body.simulation, problem.priors)
-    found = identify(
-        problem.frfs, problem.q, body.simulation, priors,
-        band_hz=problem.band_hz, starts=1, effort=QUICK,
-    )  # fmt: skip
-    return settle(problem, _at(problem.misfit(effect, FINE), found.mean))
+    fits = []
+    for effort in (QUICK, PATIENT):
+        found = identify(
+            problem.frfs, problem.q, body.simulation, priors,
+            band_hz=problem.band_hz, starts=1, effort=effort,
+        )  # fmt: skip
+        fits.append(settle(problem, _at(problem.misfit(effect, FINE), found.mean)))
+    return min(fits, key=lambda f: f.misfit(f.x).value)
 
 
 def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:

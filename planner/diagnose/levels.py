@@ -68,7 +68,7 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
         c = best.candidate
         sd = np.sqrt(np.diagonal(_covariance(c, best.temper))[: len(c.x)])
-        return (_finding(best), *strayed(plain, c.x, sd, best.at))
+        return (_finding(best), *strayed(plain, c.x, sd, best.at, best.per_value))
     law = best.candidate.law.effect.replace("_", " ")
     return (
         _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),

@@ -21,6 +21,8 @@ HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain 
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
 LESSENED = 3  # explanations that are looked at without one of their effects
 MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
+SOFT = "base_compliance", "link_flexibility", "transverse_compliance"
+STUCK, AGAIN = 100.0, 6  # misfit from which so many soft structures are looked at again
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
 Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
@@ -40,9 +42,10 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
     best = min(f.per_value for f in found.finalists)
-    if best > ENOUGH and (kin := families(effects)):
-        tell("one kind of effect everywhere", 0.6)
-        found = Found((*found.finalists, *(staged(problem, e) for e in kin)), found.left)
+    if best > ENOUGH:
+        tell("softer structures, in bands that widen", 0.6)
+        more = [*families(effects), *(_soft(found, effects) if best > STUCK else ())]
+        found = Found((*found.finalists, *(staged(problem, e) for e in more)), found.left)
         best = min(f.per_value for f in found.finalists)
     leaders = _leaders(found)
     if best <= ENOUGH:
@@ -62,6 +65,17 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
     found = _composed(problem, found, effects, tell)
     return _distinct(_lessened(problem, found))
+
+
+def _soft(found: Found, effects: Sequence[Effect]) -> list[Effect]:
+    """Effects that are springs alone, those of the base and the most promising others.
+
+    Soft ones move all modes so far that no fit in the whole band finds its way.
+    """
+    behind = {id(effect): gap for effect, gap, _ in found.left}
+    springs = [e for e in effects if e.name in SOFT]
+    springs.sort(key=lambda e: (e.name != SOFT[0], behind.get(id(e), 0.0)))
+    return springs[:AGAIN]
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:

@@ -7,13 +7,19 @@ from planner.diagnose.finding import Finding
 from planner.diagnose.fit import Fit
 
 FAR = 3.2  # prior sds that a spring does not move by chance, nor by what a fit in time neglects
+FARTHER = 5.0  # the same beside a law that is not quite the joint's
+FITS = 2.0  # χ² per value up to which a law is
 
 
-def strayed(plain: Fit, x: np.ndarray, sd: np.ndarray, nonlinear: str) -> tuple[Finding, ...]:
+def strayed(
+    plain: Fit, x: np.ndarray, sd: np.ndarray, nonlinear: str, per_value: float
+) -> tuple[Finding, ...]:
     """Joints other than the nonlinear one whose springs are far off at x (D,) ± sd (D,).
 
-    x is laid out as that of `plain`; a nonlinear joint's own spring is part of its law.
+    x is laid out as that of `plain`; a nonlinear joint's own spring is part of its law, which
+    fits to `per_value`.
     """
+    least = FAR if per_value < FITS else FARTHER
     misfit = plain.misfit
     simulation = misfit.setting.simulation
     names = [p.name for p in misfit.parametrisation.parameters]
@@ -21,7 +27,7 @@ def strayed(plain: Fit, x: np.ndarray, sd: np.ndarray, nonlinear: str) -> tuple[
     found: dict[str, Finding] = {}
     for effect in JointStiffness.everywhere(simulation):
         springs = [name for name in effect.springs(simulation) if name in names]
-        far = [name for name in springs if abs(away[names.index(name)]) > FAR]
+        far = [name for name in springs if abs(away[names.index(name)]) > least]
         if not far or effect.at == nonlinear or effect.at in found:
             continue
         places = [names.index(name) for name in far]

@@ -62,7 +62,9 @@ def together(findings: Sequence[Finding], diagnosis: Diagnosis) -> Together:
     out: dict[tuple[Place, ...], float] = {(key,): value for key, value in ranked.items()}
     for places, weight in _linear(others) or (((), 1.0),):
         unknown = places == ((UNKNOWN, None),)
-        key = places if unknown else (found + places) or (("none", None),)
+        # What a screen corrected for leaves a little of the same behind.
+        rest = tuple(p for p in places if p not in found)
+        key = places if unknown else (found + rest) or (("none", None),)
         out[key] = out.get(key, 0.0) + share * weight
     candidates = sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)
     first = candidates[0].places[0][0]
