@@ -268,4 +268,6 @@ def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:
         bases.append(x + np.where(springs & ~there, 1.5 * misfit.sd, 0.0))
     starts = [np.where(there[b:], values[b:], psi) for psi in misfit.effect.starts()]
     found = [np.concatenate([base[:b], psi]) for base in bases for psi in starts]
-    return list(np.unique(found, axis=0))
+    possible = [point for point in np.unique(found, axis=0) if misfit.possible(point)]
+    # Inertias that went with an effect which is not there now may be those of no body.
+    return possible or [np.concatenate([misfit.mean[:b], psi]) for psi in starts]

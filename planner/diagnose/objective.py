@@ -132,12 +132,18 @@ class Misfit:
         normal[:, free[:, None], free] = j @ np.swapaxes(j, 1, 2)
         return ByPose(np.sum(r**2, axis=1), gradient, normal)
 
+    def possible(self, x: np.ndarray) -> bool:
+        """Whether masses are positive at x, and nothing is farther off than is looked for."""
+        a, b = self.split
+        if np.abs((x - self.mean) / self.sd).max() > FARTHEST:
+            return False
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        return bool(np.linalg.eigvalsh(mass)[:, 0].min() > 0)
+
     def __call__(self, x: np.ndarray) -> Quadratic:
         """Data and prior together; ∞ where x cannot be."""
         away, scale = (x - self.mean) / self.sd, 1 / self.sd
-        a, b = self.split
-        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        if np.abs(away).max() > FARTHEST or np.linalg.eigvalsh(mass)[:, 0].min() <= 0:
+        if not self.possible(x):
             nothing = np.zeros(len(x))
             return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
         data = self.by_pose(x)

@@ -108,8 +108,6 @@ def _lessened(problem: Problem, found: Found) -> Found:
             effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
             misfit = problem.misfit(effect, FINE)
             x = points(misfit, whole)[0]
-            if not np.isfinite(misfit(x).value):
-                continue  # inertias that no body has without the other effect
             start = Fit(effect, misfit, x, misfit.by_pose(x))
             again.append(settle(problem, start, steps=LAST_STEPS))
     return Found((*found.finalists, *again), found.left)
