@@ -112,8 +112,14 @@ def test_more_repeats_take_up_those_that_are_there(pool, out, first):
 
 def test_ctrl_c_keeps_what_is_finished(pool, tmp_path):
     long = command(pool, tmp_path, "--repeats", "500")
+    # Tests that a shell runs in the background inherit that Ctrl-C is ignored.
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    interpreter, option, code = PLANNER
     process = subprocess.Popen(
-        [*PLANNER, *long], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [interpreter, option, heard + code, *long],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     until = time.monotonic() + 200
     while len(list((tmp_path / "runs").glob("*.json"))) < 2 and time.monotonic() < until:
