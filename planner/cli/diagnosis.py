@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from planner.diagnose.diagnose import Candidate, Diagnosis
     from planner.diagnose.finding import Finding
     from planner.diagnose.predict import Agreement
-    from planner.diagnose.recorded import Recorded
     from planner.diagnose.together import Together
+    from planner.identify.recorded import Recorded
     from planner.physics.simulation import Simulation
     from planner.robot.robot import Robot
 
@@ -48,7 +48,7 @@ def diagnose(
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
     from planner.diagnose.diagnose import diagnose as run
-    from planner.diagnose.recorded import read_recorded
+    from planner.diagnose.recorded import read_ended
     from planner.diagnose.together import linear_effects_apply, together
     from planner.physics.simulation import Simulation
     from planner.recording.folder import read_poses
@@ -61,7 +61,7 @@ def diagnose(
     nominal = Robot.load(given.robot)
     wanted = read_poses(predict, nominal.joint_names) if predict else ()
     with counting(quiet=as_json) as tell:
-        recorded = read_recorded(
+        recorded = read_ended(
             recordings,
             nominal.joint_names,
             nominal.config.band_hz,

@@ -7,8 +7,7 @@ import numpy as np
 from planner.diagnose.effect import Effect, Setting
 from planner.diagnose.fit import Fit, Grade, Problem, fit, settle
 from planner.diagnose.objective import Misfit
-from planner.frf import metrics
-from planner.identify.check import Similarity
+from planner.identify.check import Similarity, similarity_of
 from planner.identify.data import Measured
 from planner.identify.held_out import set_aside
 
@@ -61,14 +60,8 @@ def misfit_at(problem: Problem, effect: Effect, q: np.ndarray, frequency_hz: np.
 def similarity(problem: Problem, found: Fit | None) -> Similarity:
     """Of a fit (None: the simulation as it stands) to the FRFs of a problem, artefacts included."""
     misfit = problem.misfit(Effect("") if found is None else found.effect, ALL)
-    measured, parts = misfit.measured, []
     h = misfit.response(misfit.mean if found is None else found.x)[0]
-    given = np.where(measured.used, measured.accelerance, np.nan)
-    for i, used in enumerate(measured.used):
-        lines = used.any(axis=(0, 1))
-        parts.append(metrics.agreement(given[i : i + 1, ..., lines], h[i : i + 1, ..., lines]))
-    whole = metrics.stack(parts)
-    return Similarity(metrics.direct_mean(whole.global_frac), metrics.direct_mean(whole.frobenius))
+    return similarity_of(misfit.measured, h)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ known exactly (`Frf.tail_s`) and is part of the model that is fitted later. The 
 from the pulse alone (force window), because between pulses it holds only noise.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +35,11 @@ class Spectra:
     noise_power: np.ndarray  # (3,) of the responses
 
 
+Transformed = tuple[np.ndarray, list[Spectra], list[tuple[int, int]], list[str]]
+# FRF, variance, coherence (3, F) of one hit axis, and the share (F,) of the force's noise.
+Estimated = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
 def estimate(
     hits: tuple[Hit, ...],
     band_hz: tuple[float, float],
@@ -49,21 +55,32 @@ def estimate(
     """
     if estimator not in ("h1", "h2", "hv"):
         raise ValueError(f"unknown estimator {estimator}")
-    frequency, spectra, cuts, remarks = transformed(hits, band_hz, exponential_rate_1_s)
+
+    def column(group: list[Spectra]) -> Estimated:
+        return *_column(group, estimator), _force_share(group)
+
+    found = transformed(hits, band_hz, exponential_rate_1_s)
+    return assembled(hits, found, band_hz, exponential_rate_1_s, column)
+
+
+def assembled(
+    hits: tuple[Hit, ...],
+    found: Transformed,
+    band_hz: tuple[float, float],
+    exponential_rate_1_s: float,
+    column: Callable[[list[Spectra]], Estimated],
+) -> Frf:
+    """FRF matrix of hits that were `transformed`, each hit axis estimated by `column`."""
+    frequency, spectra, cuts, remarks = found
     shape = (3, 3, frequency.size)
-    h, variance, coherence = (
-        np.full(shape, np.nan + 0j),
-        np.full(shape, np.nan),
-        np.full(shape, np.nan),
-    )
+    h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
+    coherence, share = np.full(shape, np.nan), np.full((3, frequency.size), np.nan)
     counts = [0, 0, 0]
-    force_share = np.full((3, frequency.size), np.nan)
     for axis in range(3):
         group = [s for s in spectra if s.axis == axis]
         counts[axis] = len(group)
         if group:
-            h[:, axis], variance[:, axis], coherence[:, axis] = _column(group, estimator)
-            force_share[axis] = _force_share(group)
+            h[:, axis], variance[:, axis], coherence[:, axis], share[axis] = column(group)
     return Frf(
         frequency,
         h,
@@ -74,14 +91,14 @@ def estimate(
         exponential_rate_1_s,
         tuple(remarks),
         tail(hits, cuts),
-        force_share,
+        share,
         float(np.mean([s.force_window_s for s in spectra])),
     )
 
 
 def transformed(
     hits: tuple[Hit, ...], band_hz: tuple[float, float], exponential_rate_1_s: float = 0.0
-) -> tuple[np.ndarray, list[Spectra], list[tuple[int, int]], list[str]]:
+) -> Transformed:
     """Lines (F,) in Hz, spectra of all hits, the samples used of each, remarks.
 
     Raises RefusedError if the hits do not fit together.

@@ -8,7 +8,7 @@ weight, and scatter pooled over lines and channels says how far that is from the
 
 import numpy as np
 
-from planner.frf.estimate import Spectra, estimate, tail, transformed, usable
+from planner.frf.estimate import Estimated, Spectra, assembled, estimate, transformed
 from planner.frf.types import Frf
 from planner.recording.types import Hit
 
@@ -20,38 +20,14 @@ def weighted(
     hits: tuple[Hit, ...], band_hz: tuple[float, float], exponential_rate_1_s: float = 0.0
 ) -> Frf:
     """FRF matrix of one pose, as `estimate`; H1 where records hold no time before the pulse."""
-    frequency, spectra, cuts, remarks = transformed(hits, band_hz, exponential_rate_1_s)
-    noise = np.array([s.noise_power for s in spectra])  # (hits, 3)
+    found = transformed(hits, band_hz, exponential_rate_1_s)
+    noise = np.array([s.noise_power for s in found[1]])  # (hits, 3)
     if not np.all(np.isfinite(noise)) or np.any(noise <= 0):
         return estimate(hits, band_hz, exponential_rate_1_s=exponential_rate_1_s)
-    shape = (3, 3, frequency.size)
-    h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
-    coherence, share = np.full(shape, np.nan), np.full((3, frequency.size), np.nan)
-    counts = [0, 0, 0]
-    for axis in range(3):
-        group = [s for s in spectra if s.axis == axis]
-        counts[axis] = len(group)
-        if group:
-            column = _column(group)
-            h[:, axis], variance[:, axis], coherence[:, axis], share[axis] = column
-    return Frf(
-        frequency,
-        h,
-        variance,
-        coherence,
-        (counts[0], counts[1], counts[2]),
-        usable(spectra, frequency, band_hz),
-        exponential_rate_1_s,
-        tuple(remarks),
-        tail(hits, cuts),
-        share,
-        float(np.mean([s.force_window_s for s in spectra])),
-    )
+    return assembled(hits, found, band_hz, exponential_rate_1_s, _column)
 
 
-def _column(
-    group: list[Spectra],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _column(group: list[Spectra]) -> Estimated:
     """FRF, variance, coherence (3, F) of one hit axis, and the share (F,) of the force's noise."""
     force = np.array([s.force for s in group])  # (n, F)
     response = np.array([s.response for s in group])  # (n, 3, F)

@@ -52,7 +52,12 @@ def fit_similarity(
 ) -> Similarity:
     """Global FRAC and Frobenius similarity of a simulation to FRFs at q (n, dof) in rad."""
     measured = _stacked(simulation, frfs, band_hz)
-    h, parts = _simulated(simulation, measured, q), []
+    return similarity_of(measured, _simulated(simulation, measured, q))
+
+
+def similarity_of(measured: Measured, h: np.ndarray) -> Similarity:
+    """The same of FRFs h (n, 3, 3, F) in m/s²/N on the measured lines."""
+    parts = []
     given = np.where(measured.used, measured.accelerance, np.nan)
     for i, used in enumerate(measured.used):
         lines = used.any(axis=(0, 1))

@@ -10,7 +10,7 @@ from planner.errors import RefusedError
 from planner.frf.types import Frf
 from planner.modes.measure import Source, average
 from planner.recording.folder import read_recordings
-from planner.recording.types import PoseRow
+from planner.recording.types import Hit, PoseRow
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,12 @@ def read_recorded(
     band_hz: tuple[float, float],
     window_rate_1_s: float = 0.0,
     progress: Callable[[str], None] = lambda text: None,
+    averaged: Callable[[tuple[Hit, ...], Frf], Frf] = lambda hits, frf: frf,
 ) -> Recorded:
     """Read, screen and average all hits of a folder with recordings.csv.
 
-    A pose's angles are the mean of its rows' readback. Raises InputError where the table is
+    A pose's angles are the mean of its rows' readback; `averaged` may make another FRF of its
+    hits (none where FRFs were exported) and their average. Raises InputError where the table is
     wrong, RefusedError where no pose has a hit that can be used.
     """
     groups: dict[str, list[PoseRow]] = {}
@@ -58,7 +60,7 @@ def read_recorded(
             continue
         poses.append(pose)
         q.append(np.deg2rad(np.mean([r.joints_deg for r in rows], axis=0)))
-        frfs.append(measured.frf)
+        frfs.append(averaged(measured.hits, measured.frf))
     if not frfs:
         reason = refused[0][1] if refused else remarks[0]
         raise RefusedError(f"{folder}: no pose has a hit that can be used: {reason}")
