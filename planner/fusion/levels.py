@@ -39,7 +39,7 @@ class Model(Protocol):
         ...
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        """Best estimate and sd (q,) of the noise-free output at x (q, d)."""
         ...
 
 

@@ -32,9 +32,9 @@ class RecursiveAR1:
     log_evidence: float
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q,) of the noise-free output at x (q, d)."""
+        """Median and sd (q,) of the noise-free output at x (q, d)."""
         found = self.predictive(x)
-        return found.mean, found.sd
+        return found.median, found.sd
 
     def predictive(self, x: np.ndarray) -> Predictive:
         """The same, one Gaussian per sample of the hyperparameters."""

@@ -78,7 +78,7 @@ def score(d: Design, found: Predictive, seconds):
     found = Predictive(found.weights, found.means, np.maximum(found.sds, least))
     inside = np.mean(np.abs(found.below(d.y_test) - 0.5) < 0.475)
     nlpd = -np.mean(found.log_density(d.y_test)) - np.log(size)
-    return inside, nlpd, np.sqrt(np.mean((found.mean - d.y_test) ** 2)) / size, float(seconds)
+    return inside, nlpd, np.sqrt(np.mean((found.median - d.y_test) ** 2)) / size, float(seconds)
 
 
 def run(problems, name, seeds, folder):
