@@ -13,12 +13,19 @@ from planner.campaign import store
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
-from planner.campaign.events import Configured, Entry, Imported, MeasuredMode, Proposed
+from planner.campaign.events import (
+    Configured,
+    Entry,
+    Imported,
+    MeasuredMode,
+    Proposal,
+    Proposed,
+)
 from planner.campaign.logged import from_modal
 from planner.campaign.model import Model, build
 from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, fold
-from planner.errors import InputError, PlannerError
+from planner.errors import InputError, NoPoseLeftError, PlannerError
 from planner.modes.measure import MeasuredPose, measure
 
 CLOSE = 1e-6  # relative; another processor rounds differently, another program errs by more
@@ -26,7 +33,10 @@ CLOSE = 1e-6  # relative; another processor rounds differently, another program 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One entry of the log, computed again: "identical", "close" (rounding), "differs", "kept"."""
+    """One entry of the log, computed again: "identical", "close" (rounding), "differs", "kept".
+
+    `instead`: what another acquisition would have proposed there.
+    """
 
     entry: Entry
     check: str
@@ -34,6 +44,7 @@ class Step:
     state: CampaignState  # after the entry
     model: Model
     measured: MeasuredPose | None = None
+    instead: tuple[Proposal, ...] = ()
 
 
 class _Cells:
@@ -53,8 +64,12 @@ class _Cells:
         return self._cells[key]
 
 
-def replay(campaign: Campaign, until: int | None = None) -> Iterator[Step]:
+def replay(
+    campaign: Campaign, until: int | None = None, acquisition: str | None = None
+) -> Iterator[Step]:
     """Each entry of the log up to number `until`, with what computing it again gives.
+
+    `acquisition` is asked for what it would have proposed wherever the log proposes.
 
     Raises InputError if a recording that the log names is missing or changed.
     """
@@ -67,11 +82,23 @@ def replay(campaign: Campaign, until: int | None = None) -> Iterator[Step]:
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
             check, detail, measured = _check(campaign, entry, before, model)
+            instead = _instead(entry, before, model, acquisition)
             assert after.configured is not None
             key = (after.model_version, id(cells.of(after.configured)))
             if model is None or key != model_key:
                 model, model_key = build(cells.of(after.configured), after, campaign.frf_of), key
-            yield Step(entry, check, detail, after, model, measured)
+            yield Step(entry, check, detail, after, model, measured, instead)
+
+
+def _instead(
+    entry: Entry, before: CampaignState, model: Model | None, acquisition: str | None
+) -> tuple[Proposal, ...]:
+    if acquisition is None or model is None or not isinstance(entry.event, Proposed):
+        return ()
+    try:
+        return propose(model, before, entry.event.count, acquisition)
+    except NoPoseLeftError:
+        return ()
 
 
 def _check(

@@ -223,15 +223,19 @@ def replayed(
     rrd: Path | None,
     viewer: bool,
     progress: Callable[[str], None],
+    acquisition: str | None = None,
 ) -> dict[str, Any]:
-    """Answer of `replay`: each step of the log and whether computing it again gave the same."""
+    """Answer of `replay`: each step of the log and whether computing it again gave the same.
+
+    With an `acquisition` also what that would have proposed, and saved.
+    """
     from planner.replay import replay
     from planner.show.story import Story
 
     steps, model = [], None
     simulated = any(m.simulated for m in campaign.state.measurements.values())
     with Story(campaign.cell, rrd, viewer, simulated) as story:
-        for step in replay(campaign, until):
+        for step in replay(campaign, until, acquisition):
             progress(f"{step.entry.seq} of {len(campaign.entries)} {step.detail}")
             story.tell(step.entry, step.state, step.model, step.measured)
             steps.append(
@@ -243,16 +247,34 @@ def replayed(
                     "detail": step.detail,
                     "measurements": len(step.model.labelled),
                     "frequency_sd_percent": step.model.frequency_sd_percent,
+                    "instead": [
+                        {"joints_deg": p.joints_deg, "position_m": p.position_m, "hits": p.hits}
+                        for p in step.instead
+                    ],
                 }
             )
             model = step.model
+    progress(f"playing {acquisition} on what was measured" if acquisition else "done")
     return {
         "campaign": str(campaign.directory),
         "steps": steps,
         "reproduced": all(step["check"] != "differs" for step in steps),
         "rrd": str(rrd.resolve()) if rrd else None,
         "frequency_sd_percent": _sd(model),
+        "otherwise": _otherwise(campaign, acquisition),
     }
+
+
+def _otherwise(campaign: Campaign, acquisition: str | None) -> dict[str, Any] | None:
+    from planner.compare.otherwise import otherwise
+
+    found = otherwise(campaign, acquisition) if acquisition else None
+    if found is None:
+        return None
+    runs = {"campaign": found.measured, found.acquisition: found.instead}
+    names = "poses", "n", "frequency_rmse_percent", "minutes"
+    curves = {k: {name: list(getattr(run, name)) for name in names} for k, run in runs.items()}
+    return {"acquisition": found.acquisition, "text": found.text, "runs": curves}
 
 
 def _sd(model: Model | None) -> list[float] | None:

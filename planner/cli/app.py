@@ -205,6 +205,9 @@ def predict(
 def replay(
     directory: Directory,
     until: Annotated[int | None, typer.Option(metavar="N", help="Stop after entry N.")] = None,
+    acquisition: Annotated[
+        str | None, typer.Option(metavar="NAME", help="What would this one have proposed, saved?")
+    ] = None,
     rrd: Rrd = None,
     viewer: Viewer = False,
     as_json: AsJson = False,
@@ -215,7 +218,7 @@ def replay(
     from planner.cli.progress import reporting
 
     with reporting("replaying", quiet=as_json) as progress:
-        answer = answers.replayed(Campaign(directory), until, rrd, viewer, progress)
+        answer = answers.replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
     if not answer["reproduced"]:
         warn("The log was not reproduced; see the steps that differ.")
     return respond(answer, as_json, render.replayed, 0 if answer["reproduced"] else 1)

@@ -129,6 +129,7 @@ def _answer(bench: "Bench", study: "Study", found: "dict[Task, Run | Failure]") 
     return {
         "strategies": {name: _curve(curve) for name, curve in curves.items()},
         "measurements_to_one_percent": {name: curve.to_goal for name, curve in curves.items()},
+        "minutes_to_one_percent": {name: curve.minutes_to_goal for name, curve in curves.items()},
         "paired": {"baseline": baseline, "against": against},
         "acquisitions": study.strategies,
         "robot": bench.robot.name,
@@ -153,6 +154,7 @@ def _curve(curve: "Curves") -> dict[str, Any]:
         "r2": np.median(curve.r2, axis=0),
         "coverage95": np.median(curve.coverage95, axis=0),
         "coverage95_mean": np.mean(curve.coverage95, axis=0),
+        "minutes": np.median(curve.minutes, axis=0),
         "wall_seconds": curve.wall_seconds.sum(),
         "process_seconds": curve.process_seconds.sum(),
         "runs": len(curve.seeds),

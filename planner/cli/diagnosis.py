@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from planner.diagnose.finding import Finding
     from planner.diagnose.predict import Agreement
     from planner.diagnose.together import Together
+    from planner.diagnose.visits import Recorded as Visits
     from planner.identify.recorded import Recorded
     from planner.physics.simulation import Simulation
     from planner.robot.robot import Robot
@@ -47,6 +48,7 @@ def diagnose(
     from planner.cli.material import material
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
+    from planner.diagnose.beside import beside, leaves_room
     from planner.diagnose.diagnose import diagnose as run
     from planner.diagnose.recorded import read_ended
     from planner.diagnose.together import linear_effects_apply, together
@@ -70,16 +72,23 @@ def diagnose(
         )
         simulation = Simulation(nominal)
         screened = _screened(recordings, recorded, simulation, window_rate_1_s, tell)
-        recorded = screened.recorded
+        recorded, findings = screened.recorded, screened.findings
+        linear = linear_effects_apply(findings)
         found = run(
             recorded.frfs,
             recorded.q,
             simulation,
-            effects=None if linear_effects_apply(screened.findings) else (),
-            tell=lambda text, share: tell(text, 0.2 + 0.75 * share),
+            effects=None if linear or leaves_room(findings) else (),
+            tell=lambda text, share: tell(text, 0.2 + 0.7 * share),
         )
+        tell("looking for a nonlinear joint beside it", 0.9)
+        both = beside(screened.visits, findings, found) if screened.visits else None
+        if both is not None:
+            findings, found = both
+        elif not linear:
+            found = replace(found, best=found.refitted)
         tell("judging at poses set aside", 0.95)
-        answer = _answer(recorded, found, together(screened.findings, found))
+        answer = _answer(recorded, found, together(findings, found, linear or both is not None))
         answer |= {"npz": None, "robot": None, "plots": []}
         answer["next"] = _next(found, given.with_poses(wanted))
         if wanted:
@@ -104,6 +113,7 @@ def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
 class _Screened:
     findings: "tuple[Finding, ...]"
     recorded: "Recorded"  # corrected for the artefacts
+    visits: "Visits | None" = None  # the hits themselves, corrected
 
 
 def _screened(
@@ -131,10 +141,10 @@ def _screened(
     found = screen(visits, simulation)
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
     if not artefacts:
-        return _Screened(found.findings, recorded)
+        return _Screened(found.findings, recorded, found.clean)
     said = f"The recordings were corrected for: {', '.join(artefacts)}."
     clean = replace(corrected(recorded, found.clean), remarks=(*recorded.remarks, said))
-    return _Screened(found.findings, clean)
+    return _Screened(found.findings, clean, found.clean)
 
 
 def _answer(recorded: "Recorded", found: "Diagnosis", whole: "Together") -> dict[str, Any]:
@@ -283,14 +293,15 @@ def _predict(found: "Diagnosis", rows: list[tuple[str, tuple[float, ...]]], path
 
 def _written(out: Path, robot: "Robot", recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
     """The explained robot and the pictures, in a folder."""
+    from planner.diagnose.diagnose import Candidate
     from planner.diagnose.write import write_explained
     from planner.show.diagnosis_plots import diagnosis_figures
     from planner.show.pictures import Pictures
 
-    best = next(
-        c for c in found.candidates if c.fit is not None and c.fit.effect is found.best.effect
-    )
-    path = write_explained(out, robot, found, best)
+    parts = found.best.effect.parts()
+    places = {(e.name, e.at or None) for e in parts}
+    shares = [c.probability for c in found.candidates if set(c.places) == places]
+    path = write_explained(out, robot, found, Candidate(parts, sum(shares), found.best))
     mark = "SIMULATED recordings · " if recorded.simulated else ""
     figures = diagnosis_figures(found, recorded.poses, mark)
     plots = Pictures(out).write(figures, robot.name)["plots"]

@@ -11,7 +11,7 @@ from planner.cli.answer import AsJson, respond
 
 
 def prove(
-    cases: Annotated[int, typer.Option(min=1, max=5000, help="How many cases.")] = 22,
+    cases: Annotated[int, typer.Option(min=1, max=5000, help="How many cases.")] = 25,
     seed: Annotated[int, typer.Option(min=0, help="Of the cases.")] = 0,
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Where all goes; resumed if it is there.")

@@ -160,18 +160,30 @@ def predicted(answer: dict[str, Any]) -> RenderableType:
 
 def replayed(answer: dict[str, Any]) -> RenderableType:
     """Text of `replay`."""
-    made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)")
+    other = answer["otherwise"]
+    asked = any(step["instead"] for step in answer["steps"])
+    more = ["instead (deg)"] if asked else []
+    made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
     for step in answer["steps"]:
         sd = "  ".join(f"{v:.2f}" for v in step["frequency_sd_percent"])
         style = "red" if step["check"] == "differs" else None
+        poses = [" ".join(f"{v:.0f}" for v in p["joints_deg"]) for p in step["instead"]]
         made.add_row(
-            str(step["seq"]), step["event"], step["check"], step["detail"], sd, style=style
-        )
+            str(step["seq"]), step["event"], step["check"], step["detail"], sd,
+            *(["\n".join(poses)] if asked else []), style=style,
+        )  # fmt: skip
     verdict = "reproduced" if answer["reproduced"] else "NOT reproduced"
     lines = [f"The log was {verdict}."]
     if answer["rrd"]:
         lines.append(f"Rerun recording: {answer['rrd']}")
-    return Group(made, Text("\n".join(lines)))
+    if other is None:
+        return Group(made, Text("\n".join(lines)))
+    counts = next(iter(other["runs"].values()))["n"]
+    curves = table("Frequency RMSE (%) on poses not yet used, by measurements", "order",
+                   *map(str, counts))  # fmt: skip
+    for name, run in other["runs"].items():
+        curves.add_row(name, *(f"{v:.2f}" for v in run["frequency_rmse_percent"]))
+    return Group(made, curves, Text("\n".join([*lines, other["text"]])))
 
 
 def modes(answer: dict[str, Any]) -> RenderableType:

@@ -44,7 +44,8 @@ def _goals(answer: dict[str, Any]) -> RenderableType:
     last = answer["budget"]
     made = table(
         f"To 1 %, and compared with {baseline} from the same initial poses (95 % interval)",
-        "strategy", "to 1 %", "measurements more", f"RMSE more after {last} (points)", "wall (s)",
+        "strategy", "to 1 %", "robot (min)", "measurements more",
+        f"RMSE more after {last} (points)", "wall (s)",
     )  # fmt: skip
     for name, reached in answer["measurements_to_one_percent"].items():
         found = answer["paired"]["against"].get(name)
@@ -61,7 +62,10 @@ def _goals(answer: dict[str, Any]) -> RenderableType:
                 "+.3f",
             )
         wall = f"{answer['strategies'][name]['wall_seconds']:.1f}"
-        made.add_row(name, "–" if reached is None else str(reached), goal, after, wall)
+        minutes = answer["minutes_to_one_percent"][name]
+        made.add_row(
+            name, *("–" if v is None else f"{v:.0f}" for v in (reached, minutes)), goal, after, wall
+        )
     return made
 
 

@@ -21,6 +21,7 @@ class Curves:
     frequency_rmse_percent: np.ndarray
     r2: np.ndarray
     coverage95: np.ndarray
+    minutes: np.ndarray
     wall_seconds: np.ndarray  # (s,)
     process_seconds: np.ndarray  # (s,)
 
@@ -28,7 +29,10 @@ class Curves:
     def of(cls, runs: Sequence[Run]) -> "Curves":
         """Of runs with the same initial poses and budget, one at least."""
         runs = sorted(runs, key=lambda run: run.seed)
-        names = "frequency_rmse_percent", "r2", "coverage95", "wall_seconds", "process_seconds"
+        names = (
+            "frequency_rmse_percent", "r2", "coverage95", "minutes", "wall_seconds",
+            "process_seconds",
+        )  # fmt: skip
         columns = (np.array([getattr(run, name) for run in runs], dtype=float) for name in names)
         return cls(tuple(run.seed for run in runs), np.array(runs[0].n), *columns)
 
@@ -37,6 +41,12 @@ class Curves:
         """Fewest measurements with a median RMSE of at most 1 %; None: not within the budget."""
         reached = np.flatnonzero(np.median(self.frequency_rmse_percent, axis=0) <= GOAL_PERCENT)
         return int(self.n[reached[0]]) if reached.size else None
+
+    @property
+    def minutes_to_goal(self) -> float | None:
+        """Median minutes of robot time to a median RMSE of at most 1 %; None: not reached."""
+        reached = np.flatnonzero(np.median(self.frequency_rmse_percent, axis=0) <= GOAL_PERCENT)
+        return float(np.median(self.minutes[:, reached[0]])) if reached.size else None
 
     @property
     def each_to_goal(self) -> np.ndarray:

@@ -8,6 +8,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.acquire.designs import NESTED
 from planner.campaign.model import Model, build
+from planner.campaign.outlook import cost_of
 from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState
 from planner.compare import content
@@ -36,9 +37,16 @@ def run(bench: Bench, task: Task) -> Run:
 
 
 def _run(bench: Bench, task: Task) -> Run:
+    cell = cell_of(bench)
+    used = NESTED[INITIAL](cell.candidates.features, task.budget, task.seed)[: task.initial]
+    rest = [i for i in planned(cell, task) if i not in used]
+    return play(bench, used.tolist(), rest[: task.budget - task.initial], task)
+
+
+def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:
+    """A run that begins with the poses `used`, goes on with `then`, then as the model says."""
     wall, process = time.perf_counter(), time.process_time()
     cell = cell_of(bench)
-    used, planned = _planned(cell, task)
     counts, scores = [], []
     while True:
         model, state = _fitted(bench, cell, used, task.seed)
@@ -46,24 +54,32 @@ def _run(bench: Bench, task: Task) -> Run:
         scores.append(_judged(bench, model, used))
         if len(used) == task.budget:
             break
-        used = [*used, planned.pop(0) if planned else _chosen(bench, model, state, task.strategy)]
-    rmse_percent, r2, coverage95 = zip(*scores, strict=True)
+        used = [*used, then.pop(0) if then else _chosen(bench, model, state, task.strategy)]
     names = tuple(bench.measurements[i].pose for i in used)
+    minutes = _minutes(bench, cell, used)[task.initial - 1 :]
     seconds = time.perf_counter() - wall, time.process_time() - process
+    rmse_percent, r2, coverage95 = zip(*scores, strict=True)
     return Run(
-        task.strategy, task.seed, names, tuple(counts), rmse_percent, r2, coverage95, *seconds
-    )
+        task.strategy, task.seed, names, tuple(counts), rmse_percent, r2, coverage95, minutes,
+        *seconds,
+    )  # fmt: skip
 
 
-def _planned(cell: PoolCell, task: Task) -> tuple[list[int], list[int]]:
-    """Initial poses, and those to follow if the strategy does not look at the model."""
-    x = cell.candidates.features
-    first = NESTED[INITIAL](x, task.budget, task.seed)[: task.initial].tolist()
+def _minutes(bench: Bench, cell: PoolCell, used: list[int]) -> tuple[float, ...]:
+    """Robot time until each pose is measured, in this order, hit along the axes recorded."""
+    cost, at, total = cost_of(cell), None, []
+    for i in used:
+        axes = tuple(axis for axis in range(3) if bench.frfs[i].hits[axis])
+        total.append(float(cost.minutes(bench.q[i][None], at, axes)[0]))
+        at = bench.q[i]
+    return tuple(np.cumsum(total).tolist())
+
+
+def planned(cell: PoolCell, task: Task) -> list[int]:
+    """The poses that a strategy chooses without looking at the model; none if it does look."""
     if task.strategy not in NESTED:
-        return first, []
-    whole = NESTED[task.strategy](x, task.budget, task.seed).tolist()
-    rest = [i for i in whole if i not in first]
-    return first, rest[: task.budget - task.initial]
+        return []
+    return NESTED[task.strategy](cell.candidates.features, task.budget, task.seed).tolist()
 
 
 def _fitted(

@@ -29,7 +29,10 @@ class Task(msgspec.Struct, frozen=True):
 
 
 class Run(msgspec.Struct, frozen=True):
-    """What a run gave after n = initial … budget measurements, on the poses not yet used."""
+    """What a run gave after n = initial … budget measurements, on the poses not yet used.
+
+    `minutes` of robot time until then: travel, settling, hits.
+    """
 
     strategy: str
     seed: int
@@ -38,6 +41,7 @@ class Run(msgspec.Struct, frozen=True):
     frequency_rmse_percent: tuple[float, ...]
     r2: tuple[float, ...]
     coverage95: tuple[float, ...]
+    minutes: tuple[float, ...]
     wall_seconds: float
     process_seconds: float
 

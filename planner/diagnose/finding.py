@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 class Finding:
     """`log_evidence` is the gain over "nothing of this kind" (natural logarithm).
 
-    `parameters` maps a name to value, standard deviation and unit.
+    `parameters` maps a name to value, standard deviation and unit. `misfit` is χ² per value of the
+    fit that says so, ∞ where there is none.
     """
 
     effect: str
@@ -15,3 +16,4 @@ class Finding:
     log_evidence: float
     parameters: dict[str, tuple[float, float, str]] = field(default_factory=dict)
     text: str = ""
+    misfit: float = float("inf")

@@ -18,6 +18,7 @@ from planner.diagnose.visits import Recorded
 from planner.identify.solver import minimise
 from planner.physics.simulation import Simulation
 
+LAWS = "nonlinear_stiffness", "friction", "backlash"
 PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same
 ALSO = 2.5  # joints whose equivalent stiffness explains nearly as much are fitted too
 JOINTS = 2
@@ -226,4 +227,4 @@ def _finding(best: Weighed) -> Finding:
         f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
         "change with the force."
     )
-    return Finding(name, best.at, best.log_evidence, best.parameters, text)
+    return Finding(name, best.at, best.log_evidence, best.parameters, text, best.per_value)

@@ -47,12 +47,9 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         more = [*families(effects), *(_soft(found, effects) if best > STUCK else ())]
         found = Found((*found.finalists, *(staged(problem, e) for e in more)), found.left)
         best = min(f.per_value for f in found.finalists)
-    leaders = _leaders(found)
-    if best <= ENOUGH:
-        leaders = leaders[:1]
-        effects = [e for e in effects if leaders and _strayed(leaders[0], e)]
+    leaders = _leaders(found) if best > ENOUGH else []
     led: list[Place] = []
-    while effects and leaders and (leader := _next(leaders, led, found)) is not None:
+    while leaders and (leader := _next(leaders, led, found)) is not None:
         first = 0.6 + 0.4 * len(led) / MOST_LEADERS
         led.append(_place(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
@@ -63,8 +60,8 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
-    found = _composed(problem, found, effects, tell)
-    return _distinct(_lessened(problem, found))
+    found = _lessened(problem, _composed(problem, found, effects, tell))
+    return _distinct(_spared(problem, found, effects))
 
 
 def _soft(found: Found, effects: Sequence[Effect]) -> list[Effect]:
@@ -82,7 +79,7 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
     """With one more effect after the other, as long as each pays and the noise is not reached."""
     single = min(f.per_value for f in found.finalists if len(f.effect.parts()) == 1)
     best, before = min(found.finalists, key=lambda f: f.per_value), single
-    while effects and ENOUGH < best.per_value < 1 + (before - 1) / PAYS:
+    while ENOUGH < best.per_value < 1 + (before - 1) / PAYS:
         if len(best.effect.parts()) == MOST_EFFECTS:
             break
         more = [t for e in effects if (t := together(best.effect, e)) is not None]
@@ -106,11 +103,25 @@ def _lessened(problem: Problem, found: Found) -> Found:
         for part in parts:
             kept = [p for p in parts if p is not part]
             effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
-            misfit = problem.misfit(effect, FINE)
-            x = points(misfit, whole)[0]
-            start = Fit(effect, misfit, x, misfit.by_pose(x))
-            again.append(settle(problem, start, steps=LAST_STEPS))
+            again.append(_from(problem, whole, effect))
     return Found((*found.finalists, *again), found.left)
+
+
+def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """With each spring called far off that the best moved far from where it is stated."""
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    if not best.effect.at or best.per_value > ENOUGH:
+        return found
+    pairs = [together(best.effect, e) for e in effects if _strayed(best, e)]
+    more = tuple(_from(problem, best, pair) for pair in pairs if pair is not None)
+    return Found((*found.finalists, *more), found.left)
+
+
+def _from(problem: Problem, fit: Fit, effect: Effect) -> Fit:
+    """An effect fitted to the end from where another fit is."""
+    misfit = problem.misfit(effect, FINE)
+    x = points(misfit, fit)[0]
+    return settle(problem, Fit(effect, misfit, x, misfit.by_pose(x)), steps=LAST_STEPS)
 
 
 def _distinct(found: Found) -> Found:

@@ -50,20 +50,27 @@ def probability(finding: Finding) -> float:
     return float(min(SUREST, 1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0)))))
 
 
-def together(findings: Sequence[Finding], diagnosis: Diagnosis) -> Together:
-    """Combine; `diagnosis` is that of the corrected FRFs."""
+def together(
+    findings: Sequence[Finding], diagnosis: Diagnosis, linear: bool | None = None
+) -> Together:
+    """Combine; `diagnosis` is that of the corrected FRFs.
+
+    `linear`: whether its effects count, by default where no screen found other physics.
+    """
     known = [(f, probability(f)) for f in findings if f.effect != UNKNOWN]
     strange = max((probability(f) for f in findings if f.effect == UNKNOWN), default=0.0)
-    linear = linear_effects_apply(findings)
+    linear = linear_effects_apply(findings) if linear is None else linear
     others = diagnosis.candidates if linear else ()
     share = float(np.prod([p for _, p in known])) * (1 - strange)
     found: tuple[Place, ...] = tuple((f.effect, f.at) for f, _ in known)
+    own = {("joint_stiffness", at) for _, at in found}
     ranked = {("none", None): 0.0, (UNKNOWN, None): 1 - share}
     out: dict[tuple[Place, ...], float] = {(key,): value for key, value in ranked.items()}
     for places, weight in _linear(others) or (((), 1.0),):
         unknown = places == ((UNKNOWN, None),)
-        # What a screen corrected for leaves a little of the same behind.
-        rest = tuple(p for p in places if p not in found)
+        # What a screen corrected for leaves a little of the same behind, and a joint's own spring
+        # is part of its law.
+        rest = tuple(p for p in places if p not in found and p not in own)
         key = places if unknown else (found + rest) or (("none", None),)
         out[key] = out.get(key, 0.0) + share * weight
     candidates = sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)

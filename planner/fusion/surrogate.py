@@ -123,6 +123,7 @@ def _log(value: np.ndarray) -> np.ndarray:
 def _parts(residue: np.ndarray) -> np.ndarray:
     """(n, k, 3, 3) complex to (n, 18 k) real: per mode, row by row, real then imaginary."""
     both = np.stack([residue.real, residue.imag], axis=-1)
+    both[np.isnan(residue)] = np.nan  # np.nan as a complex number is nan + 0j
     return both.reshape(len(residue), 18 * residue.shape[1])
 
 

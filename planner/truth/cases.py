@@ -29,6 +29,7 @@ from planner.truth.secret import Secret, Visit, frfs, hit_poses, once
 
 EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
 KINDS = ("null", *EFFECTS, "pair")
+MIX = (*KINDS, "null", "pair", "pair")  # in these proportions: there are many pairs to be told
 # Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
 LEVELS = (0.4, 1.0, 2.5)
@@ -195,7 +196,7 @@ def main() -> None:
     """Make cases of all kinds in turn, robots in turn; print the seals."""
     parser = argparse.ArgumentParser(prog="python -m planner.truth.cases", description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--cases", type=int, default=len(KINDS))
+    parser.add_argument("--cases", type=int, default=len(MIX))
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     answers = options.folder / "answers"
@@ -203,7 +204,7 @@ def main() -> None:
     order = np.random.default_rng(options.seed).permutation(options.cases)
     for number, kind in enumerate(order):
         name, robot = f"case_{number + 1:03d}", sorted(ARMS)[number % len(ARMS)]
-        wanted = KINDS[kind % len(KINDS)], robot
+        wanted = MIX[kind % len(MIX)], robot
         case = _made(*wanted, options.seed + number, options.folder / name)
         (answers / f"{name}.json").write_text(case.answer, encoding="utf-8")
         print(f"{name} {case.seal}", flush=True)

@@ -50,7 +50,7 @@ def run(seed: int, errors: list[float]) -> Run:
     t = len(errors)
     ones = (1.0,) * t
     n = tuple(range(3, 3 + t))
-    return Run("any", seed, ("P",) * t, n, tuple(errors), ones, ones, 1.0, 1.0)
+    return Run("any", seed, ("P",) * t, n, tuple(errors), ones, ones, ones, 1.0, 1.0)
 
 
 def test_measurements_to_one_percent():

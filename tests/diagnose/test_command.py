@@ -50,3 +50,16 @@ def test_the_shipped_campaign_names_what_its_simulation_lacks(tmp_path, capsys):
         assert abs(told["value"] - true) < 3 * told["sd"]
     assert answer["simulated"]
     assert answer["next"] is None  # nothing is tied
+
+
+def test_a_nonlinear_joint_beside_a_linear_effect(tmp_path, capsys):
+    """Seed 6001 was looked at while this was developed."""
+    case = make_case("pair", "kr10", 6001, tmp_path / "case")
+    command = ["diagnose", str(case.recordings), "--robot", str(case.robot_toml), "--json"]
+    assert run(command) in (0, 3)
+    answer = json.loads(capsys.readouterr().out)
+    true = {(e["effect"], e["at"]) for e in json.loads(case.answer)["effects"]}
+    assert {kind for kind, _ in true} == {"local_resonator", "nonlinear_stiffness"}
+    assert {(f["effect"], f["at"]) for f in answer["findings"]} == true
+    first = answer["candidates"][0]
+    assert {(e["effect"], e["at"]) for e in first["effects"]} == true

@@ -5,6 +5,7 @@ from typing import Any, cast
 
 import pytest
 
+from planner.diagnose.beside import leaves_room
 from planner.diagnose.finding import Finding
 from planner.diagnose.together import linear_effects_apply, together
 
@@ -68,3 +69,21 @@ def test_a_tone_is_unknown_whatever_else_fits():
 def test_little_evidence_for_an_artefact_makes_it_doubtful():
     weak = Finding("channel_delay", "sensor", 3.0)
     assert 0.3 < combined((weak,), (NONE, 1.0)).candidates[0].probability < 0.7
+
+
+def test_beside_a_joint_law_linear_effects_count_only_where_they_were_fitted_with_it():
+    law = (Finding("friction", "joint_2", 60.0),)
+    linear = (Linear((BASE,), 0.75), Linear((BASE, ("joint_stiffness", "joint_2")), 0.25))
+    found = cast(Any, Diagnosed(linear))
+    alone, both = together(law, found), together(law, found, True)
+    assert alone.candidates[0].places == (("friction", "joint_2"),)
+    # The joint's own spring is part of its law.
+    assert both.candidates[0].places == (("friction", "joint_2"), BASE)
+    assert both.candidates[0].probability == pytest.approx(alone.candidates[0].probability)
+    assert both.verdict == "explained"
+
+
+def test_only_a_crude_law_leaves_room_for_something_beside_it():
+    assert not leaves_room(())
+    assert not leaves_room((Finding("friction", "joint_2", 60.0, misfit=1.2),))
+    assert leaves_room((Finding("friction", "joint_2", 60.0, misfit=9.0),))

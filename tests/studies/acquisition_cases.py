@@ -14,13 +14,23 @@ from planner.campaign.model import Model, build
 from planner.campaign.outlook import cost_of
 from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.frf.metrics import global_frac
 from planner.frf.types import Frf
 from planner.modes.types import Mode
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import Truth, load_truth
 
 ROBOTS = {"KR10": KR10, "IRB 6640": IRB6640, "KR210": KR210}
+# Robot and what its simulation lacks: the floor's tilts, or transverse tilts of the joints too.
+CELLS = {
+    "KR10": ("KR10", "floor"),
+    "IRB 6640": ("IRB 6640", "floor"),
+    "KR210": ("KR210", "floor"),
+    "KR10, 6 springs": ("KR10", "tilts"),
+    "KR210, 6 springs": ("KR210", "tilts"),
+}
 MODES, CANDIDATES, UNUSED, LINES = 4, 200, 60, 160
+OF_FRFS = 10  # unused poses at which FRFs are judged
 LEAST_SEEN = 0.02  # share of a mode in the hit axes below which EMA does not find it
 FREQUENCY_SD, DAMPING_SD, FRF_SD = 1e-3, 0.05, 0.02  # relative, the last one to the FRF's rms
 
@@ -34,6 +44,8 @@ class Case:
     seed: int
     unused: np.ndarray
     true_hz: np.ndarray
+    lines_hz: np.ndarray
+    true_frf: np.ndarray  # (OF_FRFS, 3, 3, LINES) at the first unused poses
 
     def measure(
         self, q: np.ndarray, number: int, axes: tuple[int, ...] = (0, 1, 2)
@@ -43,7 +55,6 @@ class Case:
         With fewer axes frequencies are less certain, and modes that hardly show are not found.
         """
         rng = np.random.default_rng([self.seed, number])
-        band = self.cell.config.modes.band_hz
 
         def lost(values: np.ndarray) -> np.ndarray:
             """Columns that were not hit are not known."""
@@ -69,13 +80,15 @@ class Case:
                     lost(noisy), lost(np.full((3, 3), sd)), shape, 1.0,
                 )
             )  # fmt: skip
-        lines, hits = np.linspace(*band, LINES), tuple(4 if i in axes else 0 for i in range(3))
-        h = self.truth.accelerance(q, lines)
+        hits = tuple(4 if i in axes else 0 for i in range(3))
+        h = self.truth.accelerance(q, self.lines_hz)
         sd = FRF_SD * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 2), keepdims=True))
         noise = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
         variance = np.broadcast_to(sd**2, h.shape)
         h = h + sd / np.sqrt(2) * noise
-        frf = Frf(lines, lost(h), lost(variance), np.full(h.shape, np.nan), hits, band)
+        band = self.cell.config.modes.band_hz
+        unknown = np.full(h.shape, np.nan)
+        frf = Frf(self.lines_hz, lost(h), lost(variance), unknown, hits, band)
         found = tuple(from_mode(m) for m in modes)
         return Measurement(f"P{number}", tuple(np.rad2deg(q)), (), found), frf
 
@@ -101,17 +114,24 @@ def make(
     cell = Cell.load(toml, config_from_builtins(table))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     unused = np.random.default_rng(10_000 + seed).uniform(low, high, (UNUSED, 6))
-    return Case(truth, cell, seed, unused, np.array([truth.modes(q, MODES)[0] for q in unused]))
+    lines_hz = np.linspace(*cell.config.modes.band_hz, LINES)
+    true_hz = np.array([truth.modes(q, MODES)[0] for q in unused])
+    true_frf = np.array([truth.accelerance(q, lines_hz) for q in unused[:OF_FRFS]])
+    return Case(truth, cell, seed, unused, true_hz, lines_hz, true_frf)
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """The model after n measurements: errors of ln f at unused poses (u, 4), minutes so far."""
+    """The model after n measurements: errors of ln f at unused poses (u, 4), minutes so far.
+
+    `frac`: Global FRAC of the FRFs predicted at unused poses, the mean over hits and responses.
+    """
 
     n: int
     model: Model
     error: np.ndarray
     minutes: float
+    frac: float
 
     @property
     def rmse_percent(self) -> float:
@@ -154,4 +174,6 @@ def campaign(
         state = CampaignState(measurements=measurements, events=n)
         model = build(case.cell, state, frf_of)
         found = np.sort(model.predict(case.unused).frequency_hz, axis=1)
-        yield Step(n, model, np.log(found / case.true_hz), minutes)
+        frf, _ = model.frf(case.unused[:OF_FRFS], case.lines_hz)
+        frac = float(np.mean(global_frac(case.true_frf, frf)))
+        yield Step(n, model, np.log(found / case.true_hz), minutes, frac)

@@ -1,43 +1,51 @@
 """Does choosing where to measure pay? Strategies × a simulation that learns, or stays, or both.
 
-`pytest -m slow tests/studies/test_acquisitions.py -s` prints the tables. STUDY_ROBOTS (all
-three), STUDY_SEEDS (5), STUDY_FIRST (101) and STUDY_LACKING ("floor"; "" for the right physics,
-"tilts") make it larger; STUDY_KEPT names a folder that keeps finished runs. Truths are MuJoCo
-models with ± 15 % springs, 4 % inertias and noise of EMA's size; errors are those at 60 poses
-never measured. Seeds 1-20 were used in development.
+`pytest -m slow tests/studies/test_acquisitions.py -s` prints the tables. STUDY_CELLS (all five,
+names separated by ";"), STUDY_SEEDS (2), STUDY_FIRST (101), STUDY_ONLY (some strategies, by ";")
+make it larger or smaller; STUDY_KEPT names a folder that keeps finished runs, so that it can be
+stopped, and several processes can share it. Truths are MuJoCo models with ± 15 % springs, 4 %
+inertias and noise of EMA's size; errors are those at 60 poses never measured, FRFs' at ten of them.
+Seeds 1-20 were used in development.
 """
 
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from acquisition_cases import ROBOTS, campaign, make
+from acquisition_cases import CELLS, campaign, make
 from planner.acquire.designs import NESTED
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
-NAMES = os.environ.get("STUDY_ROBOTS", ",".join(ROBOTS)).split(",")
-SEEDS = int(os.environ.get("STUDY_SEEDS", "5"))
+NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")
+SEEDS = int(os.environ.get("STUDY_SEEDS", "2"))
 FIRST = int(os.environ.get("STUDY_FIRST", "101"))
-LACKING = os.environ.get("STUDY_LACKING", "floor")
 BASELINE = "maximin_lhs"
 STRATEGIES = {
     "updated": (
         BASELINE, "integrated_variance", "parameter_information", "mixed",
-        "parameter_information best",
+        "parameter_information best", "mixed best", "random", "sobol", "variance", "d_information",
     ),
-    "frozen": (BASELINE, "integrated_variance", "variance", "integrated_variance best"),
+    "frozen": (
+        BASELINE, "integrated_variance", "integrated_variance best", "variance", "random", "sobol",
+    ),
 }  # "best": along the axes that tell most per minute, not along all  # fmt: skip
+ONLY = os.environ.get("STUDY_ONLY", "")
 AXES = ("all", "best")
 BUDGET = {
-    "updated": int(os.environ.get("STUDY_BUDGET", "6")),
-    "frozen": int(os.environ.get("STUDY_FROZEN", "14")),
+    "updated": int(os.environ.get("STUDY_BUDGET", "5")),
+    "frozen": int(os.environ.get("STUDY_FROZEN", "12")),
 }
 INITIAL = {"updated": 0, "frozen": 2}  # poses of the baseline's design with which all begin
+GOALS: dict[str, Callable[["Curve"], tuple[float, float]]] = {
+    "RMSE 1 %": lambda c: c.until(1.0),
+    "RMSE 0.5 %": lambda c: c.until(0.5),
+    "FRAC 95 %": lambda c: c.alike(0.95),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +57,20 @@ class Curve:
     minutes: np.ndarray
     reached: np.ndarray  # foretold probability that the RMSE is below 1 %
     bound: np.ndarray  # foretold 95 % bound of the RMSE
+    frac: np.ndarray  # Global FRAC of FRFs
 
     def until(self, percent: float) -> tuple[float, float]:
         """Measurements and minutes from which on the RMSE stays below; ∞ beyond the budget."""
-        above = np.flatnonzero(self.rmse > percent)
-        n = int(above[-1]) + 1 if len(above) else 0
-        if n == len(self.rmse):
+        return self._stays(self.rmse <= percent)
+
+    def alike(self, frac: float) -> tuple[float, float]:
+        """Measurements and minutes from which on the FRAC stays above; ∞ beyond the budget."""
+        return self._stays(self.frac >= frac)
+
+    def _stays(self, good: np.ndarray) -> tuple[float, float]:
+        bad = np.flatnonzero(~good)
+        n = int(bad[-1]) + 1 if len(bad) else 0
+        if n == len(good):
             return np.inf, np.inf
         return n + 1, float(self.minutes[n])
 
@@ -70,7 +86,9 @@ def curve(case, strategy: str, budget: int, initial: int) -> Curve:
         # The rule does not speak before three measurements.
         told = step.model.forecast if step.n >= 3 else None
         reached, bound = (told.reached, told.bound_percent) if told else (0.0, np.inf)
-        rows.append((step.rmse_percent, step.worst_percent, step.minutes, reached, bound))
+        rows.append(
+            (step.rmse_percent, step.worst_percent, step.minutes, reached, bound, step.frac)
+        )
     return Curve(*np.array(rows).T)
 
 
@@ -86,22 +104,33 @@ def kept(name: str, make_it: Callable[[], Curve]) -> Curve:
     return Curve(*np.load(path))
 
 
+def played(simulation: str, folder: Path) -> dict[str, list[Curve]]:
+    """Curves by strategy, cell by cell and seed by seed."""
+    strategies = [s for s in STRATEGIES[simulation] if not ONLY or s in ONLY.split(";")]
+    found: dict[str, list[Curve]] = {s: [] for s in strategies}
+    budget, initial = BUDGET[simulation], INITIAL[simulation]
+    for name, seed in ((n, s) for s in range(FIRST, FIRST + SEEDS) for n in NAMES):
+        robot, lacking = CELLS[name]
+        case = lru_cache(partial(_case, robot, seed, simulation, folder, lacking))
+        for strategy, curves in found.items():
+            plain, _, axes = strategy.partition(" ")
+            run = f"{simulation} {lacking} {robot} {seed} {strategy} {budget} {initial}"
+            made = partial(_curve_of, case, axes or "all", plain, budget, initial)
+            curves.append(kept(run.replace(" ", "_"), made))
+    return found
+
+
+def _case(robot: str, seed: int, simulation: str, folder: Path, lacking: str, axes: str):
+    return make(robot, seed, simulation, folder / f"{robot}{seed}{lacking}{axes}", lacking, axes)
+
+
+def _curve_of(case: Callable, axes: str, strategy: str, budget: int, initial: int) -> Curve:
+    return curve(case(axes), strategy, budget, initial)
+
+
 @pytest.fixture(scope="module", params=["updated", "frozen"])
 def runs(request, tmp_path_factory) -> tuple[str, dict[str, list[Curve]]]:
-    simulation, folder = request.param, tmp_path_factory.mktemp("cases")
-    found: dict[str, list[Curve]] = {s: [] for s in STRATEGIES[simulation]}
-    budget, initial = BUDGET[simulation], INITIAL[simulation]
-    for seed in range(FIRST, FIRST + SEEDS):
-        for name in NAMES:
-            place = folder / f"{name}{seed}"
-            cases = {a: make(name, seed, simulation, place / a, LACKING, a) for a in AXES}
-            for strategy, curves in found.items():
-                plain, _, axes = strategy.partition(" ")
-                case = cases[axes or "all"]
-                run = f"{simulation} {LACKING} {name} {seed} {strategy} {budget} {initial}"
-                made = partial(curve, case, plain, budget, initial)
-                curves.append(kept(run.replace(" ", "_"), made))
-    return simulation, found
+    return request.param, played(request.param, tmp_path_factory.mktemp("cases"))
 
 
 def saving(ours: np.ndarray, theirs: np.ndarray) -> str:
@@ -121,31 +150,39 @@ def saving(ours: np.ndarray, theirs: np.ndarray) -> str:
     return f"{middle:+.0f} % [{low:+.0f}, {high:+.0f}]"
 
 
+def reached(curves: list[Curve], goal: str) -> np.ndarray:
+    """(runs, 2) measurements and minutes to a goal of GOALS."""
+    return np.array([GOALS[goal](c) for c in curves])
+
+
 def test_measurements_to_the_target(runs):
     simulation, found = runs
-    base = found[BASELINE]
-    count = len(base)
-    print(f"\n{simulation} simulation that lacks '{LACKING}', {count} runs a strategy, RMSE in %")
-    hits = range(1, BUDGET[simulation] + 1)
+    base, count = found[BASELINE], len(found[BASELINE])
+    print(f"\n{simulation} simulation, {count} runs a strategy in {len(NAMES)} cells, RMSE in %")
     for strategy, curves in found.items():
         middle = np.median([c.rmse for c in curves], axis=0)
-        print(f"  {strategy:22s}" + " ".join(f"{v:5.2f}" for v in middle) + f"  after {hits}")
-    for percent in (1.0, 0.5):
-        print(f"  to {percent} %: median measurements, minutes; reached; saving against {BASELINE}")
-        at = np.array([c.until(percent) for c in base])
+        alike = np.median([c.frac for c in curves], axis=0)
+        print(
+            f"  {strategy:26s}" + " ".join(f"{v:5.2f}" for v in middle)
+            + "   FRAC " + " ".join(f"{v:.3f}" for v in alike)
+        )  # fmt: skip
+    for goal in GOALS:
+        print(f"  to {goal}: median measurements, minutes; reached; saving against {BASELINE}")
+        at = reached(base, goal)
         for strategy, curves in found.items():
-            own = np.array([c.until(percent) for c in curves])
+            own = reached(curves, goal)
             n, minutes = np.median(own, axis=0)
+            each = [np.median(own[i :: len(NAMES), 0]) for i in range(len(NAMES))]
             print(
-                f"    {strategy:22s}{n:5.1f} {minutes:6.1f}  {np.isfinite(own[:, 0]).sum()}/{count}"
+                f"    {strategy:26s}{n:5.1f} {minutes:6.1f}  {np.isfinite(own[:, 0]).sum()}/{count}"
                 f"  measurements {saving(own[:, 0], at[:, 0])}, minutes "
-                f"{saving(own[:, 1], at[:, 1])}"
+                f"{saving(own[:, 1], at[:, 1])}; by cell " + " ".join(f"{v:g}" for v in each)
             )
     print("  worst error in % after 4: median, and saving")
     at = np.array([c.worst[3] for c in base])
     for strategy, curves in found.items():
         own = np.array([c.worst[3] for c in curves])
-        print(f"    {strategy:22s}{np.median(own):6.2f}  {saving(own, at)}")
+        print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
     for curves in found.values():
         assert all(np.isfinite(c.rmse).all() for c in curves)
 

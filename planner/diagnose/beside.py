@@ -1,0 +1,62 @@
+"""A nonlinear joint beside a linear effect: looked for where neither explains enough alone.
+
+The nonlinear joint bends the averaged FRFs, so that no linear effect reaches their noise; and what
+the simulation lacks spoils the fit of any law to the hits. Each is therefore asked again with what
+the other has told.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from planner.diagnose import levels
+from planner.diagnose.diagnose import Candidate, Diagnosis
+from planner.diagnose.finding import Finding
+from planner.diagnose.visits import Recorded
+from planner.diagnose.write import write_explained
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+
+PAYS = 1.5  # factor by which a linear effect has to lower the misfit of averaged FRFs
+CRUDE = 3.0  # χ² per value from which a law leaves room for something beside it
+BETTER = 1.5  # factor by which the linear effect then has to lower it
+
+
+def leaves_room(findings: Sequence[Finding]) -> bool:
+    """Whether a joint's law was found, and so crude a fit that something may be beside it."""
+    laws = [f for f in findings if f.effect in levels.LAWS]
+    return bool(laws) and all(f.misfit > CRUDE for f in laws)
+
+
+def beside(
+    recorded: Recorded, findings: Sequence[Finding], found: Diagnosis
+) -> tuple[tuple[Finding, ...], Diagnosis] | None:
+    """Findings of the levels once the best linear effect is known, and the diagnosis beside them.
+
+    `findings` are those of the levels without it, "unknown" or a crude law; None where the linear
+    effect does not help.
+    """
+    before = [f for f in findings if f.effect in (*levels.LAWS, "unknown")]
+    linear = next((c for c in found.candidates if _physical(c)), None)
+    if not before or linear is None or linear.fit is None:
+        return None
+    if found.refitted.per_value < PAYS * linear.fit.per_value:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        robot = found.problem.simulation.robot
+        path = write_explained(Path(folder), robot, found, linear)
+        again = levels.screen(recorded, Simulation(Robot.load(path)))
+    law = next((f for f in again if f.effect in levels.LAWS), None)
+    if law is None or law.misfit * BETTER > min(f.misfit for f in before):
+        return None
+    kept = [f for f in findings if f not in before and f.effect != "joint_stiffness"]
+    there = [c for c in found.candidates if _physical(c)]
+    total = sum(c.probability for c in there)
+    ranked = tuple(replace(c, probability=c.probability / total) for c in there)
+    return (*kept, *again), replace(found, candidates=ranked, verdict="explained", best=linear.fit)
+
+
+def _physical(candidate: Candidate) -> bool:
+    """Whether it is an effect of the robot, neither nothing nor unknown nor an artefact."""
+    return bool(candidate.effects) and all(e.at and not e.artefact for e in candidate.effects)
