@@ -165,6 +165,9 @@ def watch(
     folder: Annotated[Path, typer.Argument(help="Folder into which the analyser exports.")],
     auto: Annotated[bool, typer.Option("--auto", help="Import without asking.")] = False,
     hits_per_pose: Annotated[int, typer.Option(min=1, help="Hits that make a pose.")] = 12,
+    explain: Annotated[
+        bool, typer.Option("--diagnose", help="Diagnose beside the session, after each import.")
+    ] = False,
     rrd: Rrd = None,
     viewer: Viewer = False,
     as_json: AsJson = False,
@@ -183,6 +186,7 @@ def watch(
         hits_per_pose=hits_per_pose,
         rrd=rrd,
         viewer=viewer,
+        explain=explain,
     )
     return respond(answers.session(summary), as_json, render.session)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from planner import itself
 from planner.errors import InputError
 
 SEALS = "seals.json"
@@ -79,9 +80,10 @@ def told(proof: Proof, name: str) -> Path:
 def _diagnose(proof: Proof, name: str) -> str:
     case, path = proof.folder / name, told(proof, name)
     path.parent.mkdir(exist_ok=True)
-    command = [sys.executable, "-c", "from planner.cli import main; main()", "diagnose"]
-    command += [str(case / "recordings"), "--robot", str(case / "robot" / "robot.toml")]
-    command += ["--predict", str(case / "recordings" / "predict.csv"), "--json"]
+    command = itself.command(
+        "diagnose", str(case / "recordings"), "--robot", str(case / "robot" / "robot.toml"),
+        "--predict", str(case / "recordings" / "predict.csv"), "--json",
+    )  # fmt: skip
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT_S, check=False)
         text = run.stdout if run.returncode in (0, 3) else json.dumps({"failed": run.stderr})

@@ -15,6 +15,7 @@ from planner.campaign.importing import ImportReport
 from planner.errors import InputError, NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
 from planner.replay import replay
+from planner.session.explaining import LEAST, Explaining
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.show import terminal
@@ -42,13 +43,15 @@ def watch(
     hits_per_pose: int = 12,
     rrd: Path | None = None,
     viewer: bool = False,
+    explain: bool = False,
     keys: Keys | None = None,
     quiet_s: float = 1.0,
     limit_s: float | None = None,
 ) -> SessionSummary:
     """Run a session until quit, target, no pose left, or `limit_s`.
 
-    `auto` imports without asking, as does a session without a keyboard.
+    `auto` imports without asking, as does a session without a keyboard. `explain` diagnoses after
+    each import, beside the session, and says what the simulation lacks.
     """
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the one the analyser exports into.")
@@ -58,9 +61,12 @@ def watch(
         if rrd is not None or viewer:  # a resumed session shows what went before, too
             for step in replay(campaign):
                 story.tell(step.entry, step.state, step.model, step.measured)
+        explaining = Explaining(campaign.directory) if explain else None
+        if explaining is not None:
+            stack.callback(explaining.close)
         session = _Session(
             campaign, Inbox(folder, quiet_s), console, source, story,
-            auto or isinstance(source, NoKeys), hits_per_pose, limit_s,
+            auto or isinstance(source, NoKeys), hits_per_pose, limit_s, explaining,
         )  # fmt: skip
         return session.run()
 
@@ -68,10 +74,11 @@ def watch(
 class _Session:
     def __init__(
         self, campaign: Campaign, inbox: Inbox, console: Console, keys: Keys, story: Story,
-        auto: bool, hits_per_pose: int, limit_s: float | None,
+        auto: bool, hits_per_pose: int, limit_s: float | None, explaining: Explaining | None,
     ):  # fmt: skip
         self.campaign, self.inbox, self.console, self.keys = campaign, inbox, console, keys
         self.story, self.auto, self.hits_per_pose = story, auto, hits_per_pose
+        self.explaining = explaining
         self.started = time.monotonic()
         self.deadline = None if limit_s is None else self.started + limit_s
         self.aside: set[str] = set()  # refused by the engineer, by content
@@ -89,6 +96,9 @@ class _Session:
                 proposal = self._propose()
                 if proposal is not None:
                     self._at_pose(proposal)
+            if self.stop != "quit":
+                with self.console.status("finding what the simulation lacks"):
+                    self._explained(wait=True)
         except KeyboardInterrupt:
             self.stop = "quit"
         self.console.print(Text(f"Session ended: {self.stop}. Go on with the same command."))
@@ -112,6 +122,12 @@ class _Session:
         self.console.print(terminal.proposal_panel(proposal, self.campaign.model, number))
         return proposal
 
+    def _explained(self, wait: bool = False) -> None:
+        """Say what the diagnosis beside the session found, once it is through."""
+        text = self.explaining.told(wait) if self.explaining is not None else None
+        if text is not None:
+            self.console.print(Text(f"Diagnosis: {text}", style="bold"))
+
     def _tell(self, report: ImportReport | None = None) -> None:
         """Show what the log gained, in Rerun."""
         for entry in self.campaign.entries[self.told :]:
@@ -128,6 +144,7 @@ class _Session:
         if not self.auto:
             self.console.print(Text(terminal.KEYS, style="dim"))
         while not self.stop:
+            self._explained()
             whole, waiting = self.inbox.scan(self._done())
             now = (tuple(whole), tuple(p for p, _ in waiting))
             if now != shown:
@@ -225,6 +242,8 @@ class _Session:
                 self.history, stop.frequency_sd_percent, per_pose, stop.measurements_min
             )
         )
+        if self.explaining is not None and len(state.used) >= LEAST:
+            self.explaining.ask()
         if not self.announced and report.model.done:
             self.announced = True
             self.console.print(Text("The target of campaign.toml is reached.", style="bold green"))

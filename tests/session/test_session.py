@@ -2,6 +2,7 @@
 
 import io
 import shutil
+import sys
 import threading
 import time
 
@@ -11,7 +12,9 @@ from rerun.chunk import RrdReader
 from rich.console import Console
 
 from outside import make_cell, record
+from planner import itself
 from planner.campaign.campaign import Campaign
+from planner.session.explaining import Explaining
 from planner.session.watch import watch
 
 WANTED = (
@@ -142,3 +145,52 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
     measured = campaign.state.measurements[proposal.pose].joints_deg
     off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
     assert 0 < off <= 0.011
+
+
+def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(cell, monkeypatch):
+    """Its process is a stand-in: what a diagnosis finds is tested where it is made."""
+    campaign, truth, tmp_path = cell
+    answers = [
+        {"verdict": "consistent", "findings": []},
+        {"verdict": "explained", "findings": [{"text": "The floor gives way."}]},
+    ]
+    counter = tmp_path / "counter"
+    counter.write_text("0")
+    script = (
+        "import json, pathlib, sys\n"
+        "path = pathlib.Path(sys.argv[1])\n"
+        "asked = int(path.read_text())\n"
+        "path.write_text(str(asked + 1))\n"
+        f"print(json.dumps({answers!r}[min(asked, 1)]))\n"
+    )
+    stand_in = [sys.executable, "-c", script, str(counter)]
+    monkeypatch.setattr(itself, "command", lambda *arguments: stand_in)
+    monkeypatch.setattr("planner.session.watch.LEAST", 1)
+    inbox = tmp_path / "inbox"
+    console = screen()
+    for number in range(2):
+        deliver(truth, tmp_path, campaign.next()[0], number)
+        watch(campaign, inbox, console=console, keys=Script(screen(), []), auto=True,
+              explain=True, hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
+    text = console.export_text()
+    print(text)
+    assert "Diagnosis: The simulation, once refitted, explains the recordings" in text
+    assert "Diagnosis: The floor gives way." in text
+
+
+def test_a_diagnosis_that_was_asked_for_meanwhile_follows_and_says_only_what_is_new(
+    tmp_path, monkeypatch
+):
+    said = {"verdict": "unexplained", "findings": [{"text": "At 20 Hz."}]}
+    stand_in = [sys.executable, "-c", f"import json; print(json.dumps({said!r}))"]
+    monkeypatch.setattr(itself, "command", lambda *arguments: stand_in)
+    explaining = Explaining(tmp_path)
+    assert explaining.told() is None
+    explaining.ask()
+    explaining.ask()
+    assert (explaining.told(wait=True) or "").endswith("At 20 Hz.")
+    explaining.ask()
+    assert explaining.told(wait=True) is None  # nothing new
+    explaining.ask()
+    explaining.close()
+    assert explaining.told() is None
