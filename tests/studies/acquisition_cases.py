@@ -46,6 +46,7 @@ class Case:
     true_hz: np.ndarray
     lines_hz: np.ndarray
     true_frf: np.ndarray  # (OF_FRFS, 3, 3, LINES) at the first unused poses
+    frf_sd: float = FRF_SD
 
     def measure(
         self, q: np.ndarray, number: int, axes: tuple[int, ...] = (0, 1, 2)
@@ -82,7 +83,7 @@ class Case:
             )  # fmt: skip
         hits = tuple(4 if i in axes else 0 for i in range(3))
         h = self.truth.accelerance(q, self.lines_hz)
-        sd = FRF_SD * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 2), keepdims=True))
+        sd = self.frf_sd * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 2), keepdims=True))
         noise = rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape)
         variance = np.broadcast_to(sd**2, h.shape)
         h = h + sd / np.sqrt(2) * noise

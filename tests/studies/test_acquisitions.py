@@ -24,7 +24,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")
 SEEDS = int(os.environ.get("STUDY_SEEDS", "2"))
 FIRST = int(os.environ.get("STUDY_FIRST", "101"))
-BASELINE = "maximin_lhs"
+BASELINE, DEFAULT = "maximin_lhs", "integrated_variance"
 STRATEGIES = {
     "updated": (
         BASELINE, "integrated_variance", "parameter_information", "mixed",
@@ -104,9 +104,12 @@ def kept(name: str, make_it: Callable[[], Curve]) -> Curve:
     return Curve(*np.load(path))
 
 
-def played(simulation: str, folder: Path) -> dict[str, list[Curve]]:
+def played(
+    simulation: str, folder: Path, strategies: tuple[str, ...] = ()
+) -> dict[str, list[Curve]]:
     """Curves by strategy, cell by cell and seed by seed."""
-    strategies = [s for s in STRATEGIES[simulation] if not ONLY or s in ONLY.split(";")]
+    if not strategies:
+        strategies = tuple(s for s in STRATEGIES[simulation] if not ONLY or s in ONLY.split(";"))
     found: dict[str, list[Curve]] = {s: [] for s in strategies}
     budget, initial = BUDGET[simulation], INITIAL[simulation]
     for name, seed in ((n, s) for s in range(FIRST, FIRST + SEEDS) for n in NAMES):
@@ -185,6 +188,26 @@ def test_measurements_to_the_target(runs):
         print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
     for curves in found.values():
         assert all(np.isfinite(c.rmse).all() for c in curves)
+
+
+def test_the_default_beside_a_frozen_simulation_on_a_latin_hypercube(tmp_path):
+    """What `planner next` does unless told otherwise, and AR1 on maximin LHS."""
+    ours = played("updated", tmp_path, (DEFAULT,))[DEFAULT]
+    theirs = played("frozen", tmp_path, (BASELINE,))[BASELINE]
+    for goal in GOALS:
+        own, other = reached(ours, goal), reached(theirs, goal)
+        n, minutes = np.median(own, axis=0)
+        n_other, minutes_other = np.median(other, axis=0)
+        worse = np.sum(own[:, 0] > other[:, 0])
+        print(
+            f"\nto {goal}: default {n:g} measurements, {minutes:.1f} min; AR1 + maximin LHS "
+            f"{n_other:g}, {minutes_other:.1f} min; saving {saving(own[:, 0], other[:, 0])} of the "
+            f"measurements, {saving(own[:, 1], other[:, 1])} of the minutes; more in {worse} of "
+            f"{len(own)} runs"
+        )
+    own, other = reached(ours, "RMSE 1 %"), reached(theirs, "RMSE 1 %")
+    assert np.median(own[:, 0]) <= 0.5 * np.median(other[:, 0])
+    assert np.median(own[:, 1]) <= 0.5 * np.median(other[:, 1])
 
 
 def test_when_it_says_done_it_is(runs):
