@@ -61,13 +61,30 @@ def recording_contents(path):
 def check_replay(tmp_path, summary):
     """Replay reproduces every step, and writes the same recording."""
     rrd = tmp_path / "again.rrd"
-    replayed = answer("replay", summary["campaign"], "--rrd", rrd)
+    replayed = answer("replay", summary["campaign"], "--rrd", rrd, "--acquisition", "variance")
     assert replayed["reproduced"]
+    check_otherwise(replayed, summary)
     assert {step["check"] for step in replayed["steps"]} <= {"identical", "kept"}
     first, second = rows(summary["rrd"]), rows(rrd)
     assert first.keys() == second.keys()
     different = [key for key in first if first[key] != second[key]]
     assert different == []
+
+
+def check_otherwise(replayed, summary):
+    """What another acquisition would have proposed at each step, and saved."""
+    proposed = [step for step in replayed["steps"] if step["event"] == "proposed"]
+    assert all(len(step["instead"]) == 1 for step in proposed)
+    assert all(not step["instead"] for step in replayed["steps"] if step["event"] == "imported")
+    runs = replayed["otherwise"]["runs"]
+    was, other = runs["campaign"], runs["variance"]
+    measured = [step["pose"] for step in summary["steps"]]
+    assert was["poses"] == measured[: len(was["poses"])]
+    assert other["poses"][0] == was["poses"][0]
+    assert len(set(other["poses"])) == len(was["poses"]) == len(measured) - 2
+    assert was["n"] == other["n"]
+    assert np.all(np.diff(other["minutes"]) > 0)
+    assert "variance would have needed" in replayed["otherwise"]["text"]
 
 
 def rows(path):

@@ -57,7 +57,10 @@ def test_measurements_to_one_percent():
     curves = Curves.of([run(0, [3, 0.9, 0.5]), run(1, [3, 2, 0.8]), run(2, [3, 2, 1.5])])
     assert curves.to_goal == 5
     assert curves.each_to_goal.tolist() == [4, 5, 6]  # 6: not within the budget
-    assert Curves.of([run(0, [3, 2, 1.01])]).to_goal is None
+    assert curves.minutes_to_goal == 1.0
+    never = Curves.of([run(0, [3, 2, 1.01])])
+    assert never.to_goal is None
+    assert never.minutes_to_goal is None
 
 
 def test_differences_are_taken_seed_by_seed():
