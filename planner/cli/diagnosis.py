@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from planner.cli.material import Material
     from planner.diagnose.diagnose import Candidate, Diagnosis
     from planner.diagnose.finding import Finding
+    from planner.diagnose.judge import Judged
     from planner.diagnose.predict import Agreement
     from planner.diagnose.together import Together
     from planner.diagnose.visits import Recorded as Visits
@@ -50,6 +51,7 @@ def diagnose(
     from planner.cli.render_diagnosis import diagnosed
     from planner.diagnose.beside import beside, leaves_room
     from planner.diagnose.diagnose import diagnose as run
+    from planner.diagnose.judge import judge
     from planner.diagnose.recorded import read_ended
     from planner.diagnose.together import linear_effects_apply, together
     from planner.physics.simulation import Simulation
@@ -88,7 +90,10 @@ def diagnose(
         elif not linear:
             found = replace(found, best=found.refitted)
         tell("judging at poses set aside", 0.95)
-        answer = _answer(recorded, found, together(findings, found, linear or both is not None))
+        judged = judge(found)
+        found = judged.diagnosis
+        whole = together(findings, found, linear or both is not None)
+        answer = _answer(recorded, judged, whole)
         answer |= {"npz": None, "robot": None, "plots": []}
         answer["next"] = _next(found, given.with_poses(wanted))
         if wanted:
@@ -147,13 +152,11 @@ def _screened(
     return _Screened(found.findings, clean, found.clean)
 
 
-def _answer(recorded: "Recorded", found: "Diagnosis", whole: "Together") -> dict[str, Any]:
-    from planner.diagnose.predict import agreement, held_out
+def _answer(recorded: "Recorded", judged: "Judged", whole: "Together") -> dict[str, Any]:
     from planner.diagnose.where import where
 
+    found = judged.diagnosis
     place = where(found.problem, found.refitted)
-    aside, judged = held_out(found.problem, found.refitted, found.best)
-    fitted = agreement(found.problem, found.refitted, found.best)
     return {
         "verdict": whole.verdict,
         "findings": [
@@ -175,8 +178,11 @@ def _answer(recorded: "Recorded", found: "Diagnosis", whole: "Together") -> dict
             "poses": [recorded.poses[i] for i in place.poses()],
             "directions": place.directions(),
         },
-        "fit": _agreement(fitted),
-        "held_out": {"poses": [recorded.poses[i] for i in aside], **_agreement(judged)},
+        "fit": _agreement(judged.fitted),
+        "held_out": {
+            "poses": [recorded.poses[i] for i in judged.aside],
+            **_agreement(judged.held_out),
+        },
         "misfit": {"refitted": found.refitted.per_value, "explained": found.best.per_value},
         "refused": [{"file": file, "reason": reason} for file, reason in recorded.refused],
         "remarks": list(recorded.remarks),

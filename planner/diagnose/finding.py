@@ -8,7 +8,8 @@ class Finding:
     """`log_evidence` is the gain over "nothing of this kind" (natural logarithm).
 
     `parameters` maps a name to value, standard deviation and unit. `misfit` is χ² per value of the
-    fit that says so, ∞ where there is none.
+    fit that says so, ∞ where there is none. No finding is surer than `sure`, and `rivals` are other
+    effects at the same place that take a share of its probability.
     """
 
     effect: str
@@ -17,3 +18,5 @@ class Finding:
     parameters: dict[str, tuple[float, float, str]] = field(default_factory=dict)
     text: str = ""
     misfit: float = float("inf")
+    sure: float = 1.0
+    rivals: tuple[tuple[str, float], ...] = ()

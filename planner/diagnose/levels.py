@@ -1,5 +1,6 @@
 """The screen for what depends on the force level: nonlinear joints, and what no joint explains."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,7 +28,8 @@ STARTS = 2  # of each law at a joint, that are followed
 ROUNDS, MORE, LAST, AGAIN = 3, 6, 4, 2
 HOPELESS = 10.0  # times the best χ² after ROUNDS
 ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
-EXPLAINED = 0.9  # of the excess of χ² of the levels' differences, that a law has to take away
+EXPLAINED = 0.6  # of the excess of χ² of the levels' differences, that a law has to take away
+INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed
 WEAKEST = 1e-10  # damping in the last rounds
 TOLERANCE = 1e-5  # of the objective, that a last round must gain
 CLEAR = 8.0
@@ -69,7 +71,7 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
         c = best.candidate
         sd = np.sqrt(np.diagonal(_covariance(c, best.temper))[: len(c.x)])
-        return (_finding(best), *strayed(plain, c.x, sd, best.at, best.per_value))
+        return (_finding(weighed), *strayed(plain, c.x, sd, best.at, best.per_value))
     law = best.candidate.law.effect.replace("_", " ")
     return (
         _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),
@@ -211,7 +213,17 @@ def _parameters(
     return out
 
 
-def _finding(best: Weighed) -> Finding:
+def _rivals(weighed: Sequence[Weighed]) -> dict[str, float]:
+    """Other laws at the joint of the best, and the shares that all that is not explained gives."""
+    there = [w for w in weighed if w.at == weighed[0].at]
+    left = np.array([max(1 - w.explained, 1e-3) for w in there])
+    shares = (left / left[0]) ** (-INDEPENDENT / 2)
+    shares /= shares.sum()
+    return {w.candidate.law.effect: float(s) for w, s in zip(there[1:], shares[1:], strict=True)}
+
+
+def _finding(weighed: Sequence[Weighed]) -> Finding:
+    best = weighed[0]
     (first, (k, k_sd, unit)), (second, (a, a_sd, other)) = best.parameters.items()
     name = best.candidate.law.effect
     how = {
@@ -227,4 +239,7 @@ def _finding(best: Weighed) -> Finding:
         f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
         "change with the force."
     )
-    return Finding(name, best.at, best.log_evidence, best.parameters, text, best.per_value)
+    return Finding(
+        name, best.at, best.log_evidence, best.parameters, text, best.per_value, best.explained,
+        tuple(_rivals(weighed).items()),
+    )  # fmt: skip

@@ -47,7 +47,17 @@ def linear_effects_apply(findings: Sequence[Finding]) -> bool:
 def probability(finding: Finding) -> float:
     """Of what a screen found, from its evidence."""
     odds = finding.log_evidence + np.log(PRIOR / (1 - PRIOR))
-    return float(min(SUREST, 1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0)))))
+    return float(min(SUREST, finding.sure, 1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0)))))
+
+
+def _ways(findings: Sequence[Finding]) -> tuple[tuple[tuple[Place, ...], float], ...]:
+    """What was found, and the same with a rival in a finding's stead; shares sum to one."""
+    ways: list[tuple[tuple[Place, ...], float]] = [((), 1.0)]
+    for f in findings:
+        others = sum(share for _, share in f.rivals)
+        names = ((f.effect, 1.0 - others), *f.rivals)
+        ways = [((*way, (name, f.at)), w * share) for way, w in ways for name, share in names]
+    return tuple(ways)
 
 
 def together(
@@ -62,21 +72,23 @@ def together(
     linear = linear_effects_apply(findings) if linear is None else linear
     others = diagnosis.candidates if linear else ()
     share = float(np.prod([p for _, p in known])) * (1 - strange)
-    found: tuple[Place, ...] = tuple((f.effect, f.at) for f, _ in known)
-    own = {("joint_stiffness", at) for _, at in found}
+    ways = _ways([f for f, _ in known])
+    own = {("joint_stiffness", f.at) for f, _ in known}
     ranked = {("none", None): 0.0, (UNKNOWN, None): 1 - share}
     out: dict[tuple[Place, ...], float] = {(key,): value for key, value in ranked.items()}
     for places, weight in _linear(others) or (((), 1.0),):
         unknown = places == ((UNKNOWN, None),)
-        # What a screen corrected for leaves a little of the same behind, and a joint's own spring
-        # is part of its law.
-        rest = tuple(p for p in places if p not in found and p not in own)
-        key = places if unknown else (found + rest) or (("none", None),)
-        out[key] = out.get(key, 0.0) + share * weight
+        for way, part in ways:
+            # What a screen corrected for leaves a little of the same behind, and a joint's own
+            # spring is part of its law.
+            rest = tuple(p for p in places if p not in way and p not in own)
+            key = places if unknown else (way + rest) or (("none", None),)
+            out[key] = out.get(key, 0.0) + share * weight * part
     candidates = sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)
     first = candidates[0].places[0][0]
     verdict = {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
-    return Together(verdict, tuple(candidates), tuple(known), linear)
+    told = tuple((f, p * (1.0 - sum(share for _, share in f.rivals))) for f, p in known)
+    return Together(verdict, tuple(candidates), told, linear)
 
 
 def _linear(candidates: Sequence[Candidate]) -> tuple[tuple[tuple[Place, ...], float], ...]:

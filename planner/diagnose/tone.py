@@ -9,6 +9,8 @@ from planner.diagnose.visits import Recorded
 WIDTH_HZ = 1.0  # half of what a tone takes up under the window
 CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together
 LEAST = 1.5  # χ² per value: below it levels do not differ
+SOUNDS_ON = 0.7  # of its size in the third quarter of a record that a tone has in the last
+STANDS_OUT, BESIDE_HZ = 3.0, 1.5  # power there over that beside it
 
 
 def screen_tone(recorded: Recorded) -> Finding | None:
@@ -36,6 +38,8 @@ def screen_tone(recorded: Recorded) -> Finding | None:
     if excess.sum() < LEAST * noise.sum() or share < CONCENTRATED:
         return None
     hz = float(np.sum(frequency[near] * over[near]) / over[near].sum())
+    if _kept(recorded, hz) < SOUNDS_ON:
+        return None  # a resonance that hardly moves with the pose: it dies away
     spacing = float(frequency[1] - frequency[0])
     text = (
         f"Something sounds at {hz:.1f} Hz however hard the robot is hit: look for a pump, a fan or "
@@ -43,6 +47,26 @@ def screen_tone(recorded: Recorded) -> Finding | None:
     )
     evidence = float(over[near].sum() / 2)
     return Finding("unknown", None, evidence, {"frequency": (hz, spacing / 2, "Hz")}, text)
+
+
+def _kept(recorded: Recorded, hz: float) -> float:
+    """What is left of a frequency from the third to the last quarter of the weakest hits.
+
+    0 where it does not stand out from what lies beside it there.
+    """
+    beside = np.array([0.0, -3.0, -2.0, 2.0, 3.0]) * BESIDE_HZ + hz
+    power = np.zeros((2, len(beside)))
+    for hit in (h for visit in recorded.visits for h in visit.hits if not recorded.level(h)):
+        n = len(hit.force_n)
+        for number, (first, last) in enumerate(((n // 2, 3 * n // 4), (3 * n // 4, n))):
+            t = np.arange(first, last) / hit.sampling_rate_hz
+            waves = np.hanning(last - first) * np.exp(-2j * np.pi * beside[:, None] * t)
+            power[number] += np.sum(np.abs(hit.acceleration_m_s2[:, first:last] @ waves.T) ** 2, 0)
+    noise = np.median(power[:, 1:], axis=1)
+    before, after = np.maximum(power[:, 0] - noise, 0.0)
+    if after < STANDS_OUT * noise[1] or before == 0:
+        return 0.0
+    return float(np.sqrt(after / before))
 
 
 def _pairs(columns: tuple[Column, ...]) -> list[tuple[Column, Column]]:

@@ -87,3 +87,13 @@ def test_only_a_crude_law_leaves_room_for_something_beside_it():
     assert not leaves_room(())
     assert not leaves_room((Finding("friction", "joint_2", 60.0, misfit=1.2),))
     assert leaves_room((Finding("friction", "joint_2", 60.0, misfit=9.0),))
+
+
+def test_rival_laws_share_what_a_finding_is_sure_of():
+    law = Finding("backlash", "joint_4", 60.0, sure=0.9, rivals=(("nonlinear_stiffness", 0.4),))
+    found = combined((law,), (NONE, 1.0))
+    shares = {c.places: c.probability for c in found.candidates}
+    assert shares[(("backlash", "joint_4"),)] == pytest.approx(0.54)
+    assert shares[(("nonlinear_stiffness", "joint_4"),)] == pytest.approx(0.36)
+    assert shares[(UNKNOWN,)] == pytest.approx(0.1)
+    assert found.established[0][1] == pytest.approx(0.54)
