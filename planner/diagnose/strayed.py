@@ -7,8 +7,7 @@ from planner.diagnose.finding import Finding
 from planner.diagnose.fit import Fit
 
 FAR = 3.2  # prior sds that a spring does not move by chance, nor by what a fit in time neglects
-FARTHER = 5.0  # the same beside a law that is not quite the joint's
-FITS = 2.0  # χ² per value up to which a law is
+FITS = 2.0  # χ² per value up to which a law is the joint's own; else springs imitate what it lacks
 
 
 def strayed(
@@ -19,7 +18,8 @@ def strayed(
     x is laid out as that of `plain`; a nonlinear joint's own spring is part of its law, which
     fits to `per_value`.
     """
-    least = FAR if per_value < FITS else FARTHER
+    if per_value > FITS:
+        return ()
     misfit = plain.misfit
     simulation = misfit.setting.simulation
     names = [p.name for p in misfit.parametrisation.parameters]
@@ -27,7 +27,7 @@ def strayed(
     found: dict[str, Finding] = {}
     for effect in JointStiffness.everywhere(simulation):
         springs = [name for name in effect.springs(simulation) if name in names]
-        far = [name for name in springs if abs(away[names.index(name)]) > least]
+        far = [name for name in springs if abs(away[names.index(name)]) > FAR]
         if not far or effect.at == nonlinear or effect.at in found:
             continue
         places = [names.index(name) for name in far]
