@@ -25,6 +25,7 @@ ALIKE = 40.0  # neighbouring values that err alike where the simulation lacks so
 CLEAR = 8.0
 COURSE = 0.01  # relative sd of the change: no course is quite one of these
 SHARE = 3.0  # by which the misfit has to fall: physics that goes with the pose gains less
+MOVED = 3.0  # sds that the change has to be away from none
 STILL = 2.0  # times the noise: a pose that answers alike when visited again has not drifted
 
 
@@ -159,7 +160,10 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     best = settle(problem_of(recorded, nominal), min(found, key=lambda f: f.per_value))
     finding = evaluate(plain, best)
     explained = plain.per_value > SHARE * best.per_value
-    return (finding,) if explained and finding.log_evidence > CLEAR else ()
+    # A fit that drift led out of a wrong minimum gains by that alone.
+    change, sd, _ = finding.parameters["change"]
+    there = explained and abs(change) > MOVED * sd
+    return (finding,) if there and finding.log_evidence > CLEAR else ()
 
 
 def evaluate(plain: Fit, best: Fit) -> Finding:

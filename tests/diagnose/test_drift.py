@@ -1,0 +1,48 @@
+"""Drift that is none: a fit that found a better minimum is no change in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from known_robots import KR210
+from planner.diagnose import drift
+from planner.diagnose.drift import problem_of, screen
+from planner.physics.simulation import Simulation
+from planner.robot.robot import Robot
+from synthetic_hits import recorded
+
+
+@pytest.fixture(scope="module")
+def simulation(tmp_path_factory):
+    return Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("robot"))))
+
+
+def stuck(recorded_, nominal):
+    """The true fits, but that the one without drift has a joint twice as stiff."""
+    plain, *found = TRUE_FITS(recorded_, nominal)
+    x = plain.x + np.log(2.0) * (np.arange(len(plain.x)) == 1)
+    return replace(plain, x=x, data=plain.misfit.by_pose(x)), *found
+
+
+TRUE_FITS = drift.fits
+
+
+def test_no_drift_where_only_the_fit_without_it_went_wrong(simulation, monkeypatch):
+    still = recorded(simulation, KR210.poses(4, 3))
+    assert screen(still, simulation) == ()
+    monkeypatch.setattr(drift, "fits", stuck)
+    plain, *_ = stuck(still, simulation)
+    assert plain.per_value > 3 * min(f.per_value for f in drift.fits(still, simulation))
+    assert screen(still, simulation) == ()
+
+
+def test_drift_that_is_there_is_found(simulation):
+    def softer(visit: int, level: int) -> float:
+        return 1.0 - 0.05 * visit
+
+    moving = recorded(simulation, KR210.poses(4, 3), softer)
+    (found,) = screen(moving, simulation)
+    change, sd, _ = found.parameters["change"]
+    assert change == pytest.approx(-0.15, abs=4 * sd)
+    assert problem_of(moving, simulation).order[-1] == 1.0
