@@ -32,6 +32,7 @@ ALIKE = 40.0  # neighbouring values that err alike where the simulation lacks so
 SCALE_SD = 0.2  # of all entries together: that is the robot's mass
 ROTATION_SD, GAIN_LOG_SD = 0.5, 0.5
 CLEAR = 8.0  # log evidence from which an artefact is told
+LATE_S = 1.5e-3, 3e-3, 4.5e-3, 6e-3  # delays to begin with: from none, a large one is not found
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +102,8 @@ def measure_chain(recorded: Recorded, nominal: Simulation) -> Chain:
     band = common_band(recorded.frfs, recorded.band_hz)
     problem = Problem(recorded.frfs, recorded.q, nominal, band)
     plain = fit(problem, Effect(""))
-    effect = SensorChain.build([kind.base for kind in KINDS if kind.effect != "sensor_gain"])
+    bases = [kind.base for kind in KINDS if kind.effect != "sensor_gain"]
+    effect = SensorChain.build(bases, late_s=LATE_S)
     found = fit(problem, effect)
     near = fit(problem, SensorChain.build([np.eye(3)]), [plain])
     best = min(found, near, key=lambda f: f.per_value)

@@ -26,15 +26,21 @@ class SensorChain(Effect):
     artefact = True
 
     @classmethod
-    def build(cls, starts: Sequence[np.ndarray], windowed: bool = False) -> "SensorChain":
-        """From several starts of A (3, 3)."""
+    def build(
+        cls,
+        starts: Sequence[np.ndarray],
+        windowed: bool = False,
+        late_s: Sequence[float] = (),
+    ) -> "SensorChain":
+        """From several starts of A (3, 3), and of the delay where A changes nothing."""
         rate = [Quantity("rate", "1/s", float(np.log(RATE_1_S[0])), RATE_1_S[1], True)]
         delay = Quantity("delay", "s", 0.0, DELAY_SD_S)
         entries = [Quantity(f"a_{i}{j}", "1", 0.0, MATRIX_SD) for i in "xyz" for j in "xyz"]
         quantities = (*(rate if windowed else []), delay, *entries)
         first = [q.mean for q in quantities[:-9]]
-        begin = tuple((*first, *(float(v) for v in (a - np.eye(3)).flat)) for a in starts)
-        return cls("sensor", quantities, windowed, begin)
+        begin = [(*first, *(float(v) for v in (a - np.eye(3)).flat)) for a in starts]
+        begin += [(*first[:-1], float(late), *np.zeros(9).tolist()) for late in late_s]
+        return cls("sensor", quantities, windowed, tuple(begin))
 
     def starts(self) -> np.ndarray:
         """See `Effect.starts`."""
