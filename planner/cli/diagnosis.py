@@ -1,8 +1,6 @@
 """Diagnosis of recordings that differ from the simulation (`planner diagnose`)."""
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,13 +11,11 @@ from planner.cli.answer import AsJson, respond, warn
 if TYPE_CHECKING:
     from planner.cli.material import Material
     from planner.diagnose.diagnose import Candidate, Diagnosis
+    from planner.diagnose.explain import Explained
     from planner.diagnose.finding import Finding
-    from planner.diagnose.judge import Judged
     from planner.diagnose.predict import Agreement
-    from planner.diagnose.together import Together
     from planner.diagnose.visits import Recorded as Visits
     from planner.identify.recorded import Recorded
-    from planner.physics.simulation import Simulation
     from planner.robot.robot import Robot
 
 
@@ -49,11 +45,8 @@ def diagnose(
     from planner.cli.material import material
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
-    from planner.diagnose.beside import beside, leaves_room
-    from planner.diagnose.diagnose import diagnose as run
-    from planner.diagnose.judge import judge
+    from planner.diagnose.explain import explain
     from planner.diagnose.recorded import read_ended
-    from planner.diagnose.together import linear_effects_apply, together
     from planner.physics.simulation import Simulation
     from planner.recording.folder import read_poses
     from planner.robot.robot import Robot
@@ -72,28 +65,10 @@ def diagnose(
             window_rate_1_s,
             lambda text: tell(text, 0.0),
         )
-        simulation = Simulation(nominal)
-        screened = _screened(recordings, recorded, simulation, window_rate_1_s, tell)
-        recorded, findings = screened.recorded, screened.findings
-        linear = linear_effects_apply(findings)
-        found = run(
-            recorded.frfs,
-            recorded.q,
-            simulation,
-            effects=None if linear or leaves_room(findings) else (),
-            tell=lambda text, share: tell(text, 0.2 + 0.7 * share),
-        )
-        tell("looking for a nonlinear joint beside it", 0.9)
-        both = beside(screened.visits, findings, found) if screened.visits else None
-        if both is not None:
-            findings, found = both
-        elif not linear:
-            found = replace(found, best=found.refitted)
-        tell("judging at poses set aside", 0.95)
-        judged = judge(found)
-        found = judged.diagnosis
-        whole = together(findings, found, linear or both is not None)
-        answer = _answer(recorded, judged, whole)
+        visits = _visits(recordings, nominal, window_rate_1_s)
+        explained = explain(recorded, visits, Simulation(nominal), tell)
+        recorded, found = explained.recorded, explained.judged.diagnosis
+        answer = _answer(explained)
         answer |= {"npz": None, "robot": None, "plots": []}
         answer["next"] = _next(found, given.with_poses(wanted))
         if wanted:
@@ -114,47 +89,22 @@ def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
     return folder.absolute() / f"{predict.stem}.npz"
 
 
-@dataclass(frozen=True, eq=False)
-class _Screened:
-    findings: "tuple[Finding, ...]"
-    recorded: "Recorded"  # corrected for the artefacts
-    visits: "Visits | None" = None  # the hits themselves, corrected
-
-
-def _screened(
-    folder: Path,
-    recorded: "Recorded",
-    simulation: "Simulation",
-    window_rate_1_s: float,
-    tell: "Callable[[str, float], None]",
-) -> _Screened:
-    """What the hits themselves say; nothing where there are only FRFs, or a window is stated."""
-    from planner.diagnose.recorded import corrected
-    from planner.diagnose.screens import screen
-    from planner.diagnose.together import ARTEFACTS
+def _visits(folder: Path, robot: "Robot", window_rate_1_s: float) -> "Visits | None":
+    """The hits themselves; None where there are only FRFs, or a window is stated."""
     from planner.diagnose.visits import read_visits
     from planner.errors import RefusedError
 
-    robot = simulation.robot
-    tell("looking at the measuring chain, the order in time and the force levels", 0.02)
     try:
         visits = read_visits(folder, robot.joint_names, robot.config.band_hz)
     except RefusedError:
-        return _Screened((), recorded)
-    if window_rate_1_s:
-        return _Screened((), recorded)
-    found = screen(visits, simulation)
-    artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
-    if not artefacts:
-        return _Screened(found.findings, recorded, found.clean)
-    said = f"The recordings were corrected for: {', '.join(artefacts)}."
-    clean = replace(corrected(recorded, found.clean), remarks=(*recorded.remarks, said))
-    return _Screened(found.findings, clean, found.clean)
+        return None
+    return None if window_rate_1_s else visits
 
 
-def _answer(recorded: "Recorded", judged: "Judged", whole: "Together") -> dict[str, Any]:
+def _answer(explained: "Explained") -> dict[str, Any]:
     from planner.diagnose.where import where
 
+    recorded, judged, whole = explained.recorded, explained.judged, explained.whole
     found = judged.diagnosis
     place = where(found.problem, found.refitted)
     return {

@@ -1,0 +1,65 @@
+"""The whole diagnosis in its order: chain, time and force levels; effects; both; a judgement."""
+
+from dataclasses import dataclass, replace
+
+from planner.diagnose.beside import beside, leaves_room
+from planner.diagnose.diagnose import diagnose
+from planner.diagnose.finding import Finding
+from planner.diagnose.judge import Judged, judge
+from planner.diagnose.recorded import corrected
+from planner.diagnose.screens import screen
+from planner.diagnose.search import Tell
+from planner.diagnose.together import ARTEFACTS, Together, linear_effects_apply, together
+from planner.diagnose.visits import Recorded as Visits
+from planner.identify.recorded import Recorded
+from planner.physics.simulation import Simulation
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """`recorded` as it was used, without artefacts; what explains it, judged; all candidates."""
+
+    recorded: Recorded
+    judged: Judged
+    whole: Together
+
+
+def explain(
+    recorded: Recorded, visits: Visits | None, simulation: Simulation, tell: Tell
+) -> Explained:
+    """What `simulation` lacks; `visits` are the hits themselves, None where there are only FRFs."""
+    tell("looking at the measuring chain, the order in time and the force levels", 0.02)
+    recorded, visits, findings = _screened(recorded, visits, simulation)
+    linear = linear_effects_apply(findings)
+    found = diagnose(
+        recorded.frfs,
+        recorded.q,
+        simulation,
+        effects=None if linear or leaves_room(findings) else (),
+        tell=lambda text, share: tell(text, 0.2 + 0.7 * share),
+    )
+    tell("looking for a nonlinear joint beside it", 0.9)
+    both = beside(visits, findings, found) if visits is not None else None
+    if both is not None:
+        findings, found = both
+    elif not linear:
+        found = replace(found, best=found.refitted)
+    tell("judging at poses set aside", 0.95)
+    judged = judge(found)
+    whole = together(findings, judged.diagnosis, linear or both is not None)
+    return Explained(recorded, judged, whole)
+
+
+def _screened(
+    recorded: Recorded, visits: Visits | None, simulation: Simulation
+) -> tuple[Recorded, Visits | None, tuple[Finding, ...]]:
+    """Recordings and hits corrected for artefacts, and what the hits themselves say."""
+    if visits is None:
+        return recorded, None, ()
+    found = screen(visits, simulation)
+    artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
+    if artefacts:
+        said = f"The recordings were corrected for: {', '.join(artefacts)}."
+        remarks = (*recorded.remarks, said)
+        recorded = replace(corrected(recorded, found.clean), remarks=remarks)
+    return recorded, found.clean, found.findings
