@@ -254,7 +254,8 @@ def replayed(
                 }
             )
             model = step.model
-    progress(f"playing {acquisition} on what was measured" if acquisition else "done")
+    if acquisition is not None:
+        progress(f"playing {acquisition} on what was measured")
     return {
         "campaign": str(campaign.directory),
         "steps": steps,

@@ -14,7 +14,10 @@ BASELINE = "maximin_lhs"
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """One strategy's runs (s) by number of measurements n (t,): arrays (s, t)."""
+    """One strategy's runs (s) by number of measurements n (t,): arrays (s, t).
+
+    `minutes` are robot time: travel, settling and hits.
+    """
 
     seeds: tuple[int, ...]
     n: np.ndarray
@@ -39,14 +42,19 @@ class Curves:
     @property
     def to_goal(self) -> int | None:
         """Fewest measurements with a median RMSE of at most 1 %; None: not within the budget."""
-        reached = np.flatnonzero(np.median(self.frequency_rmse_percent, axis=0) <= GOAL_PERCENT)
-        return int(self.n[reached[0]]) if reached.size else None
+        first = self._first_at_goal
+        return None if first is None else int(self.n[first])
 
     @property
     def minutes_to_goal(self) -> float | None:
-        """Median minutes of robot time to a median RMSE of at most 1 %; None: not reached."""
+        """Median minutes of robot time until then; None: not within the budget."""
+        first = self._first_at_goal
+        return None if first is None else float(np.median(self.minutes[:, first]))
+
+    @property
+    def _first_at_goal(self) -> int | None:
         reached = np.flatnonzero(np.median(self.frequency_rmse_percent, axis=0) <= GOAL_PERCENT)
-        return float(np.median(self.minutes[:, reached[0]])) if reached.size else None
+        return int(reached[0]) if reached.size else None
 
     @property
     def each_to_goal(self) -> np.ndarray:
