@@ -94,6 +94,15 @@ def test_a_mode_fitted_with_no_damping_keeps_its_frequency():
     assert (p.damping_ratio > 0.01).all()
 
 
+def test_residues_of_an_axis_that_was_not_hit_are_the_simulations():
+    """np.nan put into complex numbers is nan + 0j: no imaginary part was measured to be 0."""
+    seen = observed(6, 0)
+    residue = seen.residue.copy()
+    residue[..., 2] = np.nan
+    p = fit_surrogate(replace(seen, residue=residue)).predict(X, simulated(X))
+    np.testing.assert_allclose(p.residue[..., 2], simulated(X).residue[..., 2], atol=1e-12)
+
+
 def test_before_any_measurement_residues_are_of_the_size_that_the_simulation_says():
     p = fit_surrogate(observed(0, 0), reference=simulated(X)).predict(X, simulated(X))
     np.testing.assert_allclose(p.residue, simulated(X).residue, atol=1e-12)
