@@ -20,6 +20,7 @@ from planner.robot.robot import Robot
 
 PAYS = 1.5  # factor by which a linear effect has to lower the misfit of averaged FRFs
 CRUDE = 3.0  # χ² per value from which a law leaves room for something beside it
+OWN = "joint_stiffness", "angle_dependent_stiffness"  # what a joint's own law looks like on average
 BETTER = 1.5  # factor by which the linear effect then has to lower it
 
 
@@ -38,10 +39,13 @@ def beside(
     effect does not help.
     """
     before = [f for f in findings if f.effect in (*levels.LAWS, "unknown")]
-    linear = next((c for c in found.candidates if _physical(c)), None)
+    own = {(name, f.at) for f in before for name in OWN}
+    possible = [c for c in found.candidates if _physical(c) and not own.intersection(c.places)]
+    linear = _simplest(found, possible)
     if not before or linear is None or linear.fit is None:
         return None
-    if found.refitted.per_value < PAYS * linear.fit.per_value:
+    pays = found.refitted.per_value > PAYS * linear.fit.per_value
+    if not pays and found.verdict != "explained":
         return None
     with tempfile.TemporaryDirectory() as folder:
         robot = found.problem.simulation.robot
@@ -51,10 +55,26 @@ def beside(
     if law is None or law.misfit * BETTER > min(f.misfit for f in before):
         return None
     kept = [f for f in findings if f not in before and f.effect != "joint_stiffness"]
-    there = [c for c in found.candidates if _physical(c)]
+    there = [c for c in possible if len(c.effects) <= len(linear.effects)]
     total = sum(c.probability for c in there)
-    ranked = tuple(replace(c, probability=c.probability / total) for c in there)
+    ranked = tuple(replace(c, probability=c.probability / total) for c in there if total)
+    ranked = ranked or (replace(linear, probability=1.0),)
     return (*kept, *again), replace(found, candidates=ranked, verdict="explained", best=linear.fit)
+
+
+def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | None:
+    """The likeliest of the fewest linear effects: none of a set has to be there for what bends."""
+    lines = found.refitted.misfit.counts.sum()
+    settled = [
+        (c, c.fit.per_value)
+        for c in possible
+        if c.fit is not None and c.fit.misfit.counts.sum() == lines
+    ]
+    if not settled:
+        return None
+    least = min(misfit for _, misfit in settled)
+    enough = [c for c, misfit in settled if misfit <= PAYS * least]
+    return min(enough, key=lambda c: len(c.effects))
 
 
 def _physical(candidate: Candidate) -> bool:

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from planner.diagnose.effect import Effect, Setting
-from planner.diagnose.objective import ByPose, Misfit
+from planner.diagnose.objective import ByPose, Misfit, own_names
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
 from planner.identify.identify import QUICK, STAGES, identify
@@ -114,7 +114,7 @@ class Fit:
 
     def named(self) -> dict[str, float]:
         """x by name: springs, nuisances, then the effect's own."""
-        return dict(zip(_names(self.misfit), self.x, strict=True))
+        return dict(zip(self.misfit.names, self.x, strict=True))
 
     def precision(self, temper: float) -> np.ndarray:
         """(D, D) inverse covariance of x where χ² counts 1/temper."""
@@ -147,7 +147,7 @@ class Fit:
         """Value, sd and unit of what belongs to the effect, or to one of its parts."""
         part = part or self.effect
         sd = np.sqrt(np.diagonal(np.linalg.inv(self.precision(temper))))
-        p, names = self.misfit.parametrisation, _names(self.misfit)
+        p, names = self.misfit.parametrisation, self.misfit.names
         chosen = part.springs(self.misfit.setting.simulation)
         out = {}
         for i, s in enumerate(p.parameters):
@@ -156,20 +156,11 @@ class Fit:
                 if " along " in s.name:
                     unit = unit.replace("·m", "", 1).replace("rad", "m")
                 out[s.name] = (value, value * float(sd[i]), unit)
-        for q, name in zip(part.quantities, _own_names(part), strict=True):
+        for q, name in zip(part.quantities, own_names(part), strict=True):
             i = names.index(name)
             psi = float(self.x[i])
             out[q.name] = (q.value(psi), q.value_sd(psi, float(sd[i])), q.unit)
         return out
-
-
-def _own_names(effect: Effect) -> list[str]:
-    return [f"{q.name} of {p.name} at {p.at}" for p in effect.parts() for q in p.quantities]
-
-
-def _names(misfit: Misfit) -> list[str]:
-    p = misfit.parametrisation
-    return [*(s.name for s in p.parameters), *p.nuisances, *_own_names(misfit.effect)]
 
 
 def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
@@ -211,7 +202,7 @@ def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
 def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     """A few steps with all that is free, from an earlier fit."""
     close = problem.misfit(effect, CLOSE)
-    return _at(close, _best(close, points(close, warm), PROMISE_STEPS))
+    return approached(close, points(close, warm), PROMISE_STEPS)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:
@@ -238,6 +229,11 @@ def _hope(misfit: Misfit, x: np.ndarray) -> float:
     return at.value - float(gains.max(initial=0.0))
 
 
+def approached(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> Fit:
+    """Where the best of the starts leads in so many steps."""
+    return _at(misfit, _best(misfit, starts, steps))
+
+
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
     misfit = problem.misfit(found.effect, grade)
@@ -258,7 +254,7 @@ def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:
     Further springs start once as they may be, and once so stiff that they change little.
     """
     known, b = earlier.named(), misfit.split[1]
-    names = _names(misfit)
+    names = misfit.names
     there = np.array([name in known for name in names])
     values = np.array([known.get(name, 0.0) for name in names])
     springs = np.arange(len(names)) < misfit.split[0]

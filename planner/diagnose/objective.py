@@ -24,6 +24,11 @@ class ByPose:
     normal: np.ndarray
 
 
+def own_names(effect: Effect) -> list[str]:
+    """Of an effect's ψ: what, of which effect, where."""
+    return [f"{q.name} of {p.name} at {p.at}" for p in effect.parts() for q in p.quantities]
+
+
 @dataclass(frozen=True, eq=False)
 class Misfit:
     """χ²/2 of data and prior over x: springs θ (P), inertial nuisances φ (R), the effect's ψ (p).
@@ -46,6 +51,12 @@ class Misfit:
         """Where φ and ψ begin in x."""
         count = len(self.parametrisation.parameters)
         return count, count + len(self.parametrisation.nuisances)
+
+    @property
+    def names(self) -> list[str]:
+        """Of the entries of x."""
+        p = self.parametrisation
+        return [*(s.name for s in p.parameters), *p.nuisances, *own_names(self.effect)]
 
     @property
     def mean(self) -> np.ndarray:

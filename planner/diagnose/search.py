@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.diagnose.anywhere import suspects
 from planner.diagnose.both import Both, families, together
 from planner.diagnose.effect import Effect
+from planner.diagnose.elsewhere import elsewhere
 from planner.diagnose.fit import CLOSE, FINE, Fit, Problem, glance, points, promise, settle, staged
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
@@ -19,10 +21,10 @@ CLEARLY = 3.0  # misfit from which that is so
 ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
+POINTED = 2  # suspects settled on all lines
+MOVED = 2  # effects at other places, the same
 LESSENED = 3  # explanations that are looked at without one of their effects
 MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
-SOFT = "base_compliance", "link_flexibility", "transverse_compliance"
-STUCK, AGAIN = 100.0, 6  # misfit from which so many soft structures are looked at again
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
 Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
@@ -43,9 +45,9 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
     found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
     best = min(f.per_value for f in found.finalists)
     if best > ENOUGH:
-        tell("softer structures, in bands that widen", 0.6)
-        more = [*families(effects), *(_soft(found, effects) if best > STUCK else ())]
-        found = Found((*found.finalists, *(staged(problem, e) for e in more)), found.left)
+        tell("letting it give and carry everywhere", 0.6)
+        found = Found((*found.finalists, *_pointed(problem, effects)), found.left)
+        found = _lessened(problem, found)
         best = min(f.per_value for f in found.finalists)
     leaders = _leaders(found) if best > ENOUGH else []
     led: list[Place] = []
@@ -60,19 +62,28 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
+    found = _moved(problem, found, effects)
     found = _lessened(problem, _composed(problem, found, effects, tell))
-    return _distinct(_spared(problem, found, effects))
+    return _distinct(_spared(problem, _accompanied(problem, found, effects, tell), effects))
 
 
-def _soft(found: Found, effects: Sequence[Effect]) -> list[Effect]:
-    """Effects that are springs alone, those of the base and the most promising others.
+def _pointed(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """The best of `suspects`, and of families, followed to the end."""
+    rough = suspects(problem, effects)
+    close = [settle(problem, f, CLOSE, STEPS) for f in _first(rough, LAST)]
+    ends = [settle(problem, f, steps=LAST_STEPS) for f in _first(close, POINTED)]
+    return *ends, *(staged(problem, e) for e in families(effects))
 
-    Soft ones move all modes so far that no fit in the whole band finds its way.
-    """
-    behind = {id(effect): gap for effect, gap, _ in found.left}
-    springs = [e for e in effects if e.name in SOFT]
-    springs.sort(key=lambda e: (e.name != SOFT[0], behind.get(id(e), 0.0)))
-    return springs[:AGAIN]
+
+def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """With masses and resonators of the best at other places, where it misses the noise."""
+    best = min(found.finalists, key=lambda f: f.per_value)
+    if best.per_value <= ENOUGH:
+        return found
+    near = _first(elsewhere(problem, best, effects), MOVED)
+    return Found(
+        (*found.finalists, *(settle(problem, f, steps=LAST_STEPS) for f in near)), found.left
+    )
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
@@ -89,6 +100,20 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
         found = Found((*found.finalists, *grown.finalists[1:]), (*found.left, *grown.left))
         best = min(found.finalists, key=lambda f: f.per_value)
     return found
+
+
+def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
+    """With what is promising beside one effect that explains nearly everything.
+
+    Noise that is overstated hides a small second effect from `ENOUGH`, not from the evidence.
+    """
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    if not best.effect.at or len(best.effect.parts()) > 1 or best.per_value > ENOUGH:
+        return found
+    tell("looking for a small second effect", 0.98)
+    pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
+    more = _round(problem, best, pairs, lambda text, share: None)
+    return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
 
 
 def _lessened(problem: Problem, found: Found) -> Found:
@@ -215,6 +240,11 @@ def _behind(fits: Sequence[Fit]) -> np.ndarray:
     t = temper_of(fits)
     evidence = np.array([f.log_evidence(t) for f in fits])
     return evidence.max() - evidence
+
+
+def _first(fits: Sequence[Fit], most: int) -> list[Fit]:
+    """The best of fits on the same lines."""
+    return [fits[i] for i in np.argsort(_behind(fits))[:most]] if fits else []
 
 
 def _cut(fits: Sequence[Fit], most: int) -> tuple[list[Fit], list[tuple[Effect, float, Fit]]]:

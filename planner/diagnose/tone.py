@@ -8,7 +8,7 @@ from planner.diagnose.visits import Recorded
 
 WIDTH_HZ = 1.0  # half of what a tone takes up under the window
 CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together
-LEAST = 1.5  # χ² per value: below it levels do not differ
+LEAST = 10.0  # χ² per value there: below it levels hardly differ
 SOUNDS_ON = 0.7  # of its size in the third quarter of a record that a tone has in the last
 STANDS_OUT, BESIDE_HZ = 3.0, 1.5  # power there over that beside it
 
@@ -35,7 +35,7 @@ def screen_tone(recorded: Recorded) -> Finding | None:
     line = int(np.argmax(over))
     near = np.abs(frequency - frequency[line]) <= WIDTH_HZ
     share = float(over[near].sum() / max(over.sum(), 1e-300))
-    if excess.sum() < LEAST * noise.sum() or share < CONCENTRATED:
+    if excess[near].sum() < LEAST * noise[near].sum() or share < CONCENTRATED:
         return None
     hz = float(np.sum(frequency[near] * over[near]) / over[near].sum())
     if _kept(recorded, hz) < SOUNDS_ON:

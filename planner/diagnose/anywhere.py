@@ -1,0 +1,98 @@
+"""Where a robot gives and what it carries, from one fit in which it may do so everywhere.
+
+One effect after the other finds no way home where several are there: beside the first, the second
+looks like something else. Here all soft structures and added masses are free at once, stiff and
+massless unless the data want them otherwise; the logarithm of the FRFs is fitted in a band that
+widens. What gave or carries then, few places, is fitted alone from there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from planner.diagnose.both import Both, Family
+from planner.diagnose.effect import Effect
+from planner.diagnose.effects.extra import ExtraCompliance
+from planner.diagnose.effects.mass import AddedMass
+from planner.diagnose.fit import GLANCE, Fit, Problem, approached, points
+from planner.identify.held_out import farthest_first
+
+ROUGH = replace(GLANCE, lines=24, inertial=False)
+POSES = 5
+BANDS = (0.28, 12), (1.0, 30)  # shares of the band, one after the other, and steps in each
+GAVE = -0.4  # prior sds from stiff at which a spring is said to give
+CARRIED = 0.25  # prior sds of mass at which a link is said to carry something
+MOST = 4  # places that give, looked at together
+MASSES = 2  # places that give, at most, beside which each mass is looked at
+
+
+def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """Rough fits of few effects each, from the one of all; none where the library has no such."""
+    few = problem.at(farthest_first(problem.q)[:POSES].tolist())
+    all_ = _everything(effects)
+    if not all_.members:
+        return ()
+    low, high = problem.band_hz
+    x, found = None, None
+    for share, steps in BANDS:
+        part = replace(few, band_hz=(low, low + share * (high - low)))
+        misfit = part.misfit(all_, ROUGH)
+        found = approached(misfit, [misfit.mean if x is None else x], steps)
+        x = found.x
+    assert found is not None
+    misfits = [few.misfit(effect, GLANCE) for effect in _sets(found, effects)]
+    return tuple(approached(misfit, points(misfit, found)[:1]) for misfit in misfits)
+
+
+def _everything(effects: Sequence[Effect]) -> Family:
+    """Each place once with all that may give there, and all masses."""
+    widest: dict[tuple[str, str], ExtraCompliance] = {}
+    for e in effects:
+        if isinstance(e, ExtraCompliance):
+            known = widest.get((e.name, e.at))
+            if known is None or len(e.gives) > len(known.gives):
+                widest[e.name, e.at] = e
+    members = *map(_stiff, widest.values()), *(e for e in effects if isinstance(e, AddedMass))
+    quantities = tuple(q for m in members for q in m.quantities)
+    return Family(" and ".join(m.at for m in members), quantities, members)
+
+
+def _stiff(effect: ExtraCompliance) -> ExtraCompliance:
+    """The same with its prior's median where that ended: it gives if the data want it."""
+    gives = tuple(replace(g, upper=g.upper**2 / g.lower) for g in effect.gives)
+    return replace(effect, gives=gives)
+
+
+def _sets(found: Fit, effects: Sequence[Effect]) -> list[Effect]:
+    """The softest place, the softest two, …; some of them with one mass."""
+    shift = dict(
+        zip(found.misfit.names, (found.x - found.misfit.mean) / found.misfit.sd, strict=True)
+    )
+    softness: dict[tuple[str, str], float] = {}
+    for e in found.effect.parts():
+        own = [shift[n] for n in e.springs(found.misfit.setting.simulation) if "stiffness" in n]
+        if own and min(own) < GAVE:
+            softness[e.name, e.at] = min(own)
+    gave = [
+        _variant(place, shift, found, effects)
+        for place in sorted(softness, key=lambda p: softness[p])
+    ]
+    masses = [e for e in effects if isinstance(e, AddedMass)]
+    carried = [abs(shift[f"mass of {e.name} at {e.at}"]) for e in masses]
+    sets = [tuple(gave[:k]) for k in range(1, min(len(gave), MOST) + 1)]
+    if max(carried, default=0.0) > CARRIED:
+        some = [tuple(gave[:k]) for k in range(min(len(gave), MASSES) + 1)]
+        sets += [(*soft, mass) for soft in some for mass in masses]
+    return [one[0] if len(one) == 1 else Both.of(*one) for one in sets]
+
+
+def _variant(
+    place: tuple[str, str], shift: dict[str, float], found: Fit, effects: Sequence[Effect]
+) -> Effect:
+    """The smallest variant of an effect at a place that has all that gave there."""
+    simulation = found.misfit.setting.simulation
+    variants = [e for e in effects if (e.name, e.at) == place]
+
+    def given(e: Effect) -> int:
+        return sum(shift[n] < GAVE for n in e.springs(simulation) if "stiffness" in n)
+
+    return max(variants, key=lambda e: (given(e), -len(e.springs(simulation))))

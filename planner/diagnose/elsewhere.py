@@ -1,0 +1,39 @@
+"""What a fit says of a mass or a resonator, asked again at all other places.
+
+On the neighbouring link it is nearly the same, and a fit that began there does not leave it.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planner.diagnose.both import Both, together
+from planner.diagnose.effect import Effect
+from planner.diagnose.fit import CLOSE, Fit, Problem, approached, points
+
+MOVABLE = "added_mass", "local_resonator"
+KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
+
+
+def elsewhere(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """Rough fits with each of its movable effects at each other place."""
+    out = []
+    for part in fit.effect.parts():
+        rest = [p for p in fit.effect.parts() if p is not part]
+        for to in effects:
+            if part.name not in MOVABLE or to.name != part.name or to.at == part.at:
+                continue
+            effect = together(Both.of(*rest), to) if rest else to
+            if effect is not None:
+                out.append(_moved(problem, fit, part, to, effect))
+    return tuple(out)
+
+
+def _moved(problem: Problem, fit: Fit, part: Effect, to: Effect, effect: Effect) -> Fit:
+    misfit, known = problem.misfit(effect, CLOSE), fit.named()
+    starts = np.array(points(misfit, fit))
+    for name in KEPT:
+        before, now = f"{name} of {part.name} at {part.at}", f"{name} of {to.name} at {to.at}"
+        if before in known:
+            starts[:, misfit.names.index(now)] = known[before]
+    return approached(misfit, list(np.unique(starts, axis=0)))

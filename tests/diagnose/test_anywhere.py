@@ -1,0 +1,51 @@
+"""Several places at once, from the other engine, are found by one fit in which all may give."""
+
+import pytest
+
+from concealed import hidden
+from known_robots import IRB6640
+from planner.diagnose.anywhere import suspects
+from planner.diagnose.diagnose import diagnose
+from planner.diagnose.effects import library
+from planner.diagnose.fit import Problem
+from planner.truth.deviation import AddedMass, Spring
+
+X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+TILTS = Spring("base", X, 2.4e6, 1.2e3), Spring("base", Y, 1.6e6, 8e2)
+PAYLOAD = AddedMass("link_6", (0.05, 0.02, 0.1), 60.0)
+BOTH = {("base_compliance", "base"), ("added_mass", "link_6")}
+
+
+def places(effect) -> set[tuple[str, str]]:
+    return {(e.name, e.at) for e in effect.parts()}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cell")
+    return hidden(IRB6640, folder, 75, TILTS, (PAYLOAD,), poses=6)
+
+
+def problem(frfs, q, simulation) -> Problem:
+    return Problem(tuple(frfs), q, simulation, simulation.robot.config.band_hz)
+
+
+def test_what_gives_and_what_is_carried_are_among_the_first_suspects(recorded):
+    rough = suspects(problem(*recorded), library(recorded[2]))
+    best = min(rough, key=lambda f: f.per_value)
+    assert places(best.effect) >= {("base_compliance", "base")}
+    right = [f for f in rough if places(f.effect) == BOTH]
+    assert right
+    assert right[0].per_value < 1.5 * best.per_value + 0.05
+
+
+def test_a_library_without_soft_places_and_masses_has_no_suspects(recorded):
+    others = [e for e in library(recorded[2]) if e.name == "joint_stiffness"]
+    assert suspects(problem(*recorded), others) == ()
+
+
+@pytest.mark.slow
+def test_both_are_named(recorded):
+    found = diagnose(*recorded)
+    assert set(found.candidates[0].places) == BOTH
+    assert found.candidates[0].probability > 0.8
