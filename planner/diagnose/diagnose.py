@@ -2,13 +2,13 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
-from planner.diagnose.fit import Fit, Problem, fit, settle
+from planner.diagnose.fit import Fit, Problem, carried_on, fit, settle
 from planner.diagnose.search import Found, Tell, search
 from planner.diagnose.weigh import Weights, weigh
 from planner.frf.types import Frf
@@ -75,6 +75,23 @@ def diagnose(
     refitted = settle(problem, fit(problem, Effect("")))
     all_ = library(simulation) if effects is None else effects
     found = search(problem, refitted, all_, tell)
+    return _diagnosis(problem, found, all_, started)
+
+
+def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
+    """The undecided candidates of a diagnosis with further recordings, from where they were.
+
+    A tie is decided by what its candidates say of the new hits, not by which of them a new search
+    finds again.
+    """
+    started = time.perf_counter()
+    problem = replace(before.problem, frfs=tuple(frfs), q=np.atleast_2d(q))
+    tied = [c.fit for c in before.undecided if c.fit is not None and c.fit.effect.at]
+    fits = tuple(carried_on(problem, f, f.effect) for f in (before.refitted, *tied))
+    return _diagnosis(problem, Found(fits, ()), library(problem.simulation), started)
+
+
+def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
     weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
     candidates = _candidates(found, weights, all_)
     first = candidates[0].places[0][0]

@@ -234,6 +234,13 @@ def approached(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_
     return _at(misfit, _best(misfit, starts, steps))
 
 
+def carried_on(problem: Problem, fit: Fit, effect: Effect, steps: int = SETTLED[1]) -> Fit:
+    """An effect fitted to the end from where another fit, perhaps of other data, is."""
+    misfit = problem.misfit(effect, FINE)
+    x = points(misfit, fit)[0]
+    return settle(problem, _at(misfit, x), steps=steps)
+
+
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
     misfit = problem.misfit(found.effect, grade)

@@ -9,7 +9,7 @@ from planner.diagnose.anywhere import suspects
 from planner.diagnose.both import Both, families, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.elsewhere import elsewhere
-from planner.diagnose.fit import CLOSE, FINE, Fit, Problem, glance, points, promise, settle, staged
+from planner.diagnose.fit import CLOSE, Fit, Problem, carried_on, glance, promise, settle, staged
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
 
@@ -128,7 +128,7 @@ def _lessened(problem: Problem, found: Found) -> Found:
         for part in parts:
             kept = [p for p in parts if p is not part]
             effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
-            again.append(_from(problem, whole, effect))
+            again.append(carried_on(problem, whole, effect, LAST_STEPS))
     return Found((*found.finalists, *again), found.left)
 
 
@@ -138,15 +138,8 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     if not best.effect.at or best.per_value > ENOUGH:
         return found
     pairs = [together(best.effect, e) for e in effects if _strayed(best, e)]
-    more = tuple(_from(problem, best, pair) for pair in pairs if pair is not None)
+    more = tuple(carried_on(problem, best, pair, LAST_STEPS) for pair in pairs if pair is not None)
     return Found((*found.finalists, *more), found.left)
-
-
-def _from(problem: Problem, fit: Fit, effect: Effect) -> Fit:
-    """An effect fitted to the end from where another fit is."""
-    misfit = problem.misfit(effect, FINE)
-    x = points(misfit, fit)[0]
-    return settle(problem, Fit(effect, misfit, x, misfit.by_pose(x)), steps=LAST_STEPS)
 
 
 def _distinct(found: Found) -> Found:

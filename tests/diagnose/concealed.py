@@ -11,7 +11,7 @@ from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot
-from planner.truth.deviation import AddedMass, Deviation, Spring
+from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.model import load_truth
 
@@ -24,13 +24,16 @@ def hidden(
     seed: int,
     extra: tuple[Spring, ...] = (),
     added: tuple[AddedMass, ...] = (),
+    loose: tuple[Resonator, ...] = (),
     channel: Callable[[np.ndarray], np.ndarray] = lambda a: a,
     poses: int = 8,
 ) -> tuple[list[Frf], np.ndarray, Simulation]:
     """FRFs of 9 hits a pose, poses (n, 6) in rad, and the simulation that knows of nothing."""
     path = robot.write(folder / "robot")
     scatter = {"stiffness": 0.1, "damping": 0.2, "inertia": 0.04, "com_m": 0.005}
-    truth = load_truth(path, Deviation(seed=seed, extra=extra, added=added, **scatter))
+    truth = load_truth(
+        path, Deviation(seed=seed, extra=extra, added=added, resonators=loose, **scatter)
+    )
     hammer, q, out = Hammer(), robot.poses(poses, seed), []
     for number, row in enumerate(q):
         rng, hits = np.random.default_rng([seed, number]), []

@@ -21,7 +21,7 @@ from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
 from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, Measurement
-from planner.diagnose.diagnose import Diagnosis, diagnose
+from planner.diagnose.diagnose import Diagnosis, again, diagnose
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
 from planner.frf.types import Frf
@@ -111,16 +111,15 @@ def until_decided(case: Case, poses, axes, found: Diagnosis, true, strategy: str
     campaign = Campaign(case)
     for q, axis in zip(poses, axes, strict=True):
         campaign.hit(q, (int(axis),))
-    effects = [e for c in found.undecided if c.fit is not None for e in c.effects if e.at]
-    effects = list(dict.fromkeys(effects))
+    first = found
     for extra in range(1, MOST + 1):
         tied = [c for c in found.undecided if c.fit is not None]
         separate = strategy == "separation" and len(tied) > 1
         q, axis = campaign.separating(found) if separate else campaign.integrated_variance()
         campaign.hit(q, axis)
-        found = campaign.diagnosed(effects)
-        first = found.candidates[0]
-        if first.probability > SURE and first.places == (true,):
+        found = again(first, campaign.frfs, np.array(campaign.q))
+        leader = found.candidates[0]
+        if leader.probability > SURE and leader.places == (true,):
             return extra
     return MOST + 1
 

@@ -1,0 +1,59 @@
+"""A resonator that was fitted on a neighbouring link is found on its own; ties are carried on."""
+
+import pytest
+
+from concealed import hidden
+from known_robots import IRB6640
+from planner.diagnose.diagnose import again, diagnose
+from planner.diagnose.effect import Effect
+from planner.diagnose.effects import library
+from planner.diagnose.elsewhere import elsewhere
+from planner.diagnose.fit import Problem, fit, settle
+from planner.truth.deviation import Resonator
+
+LOOSE = Resonator("link_3", (0.2, 0.05, 0.1), (0.0, 0.0, 1.0), 14.0, 22.0, 0.02)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    return hidden(IRB6640, tmp_path_factory.mktemp("cell"), 76, loose=(LOOSE,), poses=5)
+
+
+def of_kind(recorded, name: str) -> dict[str, Effect]:
+    return {e.at: e for e in library(recorded[2]) if e.name == name}
+
+
+@pytest.mark.parametrize("neighbour", ["link_2", "link_4"])
+def test_it_is_found_from_the_next_link(recorded, neighbour):
+    frfs, q, simulation = recorded
+    resonators = of_kind(recorded, "local_resonator")
+    problem = Problem(tuple(frfs), q, simulation, simulation.robot.config.band_hz)
+    wrong = settle(problem, fit(problem, resonators[neighbour]), steps=8)
+    found = elsewhere(problem, wrong, list(resonators.values()))
+    assert {f.effect.at for f in found} == set(resonators) - {neighbour}
+    ends = [settle(problem, f, steps=30) for f in found]
+    best = min(ends, key=lambda f: f.per_value)
+    assert best.effect.at == "link_3"
+    assert best.per_value < 1.1 < 2.0 < wrong.per_value
+
+
+def test_joints_are_not_moved(recorded):
+    frfs, q, simulation = recorded
+    problem = Problem(tuple(frfs), q, simulation, simulation.robot.config.band_hz)
+    springs = list(of_kind(recorded, "joint_stiffness").values())
+    start = settle(problem, fit(problem, springs[0]), steps=2)
+    assert elsewhere(problem, start, springs) == ()
+
+
+def test_further_recordings_are_told_by_the_same_candidates(recorded):
+    frfs, q, simulation = recorded
+    resonators = of_kind(recorded, "local_resonator")
+    some = [resonators[at] for at in ("link_2", "link_3", "link_4")]
+    before = diagnose(frfs[:3], q[:3], simulation, effects=some)
+    after = again(before, frfs, q)
+    assert after.candidates[0].places == (("local_resonator", "link_3"),)
+    assert after.candidates[0].probability > 0.9
+    assert sum(c.probability for c in after.candidates) == pytest.approx(1.0)
+    assert len(after.problem.frfs) == len(frfs)
+    known = {c.places for c in before.undecided if c.fit is not None}
+    assert {c.places for c in after.candidates if c.effects} <= known
