@@ -1,6 +1,7 @@
 """Simulated hits on a robot that deviates from its folder, as FRFs, from the other engine."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
