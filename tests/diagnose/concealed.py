@@ -31,10 +31,8 @@ def hidden(
 ) -> tuple[list[Frf], np.ndarray, Simulation]:
     """FRFs of 9 hits a pose, poses (n, 6) in rad, and the simulation that knows of nothing."""
     path = robot.write(folder / "robot")
-    scatter = {"stiffness": 0.1, "damping": 0.2, "inertia": 0.04, "com_m": 0.005}
-    truth = load_truth(
-        path, Deviation(seed=seed, extra=extra, added=added, resonators=loose, **scatter)
-    )
+    scatter = Deviation(seed, stiffness=0.1, damping=0.2, inertia=0.04, com_m=0.005)
+    truth = load_truth(path, replace(scatter, extra=extra, added=added, resonators=loose))
     hammer, q, out = Hammer(), robot.poses(poses, seed), []
     for number, row in enumerate(q):
         rng, hits = np.random.default_rng([seed, number]), []
