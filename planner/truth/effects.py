@@ -25,6 +25,9 @@ from planner.truth.scene import (
 from planner.truth.secret import Drift, Secret
 
 
+ALONG = 0.9  # cosine from which a link runs along an axis
+
+
 def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A joint about its own axis is far softer or stiffer than stated."""
     joint = some_joint(rng)
@@ -68,11 +71,17 @@ def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
 
 
 def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A link bends about two axes, twists, or both."""
+    """A link bends about two axes, twists, or both.
+
+    Twist alone of a link along its joint's own axis is that joint's stiffness: it bends instead.
+    """
     lengths = {i: float(np.linalg.norm(scene.length(i))) for i in range(1, 5)}
     number = int(rng.choice([i for i, length in lengths.items() if length > 0.15]))
     link, along = f"link_{number}", scene.length(number)
     kind = str(rng.choice(["bending", "torsion", "both"], p=[0.5, 0.25, 0.25]))
+    axis = np.array(scene.arm.joints[number - 1].axis, dtype=float)
+    if kind == "torsion" and abs(axis @ along) > ALONG * np.linalg.norm(along):
+        kind = "bending"
     own = scene.stiffness(f"joint_{number}")
     parameters: Parameters = {"kind": kind}
     springs = []

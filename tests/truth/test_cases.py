@@ -52,6 +52,23 @@ def test_every_effect_of_the_contract_can_be_concealed(tmp_path):
     assert {"null", "pair"} <= set(KINDS)
 
 
+@pytest.mark.parametrize("robot", sorted(ARMS))
+def test_no_link_is_said_to_twist_that_runs_along_its_joints_axis(robot, tmp_path):
+    """Its twist would be that joint's stiffness, which nobody could tell apart."""
+    arm = ARMS[robot]
+    scene = Scene(arm, load_truth(arm.write(tmp_path)), 1, arm.poses(2), 1000.0)
+    twisted = set()
+    for seed in range(60):
+        drawn = EFFECTS["link_flexibility"](scene, Secret(Deviation()), np.random.default_rng(seed))
+        number = int(str(drawn.at)[-1])
+        along, axis = scene.length(number), np.array(arm.joints[number - 1].axis, dtype=float)
+        same = abs(axis @ along) > 0.9 * np.linalg.norm(along)
+        if drawn.parameters["kind"] == "torsion":
+            assert not same
+            twisted.add(number)
+    assert twisted  # others do twist
+
+
 def test_the_folder_is_what_the_contract_says(case):
     robot = Robot.load(case.robot_toml)
     rows = read_recordings(case.recordings, robot.joint_names).rows
