@@ -24,7 +24,6 @@ from planner.truth.scene import (
 )
 from planner.truth.secret import Drift, Secret
 
-
 ALONG = 0.9  # cosine from which a link runs along an axis
 
 
