@@ -19,6 +19,7 @@ from planner.identify.held_out import farthest_first
 ROUGH = replace(GLANCE, lines=24, inertial=False)
 POSES = 5
 BANDS = (0.28, 12), (1.0, 30)  # shares of the band, one after the other, and steps in each
+FOLLOWED = 20  # steps of what is left alone
 GAVE = -0.4  # prior sds from stiff at which a spring is said to give
 CARRIED = 0.25  # prior sds of mass at which a link is said to carry something
 MOST = 4  # places that give, looked at together
@@ -40,7 +41,7 @@ def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
         x = found.x
     assert found is not None
     misfits = [few.misfit(effect, GLANCE) for effect in _sets(found, effects)]
-    return tuple(approached(misfit, points(misfit, found)[:1]) for misfit in misfits)
+    return tuple(approached(misfit, points(misfit, found)[:1], FOLLOWED) for misfit in misfits)
 
 
 def _everything(effects: Sequence[Effect]) -> Family:

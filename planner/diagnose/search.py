@@ -70,7 +70,9 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
 def _pointed(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """The best of `suspects`, and of families, followed to the end."""
     rough = suspects(problem, effects)
-    close = [settle(problem, f, CLOSE, STEPS) for f in _first(rough, LAST)]
+    # The softest place comes first: alone it may be all, though more places fit more closely.
+    few = {id(f): f for f in (*rough[:1], *_first(rough, LAST))}
+    close = [settle(problem, f, CLOSE, STEPS) for f in few.values()]
     ends = [settle(problem, f, steps=LAST_STEPS) for f in _first(close, POINTED)]
     return *ends, *(staged(problem, e) for e in families(effects))
 
