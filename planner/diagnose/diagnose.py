@@ -79,10 +79,10 @@ def diagnose(
 
 
 def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
-    """The undecided candidates of a diagnosis with further recordings, from where they were.
+    """The undecided candidates of a diagnosis, fitted to more recordings from where they were.
 
-    A tie is decided by what its candidates say of the new hits, not by which of them a new search
-    finds again.
+    `frfs` at q (n, dof) in rad are the earlier ones and further ones, in the same band. A tie is
+    decided by what its candidates say of the new hits, not by which of them a search finds again.
     """
     started = time.perf_counter()
     problem = replace(before.problem, frfs=tuple(frfs), q=np.atleast_2d(q))
