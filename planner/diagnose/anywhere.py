@@ -3,16 +3,18 @@
 One effect after the other finds no way home where several are there: beside the first, the second
 looks like something else. Here all soft structures and added masses are free at once, stiff and
 massless unless the data want them otherwise; the logarithm of the FRFs is fitted in a band that
-widens. What gave or carries then, few places, is fitted alone from there.
+widens. What gave or carries then, few places, is fitted alone from there, and where that is not
+enough, with a resonator beside it.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planner.diagnose.both import Both, Family
+from planner.diagnose.both import Both, Family, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects.extra import ExtraCompliance
 from planner.diagnose.effects.mass import AddedMass
+from planner.diagnose.effects.resonator import LocalResonator
 from planner.diagnose.fit import GLANCE, Fit, Problem, approached, points
 from planner.identify.held_out import farthest_first
 
@@ -42,6 +44,19 @@ def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     assert found is not None
     misfits = [few.misfit(effect, GLANCE) for effect in _sets(found, effects)]
     return tuple(approached(misfit, points(misfit, found)[:1], FOLLOWED) for misfit in misfits)
+
+
+def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """Rough fits of each resonator beside what each of some `suspects` has."""
+    few = problem.at(farthest_first(problem.q)[:POSES].tolist())
+    out = []
+    for suspect in rough:
+        for e in effects:
+            pair = together(suspect.effect, e) if isinstance(e, LocalResonator) else None
+            if pair is not None:
+                misfit = few.misfit(pair, GLANCE)
+                out.append(approached(misfit, points(misfit, suspect), FOLLOWED))
+    return tuple(out)
 
 
 def _everything(effects: Sequence[Effect]) -> Family:

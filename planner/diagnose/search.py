@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.anywhere import suspects
+from planner.diagnose.anywhere import resonant, suspects
 from planner.diagnose.both import Both, families, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.elsewhere import elsewhere
@@ -68,13 +68,25 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
 
 
 def _pointed(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
-    """The best of `suspects`, and of families, followed to the end."""
+    """The best of `suspects`, of resonators beside them, and of families, followed to the end."""
     rough = suspects(problem, effects)
     # The softest place comes first: alone it may be all, though more places fit more closely.
-    few = {id(f): f for f in (*rough[:1], *_first(rough, LAST))}
-    close = [settle(problem, f, CLOSE, STEPS) for f in few.values()]
-    ends = [settle(problem, f, steps=LAST_STEPS) for f in _first(close, POINTED)]
-    return *ends, *(staged(problem, e) for e in families(effects))
+    ends = [*_followed(problem, rough), *(staged(problem, e) for e in families(effects))]
+    if rough and min(f.per_value for f in ends) > ENOUGH:
+        ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
+    return tuple(ends)
+
+
+def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
+    """The best to the end, the others, and the first of them if need be, less closely."""
+    few = _and_best(rough, LAST) if first else _first(rough, LAST)
+    close = [settle(problem, f, CLOSE, STEPS) for f in few]
+    return [settle(problem, f, steps=LAST_STEPS) for f in _first(close, POINTED)]
+
+
+def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
+    """The first, and the best so many."""
+    return list({id(f): f for f in (*rough[:1], *_first(rough, most))}.values())
 
 
 def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:

@@ -18,6 +18,9 @@ ARTEFACTS = ("sensor_rotation", "channel_delay", "exponential_window", "sensor_g
 UNKNOWN = "unknown"
 PRIOR = 0.05  # of any one screen's effect before its data
 SUREST = 0.98  # screens approximate: none is surer than they were right on concealed cases
+# What is said first is never said surer than it was right: in 392 of the 433 concealed cases (seeds
+# 11001 to 16001) in which it was said with 90 % or more, before the latest had taught anything.
+HONEST = 0.92
 Place = tuple[str, str | None]
 
 
@@ -84,11 +87,25 @@ def together(
             rest = tuple(p for p in places if p not in way and p not in own)
             key = places if unknown else (way + rest) or (("none", None),)
             out[key] = out.get(key, 0.0) + share * weight * part
-    candidates = sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)
+    candidates = _honest(
+        sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)
+    )
     first = candidates[0].places[0][0]
     verdict = {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
     told = tuple((f, p * (1.0 - sum(share for _, share in f.rivals))) for f, p in known)
     return Together(verdict, tuple(candidates), told, linear)
+
+
+def _honest(ranked: list[Ranked]) -> list[Ranked]:
+    """Most probable first, HONEST at most; the rest goes to "unknown", or from it to the next."""
+    first = max(ranked, key=lambda r: r.probability)
+    rest = max(first.probability - HONEST, 0.0)
+    others = [r for r in ranked if r is not first]
+    unknown = next((r for r in others if r.places == ((UNKNOWN, None),)), None)
+    heir = unknown or max(others, key=lambda r: r.probability)
+    given = {first.places: first.probability - rest, heir.places: heir.probability + rest}
+    out = [Ranked(r.places, given.get(r.places, r.probability)) for r in ranked]
+    return sorted(out, key=lambda r: -r.probability)
 
 
 def _linear(candidates: Sequence[Candidate]) -> tuple[tuple[tuple[Place, ...], float], ...]:

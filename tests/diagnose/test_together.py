@@ -7,7 +7,7 @@ import pytest
 
 from planner.diagnose.beside import leaves_room
 from planner.diagnose.finding import Finding
-from planner.diagnose.together import linear_effects_apply, together
+from planner.diagnose.together import HONEST, linear_effects_apply, together
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,16 @@ def test_probabilities_sum_to_one_and_fall(findings):
     shares = [c.probability for c in found.candidates]
     assert sum(shares) == pytest.approx(1.0)
     assert shares == sorted(shares, reverse=True)
+
+
+@pytest.mark.parametrize("sure", [NONE, BASE, UNKNOWN])
+def test_nothing_is_surer_than_it_was_right_on_concealed_cases(sure):
+    others = [place for place in (NONE, BASE, UNKNOWN) if place != sure]
+    found = combined((), (sure, 1.0), *((place, 0.0) for place in others)).candidates
+    assert found[0].places == (sure,)
+    assert found[0].probability == HONEST
+    assert found[1].probability == pytest.approx(1 - HONEST)
+    assert (found[1].places == (UNKNOWN,)) == (sure != UNKNOWN)
 
 
 def test_without_findings_the_linear_verdict_stands():

@@ -13,7 +13,8 @@ from planner.recording.read import read
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import EFFECTS, KINDS, Case, make_case
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import Deviation, Harmonic, Scaled
+from planner.truth.laws import Backlash, Hardening
 from planner.truth.model import load_truth
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret
@@ -67,6 +68,24 @@ def test_no_link_is_said_to_twist_that_runs_along_its_joints_axis(robot, tmp_pat
             assert not same
             twisted.add(number)
     assert twisted  # others do twist
+
+
+@pytest.mark.parametrize("law", ["backlash", "nonlinear_stiffness"])
+def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law, tmp_path):
+    arm = ARMS["kr210"]
+    scene = Scene(arm, load_truth(arm.write(tmp_path)), 1, arm.poses(2), 1000.0)
+    joints = [f"joint_{n}" for n in range(1, 7)]
+    soft = Deviation(
+        scaled=tuple(Scaled(j, 0.4) for j in joints),
+        harmonics=tuple(Harmonic(j, 1, 0.3, 0.4) for j in joints),
+    )
+    for seed in range(20):
+        drawn = EFFECTS[law](scene, Secret(soft), np.random.default_rng(seed))
+        at_rest = drawn.secret.ports[0].law
+        assert isinstance(at_rest, Backlash | Hardening)
+        taken = at_rest.stiffness if isinstance(at_rest, Backlash) else -at_rest.stiffness
+        # 0.4 of the stated stiffness, and half of that where the harmonic is at its least.
+        assert taken < 0.2 * scene.stiffness(str(drawn.at))
 
 
 def test_the_folder_is_what_the_contract_says(case):
