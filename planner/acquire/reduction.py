@@ -20,8 +20,8 @@ from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.kernels import parse
 
 BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
-TASK = 16  # blocks a call where there are many; calls of equal shape are compiled once
-WIDTH = 4  # the number of features is rounded up to a multiple of it, for the same reason
+TASK = 64  # blocks a call where there are many; calls of equal shape are compiled once
+WIDTH = 2  # the number of features is rounded up to a multiple of it, for the same reason
 WORTH_THREADS = 20_000_000  # covariances
 
 
@@ -39,11 +39,17 @@ def reduction_by_label(
     """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
     size = len(poses) * len(target.poses) * outputs.count * outputs.posterior.theta.shape[1]
     labels = range(outputs.count)
+    cores = os.cpu_count() or 1
     if size < WORTH_THREADS:
         both = [_label(outputs, poses, target, k, map) for k in labels]
     else:
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            both = [_label(outputs, poses, target, k, pool.map) for k in labels]
+        with ThreadPoolExecutor(cores) as pool:
+            # Whole labels side by side where there are enough of them, else the parts of each.
+            one = partial(_label, outputs, poses, target)
+            if outputs.count < cores:
+                both = [one(k, pool.map) for k in labels]
+            else:
+                both = list(pool.map(lambda k: one(k, map), labels))
     return np.array([r for r, _ in both]), np.array([v for _, v in both])
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from planner.diagnose import levels
 from planner.diagnose.diagnose import Candidate, Diagnosis
 from planner.diagnose.finding import Finding
+from planner.diagnose.search import ENOUGH
 from planner.diagnose.visits import Recorded
 from planner.diagnose.write import write_explained
 from planner.physics.simulation import Simulation
@@ -20,7 +21,8 @@ from planner.robot.robot import Robot
 
 PAYS = 1.5  # factor by which a linear effect has to lower the misfit of averaged FRFs
 CRUDE = 3.0  # χ² per value from which a law leaves room for something beside it
-OWN = "joint_stiffness", "angle_dependent_stiffness"  # what a joint's own law looks like on average
+# What a joint's own law looks like on average: but not as closely as what is really there.
+OWN = "joint_stiffness", "angle_dependent_stiffness"
 BETTER = 1.5  # factor by which the linear effect then has to lower it
 
 
@@ -40,7 +42,11 @@ def beside(
     """
     before = [f for f in findings if f.effect in (*levels.LAWS, "unknown")]
     own = {(name, f.at) for f in before for name in OWN}
-    possible = [c for c in found.candidates if _physical(c) and not own.intersection(c.places)]
+    possible = [
+        c
+        for c in found.candidates
+        if _physical(c) and (not own.intersection(c.places) or _at_the_noise(c))
+    ]
     linear = _simplest(found, possible)
     if not before or linear is None or linear.fit is None:
         return None
@@ -75,6 +81,10 @@ def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | No
     least = min(misfit for _, misfit in settled)
     enough = [c for c, misfit in settled if misfit <= PAYS * least]
     return min(enough, key=lambda c: len(c.effects))
+
+
+def _at_the_noise(candidate: Candidate) -> bool:
+    return candidate.fit is not None and candidate.fit.per_value <= ENOUGH
 
 
 def _physical(candidate: Candidate) -> bool:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnose.anywhere import resonant, suspects
-from planner.diagnose.both import Both, families, together
+from planner.diagnose.both import Both, Family, families, together
 from planner.diagnose.effect import Effect
+from planner.diagnose.effects.resonator import LocalResonator
 from planner.diagnose.elsewhere import elsewhere
 from planner.diagnose.fit import CLOSE, Fit, Problem, carried_on, glance, promise, settle, staged
 from planner.diagnose.weigh import temper_of
@@ -24,6 +25,7 @@ MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fi
 POINTED = 2  # suspects settled on all lines
 MOVED = 2  # effects at other places, the same
 LESSENED = 3  # explanations that are looked at without one of their effects
+FEW_EFFECTS = 2  # at once
 MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
@@ -43,13 +45,11 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
     if not effects:
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
-    best = min(f.per_value for f in found.finalists)
-    if best > ENOUGH:
+    if _best_of_few(found).per_value > ENOUGH:
         tell("letting it give and carry everywhere", 0.6)
-        found = Found((*found.finalists, *_pointed(problem, effects)), found.left)
+        found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
         found = _lessened(problem, found)
-        best = min(f.per_value for f in found.finalists)
-    leaders = _leaders(found) if best > ENOUGH else []
+    leaders = _leaders(found) if _best_of_few(found).per_value > ENOUGH else []
     led: list[Place] = []
     while leaders and (leader := _next(leaders, led, found)) is not None:
         first = 0.6 + 0.4 * len(led) / MOST_LEADERS
@@ -67,12 +67,26 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
     return _distinct(_spared(problem, _accompanied(problem, found, effects, tell), effects))
 
 
-def _pointed(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
-    """The best of `suspects`, of resonators beside them, and of families, followed to the end."""
+def _best_of_few(found: Found) -> Fit:
+    """The closest of one or two effects: many at once fit what only one other does as well."""
+    few = [
+        f
+        for f in found.finalists
+        if isinstance(f.effect, Family) or len(f.effect.parts()) <= FEW_EFFECTS
+    ]
+    return min(few, key=lambda f: f.per_value)
+
+
+def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """The best of `suspects`, of resonators beside them, and of families, followed to the end.
+
+    Where a resonator is the best of single effects, its company is looked for anyway.
+    """
     rough = suspects(problem, effects)
     # The softest place comes first: alone it may be all, though more places fit more closely.
     ends = [*_followed(problem, rough), *(staged(problem, e) for e in families(effects))]
-    if rough and min(f.per_value for f in ends) > ENOUGH:
+    missed = bool(ends) and min(f.per_value for f in ends) > ENOUGH
+    if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
         ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
     return tuple(ends)
 
@@ -178,7 +192,7 @@ def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
     may have been the best only as long as it was alone.
     """
     waiting = [f for f in leaders if _place(f.effect) not in led]
-    best = min(found.finalists, key=lambda f: f.per_value)
+    best = _best_of_few(found)
     if best.per_value <= ENOUGH:
         members = [_place(e) for e in best.effect.parts()]
         waiting = [f for f in waiting if _place(f.effect) in members]

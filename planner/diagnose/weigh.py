@@ -61,7 +61,8 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     evidence = np.array([f.log_evidence(t) for f in fits]) + np.log(prior)
     count = float(fits[0].misfit.counts.sum())
     charge = UNKNOWN_PARAMETERS / 2 * np.log(max(count / t, 2.0))
-    unknown = -TOLERATED * count / (2 * t) - charge + _volume(fits[0], t)
+    # Springs that a fit has bent to imitate what is not known cost that fit, not the unknown.
+    unknown = -TOLERATED * count / (2 * t) - charge + max(_volume(f, t) for f in fits)
     chi2 = np.array([f.data.chi2 for f in fits])
     n = chi2.shape[1]
     shares = np.random.default_rng(seed).dirichlet(np.ones(n), BOOTSTRAPS) * n
