@@ -15,9 +15,6 @@ import jax  # noqa: E402  (reads XLA_FLAGS when it starts)
 
 from planner import cache  # noqa: E402
 
-# XLA's other pool, in which whole computations wait for their turn, is as large as the number of
-# devices: two Python threads use two cores.
-jax.config.update("jax_num_cpu_devices", os.cpu_count() or 1)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_numpy_rank_promotion", "raise")
 
