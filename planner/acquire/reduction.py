@@ -6,8 +6,6 @@ simulation's slope and bias, minus what was measured and what is planned), so th
 loop over blocks of candidates makes it, squares it and sums it without keeping it.
 """
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import jax
@@ -22,7 +20,6 @@ from planner.fusion.kernels import parse
 BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
 TASK = 64  # blocks a call where there are many; calls of equal shape are compiled once
 WIDTH = 2  # the number of features is rounded up to a multiple of it, for the same reason
-WORTH_THREADS = 20_000_000  # covariances
 
 
 def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.ndarray:
@@ -37,24 +34,12 @@ def reduction_by_label(
     outputs: FrequencyOutputs, poses: Poses, target: Target
 ) -> tuple[np.ndarray, np.ndarray]:
     """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
-    size = len(poses) * len(target.poses) * outputs.count * outputs.posterior.theta.shape[1]
-    labels = range(outputs.count)
-    cores = os.cpu_count() or 1
-    if size < WORTH_THREADS:
-        both = [_label(outputs, poses, target, k, map) for k in labels]
-    else:
-        with ThreadPoolExecutor(cores) as pool:
-            # Whole labels side by side where there are enough of them, else the parts of each.
-            one = partial(_label, outputs, poses, target)
-            if outputs.count < cores:
-                both = [one(k, pool.map) for k in labels]
-            else:
-                both = list(pool.map(lambda k: one(k, map), labels))
+    both = [_label(outputs, poses, target, k) for k in range(outputs.count)]
     return np.array([r for r, _ in both]), np.array([v for _, v in both])
 
 
 def _label(
-    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, mapped
+    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
     weight = target.importance[:, k]
@@ -67,17 +52,13 @@ def _label(
     step = BLOCK * TASK if n > 4 * BLOCK * TASK else BLOCK
     x = _filled(poses.x, step)
     a = np.stack([_filled(one, step) for one in a])
-    theta, xu = outputs.posterior.theta[k], target.poses.x
-    jobs = [(s, i) for s in range(len(theta)) for i in range(0, len(x), step)]
-
-    def run(job: tuple[int, int]) -> np.ndarray:
-        s, i = job
-        part = slice(i, i + step)
-        kernel = outputs.posterior.kernel
-        return np.asarray(_squares(kernel, theta[s], x[part], a[s, part], xu, b[s], weight))
-
-    done = np.concatenate(list(mapped(run, jobs))).reshape(len(theta), -1)[:, :n]
-    return np.mean(done / scale, axis=0), np.mean(scale, axis=0)
+    kernel, xu = outputs.posterior.kernel, target.poses.x
+    done = np.empty(a.shape[:2])
+    for s, theta in enumerate(outputs.posterior.theta[k]):
+        for i in range(0, len(x), step):
+            part = slice(i, i + step)
+            done[s, part] = _squares(kernel, theta, x[part], a[s, part], xu, b[s], weight)
+    return np.mean(done[:, :n] / scale, axis=0), np.mean(scale, axis=0)
 
 
 @partial(jax.jit, static_argnums=0, compiler_options={"xla_cpu_prefer_vector_width": "512"})
