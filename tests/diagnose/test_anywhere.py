@@ -4,15 +4,16 @@ import pytest
 
 from concealed import hidden
 from known_robots import IRB6640
-from planner.diagnose.anywhere import suspects
+from planner.diagnose.anywhere import resonant, suspects
 from planner.diagnose.diagnose import diagnose
 from planner.diagnose.effects import library
 from planner.diagnose.fit import Problem
-from planner.truth.deviation import AddedMass, Spring
+from planner.truth.deviation import AddedMass, Resonator, Spring
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TILTS = Spring("base", X, 2.4e6, 1.2e3), Spring("base", Y, 1.6e6, 8e2)
 PAYLOAD = AddedMass("link_6", (0.05, 0.02, 0.1), 60.0)
+HOSE = Resonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
 BOTH = {("base_compliance", "base"), ("added_mass", "link_6")}
 
 
@@ -37,6 +38,16 @@ def test_what_gives_and_what_is_carried_are_among_the_first_suspects(recorded):
     right = [f for f in rough if places(f.effect) == BOTH]
     assert right
     assert right[0].per_value < 1.5 * best.per_value + 0.05
+
+
+def test_a_resonator_is_found_beside_the_soft_places_not_instead_of_them(tmp_path):
+    recorded = hidden(IRB6640, tmp_path, 77, TILTS, loose=(HOSE,), poses=6)
+    alike, effects = problem(*recorded), library(recorded[2])
+    rough = suspects(alike, effects)
+    soft = next(f for f in rough if ("base_compliance", "base") in places(f.effect))
+    best = min(resonant(alike, [soft], effects), key=lambda f: f.per_value)
+    assert places(best.effect) == {*places(soft.effect), ("local_resonator", "link_2")}
+    assert best.per_value < 0.7 * soft.per_value
 
 
 def test_a_library_without_soft_places_and_masses_has_no_suspects(recorded):

@@ -1,10 +1,14 @@
 """What the weights must do whatever the robot."""
 
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.diagnose.weigh import shared_noise, temper
+from planner.diagnose.weigh import shared_noise, temper, weigh
 
 
 @given(st.floats(0.5, 1e6), st.floats(1.0, 10.0))
@@ -20,3 +24,39 @@ def test_shared_noise_is_the_sum_over_lags(spacing_hz, rate_1_s):
     direct = np.sum(1 / (1 + (a * lag) ** 2))
     assert abs(shared_noise(spacing_hz, rate_1_s) / direct - 1) < 1e-2
     assert shared_noise(spacing_hz, 0.0) == 1.0
+
+
+@dataclass(frozen=True)
+class Rough:
+    """A fit far above the noise: `bent` is what its springs cost, in nats."""
+
+    misfit_: float
+    bent: float
+
+    @property
+    def per_value(self):
+        return self.misfit_
+
+    @property
+    def misfit(self):
+        frequency = np.tile(np.arange(100.0), (9, 1))
+        measured = SimpleNamespace(frequency_hz=frequency, s=2j * np.pi * frequency)
+        return SimpleNamespace(measured=measured, counts=np.full(9, 1000.0))
+
+    @property
+    def data(self):
+        return SimpleNamespace(chi2=np.full(9, 1000.0 * self.misfit_))
+
+    def log_evidence(self, temper):
+        return -9000 * self.misfit_ / (2 * temper) - self.bent
+
+
+def test_what_fits_nowhere_is_unknown_however_far_springs_were_bent_to_imitate_it():
+    """A feedback loop (misfit 490): once the refit's bent springs were held against "unknown"."""
+    fits = cast(Any, [Rough(492.0, 400.0), Rough(537.0, 140.0)])
+    assert weigh(fits, [100.0, 1.0]).probabilities[-1] > 0.99
+
+
+def test_what_fits_to_the_noise_is_not_unknown():
+    fits = cast(Any, [Rough(200.0, 300.0), Rough(0.9, 150.0)])
+    assert weigh(fits, [100.0, 1.0]).probabilities[1] > 0.99
