@@ -87,9 +87,7 @@ def together(
             rest = tuple(p for p in places if p not in way and p not in own)
             key = places if unknown else (way + rest) or (("none", None),)
             out[key] = out.get(key, 0.0) + share * weight * part
-    candidates = _honest(
-        sorted((Ranked(k, p) for k, p in out.items()), key=lambda r: -r.probability)
-    )
+    candidates = _honest([Ranked(places, p) for places, p in out.items()])
     first = candidates[0].places[0][0]
     verdict = {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
     told = tuple((f, p * (1.0 - sum(share for _, share in f.rivals))) for f, p in known)
