@@ -30,7 +30,7 @@ MASSES = 2  # places that give, at most, beside which each mass is looked at
 
 def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits of few effects each, from the one of all; none where the library has no such."""
-    few = problem.at(farthest_first(problem.q)[:POSES].tolist())
+    few = _few(problem)
     all_ = _everything(effects)
     if not all_.members:
         return ()
@@ -48,7 +48,7 @@ def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
 
 def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits of each resonator beside what each of some `suspects` has."""
-    few = problem.at(farthest_first(problem.q)[:POSES].tolist())
+    few = _few(problem)
     out = []
     for suspect in rough:
         for e in effects:
@@ -57,6 +57,11 @@ def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) 
                 misfit = few.misfit(pair, GLANCE)
                 out.append(approached(misfit, points(misfit, suspect), FOLLOWED))
     return tuple(out)
+
+
+def _few(problem: Problem) -> Problem:
+    """The poses that are farthest apart."""
+    return problem.at(farthest_first(problem.q)[:POSES].tolist())
 
 
 def _everything(effects: Sequence[Effect]) -> Family:

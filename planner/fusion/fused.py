@@ -48,8 +48,8 @@ def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float
     _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
     families: dict[str, dict[str, Averaged]] = {
         "AR1": {
-            name: fit_recursive(measured, low, low_spread, name.split(", ")[0], prior)
-            for name, prior in _discrepancies(fused, measured.x.shape[1]).items()
+            name: fit_recursive(measured, low, low_spread, kernel, prior)
+            for name, (kernel, prior) in _discrepancies(fused, measured.x.shape[1]).items()
         },
         "NARGP": {k: fit_nargp(measured, low, low_spread, k, fused) for k in BENDS},
         "GP": {k: fit_gp(measured, k, alone, scale) for k in SHAPES},
@@ -61,21 +61,21 @@ def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float
     return mix(models, belief)
 
 
-def _discrepancies(fused: OutputPrior, width: int) -> dict[str, OutputPrior]:
-    """What is believed of AR1's discrepancy, after the kernel's name.
+def _discrepancies(fused: OutputPrior, width: int) -> dict[str, tuple[str, OutputPrior]]:
+    """Kernels and priors of AR1's discrepancy over `width` coordinates, by name.
 
     Chosen on `development_problems`. That ρ is near 1 and that the discrepancy is gentle is worth
     most where few points cannot tell, as for a robot's frequencies.
     """
     # A simulation may be off by a trend over the workspace as by an offset. The kernel's origin is
     # a corner of the workspace, far from where the trend's offset is small.
-    out = {"linear": replace(fused, amplitude=TREND, bias_sd=CORNER)}
+    out = {"linear": ("linear", replace(fused, amplitude=TREND, bias_sd=CORNER))}
     gentle = {
         "length": LONG / max(width, 1) ** 0.5, "length_spread": LONG_SPREAD, "amplitude": GENTLE,
     }  # fmt: skip
     for shape in SHAPES:
-        out[shape] = fused
-        out[f"{shape}, gentle"] = replace(fused, **gentle)
-        out[f"{shape}, alike"] = replace(fused, slope_sd=ALIKE)
-        out[f"{shape}, gentle and alike"] = replace(fused, slope_sd=ALIKE, **gentle)
+        out[shape] = shape, fused
+        out[f"{shape}, gentle"] = shape, replace(fused, **gentle)
+        out[f"{shape}, alike"] = shape, replace(fused, slope_sd=ALIKE)
+        out[f"{shape}, gentle and alike"] = shape, replace(fused, slope_sd=ALIKE, **gentle)
     return out
