@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.fusion.gp import normal_points
+from planner.fusion.importance import normal_points
 
 STEP = 1e-3  # in sds of the prior
 COUNT = 8  # draws

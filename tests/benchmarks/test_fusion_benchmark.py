@@ -84,8 +84,7 @@ def test_times_of_a_start(tmp_path):
         "XDG_CACHE_HOME": str(tmp_path),
         "PYTHONPATH": os.pathsep.join(p for p in sys.path if p),
     }
-    first = []
-    for what in ("nothing cached", "cached"):
+    for what, bound in (("nothing cached", 6.0), ("cached", 3.0)):
         done = subprocess.run(
             [sys.executable, "-c", code],
             env=environment,
@@ -95,6 +94,4 @@ def test_times_of_a_start(tmp_path):
         )
         imports, fit = (float(v) for v in done.stdout.split())
         print(f"\n{what}: imports {imports:.2f} s, first fit and prediction {fit:.2f} s")
-        first.append(fit)
-    assert first[0] < 15
-    assert first[1] < first[0]
+        assert imports + fit < bound

@@ -111,12 +111,12 @@ def test_duplicates_and_constants_work():
 
 def test_padding_changes_nothing_and_growth_compiles_nothing():
     fit(data(3))
-    before = gp._fit._cache_size()
+    before = gp._compiled._cache_size()
     results = []
     for n in range(4, 16):
         fitted = fit(data(n))
         results.append(fitted.predict(data(5, seed=9).x, data(5, seed=9).low)[0])
-    assert gp._fit._cache_size() == before
+    assert gp._compiled._cache_size() == before
     again = fit(data(15)).predict(data(5, seed=9).x, data(5, seed=9).low)[0]
     assert np.array_equal(results[-1], again)  # bit for bit
     small, large = data(16), data(17)

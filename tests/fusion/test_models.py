@@ -201,7 +201,7 @@ def test_growth_compiles_nothing():
     from planner.fusion import gp, marginal
 
     fit_recursive(samples(3), exact_low(), SPREAD)
-    before = gp._fit._cache_size(), marginal._objective._cache_size()
+    before = gp._compiled._cache_size(), marginal._objective._cache_size()
     for n in range(4, 16):
         fit_recursive(samples(n), exact_low(), SPREAD)
-    assert (gp._fit._cache_size(), marginal._objective._cache_size()) == before
+    assert (gp._compiled._cache_size(), marginal._objective._cache_size()) == before

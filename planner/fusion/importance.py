@@ -1,0 +1,95 @@
+"""Average over hyperparameters by importance sampling.
+
+Samples from the prior, then from Gaussians around what the data favour, weighted by
+prior × likelihood over the mixture they came from (deterministic mixture weights, Owen & Zhou
+2000), then resampled to a few of equal weight. Everything is in units of the prior, N(0, 1).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import logsumexp, ndtri, softmax
+from scipy.stats import qmc
+
+INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
+
+Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
+
+
+def normal_points(samples: int, p: int, count: int) -> list[np.ndarray]:
+    """`count` sets (samples, p) of quasi-random standard normal points, the same every time."""
+    sets = []
+    for seed in range(1, count + 1):
+        sobol = qmc.Sobol(p, scramble=True, rng=np.random.default_rng(seed))
+        unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
+        sets.append(ndtri(np.clip(unit, 1e-6, 1 - 1e-6)))
+    return sets
+
+
+def sample(
+    score: Callable[[np.ndarray], np.ndarray], normal: list[np.ndarray], outputs: int, kept: int,
+    start: Gaussians | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """`kept` points z (m, kept, p) of equal weight from N(0, 1) × exp(score); log of its integral.
+
+    `score` takes z (m, s, p) and returns (m, s). The first set (s, p) of `normal` are points from
+    the prior, each further one is moved to a Gaussian around what weighs most so far; `start` is
+    the first of these Gaussians, if there is one. LinAlgError if an output has no finite score.
+    """
+    points = np.broadcast_to(normal[0], (outputs, *normal[0].shape))
+    like = score(points)
+    if not np.isfinite(like).any(axis=1).all():
+        raise np.linalg.LinAlgError
+    proposals: list[Gaussians] = []
+    for t, base in enumerate(normal[1:]):
+        if t == 0 and start is not None:
+            centre, root = start
+        else:
+            centre, root = _around(points, softmax(_log_weight(points, like, proposals), axis=1))
+        proposals.append((centre, INFLATION * root))
+        moved = centre[:, None, :] + INFLATION * base @ np.swapaxes(root, 1, 2)
+        points = np.concatenate([points, moved], axis=1)
+        like = np.concatenate([like, score(moved)], axis=1)
+    log_weight = _log_weight(points, like, proposals)
+    evidence = logsumexp(log_weight, axis=1) - np.log(points.shape[1])
+    return _resampled(points, softmax(log_weight, axis=1), kept), evidence
+
+
+def _log_weight(points: np.ndarray, like: np.ndarray, proposals: list[Gaussians]) -> np.ndarray:
+    """(m, s) of points (m, s, p) from equally many of N(0, 1) and of every proposal."""
+    densities = [_log_normal(points), *(_log_gaussian(points, *g) for g in proposals)]
+    return like + densities[0] - logsumexp(densities, axis=0) + np.log(len(densities))
+
+
+def _resampled(points: np.ndarray, weight: np.ndarray, kept: int) -> np.ndarray:
+    # Every 16th point of a Sobol sequence is not spread evenly; in the order of the steepness of
+    # δ, on which predictions away from the data hang, every 16th is.
+    steepness = points[:, :, 0] - np.sum(points[:, :, 2:], axis=2) / max(points.shape[2] - 2, 1)
+    order = np.argsort(steepness, axis=1)
+    edges = np.cumsum(np.take_along_axis(weight, order, axis=1), axis=1)
+    wanted = (np.arange(kept) + 0.5) / kept
+    picks = [np.searchsorted(e, wanted * e[-1]) for e in edges]
+    chosen = np.take_along_axis(order, np.minimum(picks, points.shape[1] - 1), axis=1)
+    return np.take_along_axis(points, chosen[:, :, None], axis=1)
+
+
+def _around(points: np.ndarray, weight: np.ndarray) -> Gaussians:
+    """Gaussians like the weighted points (m, s, p)."""
+    p = points.shape[2]
+    centre = np.einsum("ms,msp->mp", weight, points)
+    apart = points - centre[:, None, :]
+    # With few effective samples their spread says little; the prior's own variance is mixed in.
+    effective = 1 / np.sum(weight**2, axis=1)
+    share = (1 / (1 + effective / p))[:, None, None]
+    spread = np.swapaxes(apart * weight[:, :, None], 1, 2) @ apart * (1 - share)
+    return centre, np.linalg.cholesky(spread + (0.25 * share + 1e-6) * np.eye(p))
+
+
+def _log_normal(z: np.ndarray) -> np.ndarray:
+    return -0.5 * np.sum(z**2, axis=-1)
+
+
+def _log_gaussian(points: np.ndarray, centre: np.ndarray, root: np.ndarray) -> np.ndarray:
+    white = (points - centre[:, None, :]) @ np.swapaxes(np.linalg.inv(root), 1, 2)
+    sizes = np.diagonal(root, axis1=1, axis2=2)
+    return _log_normal(white) - np.sum(np.log(sizes), axis=1)[:, None]
