@@ -45,14 +45,30 @@ def separation(
             tuple(one[0] for one in misfit_at(problem, f.effect, row[None], lines).response(f.x))
             for f in fits
         ]
-        for true, other in permutations(range(len(fits)), 2):
-            weight = share[true] * share[other] / (1 - share[true])
-            (h, _), (rival, slope) = told[true], told[other]
-            scale = np.sqrt(2 * each / noise.misfit) / _sd(noise, h)
-            for axis in range(AXES):
-                missed = (scale * (h - rival))[:, axis]
-                moved = (scale * slope)[:, :, axis]
-                gain[place, axis] += weight * _left(missed, moved, known[other]) / 2
+        scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in told]
+        gain[place] = expected_log_odds(told, scales, known, share)
+    return gain
+
+
+def expected_log_odds(
+    told: Sequence[tuple[np.ndarray, np.ndarray]],
+    scales: Sequence[np.ndarray],
+    known: Sequence[np.ndarray],
+    share: np.ndarray,
+) -> np.ndarray:
+    """Of the true candidate to each other one (3,), for a hit along each axis.
+
+    Each candidate tells an FRF (3, 3, F) and its slopes (D, 3, 3, F), weighs what it would be
+    measured as with its scale (3, 3, F), and has `known` (D, D), the precision of its parameters.
+    """
+    gain = np.zeros(AXES)
+    for true, other in permutations(range(len(told)), 2):
+        weight = share[true] * share[other] / (1 - share[true])
+        missed = scales[true] * (told[true][0] - told[other][0])
+        moved = scales[true] * told[other][1]
+        for axis in range(AXES):
+            left = _left(missed[:, axis], moved[:, :, axis], known[other])
+            gain[axis] += weight * left / 2
     return gain
 
 

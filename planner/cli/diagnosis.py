@@ -9,7 +9,6 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
-    from planner.cli.material import Material
     from planner.diagnose.diagnose import Candidate, Diagnosis
     from planner.diagnose.explain import Explained
     from planner.diagnose.finding import Finding
@@ -43,6 +42,7 @@ def diagnose(
     """Locate where simulation and recordings differ, name the missing physics, show the fit."""
     from planner.cli import modal
     from planner.cli.material import material
+    from planner.cli.next_hit import next_hit
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
     from planner.diagnose.explain import explain
@@ -70,7 +70,7 @@ def diagnose(
         recorded, found = explained.recorded, explained.judged.diagnosis
         answer = _answer(explained)
         answer |= {"npz": None, "robot": None, "plots": []}
-        answer["next"] = _next(found, given.with_poses(wanted))
+        answer["next"] = next_hit(explained, visits, given.with_poses(wanted))
         if wanted:
             rows = [(row.pose, row.joints_deg) for row in wanted]
             answer["npz"] = str(_predict(found, rows, _target(out, predict, recordings)))
@@ -140,28 +140,6 @@ def _answer(explained: "Explained") -> dict[str, Any]:
     }
 
 
-def _next(found: "Diagnosis", given: "Material") -> dict[str, Any] | None:
-    """The pose and axis of a hit that best tells tied candidates apart; None if none are tied."""
-    import numpy as np
-
-    from planner.acquire.separate import separation
-
-    tied = [c for c in found.undecided if c.fit is not None]
-    fits = [c.fit for c in tied if c.fit is not None]
-    if len(fits) < 2 or not len(given.offered):
-        return None
-    shares = [c.probability for c in tied]
-    gain = separation(found.problem, fits, shares, given.offered, found.temper)
-    pose, axis = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    return {
-        "pose": given.names[pose],
-        "joints_deg": [round(float(v), 3) for v in np.rad2deg(given.offered[pose])],
-        "hit": "xyz"[axis],
-        "log_odds": float(gain[pose, axis]),
-        "between": [_words(c) for c in tied],
-    }
-
-
 def _findings(found: "Diagnosis") -> list[dict[str, Any]]:
     """The effects of the best candidate, where there is one better than "none" and "unknown"."""
     if found.verdict != "explained":
@@ -191,25 +169,15 @@ def _marginal(found: "Diagnosis", name: str, at: str) -> float:
 
 
 def _text(found: "Diagnosis", first: "Candidate", text: str) -> str:
+    from planner.cli.next_hit import in_words
+
     others = [c for c in found.undecided if c is not first]
     if not others:
         return f"{text} ({100 * first.probability:.0f} %)"
-    names = "; ".join(_words(c) for c in others)
+    names = "; ".join(in_words(c.places, c.probability) for c in others)
     return (
         f"{text} ({100 * first.probability:.0f} %) These recordings cannot tell it from: {names}."
     )
-
-
-def _words(candidate: "Candidate") -> str:
-    said = [
-        "no effect at all"
-        if name == "none"
-        else "something unknown"
-        if at is None
-        else f"{name.replace('_', ' ')} at {at}"
-        for name, at in candidate.places
-    ]
-    return f"{' and '.join(said)} ({100 * candidate.probability:.0f} %)"
 
 
 def _established(finding: "Finding", probability: float) -> dict[str, Any]:

@@ -1,6 +1,10 @@
 """What a screen found: an effect of the contract at a place, with odds and parameters."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from planner.diagnose.nonlinear import Laws
 
 
 @dataclass(frozen=True)
@@ -9,7 +13,8 @@ class Finding:
 
     `parameters` maps a name to value, standard deviation and unit. `misfit` is χ² per value of the
     fit that says so, ∞ where there is none. No finding is surer than `sure`, and `rivals` are other
-    effects at the same place that take a share of its probability.
+    effects at the same place that take a share of its probability; `laws` are their fits, by which
+    a further hit can be planned.
     """
 
     effect: str
@@ -20,3 +25,4 @@ class Finding:
     misfit: float = float("inf")
     sure: float = 1.0
     rivals: tuple[tuple[str, float], ...] = ()
+    laws: "Laws | None" = None

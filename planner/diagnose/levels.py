@@ -11,7 +11,7 @@ from planner.diagnose.equivalent import Equivalent, System, equivalent, system_o
 from planner.diagnose.finding import Finding
 from planner.diagnose.fit import FINE, GLANCE, Fit
 from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
-from planner.diagnose.nonlinear import Candidate, descend
+from planner.diagnose.nonlinear import Candidate, Laws, covariance, descend
 from planner.diagnose.starts import starts
 from planner.diagnose.strayed import strayed
 from planner.diagnose.tone import screen_tone
@@ -70,8 +70,12 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
         c = best.candidate
-        sd = np.sqrt(np.diagonal(_covariance(c, best.temper))[: len(c.x)])
-        return (_finding(weighed), *strayed(plain, c.x, sd, best.at, best.per_value))
+        sd = np.sqrt(np.diagonal(covariance(c, best.temper))[: len(c.x)])
+        laws = _laws(recorded, nominal, plain, weighed)
+        return (
+            replace(_finding(weighed), laws=laws),
+            *strayed(plain, c.x, sd, best.at, best.per_value),
+        )
     law = best.candidate.law.effect.replace("_", " ")
     return (
         _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),
@@ -183,22 +187,16 @@ def _linear(data: Data, plain: Fit) -> tuple[float, float, float]:
 def _volume(plain: Fit, candidate: Candidate, temper: float) -> float:
     """What ν costs: ln of how much narrower the data make it than the prior, and its distance."""
     mean, sd = candidate.prior
-    spread = np.sqrt(np.diagonal(_covariance(candidate, temper))[-2:])
+    spread = np.sqrt(np.diagonal(covariance(candidate, temper))[-2:])
     away = (candidate.nu - mean) / sd
     return float(away @ away) / 2 + float(np.sum(np.log(sd / np.minimum(spread, sd))))
-
-
-def _covariance(candidate: Candidate, temper: float) -> np.ndarray:
-    """Of (x, ν)."""
-    assert candidate.normal is not None
-    return np.linalg.inv(2 * candidate.normal / temper)
 
 
 def _parameters(
     plain: Fit, candidate: Candidate, temper: float
 ) -> dict[str, tuple[float, float, str]]:
     c = candidate
-    spread = _covariance(c, temper)[-2:, -2:]
+    spread = covariance(c, temper)[-2:, -2:]
     share = c.nu[0] if c.law.signed else 1.0
     to_k = np.array([c.k / share if c.law.signed else c.k, 0.0])
     to_a = np.array([0.0, c.a])
@@ -214,12 +212,25 @@ def _parameters(
 
 
 def _rivals(weighed: Sequence[Weighed]) -> dict[str, float]:
-    """Other laws at the joint of the best, and the shares that all that is not explained gives."""
+    """Other laws at the joint of the best, and their shares."""
+    there, shares = _shares(weighed)
+    return {w.candidate.law.effect: s for w, s in zip(there[1:], shares[1:], strict=True)}
+
+
+def _shares(weighed: Sequence[Weighed]) -> tuple[list[Weighed], list[float]]:
+    """The laws at the joint of the best, and the shares that all that is not explained gives."""
     there = [w for w in weighed if w.at == weighed[0].at]
     left = np.array([max(1 - w.explained, 1e-3) for w in there])
     shares = (left / left[0]) ** (-INDEPENDENT / 2)
-    shares /= shares.sum()
-    return {w.candidate.law.effect: float(s) for w, s in zip(there[1:], shares[1:], strict=True)}
+    return there, (shares / shares.sum()).tolist()
+
+
+def _laws(recorded: Recorded, nominal: Simulation, plain: Fit, weighed: Sequence[Weighed]) -> Laws:
+    there, shares = _shares(weighed)
+    hit = max((c for group in recorded.columns for c in group), key=lambda c: c.peak_n)
+    candidates = tuple(w.candidate for w in there)
+    problem = problem_of(recorded, nominal)
+    return Laws(problem, plain, candidates, tuple(shares), weighed[0].temper, hit)
 
 
 def _finding(weighed: Sequence[Weighed]) -> Finding:

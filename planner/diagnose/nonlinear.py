@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.diagnose.columns import Column
 from planner.diagnose.equivalent import System, receptances, system_of
-from planner.diagnose.fit import Fit
+from planner.diagnose.fit import Fit, Problem
 from planner.diagnose.laws import Law
 from planner.diagnose.leveldata import Data, own_parameter
 from planner.diagnose.timedomain import Seen, seen, spectra, torques
@@ -56,6 +57,18 @@ class Candidate:
         if self.law.signed:
             return np.array([0.0, self.middle]), np.array([SHARE_SD, LOG_ANGLE_SD])
         return np.array([LOG_SHARE, self.middle]), np.array([LOG_SHARE_SD, LOG_ANGLE_SD])
+
+
+@dataclass(frozen=True, eq=False)
+class Laws:
+    """Laws fitted at one joint, their probabilities, and the hardest of the hits that told."""
+
+    problem: Problem
+    plain: Fit
+    candidates: tuple[Candidate, ...]
+    probability: tuple[float, ...]
+    temper: float
+    hit: Column
 
 
 def predict(
@@ -127,6 +140,12 @@ def _frfs(data: Data, system: System, port: int, torque: np.ndarray) -> np.ndarr
                 data.s[:, None] ** 2 * (linear - found.sensor_port[:, :, port] * part[:, None])
             ).T
     return out
+
+
+def covariance(candidate: Candidate, temper: float) -> np.ndarray:
+    """Of (x, ν)."""
+    assert candidate.normal is not None
+    return np.linalg.inv(2 * candidate.normal / temper)
 
 
 def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candidate]:

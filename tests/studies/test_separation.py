@@ -37,7 +37,7 @@ FIRST = int(os.environ.get("STUDY_FIRST", "301"))
 KINDS = ("transverse_compliance", "link_flexibility", "added_mass")
 START, MOST, SURE = 4, 8, 0.95
 OFFERED = 60  # candidates that the T-optimal hit is chosen from
-TRIES = 200
+TRIES = 400
 NOISE = 0.15  # of the FRF's rms: with less, four hits leave hardly anything tied
 
 

@@ -1,0 +1,73 @@
+"""The hit that best tells apart what the recordings leave tied, for `planner diagnose`."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from planner.acquire.separate import separation
+from planner.acquire.separate_laws import forces_n, law_separation
+from planner.cli.material import Material
+from planner.diagnose.diagnose import TIED
+from planner.diagnose.explain import Explained
+from planner.diagnose.finding import Finding
+from planner.diagnose.visits import Recorded as Visits
+
+
+def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:
+    """Pose, axis and peak force; None if nothing is tied or no pose is offered."""
+    if not len(given.offered):
+        return None
+    for finding, _ in explained.whole.established:
+        if finding.laws is not None and sum(p > TIED for p in finding.laws.probability) > 1:
+            assert visits is not None
+            return _of_laws(finding, visits.level_n, given)
+    found = explained.judged.diagnosis
+    tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
+    if len(tied) < 2:
+        return None
+    fits, shares = [f for f, _ in tied], [p for _, p in tied]
+    gain = separation(found.problem, fits, shares, given.offered, found.temper)
+    # Linear candidates answer in proportion: the harder, the less noise.
+    hardest = float(visits.level_n[-1]) if visits is not None else None
+    names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
+    return _proposal(gain[..., None], given, [hardest], names)
+
+
+def _of_laws(finding: Finding, level_n: np.ndarray, given: Material) -> dict[str, Any]:
+    laws = finding.laws
+    assert laws is not None
+    force = forces_n(float(level_n[0]), float(level_n[-1]))
+    gain = law_separation(laws, given.offered, force)
+    both = zip(laws.candidates, laws.probability, strict=True)
+    names = [in_words([(c.law.effect, finding.at)], p) for c, p in both if p > TIED]
+    return _proposal(gain, given, force.tolist(), names)
+
+
+def _proposal(
+    gain: np.ndarray, given: Material, force_n: Sequence[float | None], between: list[str]
+) -> dict[str, Any]:
+    """The best of gain (n, 3, L)."""
+    pose, axis, level = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    force = force_n[int(level)]
+    return {
+        "pose": given.names[pose],
+        "joints_deg": [round(float(v), 3) for v in np.rad2deg(given.offered[pose])],
+        "hit": "xyz"[axis],
+        "force_n": None if force is None else float(f"{force:.2g}"),
+        "log_odds": float(gain[pose, axis, level]),
+        "between": between,
+    }
+
+
+def in_words(places: Sequence[tuple[str, str | None]], probability: float) -> str:
+    """A candidate's effects at their places, and its probability."""
+    said = [
+        "no effect at all"
+        if name == "none"
+        else "something unknown"
+        if at is None
+        else f"{name.replace('_', ' ')} at {at}"
+        for name, at in places
+    ]
+    return f"{' and '.join(said)} ({100 * probability:.0f} %)"

@@ -1,0 +1,157 @@
+"""The force of a hit that tells a joint's laws apart, against hits integrated in time."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import spearmanr
+
+from known_robots import KR210
+from planner.acquire.parameters import MODEL_ERROR
+from planner.acquire.separate_laws import accelerance, forces_n, law_separation
+from planner.cli.material import Material
+from planner.cli.next_hit import next_hit
+from planner.cli.render_diagnosis import _next
+from planner.diagnose.columns import column
+from planner.diagnose.drift import problem_of
+from planner.diagnose.equivalent import receptances, system_of
+from planner.diagnose.finding import Finding
+from planner.diagnose.laws import LAWS
+from planner.diagnose.levels import base
+from planner.diagnose.nonlinear import Candidate, Laws
+from planner.diagnose.timedomain import seen, spectra, strokes, torques
+from planner.diagnose.visits import Recorded, Visit
+from planner.physics.simulation import Simulation
+from planner.recording.types import Hit
+from planner.robot.robot import Robot
+
+RATE_HZ, SAMPLES, PORT = 400.0, 1024, 2
+STIFFENING, DAHL, DEAD_ZONE = LAWS
+SWING = 4e-5  # rad
+
+
+def struck(axis, peak_n, rng):
+    t = np.arange(SAMPLES) / RATE_HZ
+    force = peak_n * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
+    noise = 2e-3 * rng.standard_normal((3, SAMPLES))
+    force = force + 1e-3 * rng.standard_normal(SAMPLES)
+    return Hit(Path("hit"), "+" + "xyz"[axis], RATE_HZ, force, noise)
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
+    rng = np.random.default_rng(3)
+    hits = tuple(struck(axis, 300.0, rng) for axis in range(3))
+    q = KR210.poses(2, 8)
+    visits = tuple(Visit(f"P{i}", row, 0.5 * i, hits) for i, row in enumerate(q))
+    recorded = Recorded(visits, (5.0, 50.0))
+    plain = base(recorded, simulation)
+    plain = replace(plain, x=plain.misfit.mean)  # records of noise say nothing of springs
+    return recorded, simulation, plain
+
+
+def laws_of(cell, *numbers):
+    recorded, simulation, plain = cell
+    scale = float(system_of(plain).elasticity.stiffness[PORT])
+    d = len(plain.x) + 2
+    made = []
+    for law, share, angle in numbers:
+        nu = np.array([share if law.signed else np.log(share), np.log(angle)])
+        candidate = Candidate(law, PORT, scale, np.log(angle), plain.x, nu)
+        made.append(replace(candidate, normal=np.eye(d) * 200.0))
+    even = (1 / len(made),) * len(made)
+    problem = problem_of(recorded, simulation)
+    return Laws(problem, plain, tuple(made), even, 1.0, recorded.columns[0][0])
+
+
+def in_time(cell, law, force_n):
+    """FRFs (3, 3, F) at the first pose with hits of one force, integrated in time; s (F,)."""
+    _, _, plain = cell
+    rng = np.random.default_rng(0)
+    columns = [
+        column((struck(axis, force_n, rng),), axis, 0, SAMPLES, (5.0, 50.0), 4.0, 0.0)
+        for axis in range(3)
+    ]
+    hits, system = strokes([0, 0, 0], columns), system_of(plain)
+    s = 2j * np.pi * np.linspace(6, 45, 40) + 4.0
+    view = seen(system, PORT, hits, 500.0)
+    one = np.ones(3)
+    torque = torques([(law.law, slice(0, 3))], law.k * one, law.a * one, 0 * one, view)
+    ratio = spectra(torque, hits, s) / spectra(hits.force.T, hits, s)
+    found = receptances(system, 0, s)
+    linear = np.moveaxis(found.sensor_hit, 0, 2)
+    through = np.moveaxis(found.sensor_port[:, :, PORT], 0, 1)
+    return s**2 * (linear - through[:, None] * ratio), columns[0], s
+
+
+@pytest.mark.parametrize(
+    ("law", "share"), [(STIFFENING, 0.6), (STIFFENING, -0.4), (DAHL, 0.5), (DEAD_ZONE, 0.5)]
+)
+def test_what_a_law_does_follows_that_in_time(cell, law, share):
+    laws = laws_of(cell, (law, share, SWING))
+    candidate = laws.candidates[0]
+    ours, exact = [], []
+    for force in (30.0, 300.0, 3000.0):
+        h, struck_column, s = in_time(cell, candidate, force)
+        spectrum = np.interp(s.imag / (2 * np.pi), struck_column.frequency_hz, struck_column.force)
+        system = system_of(laws.plain)
+        first = replace(
+            system,
+            mass=system.mass[:1],
+            geometric=system.geometric[:1],
+            hit=system.hit[:1],
+            sensor=system.sensor[:1],
+        )
+        found = accelerance(first, candidate, spectrum, s, np.ones(1))[0]
+        linear = accelerance(first, replace(candidate, scale=0.0), spectrum, s, np.ones(1))[0]
+        ours.append(found - linear)
+        exact.append(h - linear)
+    sizes = [np.linalg.norm(e) for e in exact]
+    errors = [np.linalg.norm(o - e) for o, e in zip(ours, exact, strict=True)]
+    print(law.effect, share, "size", np.round(sizes, 3), "error", np.round(errors, 3))
+    assert max(errors) < 0.5 * max(sizes)
+
+
+def test_forces_that_tell_laws_apart_in_time_are_those_proposed(cell):
+    laws = laws_of(cell, (DAHL, 0.5, SWING), (DEAD_ZONE, 0.5, SWING))
+    q = laws.problem.q[:1]
+    force = np.geomspace(1.0, 100000.0, 9)
+    gain = law_separation(laws, q, force)[0]
+    floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
+    apart = np.empty(gain.shape)
+    for level, peak in enumerate(force):
+        one, other = (in_time(cell, law, peak)[0] for law in laws.candidates)
+        variance = floor * (laws.hit.peak_n / peak) ** 2 + (MODEL_ERROR * np.abs(one)) ** 2
+        apart[:, level] = np.sum(np.abs(one - other) ** 2 / variance, axis=(0, 2))
+    print(np.round(np.log10(gain), 1), np.round(np.log10(apart), 1), sep="\n")
+    assert spearmanr(gain.ravel(), apart.ravel()).statistic > 0.8
+    best = np.unravel_index(int(np.argmax(gain)), gain.shape)
+    assert apart[best] > 0.5 * apart.max()
+
+
+def test_one_law_and_twice_the_same_need_no_hit(cell):
+    force = forces_n(50.0, 400.0)
+    assert force[-1] == pytest.approx(400.0)
+    assert force[0] == pytest.approx(25.0)
+    one = laws_of(cell, (DAHL, 0.5, SWING))
+    assert not law_separation(one, one.problem.q, force).any()
+    twice = laws_of(cell, (DAHL, 0.5, SWING), (DAHL, 0.5, SWING))
+    np.testing.assert_allclose(law_separation(twice, twice.problem.q, force), 0.0, atol=1e-9)
+
+
+def test_the_command_names_the_force(cell):
+    laws = laws_of(cell, (DAHL, 0.5, SWING), (DEAD_ZONE, 0.5, SWING))
+    finding = Finding("friction", "joint_3", 50.0, laws=laws)
+    explained = SimpleNamespace(whole=SimpleNamespace(established=((finding, 0.5),)))
+    q = KR210.poses(3, 9)
+    given = Material(Path(), Path(), 0.0, q, ("A", "B", "C"))
+    told = next_hit(explained, cell[0], given)
+    assert told["pose"] in given.names
+    assert told["hit"] in "xyz"
+    assert 100.0 < told["force_n"] <= 300.0  # all hits were of 300 N
+    assert told["between"] == ["friction at joint_3 (50 %)", "backlash at joint_3 (50 %)"]
+    assert "N along" in _next(told)
+    assert next_hit(explained, cell[0], replace(given, offered=q[:0])) is None
