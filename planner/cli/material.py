@@ -11,7 +11,7 @@ from planner.campaign.table import write_table
 from planner.errors import InputError
 from planner.recording.types import PoseRow
 
-OFFERED = 60  # of a campaign's candidates, evenly spread, that are looked at
+OFFERED = 200  # of a campaign's candidates, evenly spread, that are looked at
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,9 +2,10 @@
 
 `pytest -m slow -s tests/studies/test_separation.py`. Truths are MuJoCo models with ± 15 % springs,
 4 % inertias and one of a few effects; each of four random poses is hit along one random axis, with
-much noise. What that leaves tied is decided by further hits, one axis each. STUDY_SEEDS (20) tied
-cases from STUDY_FIRST (301) on; STUDY_KEPT names a folder that keeps finished ones. Seeds 1-9 were
-used in development.
+much noise. What that leaves tied is decided by further hits, one axis each; pairs that neither way
+of choosing them decides (a mass at a joint's axis is as well on the one link as on the other) are
+listed and left out. STUDY_SEEDS (20) cases from STUDY_FIRST (601) on; STUDY_KEPT names a folder
+that keeps finished ones. Seeds 1-9 and 301-582 were used in development.
 """
 
 import json
@@ -33,10 +34,9 @@ from planner.truth.secret import Secret
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 SEEDS = int(os.environ.get("STUDY_SEEDS", "20"))
-FIRST = int(os.environ.get("STUDY_FIRST", "301"))
+FIRST = int(os.environ.get("STUDY_FIRST", "601"))
 KINDS = ("transverse_compliance", "link_flexibility", "added_mass")
 START, MOST, SURE = 4, 8, 0.95
-OFFERED = 60  # candidates that the T-optimal hit is chosen from
 TRIES = 400
 NOISE = 0.15  # of the FRF's rms: with less, four hits leave hardly anything tied
 
@@ -99,7 +99,7 @@ class Campaign:
 
     def separating(self, found: Diagnosis) -> tuple[np.ndarray, tuple[int, ...]]:
         tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
-        offered = self.case.cell.candidates.q[:OFFERED]
+        offered = self.case.cell.candidates.q
         fits, shares = [f for f, _ in tied], [p for _, p in tied]
         gain = separation(found.problem, fits, shares, offered, found.temper)
         pose, axis = np.unravel_index(int(np.argmax(gain)), gain.shape)
@@ -150,15 +150,17 @@ def played(seed: int, folder: Path) -> dict | None:
 def test_tied_candidates_are_decided_with_half_as_many_hits(tmp_path):
     keep = Path(os.environ.get("STUDY_KEPT", tmp_path))
     keep.mkdir(parents=True, exist_ok=True)
-    found = []
+    found, neither = [], []
     for seed in range(FIRST, FIRST + TRIES):
         path = keep / f"separation_{seed}.json"
         if not path.exists():
             path.write_text(json.dumps(played(seed, tmp_path)))
         case = json.loads(path.read_text())
-        if case["tied"]:
-            found.append(case)
-            print(case, flush=True)
+        if not case["tied"]:
+            continue
+        print(case, flush=True)
+        decided = min(case["separation"], case["integrated variance"]) <= MOST
+        (found if decided else neither).append(case)
         if len(found) == SEEDS:
             break
     ours, theirs = (np.array([c[s] for c in found]) for s in ("separation", "integrated variance"))
@@ -167,10 +169,11 @@ def test_tied_candidates_are_decided_with_half_as_many_hits(tmp_path):
     ratio = ours[picks].mean(axis=1) / theirs[picks].mean(axis=1)
     low, high = np.quantile(ratio, [0.025, 0.975])
     print(
-        f"{len(found)} tied of {seed - FIRST + 1}. Further hits to {SURE:.0%}, mean (median): "
-        f"separating {ours.mean():.2f} ({np.median(ours):g}), integrated variance "
-        f"{theirs.mean():.2f} ({np.median(theirs):g}); ratio {ours.mean() / theirs.mean():.2f} "
-        f"[{low:.2f}, {high:.2f}]; not decided within {MOST}: {np.sum(ours > MOST)} and "
-        f"{np.sum(theirs > MOST)}"
+        f"{len(found)} pairs decided, {len(neither)} by neither, of {seed - FIRST + 1} cases. "
+        f"Further hits to {SURE:.0%} (no more than {MOST} are made; {MOST + 1} counts where they "
+        f"do not decide), mean (median): separating {ours.mean():.2f} ({np.median(ours):g}), "
+        f"integrated variance {theirs.mean():.2f} ({np.median(theirs):g}); ratio "
+        f"{ours.mean() / theirs.mean():.2f} [{low:.2f}, {high:.2f}]; not decided: "
+        f"{np.sum(ours > MOST)} and {np.sum(theirs > MOST)}"
     )
-    assert ours.mean() <= theirs.mean()
+    assert ours.mean() <= 0.5 * theirs.mean()
