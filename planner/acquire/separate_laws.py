@@ -19,9 +19,9 @@ from planner.diagnose.starts import faded
 
 LINES = 96
 LEVELS = 6  # forces that are looked at, evenly in logarithms
-ROUNDS = 12  # of the iteration between swing and stiffness
+ROUNDS = 8  # of the iteration between swing and stiffness
 STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's own stiffness
-INSTANTS = np.linspace(0, 0.5, 129)  # s after the pulse in which the swing is largest
+INSTANTS = np.linspace(0, 0.5, 97)  # s after the pulse in which the swing is largest
 
 
 def forces_n(weakest_n: float, hardest_n: float) -> np.ndarray:

@@ -13,6 +13,8 @@ from planner.diagnose.explain import Explained
 from planner.diagnose.finding import Finding
 from planner.diagnose.visits import Recorded as Visits
 
+OF_LAWS = 60  # poses that are looked at for nonlinear joints: each takes tens of milliseconds
+
 
 def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:
     """Pose, axis and peak force; None if nothing is tied or no pose is offered."""
@@ -38,7 +40,7 @@ def _of_laws(finding: Finding, level_n: np.ndarray, given: Material) -> dict[str
     laws = finding.laws
     assert laws is not None
     force = forces_n(float(level_n[0]), float(level_n[-1]))
-    gain = law_separation(laws, given.offered, force)
+    gain = law_separation(laws, given.offered[:OF_LAWS], force)
     both = zip(laws.candidates, laws.probability, strict=True)
     names = [in_words([(c.law.effect, finding.at)], p) for c, p in both if p > TIED]
     return _proposal(gain, given, force.tolist(), names)
