@@ -19,6 +19,8 @@ from planner.fusion.kernels import parse
 
 BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
 TASK = 64  # blocks a call where there are many; calls of equal shape are compiled once
+LARGE = 20_000  # candidates from which all but the EXACT best are done in single precision
+EXACT = 2_000
 WIDTH = 2  # the number of features is rounded up to a multiple of it, for the same reason
 
 
@@ -33,13 +35,28 @@ def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.nda
 def reduction_by_label(
     outputs: FrequencyOutputs, poses: Poses, target: Target
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The part of each label in it (k, n), and the variance of a measurement there (k, n)."""
-    both = [_label(outputs, poses, target, k) for k in range(outputs.count)]
+    """The part of each label in it (k, n), and the variance of a measurement there (k, n).
+
+    Of many candidates only the best are done in double precision: single precision errs by 1e-7 of
+    the prior covariance, which ranks the others well enough.
+    """
+    if len(poses) <= LARGE:
+        return _labels(outputs, poses, target, np.dtype(np.float64))
+    gained, variance = _labels(outputs, poses, target, np.dtype(np.float32))
+    best = np.argpartition(np.sum(gained, axis=0), -EXACT)[-EXACT:]
+    gained[:, best] = _labels(outputs, poses[best], target, np.dtype(np.float64))[0]
+    return gained, variance
+
+
+def _labels(
+    outputs: FrequencyOutputs, poses: Poses, target: Target, precision: np.dtype
+) -> tuple[np.ndarray, np.ndarray]:
+    both = [_label(outputs, poses, target, k, precision) for k in range(outputs.count)]
     return np.array([r for r, _ in both]), np.array([v for _, v in both])
 
 
 def _label(
-    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int
+    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, precision: np.dtype
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
     weight = target.importance[:, k]
@@ -50,11 +67,13 @@ def _label(
     scale = va + outputs.noise[k]
     n = len(poses)
     step = BLOCK * TASK if n > 4 * BLOCK * TASK else BLOCK
-    x = _filled(poses.x, step)
-    a = np.stack([_filled(one, step) for one in a])
-    kernel, xu = outputs.posterior.kernel, target.poses.x
+    kernel = outputs.posterior.kernel
+    rows = (_filled(poses.x, step), np.stack([_filled(one, step) for one in a]))
+    x, a = (one.astype(precision) for one in rows)
+    rest = (outputs.posterior.theta[k], target.poses.x, b, weight)
+    thetas, xu, b, weight = (one.astype(precision) for one in rest)
     done = np.empty(a.shape[:2])
-    for s, theta in enumerate(outputs.posterior.theta[k]):
+    for s, theta in enumerate(thetas):
         for i in range(0, len(x), step):
             part = slice(i, i + step)
             done[s, part] = _squares(kernel, theta, x[part], a[s, part], xu, b[s], weight)

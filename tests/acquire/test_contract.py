@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from test_acquire import X, conditioned_variance, over, with_parameters
 
+from planner.acquire import reduction as module
 from planner.acquire.axes import axis_shares, best_axes
 from planner.acquire.cost import Cost, shortest_tour
 from planner.acquire.goal import goal
@@ -82,6 +83,18 @@ def test_parameters_are_refitted_as_foretold(surrogate):
         np.testing.assert_allclose(
             planned.covariance_root @ planned.covariance_root.T, refit, atol=1e-9
         )
+
+
+def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
+    outputs, poses = over(surrogate, X, 30)
+    exact = reduction(outputs, poses, outputs.workspace)
+    monkeypatch.setattr(module, "LARGE", 10)
+    monkeypatch.setattr(module, "EXACT", 20)
+    screened = reduction(outputs, poses, outputs.workspace)
+    best = np.argsort(exact)[-15:]
+    np.testing.assert_allclose(screened[best], exact[best], rtol=1e-12)
+    np.testing.assert_allclose(screened, exact, rtol=1e-3, atol=1e-6 * exact.max())
+    assert np.any(screened != exact)
 
 
 def test_more_axes_tell_more(surrogate):

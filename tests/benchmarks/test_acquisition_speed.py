@@ -88,7 +88,6 @@ def test_beside_emukit(tmp_path: Path):
     assert theirs_own >= 100 * own
 
 
-@pytest.mark.xfail(reason="XLA runs one computation at a time here: 3 s would need both cores")
 def test_full_size():
     seen, poses = problem(8, 2000, 100_000)
     runs = [timed(lambda: reduction(seen, poses, seen.workspace)) for _ in range(3)]
