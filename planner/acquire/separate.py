@@ -2,20 +2,90 @@
 
 Of each pair, the χ² by which one candidate's FRFs would miss the other's even if it were fitted to
 them too, its posterior being the prior: T-optimality (Atkinson & Fedorov 1975), after which what
-mere refitting follows counts for nothing, as it still does in Hunter & Reiner (1965).
+mere refitting follows counts for nothing, as it still does in Hunter & Reiner (1965). In closed
+form refitting is a linear step; a mass that may lie on this link or that goes farther, so that the
+most promising hits are tried: every candidate is fitted to what every other one foretells.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
 
 from planner.acquire.parameters import FrfNoise
-from planner.diagnose.fit import Fit, Problem
+from planner.diagnose.fit import Fit, Problem, carried_on
 from planner.diagnose.predict import misfit_at
+from planner.frf.types import Frf
 
 LINES = 96  # evenly over the band
 AXES = 3
+TRIED = 8  # poses at which fits are tried, the most promising in closed form
+
+
+@dataclass(frozen=True)
+class Telling:
+    """A hit at the pose with this number along an axis, and the log odds it is expected to give."""
+
+    pose: int
+    axis: int
+    log_odds: float
+
+
+def most_telling(
+    problem: Problem,
+    fits: Sequence[Fit],
+    probability: Sequence[float],
+    q: np.ndarray,
+    temper: float,
+) -> Telling:
+    """The hit that best separates two or more fits, at one of q (n, dof) in rad."""
+    gain = separation(problem, fits, probability, q, temper)
+    share = np.array(probability) / np.sum(probability)
+    axes = np.argmax(gain, axis=1)
+    promising = np.argsort(-np.max(gain, axis=1))[:TRIED]
+    settled = [carried_on(problem, f, f.effect) for f in fits]
+    tried = [
+        Telling(int(i), int(axes[i]), _tried(problem, settled, share, q[i], int(axes[i]), temper))
+        for i in promising
+    ]
+    return max(tried, key=lambda t: t.log_odds)
+
+
+def _tried(
+    problem: Problem,
+    fits: Sequence[Fit],
+    share: np.ndarray,
+    q: np.ndarray,
+    axis: int,
+    temper: float,
+) -> float:
+    """What a hit at q (dof,) gives when all are fitted to what each of them foretells."""
+    before = np.array([f.log_evidence(temper) for f in fits])
+    out = 0.0
+    for true, source in enumerate(fits):
+        frfs = (*problem.frfs, _foretold(problem, source, q, axis))
+        more = replace(problem, frfs=frfs, q=np.vstack([problem.q, q]))
+        after = np.array([carried_on(more, f, f.effect).log_evidence(temper) for f in fits])
+        gained = after - before
+        for other in range(len(fits)):
+            if other != true:
+                weight = share[true] * share[other] / (1 - share[true])
+                out += float(weight * (gained[true] - gained[other]))
+    return out
+
+
+def _foretold(problem: Problem, source: Fit, q: np.ndarray, axis: int) -> Frf:
+    """The FRF column that a fit foretells at q (dof,), with the noise of those measured."""
+    like = problem.frfs[0]
+    h = misfit_at(problem, source.effect, q[None], like.frequency_hz).response(source.x)[0][0]
+    noise = FrfNoise.of(problem.frfs, problem.band_hz, 1.0)
+    unknown = np.full(h.shape, np.nan)
+    seen, variance = unknown.astype(complex), unknown.copy()
+    seen[:, axis] = h[:, axis]
+    variance[:, axis] = _sd(noise, h)[:, axis] ** 2
+    hits = int(axis == 0), int(axis == 1), int(axis == 2)
+    return Frf(like.frequency_hz, seen, variance, unknown, hits, like.usable_band_hz)
 
 
 def separation(

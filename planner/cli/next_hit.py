@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.acquire.separate import separation
+from planner.acquire.separate import Telling, most_telling
 from planner.acquire.separate_laws import forces_n, law_separation
 from planner.cli.material import Material
 from planner.diagnose.diagnose import TIED
@@ -29,11 +29,11 @@ def next_hit(explained: Explained, visits: Visits | None, given: Material) -> di
     if len(tied) < 2:
         return None
     fits, shares = [f for f, _ in tied], [p for _, p in tied]
-    gain = separation(found.problem, fits, shares, given.offered, found.temper)
+    best = most_telling(found.problem, fits, shares, given.offered, found.temper)
     # Linear candidates answer in proportion: the harder, the less noise.
     hardest = float(visits.level_n[-1]) if visits is not None else None
     names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
-    return _proposal(gain[..., None], given, [hardest], names)
+    return _proposal(best, hardest, given, names)
 
 
 def _of_laws(finding: Finding, level_n: np.ndarray, given: Material) -> dict[str, Any]:
@@ -43,21 +43,20 @@ def _of_laws(finding: Finding, level_n: np.ndarray, given: Material) -> dict[str
     gain = law_separation(laws, given.offered[:OF_LAWS], force)
     both = zip(laws.candidates, laws.probability, strict=True)
     names = [in_words([(c.law.effect, finding.at)], p) for c, p in both if p > TIED]
-    return _proposal(gain, given, force.tolist(), names)
+    pose, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
+    best = Telling(pose, axis, float(gain[pose, axis, level]))
+    return _proposal(best, float(force[level]), given, names)
 
 
 def _proposal(
-    gain: np.ndarray, given: Material, force_n: Sequence[float | None], between: list[str]
+    best: Telling, force_n: float | None, given: Material, between: list[str]
 ) -> dict[str, Any]:
-    """The best of gain (n, 3, L)."""
-    pose, axis, level = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    force = force_n[int(level)]
     return {
-        "pose": given.names[pose],
-        "joints_deg": [round(float(v), 3) for v in np.rad2deg(given.offered[pose])],
-        "hit": "xyz"[axis],
-        "force_n": None if force is None else float(f"{force:.2g}"),
-        "log_odds": float(gain[pose, axis, level]),
+        "pose": given.names[best.pose],
+        "joints_deg": [round(float(v), 3) for v in np.rad2deg(given.offered[best.pose])],
+        "hit": "xyz"[best.axis],
+        "force_n": None if force_n is None else float(f"{force_n:.2g}"),
+        "log_odds": best.log_odds,
         "between": between,
     }
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.acquire.separate import separation
+from planner.acquire.separate import most_telling, separation
 from planner.diagnose.diagnose import Problem
 from planner.diagnose.effects import library
 from planner.diagnose.fit import FINE, Fit, fit, settle
@@ -87,3 +87,15 @@ def test_what_is_expected_happens(tied):
 def value(found: Fit) -> float:
     """χ²/2 with the prior's part."""
     return found.misfit(found.x).value
+
+
+def test_the_most_telling_hit_is_tried_before_it_is_named(tied):
+    problem, (light, heavy) = tied
+    true = replace(heavy, x=np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0]))
+    poses = KR210.poses(12, 9)
+    best = most_telling(problem, [true, light], [0.5, 0.5], poses, 1.0)
+    closed = separation(problem, [true, light], [0.5, 0.5], poses, 1.0)
+    assert best.log_odds > 0
+    assert closed[best.pose, best.axis] == closed[best.pose].max()
+    same = most_telling(problem, [light, light], [0.5, 0.5], poses[:2], 1.0)
+    assert abs(same.log_odds) < 1e-6

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from acquisition_cases import LINES, MODES, ROBOTS, Case
-from planner.acquire.separate import separation
+from planner.acquire.separate import most_telling
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
@@ -101,9 +101,8 @@ class Campaign:
         tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
         offered = self.case.cell.candidates.q
         fits, shares = [f for f, _ in tied], [p for _, p in tied]
-        gain = separation(found.problem, fits, shares, offered, found.temper)
-        pose, axis = np.unravel_index(int(np.argmax(gain)), gain.shape)
-        return offered[pose], (int(axis),)
+        best = most_telling(found.problem, fits, shares, offered, found.temper)
+        return offered[best.pose], (best.axis,)
 
 
 def until_decided(case: Case, poses, axes, found: Diagnosis, true, strategy: str) -> int:
