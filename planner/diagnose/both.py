@@ -66,16 +66,9 @@ class Both(Effect):
         """Of all."""
         return tuple(name for m in self.members for name in m.springs(simulation))
 
-    def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance | None:
-        """The sum; each depends on its own parameters only."""
-        found = [m.impedance(setting, p) for m, p in self._split(psi)]
-        there = [i for i in found if i is not None]
-        if not there:
-            return None
-        values = there[0].values
-        for more in there[1:]:
-            values = values + more.values
-        return Impedance(values, np.concatenate([i.slope for i in there], axis=1))
+    def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
+        """All; each depends on its own parameters only."""
+        return tuple(i for m, own in self._split(psi) for i in m.impedance(setting, own))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer | None:
         """The product, the last effect nearest to the recorder."""

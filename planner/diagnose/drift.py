@@ -95,9 +95,7 @@ class DriftMisfit(Misfit):
             inertias = None
             if self.inertial:
                 inertias = Inertias(self.inertias.jacobians[one], self.inertias.basis)
-            h, full = response_gradient(
-                matrices, now, self.setting.s[one], mass[one], inertias, None
-            )
+            h, full = response_gradient(matrices, now, self.setting.s[one], mass[one], inertias)
             e, springs = p.size, len(p.held)
             theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
             along = full[:, :e].sum(axis=1)

@@ -87,9 +87,9 @@ class Effect:
         """Names of the springs' parameters that tell of the effect."""
         return ()
 
-    def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance | None:
+    def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         """What it adds to Z at its own parameters ψ (p,)."""
-        return None
+        return ()
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer | None:
         """What it does to the measured FRFs."""

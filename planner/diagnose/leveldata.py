@@ -123,11 +123,12 @@ def _slopes(
     p, n = misfit.parametrisation, len(misfit.matrices.mass)
     mass = misfit.matrices.mass + misfit.inertias.mass_change(x[a:b])
     every = np.broadcast_to(s, (n, len(s)))
-    added = None
+    added = ()
     if stiffer is not None:
-        values = np.zeros((n, len(s), p.size, p.size), dtype=complex)
-        values[:, :, block, block] = stiffer[:, None]
-        added = Impedance(values, np.zeros((n, 0, *values.shape[1:]), dtype=complex))
+        port = np.zeros((n, 1, p.size))
+        port[:, 0, block] = 1.0
+        spring = np.broadcast_to(stiffer[:, None], every.shape)
+        added = (Impedance(port, np.ones((1, 1, 1)), ((0, spring),)),)
     full = response_gradient(
         misfit.matrices, p.elasticity(x[:a]), every, mass, misfit.inertias, added
     )[1]

@@ -5,6 +5,7 @@ Z = K(1+iη) + s C + s² M. Z is symmetric, so that with X = Z⁻¹ Jᵀ any cha
 −X_sᵀ dZ X_h: two solutions serve all parameters.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,15 +30,42 @@ class Inertias:
         return np.sum(np.swapaxes(self.jacobians, 2, 3) @ weighted @ self.jacobians, axis=1)
 
 
+Terms = tuple[tuple[int, np.ndarray], ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Impedance:
-    """What an effect adds to Z: `values` (n, F, e, e), and derivatives `slope` (n, p, F, e, e).
+    """What an effect adds to Z through r ports: Pᵀ [Σ c(s) S] P, P being `ports` (n, r, e).
 
-    In N·m/rad; the derivatives are with respect to the effect's own p parameters.
+    `shapes` (t, r, r) are all S that occur, real and symmetric. `values` names those of Z itself,
+    by number, each with its c (n, F); `slope` those of its derivative by each of the effect's own
+    parameters.
     """
 
-    values: np.ndarray
-    slope: np.ndarray
+    ports: np.ndarray
+    shapes: np.ndarray
+    values: Terms
+    slope: tuple[Terms, ...] = ()
+
+    def add_to(self, z: np.ndarray) -> None:
+        """Add it to z (n, F, e, e)."""
+        for number, coefficient in self.values:
+            whole = np.swapaxes(self.ports, 1, 2) @ self.shapes[number] @ self.ports
+            z += coefficient[..., None, None] * whole[:, None]
+
+    def gradient(self, x_hit: np.ndarray, x_sensor: np.ndarray, out: np.ndarray) -> None:
+        """X_sᵀ dZ X_h into out (n, p, 3s, 3h, F), of solutions (n, e, 3, F)."""
+        hit, sensor = _moved(self.ports, x_hit), _moved(self.ports, x_sensor)
+        out[:] = 0.0
+        for number in {t for terms in self.slope for t, _ in terms}:
+            shape = self.shapes[number]
+            pushed = _moved(np.broadcast_to(shape, (len(hit), *shape.shape)), hit)
+            rows = np.flatnonzero(shape.any(axis=1)).tolist()
+            both = sum(sensor[:, i, :, None] * pushed[:, i, None] for i in rows)
+            for parameter, terms in enumerate(self.slope):
+                for t, coefficient in terms:
+                    if t == number:
+                        out[:, parameter] += coefficient[:, None, None] * both
 
 
 def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:
@@ -58,12 +86,12 @@ def response_gradient(
     s: np.ndarray,
     mass: np.ndarray | None = None,
     inertias: Inertias | None = None,
-    added: Impedance | None = None,
+    added: Sequence[Impedance] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives (n, P, 3s, 3h, F).
 
     The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
-    those of `inertias` (B · p, only if given), and those of what is `added` to Z (if given).
+    those of `inertias` (B · p, only if given), and those of all that is `added` to Z.
     """
     points = matrices.hit.shape[1]
     both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
@@ -72,7 +100,7 @@ def response_gradient(
     e, lossy = x.shape[1], bool(elasticity.loss_factor.any())
     springs = (3 if lossy else 2) * e
     extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
-    own = 0 if added is None else added.slope.shape[1]
+    own = sum(len(one.slope) for one in added)
     shape = len(s), springs + extra + own, x_sensor.shape[2], points, s.shape[1]
     out = np.empty(shape, dtype=complex)
     minus = -(s**2)[:, None, None, None]
@@ -89,10 +117,11 @@ def response_gradient(
         each *= k
     if inertias is not None:
         _by_inertia(inertias, x_hit, x_sensor, s, out[:, springs : springs + extra])
-    if added is not None:
-        moved = np.einsum("npfij,njhf->npihf", added.slope, x_hit, optimize=True)
-        out[:, springs + extra :] = np.einsum("niaf,npihf->npahf", x_sensor, moved, optimize=True)
-        out[:, springs + extra :] *= minus
+    place = springs + extra
+    for one in added:
+        part = out[:, place : place + len(one.slope)]
+        one.gradient(x_hit * minus[:, 0], x_sensor, part)
+        place += len(one.slope)
     return _synthesis(matrices, x_hit, s), out
 
 
@@ -109,7 +138,7 @@ def _solutions(
     s: np.ndarray,
     mass: np.ndarray | None,
     rows: np.ndarray,
-    added: Impedance | None = None,
+    added: Sequence[Impedance] = (),
 ) -> np.ndarray:
     """X = Z⁻¹ rowsᵀ as (n, e, rows, F)."""
     mass = matrices.mass if mass is None else mass
@@ -118,8 +147,8 @@ def _solutions(
     diagonal = np.einsum("...ii->...i", z)
     diagonal += elasticity.stiffness * (1 + 1j * elasticity.loss_factor)
     diagonal += s[..., None] * elasticity.damping
-    if added is not None:
-        z = z + added.values
+    for one in added:
+        one.add_to(z)
     x = np.linalg.solve(z, np.swapaxes(rows, 1, 2)[:, None].astype(complex))
     return np.ascontiguousarray(np.moveaxis(x, 1, 3))
 
@@ -141,6 +170,13 @@ def _by_inertia(
             np.multiply(sensor[b, 0][:, None], momentum[:, 0], out=part)
             for axis in range(1, 6):
                 part += sensor[b, axis][:, None] * momentum[:, axis]
+
+
+def _moved(ports: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Real ports (n, r, e) times complex columns (n, e, 3, F)."""
+    n, r, _ = ports.shape
+    flat = np.ascontiguousarray(x).reshape(n, x.shape[1], -1).view(float)
+    return (ports @ flat).view(complex).reshape(n, r, *x.shape[2:])
 
 
 def _times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:

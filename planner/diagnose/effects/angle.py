@@ -35,7 +35,7 @@ class AngleDependentStiffness(Effect):
                 found += [cls(place, quantities, order) for order in ORDERS]
         return tuple(found)
 
-    def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
+    def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         """On the diagonal, one value a pose; `damping_share` of the damping changes alike."""
         simulation = setting.simulation
         joint = joint_of(simulation, self.at)
@@ -49,9 +49,10 @@ class AngleDependentStiffness(Effect):
         own[:, :2] = waves[:, :, None] * (1 + psi[2] * late)[:, None]
         own[:, 2] = (waves @ psi[:2])[:, None] * late
         change = np.einsum("p,npf->nf", psi[:2], own[:, :2])
-        unit = np.zeros((simulation.elastic.size, simulation.elastic.size))
-        unit[number, number] = 1.0
-        return Impedance(change[..., None, None] * unit, own[..., None, None] * unit)
+        port = np.zeros((len(angle), 1, simulation.elastic.size))
+        port[:, 0, number] = 1.0
+        slope = tuple(((0, own[:, k]),) for k in range(3))
+        return (Impedance(port, np.ones((1, 1, 1)), ((0, change),), slope),)
 
     def elements(
         self, simulation: Simulation, values: dict[str, tuple[float, float, str]]

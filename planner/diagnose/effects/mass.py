@@ -74,16 +74,16 @@ class AddedMass(Effect):
         little = np.array([0.3 * self.quantities[0].sd, 0, 0, 0])
         return np.array([middle + little, middle - little])
 
-    def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
+    def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         """s² Jᵀ I(m, p) J."""
         jacobian = setting.body(joint_of(setting.simulation, self.at))
         mass, place = psi[0], psi[1:]
         unit, slope = point_mass(place), point_mass_slope(place)
         weights = np.vstack([mass * unit, unit, mass * slope])  # value, d/dm, d/dp
         inertias = np.einsum("kb,bij->kij", weights, inertia_basis())
-        m = np.swapaxes(jacobian, 1, 2)[:, None] @ inertias @ jacobian[:, None]  # (n, 5, e, e)
-        all_ = (setting.s**2)[:, None, :, None, None] * m[:, :, None]
-        return Impedance(all_[:, 0], all_[:, 1:])
+        s2 = setting.s**2
+        slope = tuple(((k, s2),) for k in range(1, len(inertias)))
+        return (Impedance(jacobian, inertias, ((0, s2),), slope),)
 
     def elements(
         self, simulation: Simulation, values: dict[str, tuple[float, float, str]]

@@ -65,7 +65,7 @@ class LocalResonator(Effect):
                 out.append(start)
         return np.array(out)
 
-    def impedance(self, setting: Setting, psi: np.ndarray) -> Impedance:
+    def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         """s² m Jₚᵀ [1 + (T − 1) d dᵀ] Jₚ with the transmissibility T of spring and damper."""
         mass, omega, zeta = np.exp(psi[0]), 2 * np.pi * np.exp(psi[1]), np.exp(psi[2])
         length = np.linalg.norm(psi[3:6]) + 1e-12
@@ -79,24 +79,21 @@ class LocalResonator(Effect):
         # derivatives of T with respect to ln ω and ln ζ
         d_above = np.stack([2 * zeta * omega * s + 2 * omega**2, 2 * zeta * omega * s])
         t_slope = (d_above * below - above * d_above) / below**2
-        along = np.einsum("a,nae->ne", d, linear)
-        full = np.einsum("nae,nag->neg", linear, linear)
-        line = along[:, :, None] * along[:, None]
         turn = (np.eye(3) - np.outer(d, d)) / length  # ∂d/∂v
-        d_along = np.einsum("av,nae->vne", turn, linear)
-        d_line = _both(d_along, along)
-        moves = np.array([_shift(jacobian[:, 3:], axis) for axis in range(3)])  # ∂Jp/∂p
-        d_full = np.einsum("vnae,nag->vneg", moves, linear)
-        d_full = d_full + np.swapaxes(d_full, 2, 3)
-        d_line_p = _both(np.einsum("a,vnae->vne", d, moves), along)
-        m = mass * (s**2)[..., None, None]
-        u = (t - 1)[..., None, None]
-        values = m * (full[:, None] + u * line[:, None])
-        slopes = [values]
-        slopes += [m * t_slope[k][..., None, None] * line[:, None] for k in range(2)]
-        slopes += [m * u * d_line[v][:, None] for v in range(3)]
-        slopes += [m * (d_full[v][:, None] + u * d_line_p[v][:, None]) for v in range(3)]
-        return Impedance(values, np.stack(slopes, axis=1))
+        along = np.outer(d, d)
+        # Ports: the place's velocity and the link's rate of turn ω, which shifts it by ω × e.
+        shapes = [_moving(np.eye(3)), _moving(along)]
+        shapes += [_moving(np.outer(turn[v], d) + np.outer(d, turn[v])) for v in range(3)]
+        shapes += [_turning(np.cross(np.eye(3), e, axisa=0).T) for e in np.eye(3)]
+        shapes += [_turning(along @ np.cross(np.eye(3), e, axisa=0).T) for e in np.eye(3)]
+        m = mass * s**2
+        u = m * (t - 1)
+        values = (0, m), (1, u)
+        slope = [values, ((1, m * t_slope[0]),), ((1, m * t_slope[1]),)]
+        slope += [((2 + v, u),) for v in range(3)]
+        slope += [((5 + v, m), (8 + v, u)) for v in range(3)]
+        ports = np.concatenate([linear, jacobian[:, 3:]], axis=1)
+        return (Impedance(ports, np.array(shapes), values, tuple(slope)),)
 
     def elements(
         self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
@@ -124,12 +121,15 @@ class LocalResonator(Effect):
         )
 
 
-def _both(change: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """(3, n, e, e): derivative of a aᵀ for changes (3, n, e) of a (n, e)."""
-    half = change[..., :, None] * along[None, :, None, :]
-    return half + np.swapaxes(half, 2, 3)
+def _moving(shape: np.ndarray) -> np.ndarray:
+    """(6, 6): a shape (3, 3) of velocities alone."""
+    out = np.zeros((6, 6))
+    out[:3, :3] = shape
+    return out
 
 
-def _shift(angular: np.ndarray, axis: int) -> np.ndarray:
-    """(n, 3, e): ω × e_axis."""
-    return np.cross(angular, np.eye(3)[axis], axisa=1, axisc=1)
+def _turning(shape: np.ndarray) -> np.ndarray:
+    """(6, 6): a shape (3, 3) between velocities and rates of turn, and its transpose."""
+    out = np.zeros((6, 6))
+    out[:3, 3:], out[3:, :3] = shape, shape.T
+    return out
