@@ -14,7 +14,7 @@ import numpy as np
 from jax import Array
 
 from planner.acquire.outputs import FrequencyOutputs, Poses, Target
-from planner.fusion import jaxsetup  # noqa: F401
+from planner.fusion import jaxsetup
 from planner.fusion.kernels import parse
 
 BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
@@ -80,7 +80,7 @@ def _label(
     return np.mean(done[:, :n] / scale, axis=0), np.mean(scale, axis=0)
 
 
-@partial(jax.jit, static_argnums=0, compiler_options={"xla_cpu_prefer_vector_width": "512"})
+@partial(jaxsetup.widely_compiled, static_argnums=0)
 def _squares(
     kernel: str, theta: Array, x: Array, a: Array, xu: Array, b: Array, weight: Array
 ) -> Array:

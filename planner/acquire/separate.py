@@ -21,6 +21,8 @@ from planner.frf.types import Frf
 LINES = 96  # evenly over the band
 AXES = 3
 TRIED = 8  # poses at which fits are tried, the most promising in closed form
+LIKELIEST = 4  # fits that are tried there
+STEPS = 20  # of each
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,9 @@ def most_telling(
     temper: float,
 ) -> Telling:
     """The hit that best separates two or more fits, at one of q (n, dof) in rad."""
-    gain = separation(problem, fits, probability, q, temper)
+    likeliest = np.argsort(-np.asarray(probability))[:LIKELIEST].tolist()
+    fits, probability = [fits[i] for i in likeliest], [probability[i] for i in likeliest]
+    gain = np.nan_to_num(separation(problem, fits, probability, q, temper))
     share = np.array(probability) / np.sum(probability)
     axes = np.argmax(gain, axis=1)
     promising = np.argsort(-np.max(gain, axis=1))[:TRIED]
@@ -66,7 +70,8 @@ def _tried(
     for true, source in enumerate(fits):
         frfs = (*problem.frfs, _foretold(problem, source, q, axis))
         more = replace(problem, frfs=frfs, q=np.vstack([problem.q, q]))
-        after = np.array([carried_on(more, f, f.effect).log_evidence(temper) for f in fits])
+        refitted = [carried_on(more, f, f.effect, STEPS) for f in fits]
+        after = np.array([f.log_evidence(temper) for f in refitted])
         gained = after - before
         for other in range(len(fits)):
             if other != true:
@@ -77,15 +82,17 @@ def _tried(
 
 def _foretold(problem: Problem, source: Fit, q: np.ndarray, axis: int) -> Frf:
     """The FRF column that a fit foretells at q (dof,), with the noise of those measured."""
-    like = problem.frfs[0]
-    h = misfit_at(problem, source.effect, q[None], like.frequency_hz).response(source.x)[0][0]
-    noise = FrfNoise.of(problem.frfs, problem.band_hz, 1.0)
+    like, noise = problem.frfs[0], FrfNoise.of(problem.frfs, problem.band_hz, 1.0)
+    rate = like.exponential_rate_1_s
+    there = misfit_at(problem, source.effect, q[None], like.frequency_hz, rate)
+    h = there.response(source.x)[0][0]
+    # The model's own error is no part of an FRF's variance; fits add it.
+    floor = _sd(noise, h) if noise.floor is None else np.full(h.shape, noise.floor)
     unknown = np.full(h.shape, np.nan)
     seen, variance = unknown.astype(complex), unknown.copy()
-    seen[:, axis] = h[:, axis]
-    variance[:, axis] = _sd(noise, h)[:, axis] ** 2
+    seen[:, axis], variance[:, axis] = h[:, axis], floor[:, axis] ** 2
     hits = int(axis == 0), int(axis == 1), int(axis == 2)
-    return Frf(like.frequency_hz, seen, variance, unknown, hits, like.usable_band_hz)
+    return Frf(like.frequency_hz, seen, variance, unknown, hits, like.usable_band_hz, rate)
 
 
 def separation(
@@ -110,9 +117,12 @@ def separation(
     # Lines closer than those of a record are not measured apart; farther ones stand for several.
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
     known = [fit.precision(temper) for fit in fits]
+    rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):
         told = [
-            tuple(one[0] for one in misfit_at(problem, f.effect, row[None], lines).response(f.x))
+            tuple(
+                one[0] for one in misfit_at(problem, f.effect, row[None], lines, rate).response(f.x)
+            )
             for f in fits
         ]
         scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in told]

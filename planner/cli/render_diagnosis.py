@@ -41,7 +41,8 @@ def diagnosed(answer: dict[str, Any]) -> RenderableType:
 
 def _next(told: dict[str, Any]) -> str:
     angles = ", ".join(f"{v:.1f}" for v in told["joints_deg"])
-    force = f" with about {told['force_n']:g} N" if told["force_n"] else ""
+    force = " and ".join(f"{n:g}" for n in told["force_n"])
+    force = f" with about {force} N" if force else ""
     return (
         f"To tell apart {' from '.join(told['between'])}: hit{force} along {told['hit']} at "
         f"{told['pose']} ({angles}°); the odds are expected to become e^{told['log_odds']:.1f}."

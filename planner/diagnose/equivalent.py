@@ -16,6 +16,7 @@ from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Elasticity, Simulation
 
 LINES = 128  # most lines a column
+INSTANTS_S = np.linspace(0, 0.5, 257)
 STARTS = (-0.5, -0.1, 0.1, 0.5, 1.5)  # of Δ, times the joint's stiffness
 STEPS = 12
 LEAST, MOST = -0.95, 5.0  # of Δ, times the joint's stiffness
@@ -146,10 +147,13 @@ def equivalent(recorded: Recorded, system: System) -> Equivalent:
 def _swing(full: Receptances, column, recorded: Recorded) -> np.ndarray:
     """Largest angle (J,) that the hit gives each joint, in the band."""
     spectrum = full.port_hit[:, :, column.axis] * column.force[:, None]
-    step = float(column.frequency_hz[1] - column.frequency_hz[0])
-    t = np.linspace(0, 0.5, 257)
-    wave = np.real(np.exp(np.outer(t, full.s)) @ spectrum) * 2 * step
-    return np.max(np.abs(wave), axis=0)
+    return np.max(np.abs((spectrum.T @ waves(full.s)).real), axis=1)
+
+
+def waves(s: np.ndarray) -> np.ndarray:
+    """(F, t) that turn spectra at evenly spaced s (F,) into their first half second."""
+    step_hz = float((s[1] - s[0]).imag) / (2 * np.pi)
+    return np.exp(np.outer(s, INSTANTS_S)) * 2 * step_hz
 
 
 def _delta(

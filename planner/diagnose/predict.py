@@ -10,6 +10,7 @@ from planner.diagnose.objective import Misfit
 from planner.identify.check import Similarity, similarity_of
 from planner.identify.data import Measured
 from planner.identify.held_out import set_aside
+from planner.physics.gradient import laplace
 
 ALL = Grade(256)
 SHORT = 10  # steps from a fit on all poses to one on most of them
@@ -45,12 +46,17 @@ def _columns(found: Fit) -> np.ndarray:
     return np.flatnonzero(np.concatenate([np.ones(b, dtype=bool), np.array(own, dtype=bool)]))
 
 
-def misfit_at(problem: Problem, effect: Effect, q: np.ndarray, frequency_hz: np.ndarray) -> Misfit:
-    """Misfit to nothing measured at q (n, dof) in rad and frequency_hz (F,): for its response."""
+def misfit_at(
+    problem: Problem, effect: Effect, q: np.ndarray, frequency_hz: np.ndarray, rate_1_s: float = 0.0
+) -> Misfit:
+    """Misfit to nothing measured at q (n, dof) in rad and frequency_hz (F,): for its response.
+
+    FRFs of records with an exponential window have its rate.
+    """
     simulation, p = problem.parametrised(effect)
     lines = np.tile(frequency_hz, (len(q), 1))
     shape = (len(q), 3, 3, len(frequency_hz))
-    s = 2j * np.pi * lines
+    s = laplace(lines, rate_1_s)
     nothing = Measured(lines, s, np.ones(shape, complex), np.full(shape, np.inf), np.zeros(len(q)))
     jacobians = simulation.elastic.body_jacobians(q)
     setting, matrices = Setting(simulation, q, s, jacobians), simulation.elastic.matrices(q)

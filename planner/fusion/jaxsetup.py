@@ -30,11 +30,8 @@ except (OSError, RuntimeError):  # RuntimeError: a user without a home
     pass  # a cache that cannot be kept costs seconds, nothing else
 
 # Less time to compile, and about as fast for many small matrices; wide vectors are a fifth faster.
-_QUICK = {
-    "xla_cpu_use_fusion_emitters": False,
-    "xla_backend_optimization_level": 1,
-    "xla_cpu_prefer_vector_width": "512",
-}
+_WIDE: dict[str, bool | int | str] = {"xla_cpu_prefer_vector_width": "512"}
+_QUICK = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1, **_WIDE}
 
 
 def _understood(options: dict[str, bool | int | str]) -> bool:
@@ -45,5 +42,8 @@ def _understood(options: dict[str, bool | int | str]) -> bool:
     return True
 
 
-# As jax.jit, for what the first fit of a campaign waits for; another XLA may lack the options.
-quickly_compiled = partial(jax.jit, compiler_options=_QUICK if _understood(_QUICK) else None)
+_KNOWN = _understood(_QUICK)  # another XLA may lack the options
+
+# As jax.jit, for what the first fit of a campaign waits for, and for loops that run long.
+quickly_compiled = partial(jax.jit, compiler_options=_QUICK if _KNOWN else None)
+widely_compiled = partial(jax.jit, compiler_options=_WIDE if _KNOWN else None)

@@ -9,7 +9,7 @@ from known_robots import KR210
 from planner.acquire.separate import most_telling, separation
 from planner.diagnose.diagnose import Problem
 from planner.diagnose.effects import library
-from planner.diagnose.fit import FINE, Fit, fit, settle
+from planner.diagnose.fit import FINE, Fit, carried_on, fit, settle
 from planner.diagnose.predict import misfit_at
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
@@ -89,13 +89,29 @@ def value(found: Fit) -> float:
     return found.misfit(found.x).value
 
 
-def test_the_most_telling_hit_is_tried_before_it_is_named(tied):
+@pytest.mark.parametrize("rate", [0.0, 2.0])
+def test_what_is_tried_is_what_happens_without_noise(tied, rate):
     problem, (light, heavy) = tied
+    problem = replace(
+        problem, frfs=tuple(replace(f, exponential_rate_1_s=rate) for f in problem.frfs)
+    )
     true = replace(heavy, x=np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0]))
     poses = KR210.poses(12, 9)
-    best = most_telling(problem, [true, light], [0.5, 0.5], poses, 1.0)
-    closed = separation(problem, [true, light], [0.5, 0.5], poses, 1.0)
-    assert best.log_odds > 0
-    assert closed[best.pose, best.axis] == closed[best.pose].max()
-    same = most_telling(problem, [light, light], [0.5, 0.5], poses[:2], 1.0)
+    before = [carried_on(problem, f, f.effect) for f in (true, light)]
+    best = most_telling(problem, before, [1 - 1e-9, 1e-9], poses, 1.0)
+    h = misfit_at(problem, true.effect, poses[best.pose][None], LINES, rate)
+    h = h.response(before[0].x)[0][0]
+    columns = np.arange(3) == best.axis
+    frf = measured(h, 1e-12, np.random.default_rng(0), columns)
+    variance = np.where(columns[:, None], SD**2, np.nan) + 0 * frf.variance
+    frf = replace(frf, variance=variance, exponential_rate_1_s=rate)
+    more = replace(problem, frfs=(*problem.frfs, frf), q=np.vstack([problem.q, poses[best.pose]]))
+    after = [carried_on(more, f, f.effect) for f in before]
+    gained = [a.log_evidence(1.0) - b.log_evidence(1.0) for a, b in zip(after, before, strict=True)]
+    assert best.log_odds == pytest.approx(gained[0] - gained[1], rel=0.1)
+
+
+def test_the_same_candidate_twice_is_not_told_apart_by_trying(tied):
+    problem, (light, _) = tied
+    same = most_telling(problem, [light, light], [0.5, 0.5], KR210.poses(2, 9), 1.0)
     assert abs(same.log_odds) < 1e-6

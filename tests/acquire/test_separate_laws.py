@@ -9,7 +9,6 @@ import pytest
 from scipy.stats import spearmanr
 
 from known_robots import KR210
-from planner.acquire.parameters import MODEL_ERROR
 from planner.acquire.separate_laws import accelerance, forces_n, law_separation
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
@@ -93,43 +92,59 @@ def in_time(cell, law, force_n):
 def test_what_a_law_does_follows_that_in_time(cell, law, share):
     laws = laws_of(cell, (law, share, SWING))
     candidate = laws.candidates[0]
-    ours, exact = [], []
+    system, sizes, errors = system_of(laws.plain), [], []
     for force in (30.0, 300.0, 3000.0):
         h, struck_column, s = in_time(cell, candidate, force)
         spectrum = np.interp(s.imag / (2 * np.pi), struck_column.frequency_hz, struck_column.force)
-        system = system_of(laws.plain)
-        first = replace(
-            system,
-            mass=system.mass[:1],
-            geometric=system.geometric[:1],
-            hit=system.hit[:1],
-            sensor=system.sensor[:1],
-        )
-        found = accelerance(first, candidate, spectrum, s, np.ones(1))[0]
-        linear = accelerance(first, replace(candidate, scale=0.0), spectrum, s, np.ones(1))[0]
-        ours.append(found - linear)
-        exact.append(h - linear)
-    sizes = [np.linalg.norm(e) for e in exact]
-    errors = [np.linalg.norm(o - e) for o, e in zip(ours, exact, strict=True)]
+        found = receptances(system, 0, s)
+        ours = accelerance(found, candidate, spectrum, np.ones(1))[0]
+        linear = accelerance(found, replace(candidate, scale=0.0), spectrum, np.ones(1))[0]
+        sizes.append(np.linalg.norm(h - linear))
+        errors.append(np.linalg.norm(ours - h))
     print(law.effect, share, "size", np.round(sizes, 3), "error", np.round(errors, 3))
-    assert max(errors) < 0.5 * max(sizes)
+    # Where a law does most it is told well, elsewhere its size is.
+    assert min(e / size for e, size in zip(errors, sizes, strict=True)) < 0.2
+    assert all(e < 0.8 * size for e, size in zip(errors, sizes, strict=True))
+
+
+def test_swings_do_not_depend_on_how_wide_the_band_is(cell):
+    """Of a hit that excites nothing above 50 Hz, told over twice and four times the band."""
+    system, peak = system_of(cell[2]), 1.3e-4
+    candidate = laws_of(cell, (STIFFENING, 0.6, peak)).candidates[0]
+    told = []
+    for end in (50.0, 100.0, 200.0):
+        s = 2j * np.pi * np.arange(5.0, end, 0.4) + 4.0
+        force = np.where(s.imag < 2 * np.pi * 50.0, 2.0, 0.0).astype(complex)
+        h = accelerance(receptances(system, 0, s), candidate, force, np.ones(1))
+        told.append(h[..., : int((50.0 - 5.0) / 0.4)])
+    for other in told[1:]:
+        np.testing.assert_allclose(other, told[0], rtol=1e-6, atol=1e-9)
 
 
 def test_forces_that_tell_laws_apart_in_time_are_those_proposed(cell):
     laws = laws_of(cell, (DAHL, 0.5, SWING), (DEAD_ZONE, 0.5, SWING))
-    q = laws.problem.q[:1]
-    force = np.geomspace(1.0, 100000.0, 9)
-    gain = law_separation(laws, q, force)[0]
+    force = np.append(np.geomspace(1.0, 10000.0, 7), 3e5)
+    gain = law_separation(laws, laws.problem.q[:1], force)[0]
     floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
+    every = [[in_time(cell, law, peak)[0] for law in laws.candidates] for peak in force]
     apart = np.empty(gain.shape)
-    for level, peak in enumerate(force):
-        one, other = (in_time(cell, law, peak)[0] for law in laws.candidates)
-        variance = floor * (laws.hit.peak_n / peak) ** 2 + (MODEL_ERROR * np.abs(one)) ** 2
-        apart[:, level] = np.sum(np.abs(one - other) ** 2 / variance, axis=(0, 2))
+    for level, (one, other) in enumerate(every[:-1]):
+        change, rival = one - every[-1][0], other - every[-1][1]
+        quiet = floor * (laws.hit.peak_n / force[level]) ** 2
+        variance = quiet + (0.01 * np.abs(change)) ** 2 + (0.003 * np.abs(one)) ** 2
+        apart[:, level] = np.sum(np.abs(change - rival) ** 2 / variance, axis=(0, 2))
     print(np.round(np.log10(gain), 1), np.round(np.log10(apart), 1), sep="\n")
     assert spearmanr(gain.ravel(), apart.ravel()).statistic > 0.8
     best = np.unravel_index(int(np.argmax(gain)), gain.shape)
-    assert apart[best] > 0.5 * apart.max()
+    assert apart[best] > 0.3 * apart.max()
+
+
+def test_a_hit_that_leaves_the_joint_still_tells_nothing(cell):
+    candidate = laws_of(cell, (DAHL, 0.5, SWING)).candidates[0]
+    found = receptances(system_of(cell[2]), 0, 2j * np.pi * np.linspace(6, 45, 40))
+    still = replace(found, port_hit=np.zeros_like(found.port_hit))
+    h = accelerance(still, candidate, np.ones(40, complex), np.ones(1))[0]
+    np.testing.assert_allclose(h, found.s**2 * np.moveaxis(found.sensor_hit, 0, 2))
 
 
 def test_one_law_and_twice_the_same_need_no_hit(cell):
@@ -151,7 +166,8 @@ def test_the_command_names_the_force(cell):
     told = next_hit(explained, cell[0], given)
     assert told["pose"] in given.names
     assert told["hit"] in "xyz"
-    assert 100.0 < told["force_n"] <= 300.0  # all hits were of 300 N
+    assert told["force_n"][1] == pytest.approx(300.0, rel=0.1)  # all hits were of 300 N
+    assert told["force_n"][0] < told["force_n"][1] <= 300.5
     assert told["between"] == ["friction at joint_3 (50 %)", "backlash at joint_3 (50 %)"]
-    assert "N along" in _next(told)
+    assert " N along " in _next(told)
     assert next_hit(explained, cell[0], replace(given, offered=q[:0])) is None

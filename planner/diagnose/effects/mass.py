@@ -82,8 +82,8 @@ class AddedMass(Effect):
         weights = np.vstack([mass * unit, unit, mass * slope])  # value, d/dm, d/dp
         inertias = np.einsum("kb,bij->kij", weights, inertia_basis())
         s2 = setting.s**2
-        slope = tuple(((k, s2),) for k in range(1, len(inertias)))
-        return (Impedance(jacobian, inertias, ((0, s2),), slope),)
+        own = tuple(((k, s2),) for k in range(1, len(inertias)))
+        return (Impedance(jacobian, inertias, ((0, s2),), own),)
 
     def elements(
         self, simulation: Simulation, values: dict[str, tuple[float, float, str]]

@@ -81,11 +81,12 @@ class LocalResonator(Effect):
         t_slope = (d_above * below - above * d_above) / below**2
         turn = (np.eye(3) - np.outer(d, d)) / length  # ∂d/∂v
         along = np.outer(d, d)
-        # Ports: the place's velocity and the link's rate of turn ω, which shifts it by ω × e.
+        # Ports: the place's motion and the link's turn, which moves what lies at e by turn × e.
         shapes = [_moving(np.eye(3)), _moving(along)]
         shapes += [_moving(np.outer(turn[v], d) + np.outer(d, turn[v])) for v in range(3)]
-        shapes += [_turning(np.cross(np.eye(3), e, axisa=0).T) for e in np.eye(3)]
-        shapes += [_turning(along @ np.cross(np.eye(3), e, axisa=0).T) for e in np.eye(3)]
+        across = [np.cross(np.eye(3), e).T for e in np.eye(3)]
+        shapes += [_turning(one) for one in across]
+        shapes += [_turning(along @ one) for one in across]
         m = mass * s**2
         u = m * (t - 1)
         values = (0, m), (1, u)
