@@ -13,13 +13,13 @@ from itertools import permutations
 
 import numpy as np
 
+from planner.acquire.outputs import AXES
 from planner.acquire.parameters import FrfNoise
 from planner.diagnose.fit import Fit, Problem, carried_on
 from planner.diagnose.predict import misfit_at
 from planner.frf.types import Frf
 
 LINES = 96  # evenly over the band
-AXES = 3
 TRIED = 8  # poses at which fits are tried, the most promising in closed form
 LIKELIEST = 4  # fits that are tried there
 STEPS = 20  # of each
@@ -27,7 +27,10 @@ STEPS = 20  # of each
 
 @dataclass(frozen=True)
 class Telling:
-    """A hit at the pose with this number along an axis, and the log odds it is expected to give."""
+    """A hit at the pose with this number along tcp axis 0, 1 or 2 (x, y, z).
+
+    `log_odds` is the natural logarithm of the odds it is expected to give.
+    """
 
     pose: int
     axis: int
@@ -41,7 +44,10 @@ def most_telling(
     q: np.ndarray,
     temper: float,
 ) -> Telling:
-    """The hit that best separates two or more fits, at one of q (n, dof) in rad."""
+    """The hit that best separates two or more fits, at one of q (n, dof) in rad.
+
+    `probability` of each fit; χ² counts 1/`temper`. Only the LIKELIEST are looked at.
+    """
     likeliest = np.argsort(-np.asarray(probability))[:LIKELIEST].tolist()
     fits, probability = [fits[i] for i in likeliest], [probability[i] for i in likeliest]
     gain = np.nan_to_num(separation(problem, fits, probability, q, temper))

@@ -10,7 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.acquire.separate import AXES, expected_log_odds
+from planner.acquire.outputs import AXES
+from planner.acquire.separate import expected_log_odds
 from planner.diagnose.equivalent import Receptances, receptances, system_of, waves
 from planner.diagnose.leveldata import DIFFERENCE_ERROR, MODEL_ERROR, own_parameter
 from planner.diagnose.nonlinear import Candidate, Laws, covariance

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.diagnose.columns import Column
 from planner.diagnose.drift import problem_of
 from planner.diagnose.effect import Effect
 from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
@@ -71,9 +72,12 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
         c = best.candidate
         sd = np.sqrt(np.diagonal(covariance(c, best.temper))[: len(c.x)])
-        laws = _laws(recorded, nominal, plain, weighed)
+        there, shares = _shares(weighed)
+        candidates = tuple(w.candidate for w in there)
+        problem, hit = problem_of(recorded, nominal), _hardest(recorded)
+        laws = Laws(problem, plain, candidates, shares, best.temper, hit)
         return (
-            replace(_finding(weighed), laws=laws),
+            _finding(there, laws),
             *strayed(plain, c.x, sd, best.at, best.per_value),
         )
     law = best.candidate.law.effect.replace("_", " ")
@@ -211,30 +215,22 @@ def _parameters(
     return out
 
 
-def _rivals(weighed: Sequence[Weighed]) -> dict[str, float]:
-    """Other laws at the joint of the best, and their shares."""
-    there, shares = _shares(weighed)
-    return {w.candidate.law.effect: s for w, s in zip(there[1:], shares[1:], strict=True)}
-
-
-def _shares(weighed: Sequence[Weighed]) -> tuple[list[Weighed], list[float]]:
+def _shares(weighed: Sequence[Weighed]) -> tuple[list[Weighed], tuple[float, ...]]:
     """The laws at the joint of the best, and the shares that all that is not explained gives."""
     there = [w for w in weighed if w.at == weighed[0].at]
     left = np.array([max(1 - w.explained, 1e-3) for w in there])
     shares = (left / left[0]) ** (-INDEPENDENT / 2)
-    return there, (shares / shares.sum()).tolist()
+    return there, tuple((shares / shares.sum()).tolist())
 
 
-def _laws(recorded: Recorded, nominal: Simulation, plain: Fit, weighed: Sequence[Weighed]) -> Laws:
-    there, shares = _shares(weighed)
-    hit = max((c for group in recorded.columns for c in group), key=lambda c: c.peak_n)
-    candidates = tuple(w.candidate for w in there)
-    problem = problem_of(recorded, nominal)
-    return Laws(problem, plain, candidates, tuple(shares), weighed[0].temper, hit)
+def _hardest(recorded: Recorded) -> Column:
+    return max((c for group in recorded.columns for c in group), key=lambda c: c.peak_n)
 
 
-def _finding(weighed: Sequence[Weighed]) -> Finding:
-    best = weighed[0]
+def _finding(there: Sequence[Weighed], laws: Laws) -> Finding:
+    best = there[0]
+    others = zip(there[1:], laws.probability[1:], strict=True)
+    rivals = {w.candidate.law.effect: share for w, share in others}
     (first, (k, k_sd, unit)), (second, (a, a_sd, other)) = best.parameters.items()
     name = best.candidate.law.effect
     how = {
@@ -252,5 +248,5 @@ def _finding(weighed: Sequence[Weighed]) -> Finding:
     )
     return Finding(
         name, best.at, best.log_evidence, best.parameters, text, best.per_value, best.explained,
-        tuple(_rivals(weighed).items()),
+        tuple(rivals.items()), laws,
     )  # fmt: skip

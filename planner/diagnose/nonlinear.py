@@ -61,7 +61,10 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False)
 class Laws:
-    """Laws fitted at one joint, their probabilities, and the hardest of the hits that told."""
+    """Laws fitted at one joint beside the linear fit `plain`, and how probable each is.
+
+    χ² counts 1/`temper`; `hit` is the hardest of the columns that told.
+    """
 
     problem: Problem
     plain: Fit

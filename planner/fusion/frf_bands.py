@@ -9,9 +9,9 @@ Bands of the magnitude need samples (`frf_band`; seed 000, section 3.4; Saltelli
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from planner.frf import modal
+from planner.fusion.sobol import normal_points
 
 SAMPLES = 10_000
 REACH = 5.0  # sds of a frequency over which is integrated
@@ -146,13 +146,6 @@ def _frfs(frequency_hz: np.ndarray, poles: np.ndarray, residue: np.ndarray) -> n
     """(s, 3, 3, F)."""
     chunks = [slice(start, start + CHUNK) for start in range(0, len(poles), CHUNK)]
     return np.concatenate([modal.accelerance(frequency_hz, poles[c], residue[c]) for c in chunks])
-
-
-def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
-    """Scrambled Sobol points (samples, dimensions), as standard normal ones."""
-    sobol = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
-    unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
-    return norm.ppf(np.clip(unit, 1e-6, 1 - 1e-6))
 
 
 def log_normal(median: np.ndarray, sd: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -20,9 +20,10 @@ from scipy.linalg.lapack import dtrtri
 from planner.errors import InputError
 from planner.fusion import jaxsetup
 from planner.fusion.data import Padded
-from planner.fusion.importance import Gaussians, normal_points, sample
+from planner.fusion.importance import Gaussians, sample
 from planner.fusion.kernels import Kernel, parse
 from planner.fusion.predictive import Predictive
+from planner.fusion.sobol import normal_points
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
 UNREMARKABLE = 1e-10
@@ -143,7 +144,7 @@ def fit(
     InputError if the covariance stays singular whatever is added to its diagonal.
     """
     m, p = prior.theta_mean.shape
-    normal = normal_points(samples, p, 1 + rounds)
+    normal = [normal_points(samples, p, seed) for seed in range(1, 2 + rounds)]
     y = (padded.y - prior.mean[:, None]) * padded.mask
 
     def theta(z: np.ndarray) -> np.ndarray:

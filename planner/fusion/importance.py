@@ -8,22 +8,11 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import logsumexp, ndtri, softmax
-from scipy.stats import qmc
+from scipy.special import logsumexp, softmax
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
-
-
-def normal_points(samples: int, p: int, count: int) -> list[np.ndarray]:
-    """`count` sets (samples, p) of quasi-random standard normal points, the same every time."""
-    sets = []
-    for seed in range(1, count + 1):
-        sobol = qmc.Sobol(p, scramble=True, rng=np.random.default_rng(seed))
-        unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
-        sets.append(ndtri(np.clip(unit, 1e-6, 1 - 1e-6)))
-    return sets
 
 
 def sample(

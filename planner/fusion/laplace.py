@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from planner.fusion.importance import normal_points
+from planner.fusion.sobol import normal_points
 
 STEP = 1e-3  # in sds of the prior
 COUNT = 8  # draws
@@ -36,7 +36,7 @@ def draws(
     """
     bent = curvature(slope, peak)
     factor = np.linalg.cholesky(bent)
-    normal = normal_points(count, len(peak), 1)[0]
+    normal = normal_points(count, len(peak), 1)
     # Few points do not average to nothing; their own mean is taken off, so that these do.
     normal = normal - normal.mean(axis=0)
     apart = np.linalg.solve(factor.T, normal.T).T

@@ -37,9 +37,9 @@ Terms = tuple[tuple[int, np.ndarray], ...]
 class Impedance:
     """What an effect adds to Z through r ports: Pᵀ [Σ c(s) S] P, P being `ports` (n, r, e).
 
-    `shapes` (t, r, r) are all S that occur, real and symmetric. `values` names those of Z itself,
-    by number, each with its c (n, F); `slope` those of its derivative by each of the effect's own
-    parameters.
+    Z is in N·m/rad. `shapes` (t, r, r) are all S that occur, real and symmetric. `values` names
+    those of Z itself, by number, each with its c (n, F); `slope` those of its derivative by each
+    of the effect's own parameters.
     """
 
     ports: np.ndarray

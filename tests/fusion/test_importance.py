@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from planner.fusion.importance import normal_points, sample
+from planner.fusion.importance import sample
+from planner.fusion.sobol import normal_points
 
 CENTRES = np.array([[0.5, -0.3, 0.2], [-1.0, 1.5, 0.8]])
 WIDTHS = np.array([[0.5, 0.7, 2.0], [0.15, 0.3, 0.6]])
+
+
+def points(samples, count):
+    return [normal_points(samples, 3, seed) for seed in range(1, 1 + count)]
 
 
 def score(z):
@@ -16,7 +21,7 @@ def score(z):
 
 @pytest.mark.parametrize("rounds", [1, 2])
 def test_evidence_and_posterior_of_gaussians(rounds):
-    z, evidence = sample(score, normal_points(512, 3, 1 + rounds), 2, 128)
+    z, evidence = sample(score, points(512, 1 + rounds), 2, 128)
     for j in range(2):
         total = np.diag(1 + WIDTHS[j] ** 2)
         constant = np.sum(np.log(WIDTHS[j])) + 1.5 * np.log(2 * np.pi)
@@ -33,7 +38,7 @@ def test_a_start_where_the_likelihood_lies_is_used():
     # A likelihood so narrow that no point of the prior comes near it.
     centre, width = np.array([[2.0, -2.5, 2.0]]), 0.01
     start = centre, width * np.eye(3)[None]
-    normal = normal_points(64, 3, 2)
+    normal = points(64, 2)
     z, _ = sample(
         lambda z: -0.5 * np.sum(((z - centre[:, None, :]) / width) ** 2, axis=2),
         normal,
@@ -45,10 +50,10 @@ def test_a_start_where_the_likelihood_lies_is_used():
 
 
 def test_outputs_do_not_touch_each_other():
-    both, evidence = sample(score, normal_points(64, 3, 2), 2, 16)
+    both, evidence = sample(score, points(64, 2), 2, 16)
     for j in range(2):
         alone, own = sample(
-            lambda z, j=j: score(np.repeat(z, 2, axis=0))[[j]], normal_points(64, 3, 2), 1, 16
+            lambda z, j=j: score(np.repeat(z, 2, axis=0))[[j]], points(64, 2), 1, 16
         )
         np.testing.assert_allclose(both[j], alone[0])
         np.testing.assert_allclose(evidence[j], own[0])
@@ -56,4 +61,4 @@ def test_outputs_do_not_touch_each_other():
 
 def test_where_nothing_is_possible_is_said():
     with pytest.raises(np.linalg.LinAlgError):
-        sample(lambda z: np.full(z.shape[:2], -np.inf), normal_points(64, 3, 2), 2, 16)
+        sample(lambda z: np.full(z.shape[:2], -np.inf), points(64, 2), 2, 16)
