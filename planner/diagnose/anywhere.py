@@ -16,6 +16,7 @@ from planner.diagnose.effects.extra import ExtraCompliance
 from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.effects.resonator import LocalResonator
 from planner.diagnose.fit import GLANCE, Fit, Problem, approached, points
+from planner.diagnose.side_by_side import side_by_side
 from planner.identify.held_out import farthest_first
 
 ROUGH = replace(GLANCE, lines=24, inertial=False)
@@ -42,21 +43,27 @@ def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
         found = approached(misfit, [misfit.mean if x is None else x], steps)
         x = found.x
     assert found is not None
-    misfits = [few.misfit(effect, GLANCE) for effect in _sets(found, effects)]
-    return tuple(approached(misfit, points(misfit, found)[:1], FOLLOWED) for misfit in misfits)
+    end = found
+    return tuple(side_by_side(lambda e: _from(few, end, e, 1), _sets(end, effects)))
 
 
 def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits of each resonator beside what each of some `suspects` has."""
     few = _few(problem)
-    out = []
-    for suspect in rough:
-        for e in effects:
-            pair = together(suspect.effect, e) if isinstance(e, LocalResonator) else None
-            if pair is not None:
-                misfit = few.misfit(pair, GLANCE)
-                out.append(approached(misfit, points(misfit, suspect), FOLLOWED))
-    return tuple(out)
+    resonators = [e for e in effects if isinstance(e, LocalResonator)]
+    pairs = [
+        (suspect, pair)
+        for suspect in rough
+        for e in resonators
+        if (pair := together(suspect.effect, e)) is not None
+    ]
+    return tuple(side_by_side(lambda both: _from(few, *both), pairs))
+
+
+def _from(problem: Problem, fit: Fit, effect: Effect, most: int | None = None) -> Fit:
+    """A rough fit of an effect from where another is, and from `most` starts of what is new."""
+    misfit = problem.misfit(effect, GLANCE)
+    return approached(misfit, points(misfit, fit)[:most], FOLLOWED)
 
 
 def _few(problem: Problem) -> Problem:

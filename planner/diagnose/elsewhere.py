@@ -10,6 +10,7 @@ import numpy as np
 from planner.diagnose.both import Both, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.fit import CLOSE, Fit, Problem, approached, points
+from planner.diagnose.side_by_side import side_by_side
 
 MOVABLE = "added_mass", "local_resonator"
 KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
@@ -17,7 +18,7 @@ KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
 
 def elsewhere(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits with each of its movable effects at each other place."""
-    out = []
+    moves: list[tuple[Effect, Effect, Effect]] = []
     for part in fit.effect.parts():
         rest = [p for p in fit.effect.parts() if p is not part]
         for to in effects:
@@ -25,8 +26,8 @@ def elsewhere(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fi
                 continue
             effect = together(Both.of(*rest), to) if rest else to
             if effect is not None:
-                out.append(_moved(problem, fit, part, to, effect))
-    return tuple(out)
+                moves.append((part, to, effect))
+    return tuple(side_by_side(lambda move: _moved(problem, fit, *move), moves))
 
 
 def _moved(problem: Problem, fit: Fit, part: Effect, to: Effect, effect: Effect) -> Fit:

@@ -11,6 +11,7 @@ from planner.diagnose.objective import ByPose, Misfit, own_names
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
 from planner.identify.identify import QUICK, STAGES, identify
+from planner.identify.objective import Quadratic
 from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.identify.solver import Minimum, minimise
 from planner.physics.gradient import Inertias
@@ -166,11 +167,11 @@ class Fit:
 def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
     """From the prior's median by way of logarithms, and from each warm one; on the finest lines."""
     coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
-    ends = [_best(coarse, [_approach(problem, effect)])]
+    ends = [_best(coarse, [_approach(problem, effect)]).x]
     for earlier in warm:
-        ends.append(_best(close, points(close, earlier)))
+        ends.append(_best(close, points(close, earlier)).x)
     fine = problem.misfit(effect, FINE)
-    return _at(fine, _minimise(fine, _best(close, ends), LOOSE, LAST_STEPS).x)
+    return _at(fine, _minimise(fine, _best(close, ends).x, LOOSE, LAST_STEPS))
 
 
 def staged(problem: Problem, effect: Effect) -> Fit:
@@ -186,7 +187,7 @@ def staged(problem: Problem, effect: Effect) -> Fit:
             problem.frfs, problem.q, body.simulation, priors,
             band_hz=problem.band_hz, starts=1, effort=effort,
         )  # fmt: skip
-        fits.append(settle(problem, _at(problem.misfit(effect, FINE), found.mean)))
+        fits.append(_settled(problem.misfit(effect, FINE), found.mean))
     return min(fits, key=lambda f: f.misfit(f.x).value)
 
 
@@ -196,7 +197,7 @@ def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     ends = [_best(coarse, points(coarse, warm))]
     if len(effect.parts()) == 1:
         ends.append(_best(coarse, [_approach(problem, effect)]))
-    return _at(coarse, min(ends, key=lambda x: coarse(x).value))
+    return _at(coarse, min(ends, key=lambda m: m.at.value))
 
 
 def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
@@ -209,17 +210,19 @@ def _approach(problem: Problem, effect: Effect) -> np.ndarray:
     rough = problem.misfit(effect, GLANCE)
     b = rough.split[1]
     starts = [np.concatenate([rough.mean[:b], psi]) for psi in effect.starts()]
-    return _best(rough, starts)
+    return _best(rough, starts).x
 
 
-def _best(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> np.ndarray:
+def _best(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> Minimum:
     """Where the best of the starts leads."""
     if len(starts) > KEPT:
-        starts = sorted(starts, key=lambda x: _hope(misfit, x))[:KEPT]
-    if len(starts) > 1:
-        tried = [_minimise(misfit, x, LOOSE, 2) for x in starts]
-        starts = [min(tried, key=lambda m: m.at.value).x]
-    return _minimise(misfit, starts[0], LOOSE, steps).x
+        held = replace(misfit, inertial=False)
+        starts = sorted(starts, key=lambda x: _hope(held, x))[:KEPT]
+    if len(starts) == 1:
+        return _minimise(misfit, starts[0], LOOSE, steps)
+    tried = [_minimise(misfit, x, LOOSE, 2) for x in starts]
+    first = min(tried, key=lambda m: m.at.value)
+    return _minimise(misfit, first.x, LOOSE, steps, first.at)
 
 
 def _hope(misfit: Misfit, x: np.ndarray) -> float:
@@ -237,22 +240,26 @@ def approached(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_
 def carried_on(problem: Problem, fit: Fit, effect: Effect, steps: int = SETTLED[1]) -> Fit:
     """An effect fitted to the end from where another fit, perhaps of other data, is."""
     misfit = problem.misfit(effect, FINE)
-    x = points(misfit, fit)[0]
-    return settle(problem, _at(misfit, x), steps=steps)
+    return _settled(misfit, points(misfit, fit)[0], steps)
 
 
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
-    misfit = problem.misfit(found.effect, grade)
-    return _at(misfit, _minimise(misfit, found.x, SETTLED[0], steps).x)
+    return _settled(problem.misfit(found.effect, grade), found.x, steps)
 
 
-def _minimise(misfit: Misfit, x: np.ndarray, tolerance: float, steps: int) -> Minimum:
-    return minimise(misfit, x, tolerance, steps, longest=misfit.longest)
+def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
+    return _at(misfit, _minimise(misfit, x, SETTLED[0], steps))
 
 
-def _at(misfit: Misfit, x: np.ndarray) -> Fit:
-    return Fit(misfit.effect, misfit, x, misfit.by_pose(x))
+def _minimise(
+    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: Quadratic | None = None
+) -> Minimum:
+    return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at)
+
+
+def _at(misfit: Misfit, found: Minimum) -> Fit:
+    return Fit(misfit.effect, misfit, found.x, misfit.by_pose(found.x))
 
 
 def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:

@@ -1,12 +1,20 @@
 """Misfit of a simulation with one effect to measured FRFs, pose by pose, with its gradient."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from planner.diagnose.effect import Effect, Setting
 from planner.identify.data import Measured
-from planner.identify.objective import FARTHEST, LOG_DROP, LOG_FLOOR, LOG_PRIOR, Quadratic
+from planner.identify.objective import (
+    FARTHEST,
+    LOG_DROP,
+    LOG_FLOOR,
+    LOG_PRIOR,
+    Quadratic,
+    positive,
+)
 from planner.identify.parameters import Parametrisation
 from planner.identify.solver import LONGEST
 from planner.physics.gradient import Inertias, response_gradient
@@ -46,39 +54,39 @@ class Misfit:
     logarithmic: bool = False
     inertial: bool = True
 
-    @property
+    @cached_property
     def split(self) -> tuple[int, int]:
         """Where φ and ψ begin in x."""
         count = len(self.parametrisation.parameters)
         return count, count + len(self.parametrisation.nuisances)
 
-    @property
+    @cached_property
     def names(self) -> list[str]:
         """Of the entries of x."""
         p = self.parametrisation
         return [*(s.name for s in p.parameters), *p.nuisances, *own_names(self.effect)]
 
-    @property
+    @cached_property
     def mean(self) -> np.ndarray:
         """Prior mean of x."""
         p = self.parametrisation
         own = [q.mean for q in self.effect.quantities]
         return np.concatenate([p.mean, np.zeros(len(p.nuisances)), own])
 
-    @property
+    @cached_property
     def sd(self) -> np.ndarray:
         """Prior sd of x."""
         p = self.parametrisation
         own = [q.sd for q in self.effect.quantities]
         return np.concatenate([p.log_sd, np.ones(len(p.nuisances)), own])
 
-    @property
+    @cached_property
     def longest(self) -> np.ndarray:
         """(D,) by how much an entry of x may move in one step."""
         b = self.split[1]
         return np.concatenate([np.full(b, LONGEST), STRIDE * self.sd[b:]])
 
-    @property
+    @cached_property
     def weight(self) -> np.ndarray:
         """(n, 3, 3, F): one over the sd of the residual's real (and imaginary) part."""
         m = self.measured
@@ -88,12 +96,12 @@ class Misfit:
         kept = relative < LOG_DROP
         return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
 
-    @property
+    @cached_property
     def counts(self) -> np.ndarray:
         """(n,) numbers of real residuals."""
         return 2 * np.count_nonzero(self.weight, axis=(1, 2, 3))
 
-    @property
+    @cached_property
     def free(self) -> np.ndarray:
         """(D,) bool: which entries of x may move."""
         a, b = self.split
@@ -149,7 +157,7 @@ class Misfit:
         if np.abs((x - self.mean) / self.sd).max() > FARTHEST:
             return False
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        return bool(np.linalg.eigvalsh(mass)[:, 0].min() > 0)
+        return positive(mass)
 
     def __call__(self, x: np.ndarray) -> Quadratic:
         """Data and prior together; ∞ where x cannot be."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -10,7 +11,19 @@ from planner.diagnose.both import Both, Family, families, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects.resonator import LocalResonator
 from planner.diagnose.elsewhere import elsewhere
-from planner.diagnose.fit import CLOSE, Fit, Problem, carried_on, glance, promise, settle, staged
+from planner.diagnose.fit import (
+    CLOSE,
+    FINE,
+    Fit,
+    Grade,
+    Problem,
+    carried_on,
+    glance,
+    promise,
+    settle,
+    staged,
+)
+from planner.diagnose.side_by_side import side_by_side
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
 
@@ -84,7 +97,8 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
     """
     rough = suspects(problem, effects)
     # The softest place comes first: alone it may be all, though more places fit more closely.
-    ends = [*_followed(problem, rough), *(staged(problem, e) for e in families(effects))]
+    ends = _followed(problem, rough)
+    ends += side_by_side(partial(staged, problem), families(effects))
     missed = bool(ends) and min(f.per_value for f in ends) > ENOUGH
     if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
         ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
@@ -94,8 +108,13 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
     """The best to the end, the others, and the first of them if need be, less closely."""
     few = _and_best(rough, LAST) if first else _first(rough, LAST)
-    close = [settle(problem, f, CLOSE, STEPS) for f in few]
-    return [settle(problem, f, steps=LAST_STEPS) for f in _first(close, POINTED)]
+    return _settled(problem, _first(_settled(problem, few, CLOSE, STEPS), POINTED))
+
+
+def _settled(
+    problem: Problem, fits: Sequence[Fit], grade: Grade = FINE, steps: int = LAST_STEPS
+) -> list[Fit]:
+    return side_by_side(lambda f: settle(problem, f, grade, steps), fits)
 
 
 def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
@@ -109,9 +128,7 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     if best.per_value <= ENOUGH:
         return found
     near = _first(elsewhere(problem, best, effects), MOVED)
-    return Found(
-        (*found.finalists, *(settle(problem, f, steps=LAST_STEPS) for f in near)), found.left
-    )
+    return Found((*found.finalists, *_settled(problem, near)), found.left)
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
@@ -150,13 +167,14 @@ def _lessened(problem: Problem, found: Found) -> Found:
     It may have led the fit out of a wrong minimum, and then explain nothing itself.
     """
     there = [f for f in found.finalists if f.effect.at]
-    again = []
+    less: list[tuple[Fit, Effect]] = []
     for whole in sorted(there, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
         parts = whole.effect.parts()
         for part in parts:
             kept = [p for p in parts if p is not part]
             effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
-            again.append(carried_on(problem, whole, effect, LAST_STEPS))
+            less.append((whole, effect))
+    again = side_by_side(lambda pair: carried_on(problem, *pair, LAST_STEPS), less)
     return Found((*found.finalists, *again), found.left)
 
 
@@ -165,8 +183,9 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
     if not best.effect.at or best.per_value > ENOUGH:
         return found
-    pairs = [together(best.effect, e) for e in effects if _strayed(best, e)]
-    more = tuple(carried_on(problem, best, pair, LAST_STEPS) for pair in pairs if pair is not None)
+    strayed = [e for e in effects if _strayed(best, e)]
+    pairs = [p for e in strayed if (p := together(best.effect, e)) is not None]
+    more = side_by_side(lambda pair: carried_on(problem, best, pair, LAST_STEPS), pairs)
     return Found((*found.finalists, *more), found.left)
 
 
@@ -230,13 +249,11 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     none = settle(problem, warm, CLOSE, STEPS)
     clearly = none.per_value > CLEARLY
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
-    fits = []
-    for number, effect in enumerate(effects):
-        tell(_words(effect), 0.6 * number / max(len(effects), 1))
-        fits.append((glance if clearly else promise)(few, effect, none))
+    looked = partial(glance if clearly else promise, few, warm=none)
+    fits = side_by_side(looked, effects, lambda n: tell(_words(effects[n]), 0.6 * n / len(effects)))
     if clearly:
         order = np.argsort([f.misfit(f.x).value for f in fits])
-        close = [settle(problem, fits[i], CLOSE, STEPS) for i in order[:FIRST]]
+        close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
         worst = max(_behind([none, *close]))
         left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
     else:
@@ -244,12 +261,11 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
         if min(_behind([none, *fits])[1:]) - _behind([none, *fits])[0] > -HOPELESS:
             kept, more = _cut([none, *fits], 1)
             return Found((settle(problem, none),), tuple(more))
-        close = [settle(problem, f, CLOSE, STEPS) for f in kept[1:]]
+        close = _settled(problem, kept[1:], CLOSE, STEPS)
     tell("following the best", 0.8)
     kept, more = _cut([none, *close], LAST)
     tell("settling", 0.9)
-    ends = tuple(settle(problem, f, steps=LAST_STEPS) for f in kept)
-    return Found(ends, (*left, *more))
+    return Found(tuple(_settled(problem, kept)), (*left, *more))
 
 
 def _words(effect: Effect) -> str:

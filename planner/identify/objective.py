@@ -94,7 +94,7 @@ class Objective:
         away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
         scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
         beyond = self._beyond(phi)
-        possible = not self.free_inertia or np.linalg.eigvalsh(mass)[:, 0].min() > 0
+        possible = not self.free_inertia or positive(mass)
         if not possible or not np.isfinite(beyond[0]) or np.abs(away).max() > FARTHEST:
             nothing = np.zeros(len(x))
             return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
@@ -150,3 +150,12 @@ def _normal_equations(residual: np.ndarray, slope: np.ndarray) -> tuple[np.ndarr
     for block in j:
         normal += block @ block.T
     return gradient, normal
+
+
+def positive(mass: np.ndarray) -> bool:
+    """Whether all of the mass matrices (n, e, e) are positive definite."""
+    try:
+        np.linalg.cholesky(mass)
+    except np.linalg.LinAlgError:
+        return False
+    return True

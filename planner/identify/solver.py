@@ -39,13 +39,16 @@ def minimise(
     most: int,
     progress: Callable[[int, float], None] | None = None,
     longest: float | np.ndarray = LONGEST,
+    at: Quadratic | None = None,
 ) -> Minimum:
     """Least value from `start`, until a step would gain less than `tolerance` of it.
+
+    `at` is the objective there, where that is known.
 
     Damping follows Nielsen 1999; each step is shortened so that no entry moves by over
     `longest` (that of each, or one for all).
     """
-    x, at = start, objective(start)
+    x, at = start, at or objective(start)
     damping, grow = 1e-2, 2.0
     for iteration in range(1, most + 1):
         if progress:
@@ -54,9 +57,8 @@ def minimise(
         # In units in which the diagonal is 1: parameters of any size are solved for as well.
         unit = 1 / np.sqrt(scale)
         damped = at.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
-        step = -unit * scipy.linalg.solve(
-            damped, unit * at.gradient, assume_a="pos", check_finite=False
-        )
+        factor = scipy.linalg.cho_factor(damped, overwrite_a=True, check_finite=False)
+        step = -unit * scipy.linalg.cho_solve(factor, unit * at.gradient, check_finite=False)
         step *= min(1.0, 1 / max(float(np.max(np.abs(step) / longest)), 1e-300))
         expected = -(at.gradient @ step + step @ at.normal @ step / 2)
         if expected <= tolerance * at.value:

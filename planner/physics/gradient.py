@@ -18,7 +18,8 @@ from planner.robot.elastic import Matrices
 class Inertias:
     """How p inertial parameters of each of B bodies move the mass matrix: Σ Jᵀ basis J.
 
-    `jacobians` (n, B, 6, e) of the bodies at n poses, `basis` (B, p, 6, 6) per unit of parameter.
+    `jacobians` (n, B, 6, e) of the bodies at n poses; `basis` (B, p, 6, 6), symmetric, per unit of
+    parameter.
     """
 
     jacobians: np.ndarray
@@ -156,20 +157,26 @@ def _solutions(
 def _by_inertia(
     inertias: Inertias, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray, out: np.ndarray
 ) -> None:
-    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F)."""
+    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F).
+
+    The basis is symmetric: 21 products of a body's six motions, added up in one real product.
+    """
     n, bodies, _, e = inertias.jacobians.shape
     p, lines = inertias.basis.shape[1], s.shape[1]
-    weights = inertias.basis.reshape(bodies, p * 6, 6)
+    upper = np.triu_indices(6)
+    weights = inertias.basis[:, :, upper[0], upper[1]]
+    products = np.empty((bodies, len(upper[0]), *out.shape[2:]), dtype=complex)
     for i in range(n):
         jacobian = inertias.jacobians[i].reshape(-1, e)
-        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, -1, lines)
-        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, lines)
-        for b in range(bodies):
-            momentum = _times(weights[b], hit[b]).reshape(p, 6, 1, -1, lines)
-            part = out[i, b * p : (b + 1) * p]
-            np.multiply(sensor[b, 0][:, None], momentum[:, 0], out=part)
-            for axis in range(1, 6):
-                part += sensor[b, axis][:, None] * momentum[:, axis]
+        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, 1, -1, lines)
+        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, 1, lines)
+        for axis in range(6):
+            first = 6 * axis - axis * (axis - 1) // 2
+            part = products[:, first : first + 6 - axis]
+            np.multiply(sensor[:, axis : axis + 1], hit[:, axis:], out=part)
+            part[:, 1:] += sensor[:, axis + 1 :] * hit[:, axis : axis + 1]
+        flat = products.reshape(bodies, len(upper[0]), -1).view(float)
+        np.matmul(weights, flat, out=out[i].reshape(bodies, p, -1).view(float))
 
 
 def _moved(ports: np.ndarray, x: np.ndarray) -> np.ndarray:

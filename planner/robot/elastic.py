@@ -59,7 +59,6 @@ class ElasticModel:
         self._waves = tuple((self._own(w.joint), w) for w in robot.config.harmonic)
         self._virtual = virtual_model(robot, inertia_change)
         self._model = self._virtual.model
-        self._data = self._model.createData()
         self._elastic = self._virtual.elastic
         self._grid = np.ix_(self._elastic, self._elastic)
         self._check_mass()
@@ -120,24 +119,25 @@ class ElasticModel:
         n, e, robot = len(q), self.size, self.robot
         ids = [[robot.frame_id("hit frame", name) for name in hits] or [robot.tcp_id]]
         ids += [[robot.frame_id("sensor frame", name) for name in sensors] or [robot.sensor_id]]
+        data = self._model.createData()  # one for each call, so that threads do not meet in it
         mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
         out = [np.empty((n, len(group), 3, e)) for group in ids]
         for i, row in enumerate(q):
-            full = self._standing(row)
+            full = self._standing(row, data)
             if robot.config.geometric_stiffness:
-                geometric[i] = self._gravity_stiffness(full)
+                geometric[i] = self._gravity_stiffness(full, data)
             for number, wave in self._waves:
                 angle = wave.order * row[robot.joint_names.index(wave.joint)]
                 change = wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
                 geometric[i, number, number] += change
-            crba = pin.crba(self._model, self._data, full)
+            crba = pin.crba(self._model, data, full)
             upper = np.triu(crba)
             mass[i] = (upper + np.triu(crba, 1).T)[self._grid]
             for group, jacobians in zip(ids, out, strict=True):
                 for k, number in enumerate(group):
                     frame = self._virtual.frames[number]
                     jacobians[i, k] = pin.computeFrameJacobian(
-                        self._model, self._data, full, frame, pin.LOCAL
+                        self._model, data, full, frame, pin.LOCAL
                     )[:3, self._elastic]
         hit, sensor = (jacobians.reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric)
@@ -149,29 +149,30 @@ class ElasticModel:
         spatial inertias I of the bodies (`virtual.inertia_basis`), M = Σ Jᵀ I J.
         """
         q = np.atleast_2d(q)
+        data = self._model.createData()
         out = np.empty((len(q), len(self.bodies), 6, self.size))
         for i, row in enumerate(q):
-            pin.computeJointJacobians(self._model, self._data, self._standing(row))
+            pin.computeJointJacobians(self._model, data, self._standing(row, data))
             for b, joint in enumerate(self._virtual.carriers):
-                jacobian = pin.getJointJacobian(self._model, self._data, joint, pin.LOCAL)
+                jacobian = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
                 out[i, b] = jacobian[:, self._elastic]
         return out
 
-    def _standing(self, q: np.ndarray) -> np.ndarray:
+    def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), sagged if robot.toml asks for it."""
         full = np.zeros(self._model.nq)
         full[self._virtual.rigid] = q
-        return self._sagged(full) if self.robot.config.geometric_stiffness else full
+        return self._sagged(full, data) if self.robot.config.geometric_stiffness else full
 
-    def _sagged(self, full: np.ndarray) -> np.ndarray:
+    def _sagged(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Where springs of the stated stiffness carry the weight: K δ = −g(q + δ)."""
         for _ in range(SAG_STEPS):
-            weight = pin.computeGeneralizedGravity(self._model, self._data, full)
+            weight = pin.computeGeneralizedGravity(self._model, data, full)
             full[self._elastic] = -weight[self._elastic] / self.stiffness
         return full
 
-    def _gravity_stiffness(self, full: np.ndarray) -> np.ndarray:
+    def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Second derivative of the potential energy of the weight, (e, e)."""
-        gradient = pin.computeGeneralizedGravityDerivatives(self._model, self._data, full)
+        gradient = pin.computeGeneralizedGravityDerivatives(self._model, data, full)
         part = np.array(gradient)[self._grid]
         return (part + part.T) / 2
