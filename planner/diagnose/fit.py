@@ -8,9 +8,10 @@ import numpy as np
 
 from planner.diagnose.effect import Effect, Setting
 from planner.diagnose.objective import ByPose, Misfit, own_names
+from planner.diagnose.side_by_side import side_by_side
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
-from planner.identify.identify import QUICK, STAGES, identify
+from planner.identify.identify import QUICK, STAGES, Effort, identify
 from planner.identify.objective import Quadratic
 from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.identify.solver import Minimum, minimise
@@ -181,14 +182,15 @@ def staged(problem: Problem, effect: Effect) -> Fit:
     """
     body = _prepared(problem, effect)
     priors = effect.priors(body.simulation, problem.priors)
-    fits = []
-    for effort in (QUICK, PATIENT):
+
+    def identified(effort: Effort) -> Fit:
         found = identify(
             problem.frfs, problem.q, body.simulation, priors,
             band_hz=problem.band_hz, starts=1, effort=effort,
         )  # fmt: skip
-        fits.append(_settled(problem.misfit(effect, FINE), found.mean))
-    return min(fits, key=lambda f: f.misfit(f.x).value)
+        return _settled(problem.misfit(effect, FINE), found.mean)
+
+    return min(side_by_side(identified, (QUICK, PATIENT)), key=lambda f: f.misfit(f.x).value)
 
 
 def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:

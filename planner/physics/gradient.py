@@ -57,16 +57,12 @@ class Impedance:
     def gradient(self, x_hit: np.ndarray, x_sensor: np.ndarray, out: np.ndarray) -> None:
         """X_sᵀ dZ X_h into out (n, p, 3s, 3h, F), of solutions (n, e, 3, F)."""
         hit, sensor = _moved(self.ports, x_hit), _moved(self.ports, x_sensor)
+        each = np.empty((len(hit), len(self.shapes), *out.shape[2:]), dtype=complex)
+        _between(self.shapes, sensor, hit, each)
         out[:] = 0.0
-        for number in {t for terms in self.slope for t, _ in terms}:
-            shape = self.shapes[number]
-            pushed = _moved(np.broadcast_to(shape, (len(hit), *shape.shape)), hit)
-            rows = np.flatnonzero(shape.any(axis=1)).tolist()
-            both = sum(sensor[:, i, :, None] * pushed[:, i, None] for i in rows)
-            for parameter, terms in enumerate(self.slope):
-                for t, coefficient in terms:
-                    if t == number:
-                        out[:, parameter] += coefficient[:, None, None] * both
+        for parameter, terms in enumerate(self.slope):
+            for number, coefficient in terms:
+                out[:, parameter] += coefficient[:, None, None] * each[:, number]
 
 
 def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:
@@ -157,26 +153,34 @@ def _solutions(
 def _by_inertia(
     inertias: Inertias, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray, out: np.ndarray
 ) -> None:
-    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F).
-
-    The basis is symmetric: 21 products of a body's six motions, added up in one real product.
-    """
+    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F)."""
     n, bodies, _, e = inertias.jacobians.shape
-    p, lines = inertias.basis.shape[1], s.shape[1]
-    upper = np.triu_indices(6)
-    weights = inertias.basis[:, :, upper[0], upper[1]]
-    products = np.empty((bodies, len(upper[0]), *out.shape[2:]), dtype=complex)
+    lines = s.shape[1]
     for i in range(n):
         jacobian = inertias.jacobians[i].reshape(-1, e)
-        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, 1, -1, lines)
-        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, 1, lines)
-        for axis in range(6):
-            first = 6 * axis - axis * (axis - 1) // 2
-            part = products[:, first : first + 6 - axis]
-            np.multiply(sensor[:, axis : axis + 1], hit[:, axis:], out=part)
-            part[:, 1:] += sensor[:, axis + 1 :] * hit[:, axis : axis + 1]
-        flat = products.reshape(bodies, len(upper[0]), -1).view(float)
-        np.matmul(weights, flat, out=out[i].reshape(bodies, p, -1).view(float))
+        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, -1, lines)
+        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, lines)
+        _between(inertias.basis, sensor, hit, out[i].reshape(bodies, -1, *out.shape[2:]))
+
+
+def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.ndarray) -> None:
+    """sensorᵀ S hit into out (n, t, 3s, 3h, F), of motions (n, r, 3, F).
+
+    `shapes` S (t, r, r), or (n, t, r, r), are real and symmetric: the products of the motions, two
+    and two, are added up in one real product.
+    """
+    n, r = sensor.shape[:2]
+    upper = np.triu_indices(r)
+    products = np.empty((n, len(upper[0]), *out.shape[2:]), dtype=complex)
+    end = 0
+    for port in range(r):
+        start, end = end, end + r - port
+        part = products[:, start:end]
+        np.multiply(sensor[:, port, None, :, None], hit[:, port:, None], out=part)
+        part[:, 1:] += sensor[:, port + 1 :, :, None] * hit[:, port, None, None]
+    flat = products.reshape(n, len(upper[0]), -1).view(float)
+    weights = shapes[..., upper[0], upper[1]]
+    np.matmul(weights, flat, out=out.reshape(n, out.shape[1], -1).view(float))
 
 
 def _moved(ports: np.ndarray, x: np.ndarray) -> np.ndarray:

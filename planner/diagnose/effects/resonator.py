@@ -13,6 +13,8 @@ from planner.physics.simulation import Simulation
 
 SHARE = 0.05  # of the mean mass of the links
 FREQUENCIES = 6  # starts over the band
+# (3, 3, 3): what turns with a link at w moves what lies at e_v by ACROSS[v] w = w × e_v
+ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
 LITTLE = 0.3  # of the middling mass: starts change little, and their gradients tell how much
 
 
@@ -71,7 +73,7 @@ class LocalResonator(Effect):
         length = np.linalg.norm(psi[3:6]) + 1e-12
         d, place = psi[3:6] / length, psi[6:9]
         jacobian = setting.body(joint_of(setting.simulation, self.at))
-        linear = jacobian[:, :3] + np.cross(jacobian[:, 3:], place, axisa=1, axisc=1)
+        linear = jacobian[:, :3] + np.tensordot(place, ACROSS, 1) @ jacobian[:, 3:]
         s = setting.s
         below = s**2 + 2 * zeta * omega * s + omega**2
         above = 2 * zeta * omega * s + omega**2
@@ -84,9 +86,8 @@ class LocalResonator(Effect):
         # Ports: the place's motion and the link's turn, which moves what lies at e by turn × e.
         shapes = [_moving(np.eye(3)), _moving(along)]
         shapes += [_moving(np.outer(turn[v], d) + np.outer(d, turn[v])) for v in range(3)]
-        across = [np.cross(np.eye(3), e).T for e in np.eye(3)]
-        shapes += [_turning(one) for one in across]
-        shapes += [_turning(along @ one) for one in across]
+        shapes += [_turning(one) for one in ACROSS]
+        shapes += [_turning(along @ one) for one in ACROSS]
         m = mass * s**2
         u = m * (t - 1)
         values = (0, m), (1, u)
