@@ -17,6 +17,7 @@ from planner.acquire.outputs import AXES
 from planner.acquire.parameters import FrfNoise
 from planner.diagnose.fit import Fit, Problem, carried_on
 from planner.diagnose.predict import misfit_at
+from planner.diagnose.side_by_side import side_by_side
 from planner.frf.types import Frf
 
 LINES = 96  # evenly over the band
@@ -53,16 +54,17 @@ def most_telling(
     gain = np.nan_to_num(separation(problem, fits, probability, q, temper))
     share = np.array(probability) / np.sum(probability)
     axes = np.argmax(gain, axis=1)
-    promising = np.argsort(-np.max(gain, axis=1))[:TRIED]
-    settled = [carried_on(problem, f, f.effect) for f in fits]
-    tried = [
-        Telling(int(i), int(axes[i]), _tried(problem, settled, share, q[i], int(axes[i]), temper))
-        for i in promising
-    ]
-    return max(tried, key=lambda t: t.log_odds)
+    promising = np.argsort(-np.max(gain, axis=1))[:TRIED].tolist()
+    settled = side_by_side(lambda f: carried_on(problem, f, f.effect), fits)
+
+    def tried(pose: int) -> Telling:
+        axis = int(axes[pose])
+        return Telling(pose, axis, odds_after(problem, settled, share, q[pose], axis, temper))
+
+    return max(side_by_side(tried, promising), key=lambda t: t.log_odds)
 
 
-def _tried(
+def odds_after(
     problem: Problem,
     fits: Sequence[Fit],
     share: np.ndarray,
@@ -70,7 +72,10 @@ def _tried(
     axis: int,
     temper: float,
 ) -> float:
-    """What a hit at q (dof,) gives when all are fitted to what each of them foretells."""
+    """Logarithm of the odds that a hit at q (dof,) gives, all fitted to what each foretells.
+
+    `fits` are settled on the problem's recordings; `share` (fits,) sums to 1.
+    """
     before = np.array([f.log_evidence(temper) for f in fits])
     out = 0.0
     for true, source in enumerate(fits):

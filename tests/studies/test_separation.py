@@ -10,13 +10,15 @@ that keeps finished ones. Seeds 1-9 and 301-582 were used in development.
 
 import json
 import os
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition_cases import LINES, MODES, ROBOTS, Case
-from planner.acquire.separate import most_telling
+from planner.acquire.separate import most_telling, odds_after, separation
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
@@ -25,6 +27,8 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.diagnose.diagnose import Diagnosis, again, diagnose
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
+from planner.diagnose.fit import carried_on
+from planner.diagnose.side_by_side import side_by_side
 from planner.frf.types import Frf
 from planner.truth.deviation import Deviation
 from planner.truth.effects import LINEAR
@@ -38,6 +42,7 @@ FIRST = int(os.environ.get("STUDY_FIRST", "601"))
 KINDS = ("transverse_compliance", "link_flexibility", "added_mass")
 START, MOST, SURE = 4, 8, 0.95
 TRIES = 400
+EVERY = 4  # poses of the cell that are tried for how much a hit can tell
 NOISE = 0.15  # of the FRF's rms: with less, four hits leave hardly anything tied
 
 
@@ -123,8 +128,8 @@ def until_decided(case: Case, poses, axes, found: Diagnosis, true, strategy: str
     return MOST + 1
 
 
-def played(seed: int, folder: Path) -> dict | None:
-    """Further hits by strategy; None where four poses decide it, or do not hold the truth."""
+def begun(seed: int, folder: Path) -> tuple[Campaign, Drawn, np.ndarray, Diagnosis]:
+    """A case with its four poses hit along the axes given, and what they say."""
     case, drawn, poses = concealed(seed, folder)
     axes = np.random.default_rng(seed).integers(0, 3, START)
     campaign = Campaign(case)
@@ -133,7 +138,13 @@ def played(seed: int, folder: Path) -> dict | None:
     simulation = case.cell.simulation
     assert simulation is not None
     wanted = [e for e in library(simulation) if e.name in (*KINDS, "base_compliance")]
-    found = campaign.diagnosed(wanted)
+    return campaign, drawn, axes, campaign.diagnosed(wanted)
+
+
+def played(seed: int, folder: Path) -> dict:
+    """Further hits by strategy where four poses leave the truth and others tied."""
+    campaign, drawn, axes, found = begun(seed, folder)
+    case, poses = campaign.case, np.array(campaign.q)
     true = (drawn.effect, drawn.at)
     tied = [c.places for c in found.undecided if c.fit is not None]
     said = {"true": true, "candidates": tied, "shares": [c.probability for c in found.undecided]}
@@ -146,15 +157,20 @@ def played(seed: int, folder: Path) -> dict | None:
     return {"seed": seed, "tied": True, **said, **out}
 
 
-def test_tied_candidates_are_decided_with_half_as_many_hits(tmp_path):
-    keep = Path(os.environ.get("STUDY_KEPT", tmp_path))
-    keep.mkdir(parents=True, exist_ok=True)
-    found, neither = [], []
+def kept(name: str, folder: Path, make: Callable[[], dict]) -> dict:
+    """What was made before, or now."""
+    path = Path(os.environ.get("STUDY_KEPT", folder)) / f"{name}.json"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(make()))
+    return json.loads(path.read_text())
+
+
+def tied_cases(folder: Path) -> tuple[list[dict], list[dict], int]:
+    """SEEDS cases that one of the ways decides, those that neither does, and how many were made."""
+    found, neither, seed = [], [], FIRST
     for seed in range(FIRST, FIRST + TRIES):
-        path = keep / f"separation_{seed}.json"
-        if not path.exists():
-            path.write_text(json.dumps(played(seed, tmp_path)))
-        case = json.loads(path.read_text())
+        case = kept(f"separation_{seed}", folder, partial(played, seed, folder))
         if not case["tied"]:
             continue
         print(case, flush=True)
@@ -162,13 +178,55 @@ def test_tied_candidates_are_decided_with_half_as_many_hits(tmp_path):
         (found if decided else neither).append(case)
         if len(found) == SEEDS:
             break
+    return found, neither, seed - FIRST + 1
+
+
+def told(seed: int, folder: Path) -> dict[str, float]:
+    """Logarithm of the odds that the first further hit is expected to give, chosen so or so."""
+    campaign, _, _, found = begun(seed, folder)
+    offered, problem, temper = campaign.case.cell.candidates.q, found.problem, found.temper
+    tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
+    fits, share = [f for f, _ in tied], np.array([p for _, p in tied]) / sum(p for _, p in tied)
+    settled = [carried_on(problem, f, f.effect) for f in fits]
+
+    def odds(q: np.ndarray, axes: tuple[int, ...]) -> float:
+        return odds_after(problem, settled, share, q, axes[0], temper)
+
+    poses = offered[::EVERY]
+    best = np.argmax(
+        np.nan_to_num(separation(problem, fits, share.tolist(), poses, temper)), axis=1
+    )
+    each = side_by_side(lambda i: odds(poses[i], (int(best[i]),)), range(len(poses)))
+    chosen = odds(*campaign.separating(found))
+    return {
+        "best": max(chosen, *each),
+        "separating": chosen,
+        "integrated variance": odds(*campaign.integrated_variance()),
+        "any pose, its best axis": float(np.mean(each)),
+    }
+
+
+def test_how_much_a_hit_can_tell(tmp_path):
+    """The best of all hits beside those that were chosen: what a better choice could gain."""
+    found, _, _ = tied_cases(tmp_path)
+    made = [kept(f"told_{c['seed']}", tmp_path, partial(told, c["seed"], tmp_path)) for c in found]
+    best = np.array([t["best"] for t in made])
+    for way in made[0]:
+        share = np.array([t[way] for t in made]) / best
+        middle = np.median(share)
+        print(f"{way}: {share.mean():.2f} of what the best hit tells (median {middle:.2f})")
+    assert np.mean([t["separating"] for t in made] / best) > 0.8
+
+
+def test_tied_candidates_are_decided_with_half_as_many_hits(tmp_path):
+    found, neither, made = tied_cases(tmp_path)
     ours, theirs = (np.array([c[s] for c in found]) for s in ("separation", "integrated variance"))
     rng = np.random.default_rng(0)
     picks = rng.integers(0, len(found), (2000, len(found)))
     ratio = ours[picks].mean(axis=1) / theirs[picks].mean(axis=1)
     low, high = np.quantile(ratio, [0.025, 0.975])
     print(
-        f"{len(found)} pairs decided, {len(neither)} by neither, of {seed - FIRST + 1} cases. "
+        f"{len(found)} pairs decided, {len(neither)} by neither, of {made} cases. "
         f"Further hits to {SURE:.0%} (no more than {MOST} are made; {MOST + 1} counts where they "
         f"do not decide), mean (median): separating {ours.mean():.2f} ({np.median(ours):g}), "
         f"integrated variance {theirs.mean():.2f} ({np.median(theirs):g}); ratio "
