@@ -10,9 +10,12 @@ from rich.console import Console
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Imported, Proposal
+from planner.campaign.events import Entry, Imported, Proposal
 from planner.campaign.importing import ImportReport
+from planner.campaign.model import Model
+from planner.campaign.state import CampaignState
 from planner.errors import InputError, NoPoseLeftError, PlannerError
+from planner.modes.measure import MeasuredPose
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.session.explaining import LEAST, Explaining
@@ -85,7 +88,8 @@ class _Session:
         self.measured: list[str] = []
         self.history: list[float] = []
         self.stop = ""
-        self.told = len(campaign.entries)
+        self.noted = len(campaign.entries)
+        self.untold: list[tuple[Entry, CampaignState, Model, MeasuredPose | None]] = []
         self.shown_count = 0
         self.told_of: set[tuple[Path, str]] = set()
         self.announced = False
@@ -101,6 +105,7 @@ class _Session:
                     self._explained(wait=True)
         except KeyboardInterrupt:
             self.stop = "quit"
+        self._tell()
         self.console.print(Text(f"Session ended: {self.stop}. Go on with the same command."))
         return SessionSummary(
             tuple(self.measured),
@@ -117,9 +122,10 @@ class _Session:
             self.console.print(Text(str(error)))
             self.stop = "no pose left"
             return None
-        self._tell()
+        self._note()
         number = len(self.campaign.model.labelled) + 1
         self.console.print(terminal.proposal_panel(proposal, self.campaign.model, number))
+        self._tell()
         return proposal
 
     def _explained(self, wait: bool = False) -> None:
@@ -128,14 +134,20 @@ class _Session:
         if text is not None:
             self.console.print(Text(f"Diagnosis: {text}", style="bold"))
 
-    def _tell(self, report: ImportReport | None = None) -> None:
-        """Show what the log gained, in Rerun."""
-        for entry in self.campaign.entries[self.told :]:
+    def _note(self, report: ImportReport | None = None) -> None:
+        """Keep what the log gained until there is time to show it."""
+        for entry in self.campaign.entries[self.noted :]:
             measured = None
             if report is not None and isinstance(entry.event, Imported):
                 measured = report.measured
-            self.story.tell(entry, self.campaign.state, self.campaign.model, measured)
-        self.told = len(self.campaign.entries)
+            self.untold.append((entry, self.campaign.state, self.campaign.model, measured))
+        self.noted = len(self.campaign.entries)
+
+    def _tell(self) -> None:
+        """Show it in Rerun: pictures take seconds, so once the next pose is on the screen."""
+        self._note()
+        while self.untold:
+            self.story.tell(*self.untold.pop(0))
 
     def _at_pose(self, proposal: Proposal) -> None:
         """Wait at one pose for hits and keys, until it is measured, skipped or superseded."""
@@ -229,7 +241,7 @@ class _Session:
         return any(report.measurement and report.measurement.modes for report in reports)
 
     def _after(self, report: ImportReport) -> None:
-        self._tell(report)
+        self._note(report)
         state, stop = self.campaign.state, self.campaign.cell.config.stop
         simulated = bool(report.measurement and report.measurement.simulated)
         self.console.print(terminal.import_panel(report, simulated))

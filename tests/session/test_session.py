@@ -16,6 +16,7 @@ from planner import itself
 from planner.campaign.campaign import Campaign
 from planner.session.explaining import Explaining
 from planner.session.watch import watch
+from planner.show.story import Story
 
 WANTED = (
     "joint_a1",
@@ -145,6 +146,25 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
     measured = campaign.state.measurements[proposal.pose].joints_deg
     off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
     assert 0 < off <= 0.011
+
+
+def test_the_next_pose_is_on_the_screen_before_pictures_are_made(cell, monkeypatch):
+    campaign, truth, tmp_path = cell
+    deliver(truth, tmp_path, campaign.next()[0], 0)
+    console, told = screen(), []
+
+    def tell(story, entry, state, model, measured=None):
+        shown = console.export_text(clear=False)
+        told.append((type(entry.event).__name__, len(model.labelled), shown, measured))
+
+    monkeypatch.setattr(Story, "tell", tell)
+    watch(campaign, tmp_path / "inbox", console=console, keys=Script(screen(), []), auto=True,
+          hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
+    imported = next(one for one in told if one[0] == "Imported")
+    assert imported[1] == 1  # the model as it was after it
+    assert imported[3] is not None
+    assert "Measurement 2: go to pose P002" in imported[2]
+    assert [name for name, *_ in told] == ["Imported", "Proposed"]
 
 
 def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(cell, monkeypatch):
