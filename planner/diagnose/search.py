@@ -250,7 +250,8 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     clearly = none.per_value > CLEARLY
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
     looked = partial(glance if clearly else promise, few, warm=none)
-    fits = side_by_side(looked, effects, lambda n: tell(_words(effects[n]), 0.6 * n / len(effects)))
+    share = 0.6 / max(len(effects), 1)
+    fits = side_by_side(looked, effects, lambda n: tell(_words(effects[n]), share * (n + 1)))
     if clearly:
         order = np.argsort([f.misfit(f.x).value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)

@@ -16,8 +16,8 @@ def side_by_side(
 ) -> list[R]:
     """What `work` makes of each item, in their order; `done` is told the number of each.
 
-    It runs in threads, on what none of them changes. BLAS has one thread a fit meanwhile: the
-    products are too small for more.
+    It runs in threads, on what none of them changes; an error or Ctrl-C waits for what has begun.
+    BLAS has one thread meanwhile in the whole process: the products are too small for more.
     """
     out = []
     with threadpool_limits(1), ThreadPoolExecutor(THREADS) as pool:

@@ -155,7 +155,6 @@ def _normal_equations(residual: np.ndarray, slope: np.ndarray) -> tuple[np.ndarr
 def positive(mass: np.ndarray) -> bool:
     """Whether all of the mass matrices (n, e, e) are positive definite."""
     try:
-        np.linalg.cholesky(mass)
+        return bool(np.isfinite(np.linalg.cholesky(mass)).all())
     except np.linalg.LinAlgError:
         return False
-    return True

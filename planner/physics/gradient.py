@@ -164,7 +164,7 @@ def _by_inertia(
 
 
 def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.ndarray) -> None:
-    """sensorᵀ S hit into out (n, t, 3s, 3h, F), of motions (n, r, 3, F).
+    """sensorᵀ S hit into out (n, t, 3s, 3h, F), which is contiguous, of motions (n, r, 3, F).
 
     `shapes` S (t, r, r), or (n, t, r, r), are real and symmetric: the products of the motions, two
     and two, are added up in one real product.

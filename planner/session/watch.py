@@ -1,7 +1,8 @@
 """The session's loop. All state is the campaign's: quit or kill it anywhere, and start it again."""
 
 import time
-from contextlib import ExitStack
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -100,12 +101,15 @@ class _Session:
                 proposal = self._propose()
                 if proposal is not None:
                     self._at_pose(proposal)
+            self._tell()
             if self.stop != "quit":
                 with self.console.status("finding what the simulation lacks"):
                     self._explained(wait=True)
         except KeyboardInterrupt:
             self.stop = "quit"
-        self._tell()
+        finally:
+            with suppress(KeyboardInterrupt):
+                self._tell()
         self.console.print(Text(f"Session ended: {self.stop}. Go on with the same command."))
         return SessionSummary(
             tuple(self.measured),
@@ -134,20 +138,20 @@ class _Session:
         if text is not None:
             self.console.print(Text(f"Diagnosis: {text}", style="bold"))
 
-    def _note(self, report: ImportReport | None = None) -> None:
+    def _note(self, reports: Sequence[ImportReport] = ()) -> None:
         """Keep what the log gained until there is time to show it."""
+        found = {report.pose: report.measured for report in reports}
         for entry in self.campaign.entries[self.noted :]:
-            measured = None
-            if report is not None and isinstance(entry.event, Imported):
-                measured = report.measured
+            event = entry.event
+            measured = found.get(event.pose) if isinstance(event, Imported) else None
             self.untold.append((entry, self.campaign.state, self.campaign.model, measured))
         self.noted = len(self.campaign.entries)
 
     def _tell(self) -> None:
         """Show it in Rerun: pictures take seconds, so once the next pose is on the screen."""
-        self._note()
         while self.untold:
-            self.story.tell(*self.untold.pop(0))
+            self.story.tell(*self.untold[0])
+            self.untold.pop(0)
 
     def _at_pose(self, proposal: Proposal) -> None:
         """Wait at one pose for hits and keys, until it is measured, skipped or superseded."""
@@ -235,13 +239,16 @@ class _Session:
             self.console.print(Text(str(error), style="red"))
             self.aside |= {self.inbox.digest(path) for path in whole} if self.auto else set()
             return False
+        self._note(reports)
         for report in reports:
             if report.accepted or report.refused:
                 self._after(report)
-        return any(report.measurement and report.measurement.modes for report in reports)
+        done = any(report.measurement and report.measurement.modes for report in reports)
+        if not done:
+            self._tell()
+        return done
 
     def _after(self, report: ImportReport) -> None:
-        self._note(report)
         state, stop = self.campaign.state, self.campaign.cell.config.stop
         simulated = bool(report.measurement and report.measurement.simulated)
         self.console.print(terminal.import_panel(report, simulated))

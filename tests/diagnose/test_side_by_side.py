@@ -1,5 +1,6 @@
 """Fits two at a time: in order, told of, stopped by an error; a model that threads share."""
 
+import sys
 import threading
 import time
 
@@ -10,6 +11,15 @@ from known_robots import KR10
 from planner.diagnose.side_by_side import side_by_side
 from planner.robot.elastic import ElasticModel
 from planner.robot.robot import Robot
+
+
+@pytest.fixture
+def often():
+    """Threads take turns as often as they can."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    yield
+    sys.setswitchinterval(before)
 
 
 def test_results_come_in_order_whoever_is_first():
@@ -42,13 +52,17 @@ def test_an_error_ends_it():
     assert len(started) < 1000
 
 
-def test_threads_may_share_an_elastic_model(tmp_path):
-    model = ElasticModel(Robot.load(KR10.write(tmp_path, 2)))
-    poses = [KR10.poses(3, seed) for seed in range(40)]
+@pytest.mark.parametrize("gravity", [False, True])
+def test_threads_may_share_an_elastic_model(tmp_path, often, gravity):
+    path = KR10.write(tmp_path, 2)
+    if gravity:
+        path.write_text("geometric_stiffness = true\n" + path.read_text())
+    model = ElasticModel(Robot.load(path))
+    poses = [KR10.poses(3, seed) for seed in range(200)]
 
     def matrices(q: np.ndarray) -> tuple[np.ndarray, ...]:
         found = model.matrices(q)
-        return found.mass, found.hit, found.sensor, model.body_jacobians(q)
+        return found.mass, found.hit, found.sensor, found.geometric, model.body_jacobians(q)
 
     for alone, shared in zip(map(matrices, poses), side_by_side(matrices, poses), strict=True):
         for one, other in zip(alone, shared, strict=True):

@@ -154,17 +154,31 @@ def test_the_next_pose_is_on_the_screen_before_pictures_are_made(cell, monkeypat
     console, told = screen(), []
 
     def tell(story, entry, state, model, measured=None):
-        shown = console.export_text(clear=False)
-        told.append((type(entry.event).__name__, len(model.labelled), shown, measured))
+        shown = "Measurement 2: go to pose P002" in console.export_text(clear=False)
+        told.append((type(entry.event).__name__, len(state.proposals), shown, measured is not None))
 
     monkeypatch.setattr(Story, "tell", tell)
     watch(campaign, tmp_path / "inbox", console=console, keys=Script(screen(), []), auto=True,
           hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
-    imported = next(one for one in told if one[0] == "Imported")
-    assert imported[1] == 1  # the model as it was after it
-    assert imported[3] is not None
-    assert "Measurement 2: go to pose P002" in imported[2]
-    assert [name for name, *_ in told] == ["Imported", "Proposed"]
+    # Each with the state as it was right after it: one proposal, then two.
+    assert told == [("Imported", 1, True, True), ("Proposed", 2, True, False)]
+
+
+def test_pictures_that_are_interrupted_are_made_at_the_end(cell, monkeypatch):
+    campaign, truth, tmp_path = cell
+    deliver(truth, tmp_path, campaign.next()[0], 0)
+    begun = []
+
+    def tell(story, entry, state, model, measured=None):
+        begun.append(type(entry.event).__name__)
+        if len(begun) == 1:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Story, "tell", tell)
+    summary = watch(campaign, tmp_path / "inbox", console=screen(), keys=Script(screen(), []),
+                    auto=True, hits_per_pose=9, quiet_s=0.05, limit_s=20)  # fmt: skip
+    assert summary.stopped == "quit"
+    assert begun == ["Imported", "Imported", "Proposed"]
 
 
 def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(cell, monkeypatch):

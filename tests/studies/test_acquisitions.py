@@ -36,6 +36,7 @@ STRATEGIES = {
 }  # "best": along the axes that tell most per minute, not along all  # fmt: skip
 ONLY = os.environ.get("STUDY_ONLY", "")
 AXES = ("all", "best")
+ABOUT = 1.02  # minutes that are as good as equal: travel differs by seconds
 BUDGET = {
     "updated": int(os.environ.get("STUDY_BUDGET", "5")),
     "frozen": int(os.environ.get("STUDY_FROZEN", "12")),
@@ -66,6 +67,11 @@ class Curve:
     def alike(self, frac: float) -> tuple[float, float]:
         """Measurements and minutes from which on the FRAC stays above; ∞ beyond the budget."""
         return self._stays(self.frac >= frac)
+
+    def worst_within(self, minutes: float) -> float:
+        """Worst error in % of the last measurement that ends within the minutes; ∞ if none does."""
+        count = int(np.sum(self.minutes <= minutes))
+        return float(self.worst[count - 1]) if count else np.inf
 
     def _stays(self, good: np.ndarray) -> tuple[float, float]:
         bad = np.flatnonzero(~good)
@@ -185,6 +191,12 @@ def test_measurements_to_the_target(runs):
     at = np.array([c.worst[3] for c in base])
     for strategy, curves in found.items():
         own = np.array([c.worst[3] for c in curves])
+        print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
+    print("  the same within the minutes of the other's 3")
+    at = np.array([c.worst[2] for c in base])
+    for strategy, curves in found.items():
+        pairs = zip(curves, base, strict=True)
+        own = np.array([c.worst_within(ABOUT * b.minutes[2]) for c, b in pairs])
         print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
     for curves in found.values():
         assert all(np.isfinite(c.rmse).all() for c in curves)
