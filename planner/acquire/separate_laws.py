@@ -6,22 +6,58 @@ joint (describing function; Worden & Tomlinson 2001, chapter 3), found by iterat
 are fitted, the difference between two forces is compared: what else is wrong is the same in both.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.acquire.outputs import AXES
-from planner.acquire.separate import expected_log_odds
+from planner.acquire.separate import Telling, expected_log_odds
+from planner.diagnose.diagnose import TIED
 from planner.diagnose.equivalent import Receptances, receptances, system_of, waves
 from planner.diagnose.leveldata import DIFFERENCE_ERROR, MODEL_ERROR, own_parameter
 from planner.diagnose.nonlinear import Candidate, Laws, covariance
 from planner.diagnose.predict import misfit_at
 from planner.diagnose.starts import faded
 
+LOOKED_AT = 60  # poses: each takes tens of milliseconds
 LEVELS = 6  # forces that are looked at, evenly in logarithms
 ROUNDS = 8  # of the iteration between swing and stiffness
 STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's own stiffness
 STILL = 1e-15  # rad: a swing as small as none
+
+
+@dataclass(frozen=True)
+class TellingForces:
+    """A pose and an axis to hit, once or more with each of two peak forces (N)."""
+
+    hit: Telling
+    force_n: tuple[float, float]
+
+
+def undecided(laws: Laws) -> Laws:
+    """Those of the laws that the recordings leave tied, as probable as they were."""
+    tied = [i for i, share in enumerate(laws.probability) if share > TIED]
+    return replace(
+        laws,
+        candidates=tuple(laws.candidates[i] for i in tied),
+        probability=tuple(laws.probability[i] for i in tied),
+    )
+
+
+def most_telling_forces(
+    laws: Laws, weakest_n: float, hardest_n: float, q: np.ndarray
+) -> TellingForces:
+    """The hits that best separate laws, at one of LOOKED_AT of q (n, dof) in rad.
+
+    `weakest_n` and `hardest_n` are the peaks of the hits so far: no harder ones are asked for.
+    """
+    force = forces_n(weakest_n, hardest_n)
+    last = len(q) - 1
+    looked_at = np.unique(np.linspace(0, last, LOOKED_AT).round().astype(int))
+    gain = np.nan_to_num(law_separation(laws, q[looked_at], force))
+    row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
+    best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
+    return TellingForces(best, (float(force[level]), float(force[-1])))
 
 
 def forces_n(weakest_n: float, hardest_n: float) -> np.ndarray:

@@ -1,20 +1,16 @@
 """The hit that best tells apart what the recordings leave tied, for `planner diagnose`."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from planner.acquire.separate import Telling, most_telling
-from planner.acquire.separate_laws import forces_n, law_separation
+from planner.acquire.separate_laws import most_telling_forces, undecided
 from planner.cli.material import Material
-from planner.diagnose.diagnose import TIED
 from planner.diagnose.explain import Explained
-from planner.diagnose.finding import Finding
+from planner.diagnose.nonlinear import Laws
 from planner.diagnose.visits import Recorded as Visits
-
-OF_LAWS = 60  # poses that are looked at for nonlinear joints: each takes tens of milliseconds
 
 
 def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:
@@ -22,9 +18,10 @@ def next_hit(explained: Explained, visits: Visits | None, given: Material) -> di
     if not len(given.offered):
         return None
     for finding, _ in explained.whole.established:
-        if finding.laws is not None and sum(p > TIED for p in finding.laws.probability) > 1:
+        laws = finding.laws and undecided(finding.laws)
+        if laws and len(laws.candidates) > 1:
             assert visits is not None
-            return _of_laws(finding, visits.level_n, given)
+            return _of_laws(finding.at, laws, visits.level_n, given)
     found = explained.judged.diagnosis
     tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
     if len(tied) < 2:
@@ -37,21 +34,11 @@ def next_hit(explained: Explained, visits: Visits | None, given: Material) -> di
     return _proposal(best, hardest, given, names)
 
 
-def _of_laws(finding: Finding, level_n: np.ndarray, given: Material) -> dict[str, Any]:
-    assert finding.laws is not None
-    both = zip(finding.laws.candidates, finding.laws.probability, strict=True)
-    tied = [(c, p) for c, p in both if p > TIED]
-    laws = replace(
-        finding.laws, candidates=tuple(c for c, _ in tied), probability=tuple(p for _, p in tied)
-    )
-    force = forces_n(float(level_n[0]), float(level_n[-1]))
-    n = len(given.offered)
-    looked_at = np.unique(np.linspace(0, n - 1, OF_LAWS).round().astype(int))
-    gain = np.nan_to_num(law_separation(laws, given.offered[looked_at], force))
-    row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
-    best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
-    names = [in_words([(c.law.effect, finding.at)], p) for c, p in tied]
-    return _proposal(best, [float(force[level]), float(force[-1])], given, names)
+def _of_laws(at: str | None, laws: Laws, level_n: np.ndarray, given: Material) -> dict[str, Any]:
+    best = most_telling_forces(laws, float(level_n[0]), float(level_n[-1]), given.offered)
+    both = zip(laws.candidates, laws.probability, strict=True)
+    names = [in_words([(c.law.effect, at)], p) for c, p in both]
+    return _proposal(best.hit, list(best.force_n), given, names)
 
 
 def _proposal(

@@ -13,7 +13,7 @@ from planner.frf.estimate import estimate
 from planner.frf.types import Frf
 from planner.recording.folder import read_recordings
 from planner.recording.hits import hits_from
-from planner.recording.levels import SAME_LEVEL, peak_n
+from planner.recording.levels import levels, peak_n
 from planner.recording.read import read
 from planner.recording.screening import ScreeningLimits, screen
 from planner.recording.types import Hit, PoseRow
@@ -58,15 +58,7 @@ class Recorded:
     def level_n(self) -> np.ndarray:
         """Peak forces (levels,) in N, weakest first: the same for all visits."""
         peaks = np.sort([peak_n(hit) for visit in self.visits for hit in visit.hits])
-        starts = np.flatnonzero(np.diff(np.log(peaks)) > np.log(SAME_LEVEL) / 3) + 1
-        groups = np.split(peaks, starts)
-        merged = [groups[0]]
-        for group in groups[1:]:
-            if np.mean(group) < SAME_LEVEL * np.mean(merged[-1]):
-                merged[-1] = np.append(merged[-1], group)
-            else:
-                merged.append(group)
-        return np.array([float(np.exp(np.mean(np.log(group)))) for group in merged])
+        return np.array([float(np.exp(np.mean(np.log(group)))) for group in levels(peaks)])
 
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""
