@@ -28,23 +28,11 @@ def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
 def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
     """Peaks (n,) in N, sorted, by level: weakest first.
 
-    Levels are told by the gaps between them. Where forces in between fill these, so that peaks
-    reach farther than a level does, they are parted where they are sparse (Ward's criterion).
+    Clusters in logarithms by average linkage: means of two levels differ by SAME_LEVEL or more,
+    and forces in between join the nearer one.
     """
-    starts = np.flatnonzero(np.diff(np.log(peaks_n)) > np.log(SAME_LEVEL) / 3) + 1
-    groups = np.split(peaks_n, starts)
-    merged = [groups[0]]
-    for group in groups[1:]:
-        if group[-1] < SAME_LEVEL * merged[-1][0]:
-            merged[-1] = np.append(merged[-1], group)
-        else:
-            merged.append(group)
-    return [part for group in merged for part in _parted(group)]
-
-
-def _parted(peaks_n: np.ndarray) -> list[np.ndarray]:
-    count = round(float(np.log(peaks_n[-1] / peaks_n[0]) / np.log(SAME_LEVEL)))
-    if count < 2:
+    if len(peaks_n) < 2:
         return [peaks_n]
-    which = fcluster(linkage(np.log(peaks_n)[:, None], "ward"), count, "maxclust")
+    tree = linkage(np.log(peaks_n)[:, None], "average")
+    which = fcluster(tree, np.log(SAME_LEVEL), "distance")
     return np.split(peaks_n, np.flatnonzero(np.diff(which)) + 1)
