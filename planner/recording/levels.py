@@ -15,14 +15,11 @@ def peak_n(hit: Hit) -> float:
 
 
 def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
-    """The hits by strength, weakest level first; a gap of SAME_LEVEL between peaks separates."""
-    groups: list[list[Hit]] = []
-    for hit in sorted(hits, key=peak_n):
-        if groups and peak_n(hit) < SAME_LEVEL * peak_n(groups[-1][-1]):
-            groups[-1].append(hit)
-        else:
-            groups.append([hit])
-    return tuple(tuple(group) for group in groups)
+    """The hits by strength, weakest level first; see `levels`."""
+    ordered = sorted(hits, key=peak_n)
+    groups = levels(np.array([peak_n(hit) for hit in ordered]))
+    ends = np.cumsum([len(group) for group in groups]).tolist()
+    return tuple(tuple(ordered[end - len(g) : end]) for g, end in zip(groups, ends, strict=True))
 
 
 def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
