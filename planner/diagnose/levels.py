@@ -30,6 +30,7 @@ ROUNDS, MORE, LAST, AGAIN = 3, 6, 4, 2
 HOPELESS = 10.0  # times the best χ² after ROUNDS
 ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
 EXPLAINED = 0.6  # of the excess of χ² of the levels' differences, that a law has to take away
+UNEXPLAINED = 1e-3  # of the same, that no law can be expected to explain
 INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed
 WEAKEST = 1e-10  # damping in the last rounds
 TOLERANCE = 1e-5  # of the objective, that a last round must gain
@@ -42,12 +43,16 @@ INEXACT = 0.02, 0.02
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A law at a joint: its log evidence over a linear joint, and the share that it explains."""
+    """A law at a joint: its log evidence over a linear joint, and the share that it explains.
+
+    `left` is what it leaves unexplained, with what noise could make of it: laws are weighed by it.
+    """
 
     candidate: Candidate
     at: str
     log_evidence: float
     explained: float
+    left: float
     per_value: float
     parameters: dict[str, tuple[float, float, str]]
     temper: float
@@ -161,17 +166,18 @@ def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> t
     linear = _linear(data, plain)
     weaker = (data.best != np.arange(len(data.h)))[:, None, None]
     values = np.count_nonzero(data.weight * weaker)
-    excess = max(linear[1] - values, 1e-9)
+    excess, expected = max(linear[1] - values, 1e-9), linear[2] + values
+    # Where all is explained but for noise, laws are told apart as noise tells them, and no better.
+    least = min(expected, *(c.chi2 for c in kept))
+    noise = max(UNEXPLAINED * excess, INDEPENDENT / 2)
     out = []
     for c in kept:
         evidence = (linear[0] - c.chi2) / temper - _volume(plain, c, temper)
-        explained = 1 - max(c.chi2 - linear[2] - values, 0.0) / excess
+        explained = 1 - max(c.chi2 - expected, 0.0) / excess
+        left = c.chi2 - least + noise
+        at, per_value = system.ports[c.port], 2 * c.chi2 / count
         parameters = _parameters(plain, c, temper)
-        out.append(
-            Weighed(
-                c, system.ports[c.port], evidence, explained, 2 * c.chi2 / count, parameters, temper
-            )
-        )
+        out.append(Weighed(c, at, evidence, explained, left, per_value, parameters, temper))
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 
 
@@ -218,7 +224,7 @@ def _parameters(
 def _shares(weighed: Sequence[Weighed]) -> tuple[list[Weighed], tuple[float, ...]]:
     """The laws at the joint of the best, and the shares that all that is not explained gives."""
     there = [w for w in weighed if w.at == weighed[0].at]
-    left = np.array([max(1 - w.explained, 1e-3) for w in there])
+    left = np.array([w.left for w in there])
     shares = (left / left[0]) ** (-INDEPENDENT / 2)
     return there, tuple((shares / shares.sum()).tolist())
 
