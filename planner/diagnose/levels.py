@@ -13,6 +13,7 @@ from planner.diagnose.finding import Finding
 from planner.diagnose.fit import FINE, GLANCE, Fit
 from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
 from planner.diagnose.nonlinear import Candidate, Laws, covariance, descend
+from planner.diagnose.side_by_side import side_by_side
 from planner.diagnose.starts import starts
 from planner.diagnose.strayed import strayed
 from planner.diagnose.tone import screen_tone
@@ -140,14 +141,21 @@ def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> 
     rough = _best_of_each(descend(data, plain, begun, ROUNDS), 1)
     best = min(c.chi2 for c in rough)
     kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
-    first = min(kept, key=lambda c: c.value)
-    last = first
+    first, levels = min(kept, key=lambda c: c.value), _levels(data)
+    # Laws are weighed one against the other: whichever might be said is followed to its end.
+    told = [c for c in kept if c is first or levels.explained(c) > EXPLAINED]
+    ends = side_by_side(lambda c: _followed(data, plain, found, c), told)
+    kept = [*ends, *(c for c in kept if all(c is not t for t in told))]
+    return _weighed(data, plain, system, kept)
+
+
+def _followed(data: Data, plain: Fit, found: Equivalent, candidate: Candidate) -> Candidate:
+    last = candidate
     for _ in range(AGAIN):
         whole = relinearised(data, plain, found, last.port, last.x)
         again = [replace(last, normal=None, gradient=None, damping=1e-7)]
         last = descend(whole, plain, again, LAST, TOLERANCE, WEAKEST)[0]
-    kept = [last if c is first else c for c in kept]
-    return _weighed(data, plain, system, kept)
+    return last
 
 
 def _best_of_each(candidates: list[Candidate], most: int) -> list[Candidate]:
@@ -163,17 +171,14 @@ def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> t
     count = 2 * int(np.count_nonzero(data.weight))
     misfit = max(1.0, min(2 * c.chi2 for c in kept) / count)
     temper = misfit * (1 + ALIKE * (1 - 1 / misfit))
-    linear = _linear(data, plain)
-    weaker = (data.best != np.arange(len(data.h)))[:, None, None]
-    values = np.count_nonzero(data.weight * weaker)
-    excess, expected = max(linear[1] - values, 1e-9), linear[2] + values
+    levels = _levels(data)
     # Where all is explained but for noise, laws are told apart as noise tells them, and no better.
-    least = min(expected, *(c.chi2 for c in kept))
-    noise = max(UNEXPLAINED * excess, INDEPENDENT / 2)
+    least = min(levels.expected, *(c.chi2 for c in kept))
+    noise = max(UNEXPLAINED * levels.excess, INDEPENDENT / 2)
     out = []
     for c in kept:
-        evidence = (linear[0] - c.chi2) / temper - _volume(plain, c, temper)
-        explained = 1 - max(c.chi2 - expected, 0.0) / excess
+        evidence = (levels.linear - c.chi2) / temper - _volume(plain, c, temper)
+        explained = levels.explained(c)
         left = c.chi2 - least + noise
         at, per_value = system.ports[c.port], 2 * c.chi2 / count
         parameters = _parameters(plain, c, temper)
@@ -181,17 +186,31 @@ def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> t
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 
 
-def _linear(data: Data, plain: Fit) -> tuple[float, float, float]:
-    """Σ weight |error|² of the linear fit: in all, of the weaker columns, of the strongest.
+@dataclass(frozen=True)
+class _Levels:
+    """Σ weight |error|²: of a linear joint, what noise alone would leave, and the former's excess.
 
     A linear simulation says that levels do not differ; of the strongest only the noise is counted,
     because a linear fit could still follow them.
     """
+
+    linear: float
+    expected: float
+    excess: float
+
+    def explained(self, candidate: Candidate) -> float:
+        """Share of the excess that a law takes away."""
+        return 1 - max(candidate.chi2 - self.expected, 0.0) / self.excess
+
+
+def _levels(data: Data) -> _Levels:
     weaker = (data.best != np.arange(len(data.h)))[:, None, None]
     change = np.where(weaker, np.abs(data.h - data.h[data.best]) ** 2, 0.0)
-    levels = float(np.sum(data.weight * change))
+    differing = float(np.sum(data.weight * change))
     strongest = float(np.count_nonzero(data.weight * ~weaker))
-    return levels + strongest, levels, strongest
+    values = float(np.count_nonzero(data.weight * weaker))
+    excess = max(differing - values, 1e-9)
+    return _Levels(differing + strongest, strongest + values, excess)
 
 
 def _volume(plain: Fit, candidate: Candidate, temper: float) -> float:
