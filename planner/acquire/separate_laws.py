@@ -20,6 +20,7 @@ from planner.diagnose.predict import misfit_at
 from planner.diagnose.starts import faded
 
 LOOKED_AT = 60  # poses: each takes tens of milliseconds
+APART = 2.0  # between two forces, so that hits of each are told from those of the other
 LEVELS = 6  # forces that are looked at, evenly in logarithms
 ROUNDS = 8  # of the iteration between swing and stiffness
 STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's own stiffness
@@ -55,6 +56,7 @@ def most_telling_forces(
     last = len(q) - 1
     looked_at = np.unique(np.linspace(0, last, LOOKED_AT).round().astype(int))
     gain = np.nan_to_num(law_separation(laws, q[looked_at], force))
+    gain[:, :, force[:-1] > hardest_n / APART] = 0.0
     row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
     best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
     return TellingForces(best, (float(force[level]), float(force[-1])))

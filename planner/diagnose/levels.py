@@ -31,6 +31,7 @@ ROUNDS, MORE, LAST, AGAIN = 3, 6, 4, 2
 HOPELESS = 10.0  # times the best χ² after ROUNDS
 ALIKE = 40.0  # neighbouring values that err alike where the model is not quite right
 EXPLAINED = 0.6  # of the excess of χ² of the levels' differences, that a law has to take away
+HOPEFUL = 0.3  # of the same, from which on a law is followed to its end
 UNEXPLAINED = 1e-3  # of the same, that no law can be expected to explain
 INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed
 WEAKEST = 1e-10  # damping in the last rounds
@@ -46,14 +47,14 @@ INEXACT = 0.02, 0.02
 class Weighed:
     """A law at a joint: its log evidence over a linear joint, and the share that it explains.
 
-    `left` is what it leaves unexplained, with what noise could make of it: laws are weighed by it.
+    `levels` are what it was to explain.
     """
 
     candidate: Candidate
     at: str
     log_evidence: float
     explained: float
-    left: float
+    levels: "_Levels"
     per_value: float
     parameters: dict[str, tuple[float, float, str]]
     temper: float
@@ -76,9 +77,9 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     weighed = weigh(recorded, plain, system, found)
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
-        c = best.candidate
-        sd = np.sqrt(np.diagonal(covariance(c, best.temper))[: len(c.x)])
         there, shares = _shares(weighed)
+        best, c = there[0], there[0].candidate
+        sd = np.sqrt(np.diagonal(covariance(c, best.temper))[: len(c.x)])
         candidates = tuple(w.candidate for w in there)
         problem, hit = problem_of(recorded, nominal), _hardest(recorded)
         laws = Laws(problem, plain, candidates, shares, best.temper, hit)
@@ -142,8 +143,8 @@ def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> 
     best = min(c.chi2 for c in rough)
     kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
     first, levels = min(kept, key=lambda c: c.value), _levels(data)
-    # Laws are weighed one against the other: whichever might be said is followed to its end.
-    told = [c for c in kept if c is first or levels.explained(c) > EXPLAINED]
+    # Laws are weighed one against the other: those half-way would be wronged.
+    told = [c for c in kept if c is first or levels.explained(c) > HOPEFUL]
     ends = side_by_side(lambda c: _followed(data, plain, found, c), told)
     kept = [*ends, *(c for c in kept if all(c is not t for t in told))]
     return _weighed(data, plain, system, kept)
@@ -172,17 +173,13 @@ def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> t
     misfit = max(1.0, min(2 * c.chi2 for c in kept) / count)
     temper = misfit * (1 + ALIKE * (1 - 1 / misfit))
     levels = _levels(data)
-    # Where all is explained but for noise, laws are told apart as noise tells them, and no better.
-    least = min(levels.expected, *(c.chi2 for c in kept))
-    noise = max(UNEXPLAINED * levels.excess, INDEPENDENT / 2)
     out = []
     for c in kept:
         evidence = (levels.linear - c.chi2) / temper - _volume(plain, c, temper)
         explained = levels.explained(c)
-        left = c.chi2 - least + noise
         at, per_value = system.ports[c.port], 2 * c.chi2 / count
         parameters = _parameters(plain, c, temper)
-        out.append(Weighed(c, at, evidence, explained, left, per_value, parameters, temper))
+        out.append(Weighed(c, at, evidence, explained, levels, per_value, parameters, temper))
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 
 
@@ -242,8 +239,12 @@ def _parameters(
 
 def _shares(weighed: Sequence[Weighed]) -> tuple[list[Weighed], tuple[float, ...]]:
     """The laws at the joint of the best, and the shares that all that is not explained gives."""
-    there = [w for w in weighed if w.at == weighed[0].at]
-    left = np.array([w.left for w in there])
+    at, levels = weighed[0].at, weighed[0].levels
+    there = sorted((w for w in weighed if w.at == at), key=lambda w: w.candidate.chi2)
+    chi2 = np.array([w.candidate.chi2 for w in there])
+    # Below what noise is expected to leave, the best law is as good as any: others count from it.
+    beyond = chi2 - min(levels.expected, chi2[0])
+    left = np.maximum(beyond, max(UNEXPLAINED * levels.excess, INDEPENDENT / 2))
     shares = (left / left[0]) ** (-INDEPENDENT / 2)
     return there, tuple((shares / shares.sum()).tolist())
 

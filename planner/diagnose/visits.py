@@ -55,14 +55,18 @@ class Recorded:
         return tuple(self.frf(visit.hits) for visit in self.visits)
 
     @cached_property
+    def _by_level(self) -> list[np.ndarray]:
+        return levels(np.sort([peak_n(hit) for visit in self.visits for hit in visit.hits]))
+
+    @cached_property
     def level_n(self) -> np.ndarray:
         """Peak forces (levels,) in N, weakest first: the same for all visits."""
-        peaks = np.sort([peak_n(hit) for visit in self.visits for hit in visit.hits])
-        return np.array([float(np.exp(np.mean(np.log(group)))) for group in levels(peaks)])
+        return np.array([float(np.exp(np.mean(np.log(group)))) for group in self._by_level])
 
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""
-        return int(np.argmin(np.abs(np.log(self.level_n / peak_n(hit)))))
+        weakest = [group[0] for group in self._by_level[1:]]
+        return int(np.searchsorted(weakest, peak_n(hit), side="right"))
 
     @cached_property
     def columns(self) -> tuple[tuple[Column, ...], ...]:

@@ -15,21 +15,25 @@ def peak_n(hit: Hit) -> float:
 
 
 def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
-    """The hits by strength, weakest level first; see `levels`."""
-    ordered = sorted(hits, key=peak_n)
-    groups = levels(np.array([peak_n(hit) for hit in ordered]))
-    ends = np.cumsum([len(group) for group in groups]).tolist()
-    return tuple(tuple(ordered[end - len(g) : end]) for g, end in zip(groups, ends, strict=True))
+    """The hits by strength, weakest level first; a gap of SAME_LEVEL between peaks separates."""
+    groups: list[list[Hit]] = []
+    for hit in sorted(hits, key=peak_n):
+        if groups and peak_n(hit) < SAME_LEVEL * peak_n(groups[-1][-1]):
+            groups[-1].append(hit)
+        else:
+            groups.append([hit])
+    return tuple(tuple(group) for group in groups)
 
 
 def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
     """Peaks (n,) in N, sorted, by level: weakest first.
 
     Clusters in logarithms by average linkage: means of two levels differ by SAME_LEVEL or more,
-    and forces in between join the nearer one.
+    also where forces in between leave no gap.
     """
     if len(peaks_n) < 2:
         return [peaks_n]
-    tree = linkage(np.log(peaks_n)[:, None], "average")
+    logarithms = np.log(np.maximum(peaks_n, np.finfo(float).tiny))
+    tree = linkage(logarithms[:, None], "average")
     which = fcluster(tree, np.log(SAME_LEVEL), "distance")
     return np.split(peaks_n, np.flatnonzero(np.diff(which)) + 1)

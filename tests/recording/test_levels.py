@@ -1,8 +1,18 @@
 """Which hits are of one force level."""
 
+from pathlib import Path
+
 import numpy as np
 
-from planner.recording.levels import levels
+from planner.diagnose.visits import Recorded, Visit
+from planner.recording.levels import levels, peak_n
+from planner.recording.types import Hit
+
+
+def pushed(peak):
+    force = np.zeros(64)
+    force[8] = peak
+    return Hit(Path("hit"), "+x", 400.0, force, np.zeros((3, 64)))
 
 
 def scattered(rng, *usual, count=8):
@@ -10,7 +20,7 @@ def scattered(rng, *usual, count=8):
     return [peak * factor for peak in usual for factor in rng.uniform(0.75, 1.25, count)]
 
 
-def test_a_level_is_one_however_people_scatter():
+def test_a_level_is_one_though_nobody_hits_alike_twice():
     for seed in range(30):
         peaks = np.sort(scattered(np.random.default_rng(seed), 1000.0, count=20))
         assert len(levels(peaks)) == 1
@@ -30,8 +40,14 @@ def test_forces_in_between_do_not_make_one_level_of_two():
         peaks = np.sort(
             scattered(rng, 1200.0, 3000.0) + scattered(rng, 1400.0, 1700.0, 2000.0, 2500.0, count=2)
         )
-        found = levels(peaks)
-        assert len(found) > 1
-        np.testing.assert_array_equal(np.concatenate(found), peaks)
-        low, high = (int(np.argmin([np.abs(g - p).min() for g in found])) for p in (1000, 3000))
-        assert low < high
+        assert len(levels(peaks)) > 1
+
+
+def test_hits_are_of_the_level_whose_cluster_holds_them():
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        hits = tuple(pushed(peak) for peak in rng.permutation(np.geomspace(500, 3500, 24)))
+        recorded = Recorded((Visit("P1", np.zeros(6), 0.0, hits),), (5.0, 50.0))
+        groups = levels(np.sort([peak_n(hit) for hit in hits]))
+        for hit in hits:
+            assert peak_n(hit) in groups[recorded.level(hit)]

@@ -2,10 +2,11 @@
 
 `pytest -m slow -s tests/studies/test_separation.py`. Cases of `separation_cases`; of each, four
 random poses are hit along one random axis each. What that leaves tied is decided by further
-measurements, one axis each; pairs that neither way of choosing them decides (a mass at a joint's
-axis is as well on the one link as on the other) are listed and left out. STUDY_SEEDS (20) cases
-from STUDY_FIRST (601; of laws 4001) on; STUDY_KEPT names a folder that keeps finished ones. Seeds
-1-582, 2001-2019 and 3001-3030 were used in development.
+measurements, one axis each; where laws are to be told, ours chooses forces too. Pairs that neither
+way of choosing them decides (a mass at a joint's axis is as well on the one link as on the other)
+are listed and left out. STUDY_SEEDS (20) cases from STUDY_FIRST (601; of laws 4001) on; STUDY_KEPT
+names a folder that keeps finished ones. Seeds 1-582, 2001-2019 and 3001-3030 were used in
+development.
 """
 
 import json
