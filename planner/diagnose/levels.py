@@ -108,7 +108,8 @@ def base(recorded: Recorded, nominal: Simulation) -> Fit:
 def _unknown(found: Equivalent, how: str) -> Finding:
     text = (
         "The response is not proportional to the force, and no single joint describes how: "
-        f"{how}. Look for contact with the surroundings, loose parts or clearance."
+        f"{how}. Several joints may do it at once; or look for contact with the surroundings, "
+        "loose parts or clearance."
     )
     return Finding("unknown", None, _excess(found) / 2, {}, text)
 

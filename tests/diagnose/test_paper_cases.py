@@ -3,6 +3,8 @@
 Truths are the other engine's (MuJoCo).
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,11 +12,20 @@ from known_robots import KR10
 from measured_frfs import birk_folder, measured_frfs
 from planner.diagnose.diagnose import diagnose
 from planner.diagnose.predict import predicted
+from planner.diagnose.screens import screen
+from planner.diagnose.visits import Recorded, Visit
 from planner.physics.simulation import Simulation
+from planner.recording.types import Hit
 from planner.robot.robot import Robot
 from planner.studies.sweep import ACROSS, BEYOND_DEG, DRESS_PACK, poses, sweep
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.hits import Hammer
+from planner.truth.laws import Hardening
 from planner.truth.model import load_truth
+from planner.truth.nonlinear import Port
+from planner.truth.scene import Scene, across, triple
+from planner.truth.secret import Secret, hit_poses
+from planner.truth.secret import Visit as Planned
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -51,3 +62,57 @@ def test_seed_004_a_simulation_of_12_parameters_lacks_what_24_have(tmp_path):
     assert {name for name, _ in first.places} == {"transverse_compliance"}
     assert len(first.places) >= 5
     assert found.best.per_value < 1.1 < found.refitted.per_value
+
+
+def test_seed_004_a_link_that_bends(tmp_path):
+    """24 parameters, and link 2 bends about both axes across it."""
+    toml = birk_folder(tmp_path / "24")
+    simulation = Simulation(Robot.load(toml))
+    along, stiffness = np.array(KR10.joints[2].xyz, dtype=float), 1.7e5
+    bends = tuple(
+        Spring("link_2", triple(axis), stiffness, 1e-3 * stiffness) for axis in across(along)
+    )
+    truth = load_truth(toml, Deviation(1, extra=bends))
+    q, lines = KR10.poses(9, seed=1), np.arange(5.0, 200.0, 1 / 0.64)
+    found = diagnose(measured_frfs(truth, q, lines, 0.03, 1), q, simulation)
+    first = found.candidates[0]
+    print(f"\n{first.places} {first.probability:.3f}, misfit {found.refitted.per_value:.1f} → "
+          f"{found.best.per_value:.2f}, {found.seconds:.0f} s")  # fmt: skip
+    assert first.places == (("link_flexibility", "link_2"),)
+    assert first.probability > 0.9
+    assert found.best.per_value < 1.1 < found.refitted.per_value
+
+
+@pytest.mark.parametrize("drives", [(2,), (1, 2, 3, 4, 5, 6)], ids=["one drive", "all drives"])
+def test_seed_004_harmonic_drives_that_harden(tmp_path, drives):
+    """To twice the stiffness; of more than one, no single joint can be named."""
+    toml = birk_folder(tmp_path / "24")
+    simulation = Simulation(Robot.load(toml))
+    truth, q = load_truth(toml, Deviation(1)), KR10.poses(9, seed=1)
+    hammer = Hammer(150.0, 0.003, 1000.0, 1.28, noise=0.01)
+    scene = Scene(KR10, truth, 3, q, 50.0)
+    laws = {f"joint_{i}": Hardening(scene.stiffness(f"joint_{i}"), 1.6e-4) for i in drives}
+    secret = Secret(Deviation(1), tuple(Port(law, joint=joint) for joint, law in laws.items()))
+    shots = [("+" + axis, share * hammer.peak_n) for axis in "xyz" for share in (0.4, 1.0, 2.5)]
+    made = hit_poses(
+        truth, secret, [Planned(row, shots) for row in q], hammer, np.random.default_rng(4)
+    )
+    visits = []
+    for i, (row, hits) in enumerate(zip(q, made, strict=True)):
+        seen = tuple(
+            Hit(Path("hit"), h.axis, 1000.0, h.force_n, h.acceleration_m_s2, simulated=True)
+            for h in hits
+        )
+        visits.append(Visit(f"P{i}", row, i / 8, seen))
+    recorded = Recorded(tuple(visits), simulation.robot.config.band_hz)
+    (found,) = screen(recorded, simulation).findings
+    print(f"\n{found.text}")
+    if len(drives) > 1:
+        assert found.effect == "unknown"
+        return
+    assert (found.effect, found.at) == ("nonlinear_stiffness", "joint_2")
+    for name, true in (
+        ("stiffness_change", laws["joint_2"].stiffness), ("angle", laws["joint_2"].angle)
+    ):  # fmt: skip
+        value, sd, _ = found.parameters[name]
+        assert abs(value - true) < 3 * sd
