@@ -50,7 +50,8 @@ def most_telling_forces(
 ) -> TellingForces:
     """The hits that best separate laws, at one of LOOKED_AT of q (n, dof) in rad.
 
-    `weakest_n` and `hardest_n` are the peaks of the hits so far: no harder ones are asked for.
+    `weakest_n` and `hardest_n` are the peaks (N) of the hits so far: no harder ones are asked for,
+    and the two forces are APART, so that levels can be told.
     """
     force = forces_n(weakest_n, hardest_n)
     last = len(q) - 1

@@ -43,18 +43,35 @@ LINEARISED = 0.4  # of the same, by an equivalent stiffness for each hit: below,
 INEXACT = 0.02, 0.02
 
 
+@dataclass(frozen=True)
+class LevelMisfit:
+    """Σ weight |error|²: of a linear joint, what noise alone would leave, and the former's excess.
+
+    A linear simulation says that levels do not differ; of the strongest only the noise is counted,
+    because a linear fit could still follow them.
+    """
+
+    linear: float
+    expected: float
+    excess: float
+
+    def explained(self, candidate: Candidate) -> float:
+        """Share of the excess that a law takes away."""
+        return 1 - max(candidate.chi2 - self.expected, 0.0) / self.excess
+
+
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """A law at a joint: its log evidence over a linear joint, and the share that it explains.
 
-    `levels` are what it was to explain.
+    `levels` is what it was to explain.
     """
 
     candidate: Candidate
     at: str
     log_evidence: float
     explained: float
-    levels: "_Levels"
+    levels: LevelMisfit
     per_value: float
     parameters: dict[str, tuple[float, float, str]]
     temper: float
@@ -184,31 +201,14 @@ def _weighed(data: Data, plain: Fit, system: System, kept: list[Candidate]) -> t
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 
 
-@dataclass(frozen=True)
-class _Levels:
-    """Σ weight |error|²: of a linear joint, what noise alone would leave, and the former's excess.
-
-    A linear simulation says that levels do not differ; of the strongest only the noise is counted,
-    because a linear fit could still follow them.
-    """
-
-    linear: float
-    expected: float
-    excess: float
-
-    def explained(self, candidate: Candidate) -> float:
-        """Share of the excess that a law takes away."""
-        return 1 - max(candidate.chi2 - self.expected, 0.0) / self.excess
-
-
-def _levels(data: Data) -> _Levels:
+def _levels(data: Data) -> LevelMisfit:
     weaker = (data.best != np.arange(len(data.h)))[:, None, None]
     change = np.where(weaker, np.abs(data.h - data.h[data.best]) ** 2, 0.0)
     differing = float(np.sum(data.weight * change))
     strongest = float(np.count_nonzero(data.weight * ~weaker))
     values = float(np.count_nonzero(data.weight * weaker))
     excess = max(differing - values, 1e-9)
-    return _Levels(differing + strongest, strongest + values, excess)
+    return LevelMisfit(differing + strongest, strongest + values, excess)
 
 
 def _volume(plain: Fit, candidate: Candidate, temper: float) -> float:

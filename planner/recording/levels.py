@@ -5,7 +5,7 @@ from scipy.cluster.hierarchy import fcluster, linkage
 
 from planner.recording.types import Hit
 
-# Hits whose peaks differ by less than this factor are of one level: nobody hits alike twice.
+# Levels differ by this factor or more: nobody hits alike twice.
 SAME_LEVEL = 1.8
 
 
