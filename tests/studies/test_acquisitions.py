@@ -29,9 +29,11 @@ STRATEGIES = {
     "updated": (
         BASELINE, "integrated_variance", "parameter_information", "mixed",
         "parameter_information best", "mixed best", "random", "sobol", "variance", "d_information",
+        "mutual_information",
     ),
     "frozen": (
         BASELINE, "integrated_variance", "integrated_variance best", "variance", "random", "sobol",
+        "mutual_information",
     ),
 }  # "best": along the axes that tell most per minute, not along all  # fmt: skip
 ONLY = os.environ.get("STUDY_ONLY", "")
