@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.diagnose.columns import Column
 from planner.diagnose.fit import Fit
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Elasticity, Simulation
@@ -40,13 +41,21 @@ class System:
 
 @dataclass(frozen=True, eq=False)
 class Receptances:
-    """Of a visit at s (F,): sensor/hit (F, 3, 3), sensor/port (F, 3, J), port/hit (F, J, 3), bb."""
+    """Of a visit at s (F,): sensor/hit (F, 3, 3), sensor/port (F, 3, J), port/hit (F, J, 3).
+
+    `between` (F, J, J) is ports on ports.
+    """
 
     s: np.ndarray
     sensor_hit: np.ndarray
     sensor_port: np.ndarray
     port_hit: np.ndarray
-    port_port: np.ndarray  # (F, J): each port on itself
+    between: np.ndarray
+
+    @property
+    def port_port(self) -> np.ndarray:
+        """(F, J): each port on itself."""
+        return np.einsum("fjj->fj", self.between)
 
 
 def system_of(plain: Fit, x: np.ndarray | None = None) -> System:
@@ -91,7 +100,7 @@ def receptances(system: System, visit: int, s: np.ndarray) -> Receptances:
         at_sensor[..., :3],
         at_sensor[..., 3:],
         own[..., :3],
-        np.einsum("fjj->fj", own[..., 3:]),
+        own[..., 3:],
     )
 
 
@@ -129,8 +138,8 @@ def equivalent(recorded: Recorded, system: System) -> Equivalent:
         full = receptances(system, number, s)
         for axis in range(3):
             group = [c for c in columns if c.axis == axis]
-            swings = [_swing(full, c, recorded) for c in group]
-            for weaker, swing in zip(group[:-1], swings[:-1], strict=True):
+            swings = [swing(full, c) for c in group]
+            for weaker, largest in zip(group[:-1], swings[:-1], strict=True):
                 strongest = group[-1]
                 variance = (weaker.variance + strongest.variance)[:, lines]
                 weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
@@ -138,13 +147,13 @@ def equivalent(recorded: Recorded, system: System) -> Equivalent:
                 found = _delta(full, axis, lines, change, weight, scale)
                 before = float(np.sum(weight * np.abs(change) ** 2))
                 count = int(np.count_nonzero(weight))
-                pair = np.array([swing, swings[-1]])
+                pair = np.array([largest, swings[-1]])
                 rows.append((number, axis, weaker.level, pair, *found, before, count))
     parts = [np.array(part) for part in zip(*rows, strict=True)]
     return Equivalent(*parts)
 
 
-def _swing(full: Receptances, column, recorded: Recorded) -> np.ndarray:
+def swing(full: Receptances, column: Column) -> np.ndarray:
     """Largest angle (J,) that the hit gives each joint, in the band."""
     spectrum = full.port_hit[:, :, column.axis] * column.force[:, None]
     return np.max(np.abs((spectrum.T @ waves(full.s)).real), axis=1)

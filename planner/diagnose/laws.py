@@ -31,6 +31,11 @@ class Law:
     most_share: float
     names: tuple[tuple[str, str], tuple[str, str]]
 
+    @property
+    def remembers(self) -> bool:
+        """Whether the torque depends on how the joint came to its angle; then it is k times z."""
+        return self.effect == "friction"
+
     def slow(self, amplitude: np.ndarray, a: float) -> np.ndarray:
         """Equivalent stiffness per unit of k, same shape as `amplitude`; the loss is imaginary."""
         wave = amplitude[..., None] * np.cos(PHASES)
@@ -40,7 +45,7 @@ class Law:
         return 2 * (cosine - 1j * sine) / amplitude
 
     def _steady(self, wave: np.ndarray, amplitude: np.ndarray, a: float) -> np.ndarray:
-        if self.effect != "friction":
+        if not self.remembers:
             one, state = np.ones(()), np.zeros(wave.shape)
             return self.step(one, np.asarray(a), state, wave, wave)[0]
         # Dahl's loop closes where the state at the turning points is ± a tanh(A / a).
@@ -104,3 +109,12 @@ LAWS = (
         (("lost_stiffness", "N·m/rad"), ("half_gap", "rad")),
     ),
 )
+
+
+def behaviour(effect: str, k: float) -> str:
+    """What a joint does that follows a law with this k, for a sentence."""
+    return {
+        "friction": "sticks and slides: presliding friction",
+        "backlash": "has play",
+        "nonlinear_stiffness": f"grows {'stiffer' if k > 0 else 'softer'} as it swings",
+    }[effect]

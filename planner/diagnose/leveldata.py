@@ -100,12 +100,12 @@ def relinearised(data: Data, plain: Fit, found: Equivalent, port: int, x: np.nda
     there = strongest - system_of(plain, x).elasticity.stiffness[block]
     places = zip(found.visit.tolist(), found.axis.tolist(), found.level.tolist(), strict=True)
     delta = dict(zip(places, found.delta[:, port], strict=True))
-    n = int(visit.max()) + 1
+    n, blocks = int(visit.max()) + 1, np.array([block])
     slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
-    plainly = _slopes(plain, data.s, x, block, np.full(n, there))
+    plainly = _slopes(plain, data.s, x, blocks, np.full((n, 1), there))
     for a, level in sorted({(int(i), int(j)) for _, i, j in delta}):
         stiffer = np.array([there + delta.get((v, a, level), 0.0) for v in range(n)])
-        moved = _slopes(plain, data.s, x, block, stiffer)
+        moved = _slopes(plain, data.s, x, blocks, stiffer[:, None])
         for c in np.flatnonzero((axis == a) & (data.level == level)):
             slope[c] = moved[visit[c], :, :, a] - plainly[visit[c], :, :, a]
     for c in np.flatnonzero(data.best == np.arange(len(data.h))):
@@ -114,21 +114,54 @@ def relinearised(data: Data, plain: Fit, found: Equivalent, port: int, x: np.nda
     return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
 
 
+def compared(data: Data, h: np.ndarray) -> np.ndarray:
+    """Strongest columns as they are, weaker ones as differences to them; h (c, 3, F)."""
+    weaker = (data.best != np.arange(len(h)))[:, None, None]
+    return np.where(weaker, h - h[data.best], h)
+
+
+def linearised(
+    data: Data, plain: Fit, x: np.ndarray, blocks: np.ndarray, stiffer: np.ndarray
+) -> Data:
+    """The same data with derivatives at x of every column, whose springs `blocks` are stiffer.
+
+    `stiffer` (c, m) in N·m/rad.
+    """
+    visit, axis = data.hits.visit, data.hits.axis
+    n = int(visit.max()) + 1
+    slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
+    places = sorted({(int(a), int(level)) for a, level in zip(axis, data.level, strict=True)})
+    for a, level in places:
+        here = np.flatnonzero((axis == a) & (data.level == level))
+        there = np.zeros((n, len(blocks)))
+        there[visit[here]] = stiffer[here]
+        slope[here] = _slopes(plain, data.s, x, blocks, there)[visit[here], :, :, a]
+    weaker = data.best != np.arange(len(data.h))
+    slope = np.where(weaker[:, None, None, None], slope - slope[data.best], slope)
+    rows = np.arange(len(data.h))
+    return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
+
+
 def _slopes(
-    plain: Fit, s: np.ndarray, x: np.ndarray, block: int = 0, stiffer: np.ndarray | None = None
+    plain: Fit,
+    s: np.ndarray,
+    x: np.ndarray,
+    blocks: np.ndarray | None = None,
+    stiffer: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Derivatives (n, D, 3, 3, F) at x, one spring being `stiffer` (n,), complex."""
+    """Derivatives (n, D, 3, 3, F) at x, springs `blocks` (m,) being `stiffer` (n, m), complex."""
     misfit = plain.misfit
     a, b = misfit.split
     p, n = misfit.parametrisation, len(misfit.matrices.mass)
     mass = misfit.matrices.mass + misfit.inertias.mass_change(x[a:b])
     every = np.broadcast_to(s, (n, len(s)))
     added = ()
-    if stiffer is not None:
-        port = np.zeros((n, 1, p.size))
-        port[:, 0, block] = 1.0
-        spring = np.broadcast_to(stiffer[:, None], every.shape)
-        added = (Impedance(port, np.ones((1, 1, 1)), ((0, spring),)),)
+    if blocks is not None and stiffer is not None:
+        for j, block in enumerate(blocks):
+            port = np.zeros((n, 1, p.size))
+            port[:, 0, block] = 1.0
+            spring = np.broadcast_to(stiffer[:, j, None], every.shape)
+            added += (Impedance(port, np.ones((1, 1, 1)), ((0, spring),)),)
     full = response_gradient(
         misfit.matrices, p.elasticity(x[:a]), every, mass, misfit.inertias, added
     )[1]

@@ -13,7 +13,7 @@ from planner.diagnose.columns import Column
 from planner.diagnose.equivalent import System, receptances, system_of
 from planner.diagnose.fit import Fit, Problem
 from planner.diagnose.laws import Law
-from planner.diagnose.leveldata import Data, own_parameter
+from planner.diagnose.leveldata import Data, compared, own_parameter
 from planner.diagnose.timedomain import Seen, seen, spectra, torques
 
 SHARE_SD, LOG_SHARE, LOG_SHARE_SD, LOG_ANGLE_SD = 1.5, np.log(0.5), 1.5, 2.0
@@ -159,9 +159,9 @@ def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candid
     d = len(plain.x)
     for candidate, (h, slope) in zip(candidates, found, strict=True):
         own = own_parameter(plain, int(_block(plain, candidate)))
-        compared = _compare(data, data.h) - _compare(data, h)
-        moved = np.array([_compare(data, one) for one in slope])
-        chi2 = float(np.sum(data.weight * np.abs(compared) ** 2))
+        off = compared(data, data.h) - compared(data, h)
+        moved = np.array([compared(data, one) for one in slope])
+        chi2 = float(np.sum(data.weight * np.abs(off) ** 2))
         if not np.isfinite(chi2):
             out.append(replace(candidate, chi2=np.inf, value=np.inf))
             continue
@@ -170,7 +170,7 @@ def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candid
         gradient = np.zeros(d + 2)
         at = np.array([d, d + 1, own])
         rows = data.rows
-        weighted = data.weight * compared
+        weighted = data.weight * off
         gradient[:d] = -_times(data.slope, weighted[rows])[:, 0]
         cross = _times(data.slope, *(data.weight[rows] * moved[:, rows]))
         # The own stiffness is told by the replica, at all levels.
@@ -201,12 +201,6 @@ def _times(slope: np.ndarray, *values: np.ndarray) -> np.ndarray:
 
 def _block(plain: Fit, candidate: Candidate) -> int:
     return int(system_of(plain).blocks[candidate.port])
-
-
-def _compare(data: Data, h: np.ndarray) -> np.ndarray:
-    """Strongest columns as they are, weaker ones as differences to them."""
-    weaker = (data.best != np.arange(len(h)))[:, None, None]
-    return np.where(weaker, h - h[data.best], h)
 
 
 def step(plain: Fit, candidate: Candidate) -> Candidate:

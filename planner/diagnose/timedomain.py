@@ -32,20 +32,25 @@ class Strokes:
     axis: np.ndarray
 
 
-def strokes(visits: Sequence[int], columns: Sequence[Column]) -> Strokes:
+def strokes(
+    visits: Sequence[int],
+    columns: Sequence[Column],
+    finer: int = FINER,
+    lasts_s: float = LASTS_S,
+) -> Strokes:
     """One hit of each column; `visits` (c,) says where."""
     rate = columns[0].hits[0].sampling_rate_hz
-    count = int(LASTS_S * rate) * FINER
+    count = int(lasts_s * rate) * finer
     force, zero = np.zeros((len(columns), count)), np.zeros(len(columns))
     for row, column in enumerate(columns):
         hit = column.hits[0]
         at = pulse(hit)
         part = hit.sign * (hit.force_n[at.first : at.last] - np.median(hit.force_n))
-        fine = np.asarray(signal.resample(part, FINER * len(part)))
+        fine = np.asarray(signal.resample(part, finer * len(part)))
         force[row, : min(len(fine), count)] = fine[:count]
         zero[row] = (at.peak - at.first) / rate
     axes = np.array([column.axis for column in columns])
-    return Strokes(1 / (rate * FINER), force, zero, np.asarray(visits), axes)
+    return Strokes(1 / (rate * finer), force, zero, np.asarray(visits), axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +77,7 @@ def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
     own, struck = np.zeros((n, most), dtype=complex), np.zeros((n, most, 3), dtype=complex)
     static, static_hit = np.zeros(n), np.zeros((n, 3))
     for i in range(n):
-        lam, shapes, entry = _poles(system, i)
+        lam, shapes, entry = modal(system, i)
         at = shapes[block]
         mine, hit = at * entry[:, block], at[:, None] * (entry @ system.hit[i].T)
         slow = np.abs(lam) < 2 * np.pi * fastest_hz
@@ -84,12 +89,12 @@ def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
         own[i, :count], struck[i, :count] = mine[slow][order], hit[slow][order]
     used = np.any(own != 0, axis=0)
     poles, own, struck = poles[:, used], own[:, used], struck[:, used]
-    grow, older, newer = _weights(poles, hits.step_s)
+    grow, older, newer = weights(poles, hits.step_s)
     free = np.empty((hits.force.shape[1], len(hits.visit)))
     for i in range(n):
         here = np.flatnonzero(hits.visit == i)
         weight = struck[i][:, hits.axis[here]]  # (p, c)
-        free[:, here] = _free(hits, here, poles[i], weight, (grow[i], older[i], newer[i]))
+        free[:, here] = free_angles(hits, here, poles[i], weight, (grow[i], older[i], newer[i]))
         free[:, here] += static_hit[i, hits.axis[here]] * hits.force[here].T
     v = hits.visit
     drive = own * (newer + older / grow)
@@ -97,7 +102,7 @@ def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
     return Seen(grow[v].T.copy(), drive[v].T.copy(), gives[v], free)
 
 
-def _free(
+def free_angles(
     hits: Strokes,
     here: np.ndarray,
     poles: np.ndarray,
@@ -119,7 +124,7 @@ def _free(
     return out
 
 
-def _poles(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def modal(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Poles (p,), shapes (e, p), entries (p, e); conjugates are in the shapes' factor 2."""
     springs = system.elasticity
     e = len(springs.stiffness)
@@ -136,7 +141,7 @@ def _poles(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarr
     return poles[one], vectors[:e, one] * twice, entry[one]
 
 
-def _weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def weights(pole: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """y(t+h) = grow y(t) + older f(t) + newer f(t+h) for y' = λy + f, f linear between."""
     z = pole * step_s
     grow = np.exp(z)
@@ -182,10 +187,17 @@ def torques(
 
 def spectra(torque: np.ndarray, hits: Strokes, s: np.ndarray) -> np.ndarray:
     """∫ τ e^(−st) dt (c, F) of torques (n, c) that are linear between steps; s (F,)."""
-    n = len(torque)
-    t = np.arange(n) * hits.step_s
-    kernel = np.exp(-np.outer(s, t))
+    turn = kernel(len(torque), hits, s)
+    return (turn.real @ torque + 1j * (turn.imag @ torque)).T * scale(hits, s)
+
+
+def kernel(count: int, hits: Strokes, s: np.ndarray) -> np.ndarray:
+    """e^(−st) (F, n) at `count` steps."""
+    return np.exp(-np.outer(s, np.arange(count) * hits.step_s))
+
+
+def scale(hits: Strokes, s: np.ndarray) -> np.ndarray:
+    """(c, F) by which sums over e^(−st) become integrals, time being 0 at each hit's peak."""
     half = s * hits.step_s / 2
     linear = (np.sinh(half) / half) ** 2 * hits.step_s
-    both = kernel.real @ torque + 1j * (kernel.imag @ torque)
-    return both.T * linear * np.exp(np.outer(hits.zero_s, s))
+    return linear * np.exp(np.outer(hits.zero_s, s))

@@ -1,0 +1,156 @@
+"""One law at several joints at once: hits in time, derivatives, and robots that do it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from known_robots import KR10, KR210
+from planner.diagnose.columns import column
+from planner.diagnose.equivalent import System, receptances
+from planner.diagnose.laws import LAWS, Law
+from planner.diagnose.screens import screen
+from planner.diagnose.swings import course, joints_of, rates
+from planner.diagnose.timedomain import seen, spectra, strokes, torques
+from planner.diagnose.visits import Recorded, Visit
+from planner.physics.simulation import Elasticity, Simulation
+from planner.recording.types import Hit
+from planner.robot.robot import Robot
+from planner.truth.deviation import Deviation
+from planner.truth.hits import Hammer
+from planner.truth.laws import Friction, Hardening
+from planner.truth.model import load_truth
+from planner.truth.nonlinear import Port
+from planner.truth.scene import Scene
+from planner.truth.secret import Secret, hit_poses
+from planner.truth.secret import Visit as Planned
+
+STIFFENING, DAHL, DEAD_ZONE = LAWS
+
+
+@pytest.fixture(scope="module")
+def struck(tmp_path_factory):
+    """A system, hits along three axes at two poses, and lines."""
+    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
+    q = KR210.poses(2, 8)
+    m, springs = simulation.elastic.matrices(q), simulation.elasticity
+    ports = tuple(f"joint_{i}" for i in range(1, 7))
+    system = System(m.mass, m.geometric, m.hit, m.sensor, springs, ports, np.arange(6))
+    t = np.arange(1024) / 400.0
+    rng = np.random.default_rng(1)
+    columns = []
+    for axis in range(3):
+        force = 900 * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
+        hit = Hit(Path("hit"), "+" + "xyz"[axis], 400.0, force, rng.standard_normal((3, 1024)))
+        columns.append(column((hit,), axis, 0, 1024, (5.0, 50.0), 4.0, 0.0))
+    hits = strokes([0, 0, 0, 1, 1, 1], columns * 2, 3, 0.7)
+    return system, hits, 2j * np.pi * np.linspace(6, 45, 9) + 4
+
+
+def with_spring(law: Law, more: np.ndarray) -> Law:
+    """The law with linear springs beside it."""
+
+    def step(k, a, state, before, now):
+        torque, slope, after = law.step(k, a, state, before, now)
+        return torque + more * now, slope + more, after
+
+    return replace(law, step=step)
+
+
+def test_linear_torques_at_all_joints_are_stiffer_springs(struck):
+    system, hits, s = struck
+    joints = joints_of(system, hits, 500.0)
+    more = np.array([0.4, 0.2, 0.5, 0.3, 0.1, 0.2]) * joints.stiffness
+    one = np.ones(6)
+    found = course(with_spring(STIFFENING, more), 0 * one, one, joints, hits, s)
+    k = system.elasticity.stiffness.copy()
+    k[system.blocks] += more
+    springs = Elasticity(k, system.elasticity.damping, system.elasticity.loss_factor)
+    stiffer = replace(system, elasticity=springs)
+    force = spectra(hits.force.T, hits, s)
+    for c in range(6):
+        swing = receptances(stiffer, int(hits.visit[c]), s).port_hit[:, :, hits.axis[c]]
+        expected = (more * swing).T
+        ratio = found.spectrum[:, c] / force[c]
+        assert np.allclose(ratio, expected, atol=0.02 * np.abs(expected).max())
+    assert np.allclose(found.stiffer, more, rtol=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.effect)
+def test_a_law_at_one_joint_is_what_it_is_by_itself(struck, law):
+    """Dahl's slope jumps where a joint turns, so that Newton's steps end elsewhere by a little."""
+    system, hits, s = struck
+    joints, port = joints_of(system, hits, 500.0), 2
+    k, a = np.full(6, 1e-6 * joints.stiffness[0]), np.full(6, 3e-4)
+    k[port] = 0.5 * joints.stiffness[port]
+    together = course(law, k, a, joints, hits, s).spectrum[port]
+    view = seen(system, port, hits, 500.0)
+    alone = torques([(law, slice(0, 6))], np.full(6, k[port]), np.full(6, 3e-4), np.zeros(6), view)
+    expected = spectra(alone, hits, s)
+    assert np.allclose(together, expected, atol=5e-3 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.effect)
+def test_derivatives_follow_the_swings_in_time(struck, law):
+    system, hits, s = struck
+    joints = joints_of(system, hits, 500.0)
+    k = np.array([0.5, 0.4, 0.6, 0.5, 0.3, 0.5]) * joints.stiffness
+    a = np.full(6, 3e-4)
+    found = rates(law, k, a, joints, hits, s)
+    for joint in (1, 4):
+        bump = np.where(np.arange(6) == joint, 1e-4, 0.0)
+        ends = {
+            0: [(law, k * np.exp(sign * bump), a) for sign in (1, -1)],
+            1: [(law, k, a * np.exp(sign * bump)) for sign in (1, -1)],
+            2: [(with_spring(law, sign * bump * joints.stiffness), k, a) for sign in (1, -1)],
+        }
+        for kind, (up, down) in ends.items():
+            over, under = (course(*end, joints, hits, s).spectrum for end in (up, down))
+            slope = (over - under) / 2e-4
+            assert np.allclose(found[kind, joint], slope, atol=0.02 * np.abs(slope).max())
+
+
+def recorded(folder: Path, drives: tuple[int, ...], law: str, poses: int) -> tuple:
+    """KR10 whose drives follow a law each, hit at three levels, and its simulation."""
+    toml = KR10.write(folder)
+    truth, q = load_truth(toml, Deviation(3, inertia=0.03)), KR10.poses(poses, seed=3)
+    hammer = Hammer(150.0, 0.003, 1000.0, 1.28, noise=0.01)
+    scene = Scene(KR10, truth, 3, q, 50.0)
+    laws = {}
+    for number in drives:
+        joint = f"joint_{number}"
+        k, a = scene.stiffness(joint), scene.angle(joint)
+        laws[joint] = Hardening(k, 0.6 * a) if law == "hardening" else Friction(k, k * a / 3)
+    ports = tuple(Port(one, joint=joint) for joint, one in laws.items())
+    shots = [("+" + axis, share * hammer.peak_n) for axis in "xyz" for share in (0.4, 1.0, 2.5)]
+    planned, rng = [Planned(row, shots) for row in q], np.random.default_rng(5)
+    made = hit_poses(truth, Secret(Deviation(3, inertia=0.03), ports), planned, hammer, rng)
+    visits = []
+    for i, (row, hits) in enumerate(zip(q, made, strict=True)):
+        of_pose = tuple(
+            Hit(Path("hit"), h.axis, 1000.0, h.force_n, h.acceleration_m_s2, simulated=True)
+            for h in hits
+        )
+        visits.append(Visit(f"P{i}", row, i / max(poses - 1, 1), of_pose))
+    simulation = Simulation(Robot.load(toml))
+    return Recorded(tuple(visits), simulation.robot.config.band_hz), simulation, laws
+
+
+def test_two_drives_that_harden_are_named_and_no_others(tmp_path):
+    hit, simulation, laws = recorded(tmp_path, (2, 3), "hardening", 5)
+    found = screen(hit, simulation).findings
+    assert {(f.effect, f.at) for f in found} == {("nonlinear_stiffness", at) for at in laws}
+    for f in found:
+        true = vars(laws[f.at])
+        for (value, sd, _), expected in zip(f.parameters.values(), true.values(), strict=True):
+            assert abs(value - expected) < 3 * sd
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize("drives", [(1, 3), (2, 3, 5)], ids=["two", "three"])
+def test_drives_that_stick_and_slide_are_named(tmp_path, drives):
+    hit, simulation, laws = recorded(tmp_path, drives, "friction", 7)
+    found = screen(hit, simulation).findings
+    assert {(f.effect, f.at) for f in found} == {("friction", at) for at in laws}
