@@ -31,7 +31,7 @@ STIFFENING, DAHL, DEAD_ZONE = LAWS
 
 @pytest.fixture(scope="module")
 def struck(tmp_path_factory):
-    """A system, hits along three axes at two poses, and lines."""
+    """A system, hits along three axes at two poses, the same in fewer steps, and lines."""
     simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
     q = KR210.poses(2, 8)
     m, springs = simulation.elastic.matrices(q), simulation.elasticity
@@ -44,8 +44,8 @@ def struck(tmp_path_factory):
         force = 900 * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
         hit = Hit(Path("hit"), "+" + "xyz"[axis], 400.0, force, rng.standard_normal((3, 1024)))
         columns.append(column((hit,), axis, 0, 1024, (5.0, 50.0), 4.0, 0.0))
-    hits = strokes([0, 0, 0, 1, 1, 1], columns * 2, 3, 0.7)
-    return system, hits, 2j * np.pi * np.linspace(6, 45, 9) + 4
+    visits, s = [0, 0, 0, 1, 1, 1], 2j * np.pi * np.linspace(6, 45, 9) + 4
+    return system, strokes(visits, columns * 2), strokes(visits, columns * 2, 3, 0.7), s
 
 
 def with_spring(law: Law, more: np.ndarray) -> Law:
@@ -59,7 +59,7 @@ def with_spring(law: Law, more: np.ndarray) -> Law:
 
 
 def test_linear_torques_at_all_joints_are_stiffer_springs(struck):
-    system, hits, s = struck
+    system, hits, _, s = struck
     joints = joints_of(system, hits, 500.0)
     more = np.array([0.4, 0.2, 0.5, 0.3, 0.1, 0.2]) * joints.stiffness
     one = np.ones(6)
@@ -80,7 +80,7 @@ def test_linear_torques_at_all_joints_are_stiffer_springs(struck):
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.effect)
 def test_a_law_at_one_joint_is_what_it_is_by_itself(struck, law):
     """Dahl's slope jumps where a joint turns, so that Newton's steps end elsewhere by a little."""
-    system, hits, s = struck
+    system, hits, _, s = struck
     joints, port = joints_of(system, hits, 500.0), 2
     k, a = np.full(6, 1e-6 * joints.stiffness[0]), np.full(6, 3e-4)
     k[port] = 0.5 * joints.stiffness[port]
@@ -93,7 +93,7 @@ def test_a_law_at_one_joint_is_what_it_is_by_itself(struck, law):
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.effect)
 def test_derivatives_follow_the_swings_in_time(struck, law):
-    system, hits, s = struck
+    system, _, hits, s = struck
     joints = joints_of(system, hits, 500.0)
     k = np.array([0.5, 0.4, 0.6, 0.5, 0.3, 0.5]) * joints.stiffness
     a = np.full(6, 3e-4)
