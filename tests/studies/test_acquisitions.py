@@ -19,6 +19,7 @@ import pytest
 
 from acquisition_cases import CELLS, campaign, make
 from planner.acquire.designs import NESTED
+from planner.campaign.config import CostTable
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")
@@ -73,6 +74,15 @@ class Curve:
     def worst_within(self, minutes: float) -> float:
         """Worst error in % of the last measurement that ends within the minutes; ∞ if none does."""
         count = int(np.sum(self.minutes <= minutes))
+        return float(self.worst[count - 1]) if count else np.inf
+
+    def worst_after(self, hits: int) -> float:
+        """Worst error in % of the last measurement that ends within so many hits, an axis each."""
+        cost = CostTable()
+        axes = (np.diff(self.minutes, prepend=0.0) - cost.minutes_per_pose) / (
+            cost.minutes_per_hit * cost.hits_per_axis
+        )  # travel takes seconds
+        count = int(np.sum(np.cumsum(np.round(axes)) <= hits))
         return float(self.worst[count - 1]) if count else np.inf
 
     def _stays(self, good: np.ndarray) -> tuple[float, float]:
@@ -195,6 +205,12 @@ def test_measurements_to_the_target(runs):
         own = np.array([c.worst[3] for c in curves])
         of = " ".join(f"{v:6.2f}" for v in np.quantile(own, [0.5, 0.9, 1.0]))
         print(f"    {strategy:26s}{of}  {saving(own, at)}")
+    for hits in (4, 6):
+        print(f"  the same after {hits} hits, a hit being one axis of one pose")
+        at = np.array([c.worst_after(hits) for c in base])
+        for strategy, curves in found.items():
+            own = np.array([c.worst_after(hits) for c in curves])
+            print(f"    {strategy:26s}{np.median(own):6.2f}  {saving(own, at)}")
     print("  the same within the minutes of the other's 3")
     at = np.array([c.worst[2] for c in base])
     for strategy, curves in found.items():
