@@ -28,8 +28,9 @@ from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
 from planner.truth.secret import Secret, Visit, frfs, hit_poses, once
 
 EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
-KINDS = ("null", *EFFECTS, "pair")
-MIX = (*KINDS, "null", "pair", "pair")  # in these proportions: there are many pairs to be told
+KINDS = ("null", *EFFECTS, "pair", "drives")  # "drives": one law in several joints
+MIX = ("null", *EFFECTS, "pair", "null", "pair", "pair")  # so often: there are many pairs to tell
+DRIVES = 2, 4  # how many joints, at least and at most
 # Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
 LEVELS = (0.4, 1.0, 2.5)
@@ -106,12 +107,15 @@ def _conceal(
     rng: np.random.Generator,
 ) -> tuple[list[Drawn], list[Detectability]]:
     """Effects one upon the other, each drawn until the FRFs show it beyond doubt."""
-    names = [] if kind == "null" else _pair(scene, rng) if kind == "pair" else [kind]
+    several = {"null": lambda *_: [], "pair": _pair, "drives": _drives}
+    names = several[kind](scene, rng) if kind in several else [kind]
     found: list[Drawn] = []
     measures: list[Detectability] = []
     for name in names:
         for _ in range(ATTEMPTS):
             drawn = EFFECTS[name](scene, secret, rng)
+            if kind == "drives" and not _joins(drawn, found):
+                continue
             with_it = load_truth(robot_toml, drawn.secret.deviation)
             if not all(np.all(with_it.poles(q)[0].real < 0) for q in scene.poses):
                 continue  # a feedback loop that would shake by itself
@@ -134,6 +138,18 @@ def _pair(scene: Scene, rng: np.random.Generator) -> list[str]:
     linear = [n for n in LINEAR if n != "transverse_compliance" or scene.per_joint == 1]
     first, second = (str(name) for name in rng.choice(linear, 2, replace=False))
     return [first, str(rng.choice(list(NONLINEAR)))] if rng.random() < 0.3 else [first, second]
+
+
+def _drives(scene: Scene, rng: np.random.Generator) -> list[str]:
+    """The same law several times."""
+    return [str(rng.choice(list(NONLINEAR)))] * int(rng.integers(DRIVES[0], DRIVES[1] + 1))
+
+
+def _joins(drawn: Drawn, found: list[Drawn]) -> bool:
+    """Whether a law is at a joint of its own, and hardens or softens as the others do."""
+    numbers = [next(iter(d.parameters.values())) for d in (drawn, *found)]
+    signs = {v > 0 for v in numbers if isinstance(v, float)}
+    return len(signs) == 1 and all(d.at != drawn.at for d in found)
 
 
 def _record(
