@@ -82,7 +82,8 @@ def _laws(told: Told, judged: Told, seen: Sequence[Refit]) -> list[Shared]:
 
     def judge(family: Family) -> Shared:
         left, before, count = differences(judged, family)
-        explained = 1 - max(left - count, 0.0) / max(before - count, 1e-9)
+        to_explain = before - count
+        explained = 1 - max(left - count, 0.0) / to_explain if to_explain > 0 else 0.0
         changes = _changes(family, told.data.level)
         return Shared(family, changes, explained, max(left - count, INDEPENDENT / 2))
 

@@ -1,18 +1,13 @@
 """Nonlinear joints: laws against their theory, and hits in time against the frequency domain."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from known_robots import KR210
-from planner.diagnose.columns import column
 from planner.diagnose.equivalent import System, receptances
 from planner.diagnose.laws import LAWS
 from planner.diagnose.timedomain import seen, spectra, strokes, torques
-from planner.physics.simulation import Elasticity, Simulation
-from planner.recording.types import Hit
-from planner.robot.robot import Robot
+from planner.physics.simulation import Elasticity
+from struck import VISITS, struck_robot
 
 STIFFENING, DAHL, DEAD_ZONE = LAWS
 AMPLITUDES = np.array([1e-3, 0.1, 0.5, 2.0, 20.0])
@@ -66,20 +61,8 @@ def test_friction_never_gives_energy():
 @pytest.fixture(scope="module")
 def struck(tmp_path_factory):
     """A system, and one hit along each axis at two poses."""
-    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
-    q = KR210.poses(2, 8)
-    m, springs = simulation.elastic.matrices(q), simulation.elasticity
-    ports = tuple(f"joint_{i}" for i in range(1, 7))
-    system = System(m.mass, m.geometric, m.hit, m.sensor, springs, ports, np.arange(6))
-    t = np.arange(1024) / 400.0
-    rng = np.random.default_rng(1)
-    columns = []
-    for axis in range(3):
-        force = 900 * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
-        force = force + 0.1 * rng.standard_normal(1024)
-        hit = Hit(Path("hit"), "+" + "xyz"[axis], 400.0, force, rng.standard_normal((3, 1024)))
-        columns.append(column((hit,), axis, 0, 1024, (5.0, 50.0), 4.0, 0.0))
-    return system, strokes([0, 0, 0, 1, 1, 1], columns * 2), 2j * np.pi * np.linspace(6, 45, 9) + 4
+    system, columns = struck_robot(tmp_path_factory.mktemp("kr210"))
+    return system, strokes(VISITS, columns), 2j * np.pi * np.linspace(6, 45, 9) + 4
 
 
 def test_a_linear_torque_in_time_is_a_stiffer_spring_in_frequency(struck):

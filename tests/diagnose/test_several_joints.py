@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KR10, KR210
-from planner.diagnose.columns import column
-from planner.diagnose.equivalent import System, receptances
+from known_robots import KR10
+from planner.diagnose.equivalent import receptances
 from planner.diagnose.laws import LAWS, Law
 from planner.diagnose.screens import screen
 from planner.diagnose.swings import course, joints_of, rates
@@ -25,6 +24,7 @@ from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret, hit_poses
 from planner.truth.secret import Visit as Planned
+from struck import VISITS, struck_robot
 
 STIFFENING, DAHL, DEAD_ZONE = LAWS
 
@@ -32,20 +32,9 @@ STIFFENING, DAHL, DEAD_ZONE = LAWS
 @pytest.fixture(scope="module")
 def struck(tmp_path_factory):
     """A system, hits along three axes at two poses, the same in fewer steps, and lines."""
-    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("kr210"))))
-    q = KR210.poses(2, 8)
-    m, springs = simulation.elastic.matrices(q), simulation.elasticity
-    ports = tuple(f"joint_{i}" for i in range(1, 7))
-    system = System(m.mass, m.geometric, m.hit, m.sensor, springs, ports, np.arange(6))
-    t = np.arange(1024) / 400.0
-    rng = np.random.default_rng(1)
-    columns = []
-    for axis in range(3):
-        force = 900 * np.sin(np.pi * np.clip((t - 0.06) / 0.01, 0, 1)) ** 2
-        hit = Hit(Path("hit"), "+" + "xyz"[axis], 400.0, force, rng.standard_normal((3, 1024)))
-        columns.append(column((hit,), axis, 0, 1024, (5.0, 50.0), 4.0, 0.0))
-    visits, s = [0, 0, 0, 1, 1, 1], 2j * np.pi * np.linspace(6, 45, 9) + 4
-    return system, strokes(visits, columns * 2), strokes(visits, columns * 2, 3, 0.7), s
+    system, columns = struck_robot(tmp_path_factory.mktemp("kr210"))
+    s = 2j * np.pi * np.linspace(6, 45, 9) + 4
+    return system, strokes(VISITS, columns), strokes(VISITS, columns, 3, 0.7), s
 
 
 def with_spring(law: Law, more: np.ndarray) -> Law:
