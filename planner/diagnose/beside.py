@@ -27,9 +27,12 @@ BETTER = 1.5  # factor by which the linear effect then has to lower it
 
 
 def leaves_room(findings: Sequence[Finding]) -> bool:
-    """Whether a joint's law was found, and so crude a fit that something may be beside it."""
+    """Whether a joint's law was found, and so crude a fit that something may be beside it.
+
+    Laws of several joints are not fitted closely enough to tell.
+    """
     laws = [f for f in findings if f.effect in levels.LAWS]
-    return bool(laws) and all(f.misfit > CRUDE for f in laws)
+    return len(laws) == 1 and laws[0].misfit > CRUDE
 
 
 def beside(
