@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from known_robots import KR10
+from planner.diagnose.beside import leaves_room
 from planner.diagnose.equivalent import receptances
+from planner.diagnose.finding import Finding
 from planner.diagnose.laws import LAWS, Law
 from planner.diagnose.screens import screen
 from planner.diagnose.swings import course, joints_of, rates
@@ -143,3 +145,9 @@ def test_drives_that_stick_and_slide_are_named(tmp_path, drives):
     hit, simulation, laws = recorded(tmp_path, drives, "friction", 7)
     found = screen(hit, simulation).findings
     assert {(f.effect, f.at) for f in found} == {("friction", at) for at in laws}
+
+
+def test_beside_laws_of_several_joints_nothing_linear_is_looked_for():
+    crude = [Finding("friction", at, 50.0, misfit=40.0) for at in ("joint_1", "joint_2")]
+    assert leaves_room(crude[:1])
+    assert not leaves_room(crude)
