@@ -59,7 +59,7 @@ def beside(
     with tempfile.TemporaryDirectory() as folder:
         robot = found.problem.simulation.robot
         path = write_explained(Path(folder), robot, found, linear)
-        again = levels.screen(recorded, Simulation(Robot.load(path)))
+        again = levels.screen(recorded, Simulation(Robot.load(path)), single=True)
     law = next((f for f in again if f.effect in levels.LAWS), None)
     if law is None or law.misfit * BETTER > min(f.misfit for f in before):
         return None

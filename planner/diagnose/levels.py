@@ -79,8 +79,11 @@ class Weighed:
     temper: float
 
 
-def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
-    """Nonlinear joints; `unknown` where the level matters and no joint's law explains it."""
+def screen(recorded: Recorded, nominal: Simulation, *, single: bool = False) -> tuple[Finding, ...]:
+    """Nonlinear joints; `unknown` where the level matters and no joint's law explains it.
+
+    `single`: a law of several joints is not looked for.
+    """
     if len(recorded.level_n) < 2:
         return ()
     tone = screen_tone(recorded)
@@ -92,7 +95,7 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     if not len(found.count) or disproportion(found) < PROPORTIONAL:
         return ()
     share = equivalent_share(found)
-    several = shared.screen(recorded, nominal) if share < ONE_JOINT else ()
+    several = shared.screen(recorded, nominal) if share < ONE_JOINT and not single else ()
     if several:
         return several
     if share < LINEARISED:
