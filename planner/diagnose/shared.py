@@ -97,7 +97,7 @@ def _laws(told: Told, judged: Told, seen: Sequence[Refit]) -> list[Shared]:
     begun = [beginning(seen, *kind, told.plain) for kind in _kinds(seen)]
     afar = ordered(side_by_side(lambda one: judge(settled(told, one, AFAR)), begun))
     best = afar[0]
-    if best.explained < HOPEFUL or len(best.bent) < 2:
+    if best.explained < HOPEFUL or len(_that_matter(judged, best)) < 2:
         return afar
     rivals = [one for one in afar if one.left < RIVAL * best.left]
     near = side_by_side(lambda one: closer(one, NEAR), rivals)
