@@ -98,9 +98,12 @@ def evaluate(told: Told, family: Family) -> Family:
     """χ² and the objective where the family is."""
     data, plain = told.data, told.plain
     system = system_of(plain, family.x)
+    joints = joints_of(system, told.hits, data.fastest_hz)
     with np.errstate(over="ignore", invalid="ignore"):
-        joints = joints_of(system, told.hits, data.fastest_hz)
-        found = course(family.law, family.k, family.a, joints, told.hits, data.s)
+        try:
+            found = course(family.law, family.k, family.a, joints, told.hits, data.s)
+        except np.linalg.LinAlgError:  # swings without bounds
+            return replace(family, chi2=np.inf, value=np.inf)
         off = compared(data, data.h) - compared(data, _frfs(told, system, found.spectrum))
         chi2 = float(np.sum(data.weight * np.abs(off) ** 2))
     away, _ = _prior(plain, family)
@@ -128,7 +131,9 @@ def sloped(told: Told, family: Family) -> Family:
     m, d = len(family.scale), len(plain.x)
     linear = linearised(data, plain, family.x, system.blocks, family.stiffer).slope
     linear = np.swapaxes(linear, 0, 1).copy()
-    linear[[own_parameter(plain, int(b)) for b in system.blocks]] = ours[2 * m :]
+    own = [own_parameter(plain, int(block)) for block in system.blocks]
+    linear[own] = 0.0
+    np.add.at(linear, own, ours[2 * m :])  # tied springs share a parameter
     root = np.sqrt(data.weight)
     jacobian = (np.concatenate([linear, ours[: 2 * m]]) * root).reshape(d + 2 * m, -1)
     flat = jacobian.view(float)
