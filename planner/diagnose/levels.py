@@ -15,6 +15,7 @@ from planner.diagnose.laws import behaviour
 from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
 from planner.diagnose.nonlinear import Candidate, Laws, covariance, descend
 from planner.diagnose.refits import base
+from planner.diagnose.shared import INDEPENDENT
 from planner.diagnose.side_by_side import side_by_side
 from planner.diagnose.starts import starts
 from planner.diagnose.strayed import strayed
@@ -33,7 +34,6 @@ ALIKE = 40.0  # neighbouring values that err alike where the model is not quite 
 EXPLAINED = 0.6  # of the excess of χ² of the levels' differences, that a law has to take away
 HOPEFUL = 0.3  # of the same, from which on a law is followed to its end
 UNEXPLAINED = 1e-3  # of the same, that no law can be expected to explain
-INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed
 WEAKEST = 1e-10  # damping in the last rounds
 TOLERANCE = 1e-5  # of the objective, that a last round must gain
 CLEAR = 8.0

@@ -15,6 +15,7 @@ from planner.diagnose.effect import Effect
 from planner.diagnose.equivalent import receptances, swing, system_of
 from planner.diagnose.fit import FINE, GLANCE, Fit
 from planner.diagnose.laws import Law
+from planner.diagnose.nonlinear import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
 from planner.diagnose.starts import faded
 from planner.diagnose.visits import Recorded
 from planner.identify.solver import minimise
@@ -22,7 +23,7 @@ from planner.physics.simulation import Simulation
 
 LOG_STEPS = 20
 SPRING_SD = 0.05  # of ln stiffness that a refit gives a joint that is not linear
-LINEAR_SD, LOG_SHARE, LOG_SHARE_SD, LOG_ANGLE_SD = 1.0, float(np.log(0.5)), 1.5, 2.0
+LINEAR_SD = 1.0  # of ln stiffness of a joint without its law
 LINEAR, SHARES, ANGLES = (0.6, 1.0, 1.5), (0.1, 0.5, 1.5), (0.05, 0.2, 0.6, 1.5)  # of the grid
 LEAST_SHARE, MOST_SHARE, MOST_LACKING = 1e-3, 20.0, 0.9
 

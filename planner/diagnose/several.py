@@ -9,7 +9,8 @@ from planner.diagnose.equivalent import System, receptances, system_of
 from planner.diagnose.fit import Fit
 from planner.diagnose.laws import Law
 from planner.diagnose.leveldata import LAID, Data, compared, data_of, linearised, own_parameter
-from planner.diagnose.refits import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD, Refit, begin
+from planner.diagnose.nonlinear import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
+from planner.diagnose.refits import Refit, begin
 from planner.diagnose.swings import course, joints_of, rates
 from planner.diagnose.timedomain import Strokes, strokes
 from planner.diagnose.visits import Recorded
