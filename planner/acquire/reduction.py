@@ -6,6 +6,7 @@ simulation's slope and bias, minus what was measured and what is planned), so th
 loop over blocks of candidates makes it, squares it and sums it without keeping it.
 """
 
+from collections.abc import Sequence
 from functools import partial
 
 import jax
@@ -16,11 +17,12 @@ from jax import Array
 from planner.acquire.outputs import FrequencyOutputs, Poses, Target
 from planner.fusion import jaxsetup
 from planner.fusion.kernels import parse
+from planner.side_by_side import with_helper
 
 BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
 TASK = 64  # blocks a call where there are many; calls of equal shape are compiled once
 LARGE = 20_000  # candidates from which all but the EXACT best are done in single precision
-EXACT = 2_000
+EXACT = 1_000
 WIDTH = 2  # the number of features is rounded up to a multiple of it, for the same reason
 
 
@@ -40,23 +42,22 @@ def reduction_by_label(
     Of many candidates only the best are done in double precision: single precision errs by 1e-7 of
     the prior covariance, which ranks the others well enough.
     """
+    labels, double = range(outputs.count), partial(_label, outputs, target, np.float64)
     if len(poses) <= LARGE:
-        return _labels(outputs, poses, target, np.dtype(np.float64))
-    gained, variance = _labels(outputs, poses, target, np.dtype(np.float32))
+        return _both([double(poses, k) for k in labels])
+    single = partial(_label, outputs, target, np.float32, poses)
+    gained, variance = _both(with_helper(single, labels))
     best = np.argpartition(np.sum(gained, axis=0), -EXACT)[-EXACT:]
-    gained[:, best] = _labels(outputs, poses[best], target, np.dtype(np.float64))[0]
+    gained[:, best], _ = _both(with_helper(partial(double, poses[best]), labels))
     return gained, variance
 
 
-def _labels(
-    outputs: FrequencyOutputs, poses: Poses, target: Target, precision: np.dtype
-) -> tuple[np.ndarray, np.ndarray]:
-    both = [_label(outputs, poses, target, k, precision) for k in range(outputs.count)]
-    return np.array([r for r, _ in both]), np.array([v for _, v in both])
+def _both(by_label: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    return np.array([r for r, _ in by_label]), np.array([v for _, v in by_label])
 
 
 def _label(
-    outputs: FrequencyOutputs, poses: Poses, target: Target, k: int, precision: np.dtype
+    outputs: FrequencyOutputs, target: Target, precision: type[np.floating], poses: Poses, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
     weight = target.importance[:, k]

@@ -17,8 +17,8 @@ from planner.acquire.outputs import AXES
 from planner.acquire.parameters import FrfNoise
 from planner.diagnose.fit import Fit, Problem, carried_on
 from planner.diagnose.predict import misfit_at
-from planner.diagnose.side_by_side import side_by_side
 from planner.frf.types import Frf
+from planner.side_by_side import side_by_side
 
 LINES = 96  # evenly over the band
 TRIED = 8  # poses at which fits are tried, the most promising in closed form

@@ -16,8 +16,8 @@ from planner.diagnose.effects.extra import ExtraCompliance
 from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.effects.resonator import LocalResonator
 from planner.diagnose.fit import GLANCE, Fit, Problem, approached, points
-from planner.diagnose.side_by_side import side_by_side
 from planner.identify.held_out import farthest_first
+from planner.side_by_side import side_by_side
 
 ROUGH = replace(GLANCE, lines=24, inertial=False)
 POSES = 5

@@ -10,7 +10,7 @@ import numpy as np
 from planner.diagnose.both import Both, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.fit import CLOSE, Fit, Problem, approached, points
-from planner.diagnose.side_by_side import side_by_side
+from planner.side_by_side import side_by_side
 
 MOVABLE = "added_mass", "local_resonator"
 KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew

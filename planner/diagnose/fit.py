@@ -8,7 +8,6 @@ import numpy as np
 
 from planner.diagnose.effect import Effect, Setting
 from planner.diagnose.objective import ByPose, Misfit, own_names
-from planner.diagnose.side_by_side import side_by_side
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
 from planner.identify.identify import QUICK, STAGES, Effort, identify
@@ -18,6 +17,7 @@ from planner.identify.solver import Minimum, minimise
 from planner.physics.gradient import Inertias
 from planner.physics.simulation import Simulation
 from planner.robot.elastic import Matrices
+from planner.side_by_side import side_by_side
 
 # Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
 PRIORS = Priors(stiffness_factor=1.17, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)

@@ -16,12 +16,12 @@ from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearise
 from planner.diagnose.nonlinear import Candidate, Laws, covariance, descend
 from planner.diagnose.refits import base
 from planner.diagnose.shared import INDEPENDENT
-from planner.diagnose.side_by_side import side_by_side
 from planner.diagnose.starts import starts
 from planner.diagnose.strayed import strayed
 from planner.diagnose.tone import screen_tone
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
+from planner.side_by_side import side_by_side
 
 LAWS = "nonlinear_stiffness", "friction", "backlash"
 PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same

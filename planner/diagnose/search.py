@@ -23,9 +23,9 @@ from planner.diagnose.fit import (
     settle,
     staged,
 )
-from planner.diagnose.side_by_side import side_by_side
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
+from planner.side_by_side import side_by_side
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 FIRST, LAST = 10, 4  # candidates followed, and settled on all lines

@@ -21,9 +21,9 @@ from planner.diagnose.several import (
     straightened,
     told_by,
 )
-from planner.diagnose.side_by_side import side_by_side
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
+from planner.side_by_side import side_by_side
 
 FITTED, LEAST_VISITS = 4, 3  # poses that laws are fitted to, of how many at least
 AFAR, NEAR, CLOSE = (0.3,), (0.1,), (0.03,)  # shares by which errors are softened, in turn

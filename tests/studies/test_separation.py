@@ -20,7 +20,7 @@ import pytest
 
 from planner.acquire.separate import odds_after, separation
 from planner.diagnose.fit import carried_on
-from planner.diagnose.side_by_side import side_by_side
+from planner.side_by_side import side_by_side
 from planner.truth.effects import NONLINEAR
 from separation_cases import KINDS, Campaign, OfEffects, begun
 
