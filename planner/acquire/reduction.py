@@ -14,8 +14,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from planner import jaxsetup
 from planner.acquire.outputs import FrequencyOutputs, Poses, Target
-from planner.fusion import jaxsetup
 from planner.fusion.kernels import parse
 from planner.side_by_side import with_helper
 

@@ -14,6 +14,7 @@ from planner.diagnose import levels
 from planner.diagnose.diagnose import Candidate, Diagnosis
 from planner.diagnose.finding import Finding
 from planner.diagnose.search import ENOUGH
+from planner.diagnose.tell import Tell, quietly
 from planner.diagnose.visits import Recorded
 from planner.diagnose.write import write_explained
 from planner.physics.simulation import Simulation
@@ -36,7 +37,7 @@ def leaves_room(findings: Sequence[Finding]) -> bool:
 
 
 def beside(
-    recorded: Recorded, findings: Sequence[Finding], found: Diagnosis
+    recorded: Recorded, findings: Sequence[Finding], found: Diagnosis, tell: Tell = quietly
 ) -> tuple[tuple[Finding, ...], Diagnosis] | None:
     """Findings of the levels once the best linear effect is known, and the diagnosis beside them.
 
@@ -59,7 +60,7 @@ def beside(
     with tempfile.TemporaryDirectory() as folder:
         robot = found.problem.simulation.robot
         path = write_explained(Path(folder), robot, found, linear)
-        again = levels.screen(recorded, Simulation(Robot.load(path)), single=True)
+        again = levels.screen(recorded, Simulation(Robot.load(path)), single=True, tell=tell)
     law = next((f for f in again if f.effect in levels.LAWS), None)
     if law is None or law.misfit * BETTER > min(f.misfit for f in before):
         return None

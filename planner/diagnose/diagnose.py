@@ -9,7 +9,8 @@ import numpy as np
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
 from planner.diagnose.fit import Fit, Problem, carried_on, fit, settle
-from planner.diagnose.search import Found, Tell, search
+from planner.diagnose.search import Found, search
+from planner.diagnose.tell import Tell, quietly
 from planner.diagnose.weigh import Weights, weigh
 from planner.frf.types import Frf
 from planner.identify.data import common_band
@@ -61,7 +62,7 @@ def diagnose(
     simulation: Simulation,
     *,
     effects: Sequence[Effect] | None = None,
-    tell: Tell = lambda text, share: None,
+    tell: Tell = quietly,
 ) -> Diagnosis:
     """Which effect explains FRFs at q (n, dof) in rad that the simulation does not.
 

@@ -8,7 +8,7 @@ from planner.diagnose.finding import Finding
 from planner.diagnose.judge import Judged, judge
 from planner.diagnose.recorded import corrected
 from planner.diagnose.screens import screen
-from planner.diagnose.search import Tell
+from planner.diagnose.tell import Tell, within
 from planner.diagnose.together import ARTEFACTS, Together, linear_effects_apply, together
 from planner.diagnose.visits import Recorded as Visits
 from planner.identify.recorded import Recorded
@@ -29,17 +29,18 @@ def explain(
 ) -> Explained:
     """What `simulation` lacks; `visits` are the hits themselves, None where there are only FRFs."""
     tell("looking at the measuring chain, the order in time and the force levels", 0.02)
-    recorded, visits, findings = _screened(recorded, visits, simulation)
+    recorded, visits, findings = _screened(recorded, visits, simulation, within(tell, 0.02, 0.2))
     linear = linear_effects_apply(findings)
     found = diagnose(
         recorded.frfs,
         recorded.q,
         simulation,
         effects=None if linear or leaves_room(findings) else (),
-        tell=lambda text, share: tell(text, 0.2 + 0.7 * share),
+        tell=within(tell, 0.2, 0.85),
     )
-    tell("looking for a nonlinear joint beside it", 0.9)
-    both = beside(visits, findings, found) if visits is not None else None
+    tell("looking for a nonlinear joint beside it", 0.85)
+    closer = within(tell, 0.85, 0.95)
+    both = beside(visits, findings, found, closer) if visits is not None else None
     if both is not None:
         findings, found = both
     elif not linear:
@@ -51,12 +52,12 @@ def explain(
 
 
 def _screened(
-    recorded: Recorded, visits: Visits | None, simulation: Simulation
+    recorded: Recorded, visits: Visits | None, simulation: Simulation, tell: Tell
 ) -> tuple[Recorded, Visits | None, tuple[Finding, ...]]:
     """Recordings and hits corrected for artefacts, and what the hits themselves say."""
     if visits is None:
         return recorded, None, ()
-    found = screen(visits, simulation)
+    found = screen(visits, simulation, tell)
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
     if artefacts:
         said = f"The recordings were corrected for: {', '.join(artefacts)}."

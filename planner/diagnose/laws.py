@@ -7,21 +7,23 @@ in rad, k in N·m/rad; a is the angle at which the law bends.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 PHASES = 2 * np.pi * (np.arange(64) + 0.5) / 64
 
-Torque = tuple[np.ndarray, np.ndarray, np.ndarray]  # torque, its slope, new state
-Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], Torque]
+Torque = tuple[Any, Any, Any]  # torque, its slope, new state
+Step = Callable[[Any, Any, Any, Any, Any, Any], Torque]
 
 
 @dataclass(frozen=True)
 class Law:
-    """`step(k, a, state, before, now)` tells what a motion from `before` to `now` does.
+    """`step(xp, k, a, state, before, now)` tells what a motion from `before` to `now` does.
 
-    The state is 0 at rest. `signed`: k may be negative. `least_share` bounds k from below in
-    shares of the joint's linear stiffness, `most_share` from above.
+    `xp` is the array library, numpy or jax.numpy. The state is 0 at rest. `signed`: k may be
+    negative. `least_share` bounds k from below in shares of the joint's linear stiffness,
+    `most_share` from above.
     """
 
     effect: str
@@ -47,7 +49,7 @@ class Law:
     def _steady(self, wave: np.ndarray, amplitude: np.ndarray, a: float) -> np.ndarray:
         if not self.remembers:
             one, state = np.ones(()), np.zeros(wave.shape)
-            return self.step(one, np.asarray(a), state, wave, wave)[0]
+            return self.step(np, one, np.asarray(a), state, wave, wave)[0]
         # Dahl's loop closes where the state at the turning points is ± a tanh(A / a).
         top = a * np.tanh(amplitude / a)[..., None]
         falling = np.sin(PHASES) > 0
@@ -56,31 +58,25 @@ class Law:
         return end + (np.where(falling, top, -top) - end) * np.exp(-way / a)
 
 
-def _stiffening(
-    k: np.ndarray, a: np.ndarray, state: np.ndarray, before: np.ndarray, now: np.ndarray
-) -> Torque:
+def _stiffening(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> Torque:
     """Secant stiffness 0 at small angles, k at large ones, half of it at a."""
     share = now**2 / (now**2 + a**2)
     return k * now * share, k * share * (3 - 2 * share), state
 
 
-def _dead_zone(
-    k: np.ndarray, a: np.ndarray, state: np.ndarray, before: np.ndarray, now: np.ndarray
-) -> Torque:
+def _dead_zone(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> Torque:
     """Within ± a the spring lacks k."""
-    inside = np.abs(now) < a
-    return -k * np.clip(now, -a, a), np.where(inside, -k, 0.0), state
+    inside = xp.abs(now) < a
+    return -k * xp.clip(now, -a, a), xp.where(inside, -k, 0.0), state
 
 
-def _dahl(
-    k: np.ndarray, a: np.ndarray, state: np.ndarray, before: np.ndarray, now: np.ndarray
-) -> Torque:
+def _dahl(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> Torque:
     """Dahl 1968: dz/dθ = 1 − sgn(dθ) z / a, torque k z; exact along a motion one way."""
     way = now - before
-    end = np.where(way >= 0, a, -a)
-    rest = (state - end) * np.exp(-np.abs(way) / a)
+    end = xp.where(way >= 0, a, -a)
+    rest = (state - end) * xp.exp(-xp.abs(way) / a)
     after = end + rest
-    return k * after, k * np.abs(rest) / a, after
+    return k * after, k * xp.abs(rest) / a, after
 
 
 LAWS = (

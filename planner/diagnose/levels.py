@@ -18,6 +18,7 @@ from planner.diagnose.refits import base
 from planner.diagnose.shared import INDEPENDENT
 from planner.diagnose.starts import starts
 from planner.diagnose.strayed import strayed
+from planner.diagnose.tell import Tell, quietly
 from planner.diagnose.tone import screen_tone
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
@@ -79,7 +80,9 @@ class Weighed:
     temper: float
 
 
-def screen(recorded: Recorded, nominal: Simulation, *, single: bool = False) -> tuple[Finding, ...]:
+def screen(
+    recorded: Recorded, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
+) -> tuple[Finding, ...]:
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it.
 
     `single`: a law of several joints is not looked for.
@@ -95,12 +98,14 @@ def screen(recorded: Recorded, nominal: Simulation, *, single: bool = False) -> 
     if not len(found.count) or disproportion(found) < PROPORTIONAL:
         return ()
     share = equivalent_share(found)
+    if share < ONE_JOINT and not single:
+        tell("fitting one law at all joints to the hits", 0.2)
     several = shared.screen(recorded, nominal) if share < ONE_JOINT and not single else ()
     if several:
         return several
     if share < LINEARISED:
         return (_unknown(found, "even with a stiffness of its own for every hit"),)
-    weighed = weigh(recorded, plain, system, found)
+    weighed = weigh(recorded, plain, system, found, tell)
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > EXPLAINED:
         there, shares = _shares(weighed)
@@ -143,7 +148,9 @@ def _excess(found: Equivalent) -> float:
     return float(found.before.sum() - found.count.sum())
 
 
-def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> tuple[Weighed, ...]:
+def weigh(
+    recorded: Recorded, plain: Fit, system: System, found: Equivalent, tell: Tell = quietly
+) -> tuple[Weighed, ...]:
     """Every law at the joints that come into question, fitted in time, most probable first."""
     data = data_of(recorded, plain)
     left = found.chi2.sum(axis=0)
@@ -153,13 +160,16 @@ def weigh(recorded: Recorded, plain: Fit, system: System, found: Equivalent) -> 
     for port in ports:
         own = own_parameter(plain, int(system.blocks[port]))
         begin += starts(found, system, port, plain.x, own)
+    tell("fitting every law at single joints to the hits", 0.5)
     begun = _best_of_each(descend(data, plain, begin, 0), STARTS)
     rough = _best_of_each(descend(data, plain, begun, ROUNDS), 1)
     best = min(c.chi2 for c in rough)
+    tell("following the best laws", 0.6)
     kept = descend(data, plain, [c for c in rough if c.chi2 < HOPELESS * best], MORE)
     first, levels = min(kept, key=lambda c: c.value), _levels(data)
     # Laws are weighed one against the other: those half-way would be wronged.
     told = [c for c in kept if c is first or levels.explained(c) > HOPEFUL]
+    tell("fitting the best laws to the end", 0.8)
     ends = side_by_side(lambda c: _followed(data, plain, found, c), told)
     kept = [*ends, *(c for c in kept if all(c is not t for t in told))]
     return _weighed(data, plain, system, kept)

@@ -6,6 +6,7 @@ otherwise is the same at all levels and drops out of them.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from planner.diagnose.fit import Fit, Problem
 from planner.diagnose.laws import Law
 from planner.diagnose.leveldata import Data, compared, own_parameter
 from planner.diagnose.timedomain import Seen, seen, spectra, torques
+from planner.side_by_side import with_helper
 
 SHARE_SD, LOG_SHARE, LOG_SHARE_SD, LOG_ANGLE_SD = 1.5, np.log(0.5), 1.5, 2.0
 STEP = 1e-3  # of finite differences in ν and in the joint's own ln stiffness
@@ -98,11 +100,11 @@ def predict(
     numbers = [np.concatenate(values) for values in (k, a, extra)]
     side = _side_by_side(ports)
     torque = torques(_joined(laws), numbers[0], numbers[1], numbers[2], side)
+    parts = spectra(torque, data.hits, data.s).reshape(len(candidates), 4, c, -1)
     out = []
-    for number, (candidate, system) in enumerate(zip(candidates, systems, strict=True)):
-        parts = [torque[:, (4 * number + i) * c : (4 * number + i + 1) * c] for i in range(4)]
-        h = [_frfs(data, system, candidate.port, spectra(p, data.hits, data.s)) for p in parts]
-        out.append((h[0], (np.array(h[1:]) - h[0]) / STEP))
+    for candidate, system, part in zip(candidates, systems, parts, strict=True):
+        h = _frfs(data, system, candidate.port, part)
+        out.append((h[0], (h[1:] - h[0]) / STEP))
     return out
 
 
@@ -132,16 +134,15 @@ def _side_by_side(ports: list[Seen]) -> Seen:
 
 
 def _frfs(data: Data, system: System, port: int, torque: np.ndarray) -> np.ndarray:
-    """H = s² (G − G_port T / F) of all columns (c, 3, F)."""
-    out = np.empty_like(data.h)
+    """H = s² (G − G_port T / F) of all columns (4, c, 3, F), for torques (4, c, F)."""
+    out = np.empty((len(torque), *data.h.shape), dtype=complex)
     for visit in np.unique(data.hits.visit):
         found = receptances(system, int(visit), data.s)
         for c in np.flatnonzero(data.hits.visit == visit):
-            part = torque[c] / data.force[c]
+            part = (torque[:, c] / data.force[c])[..., None]
             linear = found.sensor_hit[:, :, data.hits.axis[c]]
-            out[c] = (
-                data.s[:, None] ** 2 * (linear - found.sensor_port[:, :, port] * part[:, None])
-            ).T
+            h = linear - found.sensor_port[:, :, port] * part
+            out[:, c] = np.swapaxes(data.s[:, None] ** 2 * h, 1, 2)
     return out
 
 
@@ -153,6 +154,15 @@ def covariance(candidate: Candidate, temper: float) -> np.ndarray:
 
 def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candidate]:
     """The candidates with χ², objective, gradient and Gauss-Newton matrix where they are."""
+    order = sorted(range(len(candidates)), key=lambda i: candidates[i].law.effect)
+    half = (len(order) + 1) // 2
+    halves = [[candidates[i] for i in part] for part in (order[:half], order[half:]) if part]
+    done = with_helper(partial(_evaluated, data, plain), halves)
+    found = dict(zip(order, (c for part in done for c in part), strict=True))
+    return [found[i] for i in range(len(candidates))]
+
+
+def _evaluated(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candidate]:
     out = []
     found = predict(data, plain, candidates)
     mean, sd = plain.misfit.mean, plain.misfit.sd

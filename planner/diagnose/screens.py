@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from planner.diagnose import artefacts, drift, levels
 from planner.diagnose.finding import Finding
+from planner.diagnose.tell import Tell, quietly
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
 
@@ -16,10 +17,10 @@ class Screened:
     clean: Recorded
 
 
-def screen(recorded: Recorded, nominal: Simulation) -> Screened:
+def screen(recorded: Recorded, nominal: Simulation, tell: Tell = quietly) -> Screened:
     """Artefacts first, so that they are never called physics; then, on clean data, the rest."""
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)
-    by_level = levels.screen(clean, nominal)
+    by_level = levels.screen(clean, nominal, tell=tell)
     by_time = () if by_level else drift.screen(clean, nominal)
     return Screened((*found, *by_level, *by_time), clean)

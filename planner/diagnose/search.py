@@ -1,6 +1,6 @@
 """The search for what explains FRFs: all candidates roughly, few of them closely."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -23,6 +23,7 @@ from planner.diagnose.fit import (
     settle,
     staged,
 )
+from planner.diagnose.tell import Tell, quietly, within
 from planner.diagnose.weigh import temper_of
 from planner.identify.held_out import farthest_first
 from planner.side_by_side import side_by_side
@@ -42,7 +43,6 @@ FEW_EFFECTS = 2  # at once
 MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
 STRAYED = 2.5  # prior sds that a spring does not move by chance
 Place = tuple[str, str]
-Tell = Callable[[str, float], None]  # what is done, and the share of all that is done
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
     """Fit all effects beside `refitted`, the fit of none, and pairs where one is not enough."""
     if not effects:
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
-    found = _round(problem, refitted, effects, lambda text, share: tell(text, 0.6 * share))
+    found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
     if _best_of_few(found).per_value > ENOUGH:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
@@ -68,10 +68,7 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         first = 0.6 + 0.4 * len(led) / MOST_LEADERS
         led.append(_place(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
-
-        def along(text: str, share: float, first: float = first) -> None:
-            tell(text, first + 0.4 * share / MOST_LEADERS)
-
+        along = within(tell, first, first + 0.4 / MOST_LEADERS)
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
@@ -140,7 +137,7 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
             break
         more = [t for e in effects if (t := together(best.effect, e)) is not None]
         tell("looking for more effects", 0.97)
-        grown = _round(problem, best, more, lambda text, share: None)
+        grown = _round(problem, best, more, quietly)
         before = best.per_value
         found = Found((*found.finalists, *grown.finalists[1:]), (*found.left, *grown.left))
         best = min(found.finalists, key=lambda f: f.per_value)
@@ -157,7 +154,7 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
         return found
     tell("looking for a small second effect", 0.98)
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
-    more = _round(problem, best, pairs, lambda text, share: None)
+    more = _round(problem, best, pairs, quietly)
     return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
 
 

@@ -5,6 +5,7 @@ Laws are fitted to some of the poses and judged at the others.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from planner.diagnose.several import (
 )
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
-from planner.side_by_side import side_by_side
+from planner.side_by_side import with_helper
 
 FITTED, LEAST_VISITS = 4, 3  # poses that laws are fitted to, of how many at least
 AFAR, NEAR, CLOSE = (0.3,), (0.1,), (0.03,)  # shares by which errors are softened, in turn
@@ -80,29 +81,33 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
 def _laws(told: Told, judged: Told, seen: Sequence[Refit]) -> list[Shared]:
     """Laws fitted to what is told, best first as judged elsewhere."""
 
-    def judge(family: Family) -> Shared:
-        left, before, count = differences(judged, family)
-        to_explain = before - count
-        explained = 1 - max(left - count, 0.0) / to_explain if to_explain > 0 else 0.0
-        changes = _changes(family, told.data.level)
-        return Shared(family, changes, explained, max(left - count, INDEPENDENT / 2))
-
-    def closer(one: Shared, softness: tuple[float, ...]) -> Shared:
-        new = judge(settled(told, one.family, softness))
-        return new if new.left < one.left else one
-
-    def ordered(some: Sequence[Shared]) -> list[Shared]:
-        return sorted(some, key=lambda one: one.left)
+    def closer(some: Sequence[Shared], softness: tuple[float, ...]) -> list[Shared]:
+        families = [one.family for one in some]
+        new = with_helper(partial(_settled, told, judged, softness), families)
+        return [min(both, key=lambda one: one.left) for both in zip(some, new, strict=True)]
 
     begun = [beginning(seen, *kind, told.plain) for kind in _kinds(seen)]
-    afar = ordered(side_by_side(lambda one: judge(settled(told, one, AFAR)), begun))
+    afar = _ordered(with_helper(partial(_settled, told, judged, AFAR), begun))
     best = afar[0]
     if best.explained < HOPEFUL or len(_that_matter(judged, best)) < 2:
         return afar
     rivals = [one for one in afar if one.left < RIVAL * best.left]
-    near = side_by_side(lambda one: closer(one, NEAR), rivals)
-    first, *rest = ordered([*near, *afar[len(rivals) :]])
-    return ordered([closer(first, CLOSE), *rest])
+    first, *rest = _ordered([*closer(rivals, NEAR), *afar[len(rivals) :]])
+    return _ordered([*closer([first], CLOSE), *rest])
+
+
+def _ordered(some: Sequence[Shared]) -> list[Shared]:
+    return sorted(some, key=lambda one: one.left)
+
+
+def _settled(told: Told, judged: Told, softness: Sequence[float], begun: Family) -> Shared:
+    """Fitted to what is told, judged elsewhere."""
+    family = settled(told, begun, softness)
+    left, before, count = differences(judged, family)
+    to_explain = before - count
+    explained = 1 - max(left - count, 0.0) / to_explain if to_explain > 0 else 0.0
+    changes = _changes(family, told.data.level)
+    return Shared(family, changes, explained, max(left - count, INDEPENDENT / 2))
 
 
 def _that_matter(judged: Told, best: Shared) -> list[int]:

@@ -112,7 +112,7 @@ def instants(law: Law, k: np.ndarray, a: np.ndarray, joints: Joints) -> Iterator
     z = np.zeros((c, 2 * joints.grow.shape[1], 1))
     before, state, rise = np.zeros((c, m)), np.zeros((c, m)), np.zeros((c, m))
     inverse, one = np.zeros((c, m, m)), np.eye(m)
-    slope = law.step(k, a, state, before, before)[1] + np.zeros((c, m))
+    slope = law.step(np, k, a, state, before, before)[1] + np.zeros((c, m))
     for i, alone in enumerate(joints.free):
         z = _grown(joints.grow, z)
         free = alone[..., None] - joints.felt @ z
@@ -120,10 +120,10 @@ def instants(law: Law, k: np.ndarray, a: np.ndarray, joints: Joints) -> Iterator
         if i % SAME == 0:
             inverse = np.linalg.inv(one + joints.gives * slope[:, None, :])
         for _ in range(NEWTON):
-            torque = law.step(k, a, state, before, now)[0]
+            torque = law.step(np, k, a, state, before, now)[0]
             error = now[..., None] + joints.gives @ torque[..., None] - free
             now = now - (inverse @ error)[..., 0]
-        torque, slope, after = law.step(k, a, state, before, now)
+        torque, slope, after = law.step(np, k, a, state, before, now)
         z += joints.drive @ torque[..., None]
         yield Instant(before, now, torque, slope, state)
         rise, before, state = now - before, now, after
@@ -170,7 +170,7 @@ def rates(
     for i, at in enumerate(instants(law, k, a, joints)):
         z = _grown(joints.grow, z)
         source = np.zeros((c, m, d))
-        further = law.step(k, a * (1 + NUDGE), at.state, at.before, at.now)[0]
+        further = law.step(np, k, a * (1 + NUDGE), at.state, at.before, at.now)[0]
         source[:, j, m + j] = (further - at.torque) / NUDGE
         if law.remembers:
             keep = k * np.exp(-np.abs(at.now - at.before) / a)

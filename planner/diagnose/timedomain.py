@@ -7,18 +7,24 @@ torque, so that only the joint itself is integrated.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from scipy import signal
 
+from planner import jaxsetup
 from planner.diagnose.columns import Column, pulse
 from planner.diagnose.equivalent import System
-from planner.diagnose.laws import Law
+from planner.diagnose.laws import Law, Step
 
 FINER = 5  # steps a sample
 LASTS_S = 1.3  # after the pulse; the window makes the rest of no account
 FASTEST = 3.0  # times the band's end: poles beyond follow at once
 NEWTON = 3
+POLES, COLUMNS, STEPS = 4, 512, 256  # that are integrated at a time, or a multiple
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,34 +167,67 @@ def torques(
     `laws` says which columns follow which law; k, a (c,) are its numbers.
     """
     n, c = port.free.shape
-    out = np.zeros((n, c))
-    least = np.where(np.abs(port.gives) > 0, port.gives, 1e-30)
-    z = np.zeros(port.grow.shape, dtype=complex)
-    before, state = np.zeros(c), np.zeros(c)
-    value, slope, after = np.zeros(c), np.zeros(c), np.zeros(c)
-    rise = np.zeros(c)
-    for i in range(n):
-        z *= port.grow
-        free = port.free[i] - z.real.sum(axis=0)
-        now = before + rise
-        for _ in range(NEWTON):
-            for law, part in laws:
-                value[part], slope[part], after[part] = law.step(
-                    k[part], a[part], state[part], before[part], now[part]
-                )
-            error = now + port.gives * (value + extra * now) - free
-            now = now - error / np.maximum(1 + port.gives * (slope + extra), 0.2)
-        torque = (free - now) / least
-        z += port.drive * torque
-        out[i] = torque
-        rise, before, state = now - before, now, after.copy()
+    out = np.empty((n, c))
+    for law, part in laws:
+        for first in range(part.start, part.stop, COLUMNS):
+            some = slice(first, min(first + COLUMNS, part.stop))
+            numbers = [_filled(v[some], 1.0) for v in (k, a, extra, port.gives)]
+            poles = [_filled(v[:, some]) for v in (port.grow, port.drive)]
+            free = _filled(port.free[:, some], sizes=(STEPS, COLUMNS))
+            torque = np.asarray(_torques(law.step, *numbers, *poles, free))
+            out[:, some] = torque[:n, : some.stop - first]
     return out
 
 
+def _filled(
+    values: np.ndarray, value: float = 0.0, sizes: tuple[int, ...] = (POLES, COLUMNS)
+) -> np.ndarray:
+    """Up to multiples of these sizes: what is compiled once serves for other recordings."""
+    more = [(0, -n % size) for n, size in zip(values.shape, sizes[-values.ndim :], strict=True)]
+    return np.pad(values, more, constant_values=value)
+
+
+@partial(jaxsetup.quickly_compiled, static_argnums=0)
+def _torques(
+    step: Step,
+    k: Array,
+    a: Array,
+    extra: Array,
+    gives: Array,
+    grow: Array,
+    drive: Array,
+    free: Array,
+) -> Array:
+    """Torque (n, c) of c hits on joints that follow one law."""
+    least = jnp.where(jnp.abs(gives) > 0, gives, 1e-30)
+
+    def following(carry: tuple[Array, ...], alone: Array) -> tuple[tuple[Array, ...], Array]:
+        real, imaginary, before, state, rise = carry
+        real, imaginary = (
+            real * grow.real - imaginary * grow.imag,
+            real * grow.imag + imaginary * grow.real,
+        )
+        left, now, after = alone - jnp.sum(real, axis=0), before + rise, state
+        for _ in range(NEWTON):
+            value, slope, after = step(jnp, k, a, state, before, now)
+            error = now + gives * (value + extra * now) - left
+            now = now - error / jnp.maximum(1 + gives * (slope + extra), 0.2)
+        torque = (left - now) / least
+        real, imaginary = real + drive.real * torque[None], imaginary + drive.imag * torque[None]
+        return (real, imaginary, now, after, now - before), torque
+
+    z, rest = jnp.zeros(grow.shape), jnp.zeros(k.shape)
+    return jax.lax.scan(following, (z, z, rest, rest, rest), free)[1]
+
+
 def spectra(torque: np.ndarray, hits: Strokes, s: np.ndarray) -> np.ndarray:
-    """∫ τ e^(−st) dt (c, F) of torques (n, c) that are linear between steps; s (F,)."""
+    """∫ τ e^(−st) dt (k, F) of torques (n, k) that are linear between steps; s (F,).
+
+    All c hits in turn, once or several times.
+    """
     turn = kernel(len(torque), hits, s)
-    return (turn.real @ torque + 1j * (turn.imag @ torque)).T * scale(hits, s)
+    sums = (turn.real @ torque + 1j * (turn.imag @ torque)).T
+    return (sums.reshape(-1, len(hits.visit), len(s)) * scale(hits, s)).reshape(sums.shape)
 
 
 def kernel(count: int, hits: Strokes, s: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ from jax import Array
 from jax.scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dtrtri
 
+from planner import jaxsetup
 from planner.errors import InputError
-from planner.fusion import jaxsetup
 from planner.fusion.data import Padded
 from planner.fusion.importance import Gaussians, sample
 from planner.fusion.kernels import Kernel, parse

@@ -9,7 +9,7 @@ from jax import Array
 from jax.scipy.linalg import cho_solve
 from scipy.optimize import minimize
 
-from planner.fusion import jaxsetup  # noqa: F401
+from planner import jaxsetup  # noqa: F401
 from planner.fusion.data import Padded
 from planner.fusion.gp import Prior
 from planner.fusion.kernels import parse

@@ -18,8 +18,8 @@ from jax import Array
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from planner import jaxsetup  # noqa: F401
 from planner.errors import InputError
-from planner.fusion import jaxsetup  # noqa: F401
 from planner.fusion.kernels import parse
 
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd

@@ -40,9 +40,9 @@ def test_stiffening_goes_from_nothing_to_all():
 def test_slope_of_the_torque(law):
     now = np.linspace(-0.9, 0.9, 14)
     k, a, state, before = np.full(14, 2.0), np.full(14, 0.25), np.full(14, 0.05), np.zeros(14)
-    slope = law.step(k, a, state, before, now)[1]
-    up = law.step(k, a, state, before, now + 1e-6)[0]
-    down = law.step(k, a, state, before, now - 1e-6)[0]
+    slope = law.step(np, k, a, state, before, now)[1]
+    up = law.step(np, k, a, state, before, now + 1e-6)[0]
+    down = law.step(np, k, a, state, before, now - 1e-6)[0]
     assert np.allclose(slope, (up - down) / 2e-6, atol=1e-6)
 
 
@@ -52,7 +52,7 @@ def test_friction_never_gives_energy():
     angle = np.concatenate([angle, angle[::-1]])
     state, work, before = np.zeros(20), np.zeros(20), angle[0]
     for now in angle:
-        torque, _, after = DAHL.step(np.ones(20), np.full(20, 0.2), state, before, now)
+        torque, _, after = DAHL.step(np, np.ones(20), np.full(20, 0.2), state, before, now)
         work += (torque + state) / 2 * (now - before)
         state, before = after, now
     assert np.all(work > 0)

@@ -42,8 +42,8 @@ def struck(tmp_path_factory):
 def with_spring(law: Law, more: np.ndarray) -> Law:
     """The law with linear springs beside it."""
 
-    def step(k, a, state, before, now):
-        torque, slope, after = law.step(k, a, state, before, now)
+    def step(xp, k, a, state, before, now):
+        torque, slope, after = law.step(xp, k, a, state, before, now)
         return torque + more * now, slope + more, after
 
     return replace(law, step=step)
