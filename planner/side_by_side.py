@@ -1,79 +1,113 @@
-"""Work whose items do not need one another, on two cores: in threads or with a helper process."""
+"""Work whose items do not need one another, on two cores."""
 
 import multiprocessing
 import os
+import pickle
 import signal
-from collections import deque
+import threading
+import time
+from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from functools import cache
-from typing import TypeVar
+from typing import Any, Generic, TypeVar
+from uuid import uuid4
 
+import cloudpickle
+from loky import ProcessPoolExecutor
 from threadpoolctl import threadpool_limits
 
-THREADS = 2
 POLL_S = 0.02
+KEPT = 8  # functions that a helper remembers
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 def side_by_side(
-    work: Callable[[T], R], items: Sequence[T], done: Callable[[int], None] = lambda number: None
+    work: Callable[[T], R],
+    items: Sequence[T],
+    done: Callable[[int, int], None] = lambda number, count: None,
 ) -> list[R]:
-    """What `work` makes of each item, in their order; `done` is told the number of each.
-
-    It runs in threads, on what none of them changes; an error or Ctrl-C waits for what has begun.
-    BLAS has one thread meanwhile in the whole process: the products are too small for more.
-    """
-    out = []
-    with threadpool_limits(1), ThreadPoolExecutor(THREADS) as pool:
-        for number, result in enumerate(pool.map(work, items)):
-            out.append(result)
-            done(number)
-    return out
-
-
-def with_helper(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """What `work` makes of each item, in their order, where threads would wait for each other.
+    """What `work` makes of each item, in their order.
 
     This process takes items from the front, a helper process from the end: `work`, items and
-    results are pickled. The helper is started by the first call, is given something once it is
-    there, and kept. Its death costs nothing but time; there is none in a process that is itself
-    one of many.
+    results are pickled. (Threads would wait for the interpreter, and XLA takes one at a time.) The
+    helper is started by the first call, is given something once it is there, and kept; its death
+    costs nothing but time. There is none in a process that is itself one of many.
+
+    `done` is told the number of each item done here, and how many are done by now. BLAS has one
+    thread meanwhile: the products are too small for more.
     """
-    if len(items) < 2 or not _has_cores():
-        return [work(item) for item in items]
     waiting, out = deque(enumerate(items)), {}
 
-    def take(following: Callable[[], tuple[int, T]], call: Callable[[T], R]) -> None:
+    def take(following: Callable[[], tuple[int, T]], call: Callable[[T], R], here: bool) -> None:
         while waiting:
             with suppress(IndexError):  # the other was faster
                 number, item = following()
                 out[number] = call(item)
-
-    def elsewhere(item: T) -> R:
-        try:
-            return _helper()[0].submit(work, item).result()
-        except BrokenProcessPool:
-            _helper.cache_clear()
-            return work(item)
+                if here:
+                    done(number, len(out))
 
     def help_() -> None:
         _, begun = _helper()
         while waiting and not begun.done():
             wait([begun], timeout=POLL_S)
-        take(waiting.pop, elsewhere)
+        if waiting:
+            take(waiting.pop, _Elsewhere(work), here=False)
 
-    with threadpool_limits(1), ThreadPoolExecutor(1) as other:
-        helped = other.submit(help_)
-        try:
-            take(waiting.popleft, work)
-        finally:
-            waiting.clear()
-        helped.result()
+    with threadpool_limits(1):
+        if len(items) < 2 or not _has_cores():
+            take(waiting.popleft, work, here=True)
+        else:
+            with ThreadPoolExecutor(1) as other:
+                helped = other.submit(help_)
+                try:
+                    take(waiting.popleft, work, here=True)
+                finally:
+                    waiting.clear()
+                helped.result()
     return [out[number] for number in range(len(items))]
+
+
+class _Elsewhere(Generic[T, R]):
+    """Work that is done by the helper, to whom it is sent once; here if that dies."""
+
+    def __init__(self, work: Callable[[T], R]):
+        self.work, self.name, self.sent = work, uuid4().hex, False
+
+    def __call__(self, item: T) -> R:
+        whole = None if self.sent else cloudpickle.dumps(self.work)
+        try:
+            found = _helper()[0].submit(_asked, self.name, whole, item).result()
+        except BrokenProcessPool:
+            _helper.cache_clear()
+            self.sent = False
+            return self.work(item)
+        except _ForgottenError:
+            self.sent = False
+            return self(item)
+        self.sent = True
+        return found
+
+
+class _ForgottenError(Exception):
+    """The helper no longer has what it was sent."""
+
+
+_known: OrderedDict[str, Callable] = OrderedDict()
+
+
+def _asked(name: str, work: bytes | None, item: Any) -> Any:
+    """In the helper."""
+    if work is not None:
+        _known[name] = pickle.loads(work)
+        while len(_known) > KEPT:
+            _known.popitem(last=False)
+    if name not in _known:
+        raise _ForgottenError
+    return _known[name](item)
 
 
 def _has_cores() -> bool:
@@ -83,9 +117,8 @@ def _has_cores() -> bool:
 @cache
 def _helper() -> tuple[ProcessPoolExecutor, Future[None]]:
     """The process, and what is done once it has started."""
-    # Spawned: forking a process with compiled JAX code in it may hang.
-    spawned = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(1, mp_context=spawned, initializer=_begin)
+    # Of loky: others run a script that has no guard for its main part once more.
+    pool = ProcessPoolExecutor(1, timeout=None, initializer=_begin)
     return pool, pool.submit(_nothing)
 
 
@@ -96,3 +129,11 @@ def _nothing() -> None:
 def _begin() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the other process's to handle
     threadpool_limits(1)
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    """A helper does not outlive a process that is killed."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)

@@ -17,7 +17,7 @@ from jax import Array
 from planner import jaxsetup
 from planner.acquire.outputs import FrequencyOutputs, Poses, Target
 from planner.fusion.kernels import parse
-from planner.side_by_side import with_helper
+from planner.side_by_side import side_by_side
 
 BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
 TASK = 64  # blocks a call where there are many; calls of equal shape are compiled once
@@ -46,9 +46,9 @@ def reduction_by_label(
     if len(poses) <= LARGE:
         return _both([double(poses, k) for k in labels])
     single = partial(_label, outputs, target, np.float32, poses)
-    gained, variance = _both(with_helper(single, labels))
+    gained, variance = _both(side_by_side(single, labels))
     best = np.argpartition(np.sum(gained, axis=0), -EXACT)[-EXACT:]
-    gained[:, best], _ = _both(with_helper(partial(double, poses[best]), labels))
+    gained[:, best], _ = _both(side_by_side(partial(double, poses[best]), labels))
     return gained, variance
 
 

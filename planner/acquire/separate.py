@@ -9,6 +9,7 @@ most promising hits are tried: every candidate is fitted to what every other one
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import permutations
 
 import numpy as np
@@ -55,13 +56,26 @@ def most_telling(
     share = np.array(probability) / np.sum(probability)
     axes = np.argmax(gain, axis=1)
     promising = np.argsort(-np.max(gain, axis=1))[:TRIED].tolist()
-    settled = side_by_side(lambda f: carried_on(problem, f, f.effect), fits)
+    settled = side_by_side(partial(_to_the_end, problem), fits)
+    hits = [(pose, int(axes[pose])) for pose in promising]
+    odds = side_by_side(partial(_tried, problem, settled, share, q, temper), hits)
+    return max(map(Telling, *zip(*hits, strict=True), odds), key=lambda t: t.log_odds)
 
-    def tried(pose: int) -> Telling:
-        axis = int(axes[pose])
-        return Telling(pose, axis, odds_after(problem, settled, share, q[pose], axis, temper))
 
-    return max(side_by_side(tried, promising), key=lambda t: t.log_odds)
+def _to_the_end(problem: Problem, fit: Fit) -> Fit:
+    return carried_on(problem, fit, fit.effect)
+
+
+def _tried(
+    problem: Problem,
+    fits: Sequence[Fit],
+    share: np.ndarray,
+    q: np.ndarray,
+    temper: float,
+    hit: tuple[int, int],
+) -> float:
+    pose, axis = hit
+    return odds_after(problem, fits, share, q[pose], axis, temper)
 
 
 def odds_after(

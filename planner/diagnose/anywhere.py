@@ -9,6 +9,7 @@ enough, with a resonator beside it.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 from planner.diagnose.both import Both, Family, together
 from planner.diagnose.effect import Effect
@@ -44,7 +45,7 @@ def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
         x = found.x
     assert found is not None
     end = found
-    return tuple(side_by_side(lambda e: _from(few, end, e, 1), _sets(end, effects)))
+    return tuple(side_by_side(partial(_from, few, end, most=1), _sets(end, effects)))
 
 
 def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) -> tuple[Fit, ...]:
@@ -57,13 +58,17 @@ def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) 
         for e in resonators
         if (pair := together(suspect.effect, e)) is not None
     ]
-    return tuple(side_by_side(lambda both: _from(few, *both), pairs))
+    return tuple(side_by_side(partial(_both_from, few), pairs))
 
 
 def _from(problem: Problem, fit: Fit, effect: Effect, most: int | None = None) -> Fit:
     """A rough fit of an effect from where another is, and from `most` starts of what is new."""
     misfit = problem.misfit(effect, GLANCE)
     return approached(misfit, points(misfit, fit)[:most], FOLLOWED)
+
+
+def _both_from(problem: Problem, both: tuple[Fit, Effect]) -> Fit:
+    return _from(problem, *both)
 
 
 def _few(problem: Problem) -> Problem:

@@ -4,6 +4,7 @@ On the neighbouring link it is nearly the same, and a fit that began there does 
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -27,10 +28,11 @@ def elsewhere(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fi
             effect = together(Both.of(*rest), to) if rest else to
             if effect is not None:
                 moves.append((part, to, effect))
-    return tuple(side_by_side(lambda move: _moved(problem, fit, *move), moves))
+    return tuple(side_by_side(partial(_moved, problem, fit), moves))
 
 
-def _moved(problem: Problem, fit: Fit, part: Effect, to: Effect, effect: Effect) -> Fit:
+def _moved(problem: Problem, fit: Fit, move: tuple[Effect, Effect, Effect]) -> Fit:
+    part, to, effect = move
     misfit, known = problem.misfit(effect, CLOSE), fit.named()
     starts = np.array(points(misfit, fit))
     for name in KEPT:

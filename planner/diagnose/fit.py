@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -180,17 +180,18 @@ def staged(problem: Problem, effect: Effect) -> Fit:
 
     Only for effects without parameters but springs.
     """
+    ends = side_by_side(partial(_identified, problem, effect), (QUICK, PATIENT))
+    return min(ends, key=lambda f: f.misfit(f.x).value)
+
+
+def _identified(problem: Problem, effect: Effect, effort: Effort) -> Fit:
     body = _prepared(problem, effect)
     priors = effect.priors(body.simulation, problem.priors)
-
-    def identified(effort: Effort) -> Fit:
-        found = identify(
-            problem.frfs, problem.q, body.simulation, priors,
-            band_hz=problem.band_hz, starts=1, effort=effort,
-        )  # fmt: skip
-        return _settled(problem.misfit(effect, FINE), found.mean)
-
-    return min(side_by_side(identified, (QUICK, PATIENT)), key=lambda f: f.misfit(f.x).value)
+    found = identify(
+        problem.frfs, problem.q, body.simulation, priors,
+        band_hz=problem.band_hz, starts=1, effort=effort,
+    )  # fmt: skip
+    return _settled(problem.misfit(effect, FINE), found.mean)
 
 
 def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:

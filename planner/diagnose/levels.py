@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -170,7 +171,7 @@ def weigh(
     # Laws are weighed one against the other: those half-way would be wronged.
     told = [c for c in kept if c is first or levels.explained(c) > HOPEFUL]
     tell("fitting the best laws to the end", 0.8)
-    ends = side_by_side(lambda c: _followed(data, plain, found, c), told)
+    ends = side_by_side(partial(_followed, data, plain, found), told)
     kept = [*ends, *(c for c in kept if all(c is not t for t in told))]
     return _weighed(data, plain, system, kept)
 

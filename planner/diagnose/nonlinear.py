@@ -16,7 +16,7 @@ from planner.diagnose.fit import Fit, Problem
 from planner.diagnose.laws import Law
 from planner.diagnose.leveldata import Data, compared, own_parameter
 from planner.diagnose.timedomain import Seen, seen, spectra, torques
-from planner.side_by_side import with_helper
+from planner.side_by_side import side_by_side
 
 SHARE_SD, LOG_SHARE, LOG_SHARE_SD, LOG_ANGLE_SD = 1.5, np.log(0.5), 1.5, 2.0
 STEP = 1e-3  # of finite differences in ν and in the joint's own ln stiffness
@@ -98,7 +98,7 @@ def predict(
             first = (4 * number + which) * c
             laws.append((candidate.law, slice(first, first + c)))
     numbers = [np.concatenate(values) for values in (k, a, extra)]
-    side = _side_by_side(ports)
+    side = _abreast(ports)
     torque = torques(_joined(laws), numbers[0], numbers[1], numbers[2], side)
     parts = spectra(torque, data.hits, data.s).reshape(len(candidates), 4, c, -1)
     out = []
@@ -119,7 +119,7 @@ def _joined(laws: list[tuple[Law, slice]]) -> list[tuple[Law, slice]]:
     return out
 
 
-def _side_by_side(ports: list[Seen]) -> Seen:
+def _abreast(ports: list[Seen]) -> Seen:
     most = max(len(p.grow) for p in ports)
 
     def padded(values: np.ndarray) -> np.ndarray:
@@ -157,7 +157,7 @@ def evaluate(data: Data, plain: Fit, candidates: list[Candidate]) -> list[Candid
     order = sorted(range(len(candidates)), key=lambda i: candidates[i].law.effect)
     half = (len(order) + 1) // 2
     halves = [[candidates[i] for i in part] for part in (order[:half], order[half:]) if part]
-    done = with_helper(partial(_evaluated, data, plain), halves)
+    done = side_by_side(partial(_evaluated, data, plain), halves)
     found = dict(zip(order, (c for part in done for c in part), strict=True))
     return [found[i] for i in range(len(candidates))]
 

@@ -111,7 +111,7 @@ def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> lis
 def _settled(
     problem: Problem, fits: Sequence[Fit], grade: Grade = FINE, steps: int = LAST_STEPS
 ) -> list[Fit]:
-    return side_by_side(lambda f: settle(problem, f, grade, steps), fits)
+    return side_by_side(partial(settle, problem, grade=grade, steps=steps), fits)
 
 
 def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
@@ -171,7 +171,7 @@ def _lessened(problem: Problem, found: Found) -> Found:
             kept = [p for p in parts if p is not part]
             effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
             less.append((whole, effect))
-    again = side_by_side(lambda pair: carried_on(problem, *pair, LAST_STEPS), less)
+    again = side_by_side(partial(_carried_on, problem), less)
     return Found((*found.finalists, *again), found.left)
 
 
@@ -182,8 +182,12 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
         return found
     strayed = [e for e in effects if _strayed(best, e)]
     pairs = [p for e in strayed if (p := together(best.effect, e)) is not None]
-    more = side_by_side(lambda pair: carried_on(problem, best, pair, LAST_STEPS), pairs)
+    more = side_by_side(partial(_carried_on, problem), [(best, pair) for pair in pairs])
     return Found((*found.finalists, *more), found.left)
+
+
+def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
+    return carried_on(problem, *pair, LAST_STEPS)
 
 
 def _distinct(found: Found) -> Found:
@@ -248,7 +252,7 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
     looked = partial(glance if clearly else promise, few, warm=none)
     share = 0.6 / max(len(effects), 1)
-    fits = side_by_side(looked, effects, lambda n: tell(_words(effects[n]), share * (n + 1)))
+    fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
     if clearly:
         order = np.argsort([f.misfit(f.x).value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)

@@ -24,7 +24,7 @@ from planner.diagnose.several import (
 )
 from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
-from planner.side_by_side import with_helper
+from planner.side_by_side import side_by_side
 
 FITTED, LEAST_VISITS = 4, 3  # poses that laws are fitted to, of how many at least
 AFAR, NEAR, CLOSE = (0.3,), (0.1,), (0.03,)  # shares by which errors are softened, in turn
@@ -83,11 +83,11 @@ def _laws(told: Told, judged: Told, seen: Sequence[Refit]) -> list[Shared]:
 
     def closer(some: Sequence[Shared], softness: tuple[float, ...]) -> list[Shared]:
         families = [one.family for one in some]
-        new = with_helper(partial(_settled, told, judged, softness), families)
+        new = side_by_side(partial(_settled, told, judged, softness), families)
         return [min(both, key=lambda one: one.left) for both in zip(some, new, strict=True)]
 
     begun = [beginning(seen, *kind, told.plain) for kind in _kinds(seen)]
-    afar = _ordered(with_helper(partial(_settled, told, judged, AFAR), begun))
+    afar = _ordered(side_by_side(partial(_settled, told, judged, AFAR), begun))
     best = afar[0]
     if best.explained < HOPEFUL or len(_that_matter(judged, best)) < 2:
         return afar

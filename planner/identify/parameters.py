@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 
 import numpy as np
 
@@ -32,7 +31,7 @@ class Priors:
     stiffness_factor: float = 3.0
     damping_factor: float = 5.0
     loss_factor_factor: float = 3.0
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=lambda: MappingProxyType({}))
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     mass: float = 0.0
     inertia: float = 0.0
     com_m: float = 0.0
