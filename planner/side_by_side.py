@@ -10,7 +10,6 @@ from collections import OrderedDict, deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
 from functools import cache
 from typing import Any, Generic, TypeVar
 from uuid import uuid4
@@ -43,14 +42,20 @@ def side_by_side(
     waiting, out = deque(enumerate(items)), {}
 
     def take(following: Callable[[], tuple[int, T]], call: Callable[[T], R], here: bool) -> None:
-        while waiting:
-            with suppress(IndexError):  # the other was faster
-                number, item = following()
+        try:
+            while waiting:
+                try:
+                    number, item = following()
+                except IndexError:  # the other was faster
+                    return
                 out[number] = call(item)
                 if here:
                     done(number, len(out))
+        except BaseException:
+            waiting.clear()  # nothing more is begun
+            raise
 
-    def help_() -> None:
+    def elsewhere() -> None:
         _, begun = _helper()
         while waiting and not begun.done():
             wait([begun], timeout=POLL_S)
@@ -62,11 +67,8 @@ def side_by_side(
             take(waiting.popleft, work, here=True)
         else:
             with ThreadPoolExecutor(1) as other:
-                helped = other.submit(help_)
-                try:
-                    take(waiting.popleft, work, here=True)
-                finally:
-                    waiting.clear()
+                helped = other.submit(elsewhere)
+                take(waiting.popleft, work, here=True)
                 helped.result()
     return [out[number] for number in range(len(items))]
 

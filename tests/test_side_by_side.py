@@ -21,8 +21,8 @@ def who(seconds: float) -> tuple[float, int]:
 
 def fail(number: int) -> int:
     time.sleep(0.02)
-    if number in (1, 38):  # one of them here, the other by the helper
-        raise ValueError("as asked")
+    if number in (1, 998):  # one of them here, the other by the helper
+        raise IndexError("as asked")
     return number
 
 
@@ -83,9 +83,12 @@ def test_a_helper_that_dies_costs_nothing(helper):
     assert side_by_side(abs, range(-9, 0)) == list(range(9, 0, -1))
 
 
-def test_an_error_in_helped_work_ends_it(helper):
-    with pytest.raises(ValueError, match="as asked"):
-        side_by_side(fail, range(40))
+@pytest.mark.parametrize("items", [range(1000), range(2, 1000), range(3)])
+def test_an_error_ends_it(helper, items):
+    started = time.monotonic()
+    with pytest.raises(IndexError, match="as asked"):
+        side_by_side(fail, items)
+    assert time.monotonic() - started < 5  # all would take ten seconds
     assert side_by_side(abs, [-1]) == [1]
 
 
@@ -95,18 +98,18 @@ def test_a_helper_ends_with_a_process_that_is_killed(tmp_path):
     script.write_text(
         "import os, time\n"
         "from planner import side_by_side as module\n"
-        "def who(x): return os.getpid()\n"
+        "def who(x):\n"
+        "    time.sleep(0.01)\n"
+        "    return os.getpid()\n"
         "module._helper()[1].result()\n"
         "found = set(module.side_by_side(who, range(99))) - {os.getpid()}\n"
         "print(*found, flush=True)\n"
         "time.sleep(100)\n"
     )
-    process = subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    helper = int(process.stdout.readline())
-    process.kill()
-    process.wait()
-    process.stdout.close()
+    with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        helper = int(process.stdout.readline())
+        process.kill()
     for _ in range(100):
         if not there(helper):
             return
