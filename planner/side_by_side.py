@@ -20,6 +20,7 @@ from threadpoolctl import threadpool_limits
 
 POLL_S = 0.02
 KEPT = 8  # functions that a helper remembers
+NO_LEAK = {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e15"}  # what it caches, in bytes, is none
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -39,57 +40,67 @@ def side_by_side(
     `done` is told the number of each item done here, and how many are done by now. BLAS has one
     thread meanwhile: the products are too small for more.
     """
-    waiting, out = deque(enumerate(items)), {}
+    waiting, out = deque(range(len(items))), {}
 
-    def take(following: Callable[[], tuple[int, T]], call: Callable[[T], R], here: bool) -> None:
+    def take(following: Callable[[], int], call: Callable[[int], R], here: bool) -> None:
         try:
             while waiting:
                 try:
-                    number, item = following()
+                    number = following()
                 except IndexError:  # the other was faster
                     return
-                out[number] = call(item)
+                out[number] = call(number)
                 if here:
                     done(number, len(out))
         except BaseException:
             waiting.clear()  # nothing more is begun
             raise
 
-    def elsewhere() -> None:
-        _, begun = _helper()
-        while waiting and not begun.done():
-            wait([begun], timeout=POLL_S)
-        if waiting:
-            take(waiting.pop, _Elsewhere(work), here=False)
+    def own(number: int) -> R:
+        return work(items[number])
 
     with threadpool_limits(1):
         if len(items) < 2 or not _has_cores():
-            take(waiting.popleft, work, here=True)
+            take(waiting.popleft, own, here=True)
         else:
+            asked = _Asked(work, items)
+
+            def elsewhere() -> None:
+                _, begun = _helper()
+                while waiting and not begun.done():
+                    wait([begun], timeout=POLL_S)
+                if waiting:
+                    take(waiting.pop, asked, here=False)
+
             with ThreadPoolExecutor(1) as other:
                 helped = other.submit(elsewhere)
-                take(waiting.popleft, work, here=True)
+                take(waiting.popleft, own, here=True)
                 helped.result()
     return [out[number] for number in range(len(items))]
 
 
-class _Elsewhere(Generic[T, R]):
-    """Work that is done by the helper, to whom it is sent once; here if that dies."""
+class _Asked(Generic[T, R]):
+    """Work that is done by the helper, to whom it is sent once; here if that dies.
 
-    def __init__(self, work: Callable[[T], R]):
-        self.work, self.name, self.sent = work, uuid4().hex, False
+    All is pickled at once: later, work that is done here may be changing what it holds.
+    """
 
-    def __call__(self, item: T) -> R:
-        whole = None if self.sent else cloudpickle.dumps(self.work)
+    def __init__(self, work: Callable[[T], R], items: Sequence[T]):
+        self.work, self.items, self.name, self.sent = work, items, uuid4().hex, False
+        self.pickled = cloudpickle.dumps(work)
+        self.pickled_items = [cloudpickle.dumps(item) for item in items]
+
+    def __call__(self, number: int) -> R:
+        whole, item = None if self.sent else self.pickled, self.pickled_items[number]
         try:
-            found = _helper()[0].submit(_asked, self.name, whole, item).result()
+            found = _helper()[0].submit(_answer, self.name, whole, item).result()
         except BrokenProcessPool:
             _helper.cache_clear()
             self.sent = False
-            return self.work(item)
+            return self.work(self.items[number])
         except _ForgottenError:
             self.sent = False
-            return self(item)
+            return self(number)
         self.sent = True
         return found
 
@@ -101,7 +112,7 @@ class _ForgottenError(Exception):
 _known: OrderedDict[str, Callable] = OrderedDict()
 
 
-def _asked(name: str, work: bytes | None, item: Any) -> Any:
+def _answer(name: str, work: bytes | None, item: bytes) -> Any:
     """In the helper."""
     if work is not None:
         _known[name] = pickle.loads(work)
@@ -109,7 +120,7 @@ def _asked(name: str, work: bytes | None, item: Any) -> Any:
             _known.popitem(last=False)
     if name not in _known:
         raise _ForgottenError
-    return _known[name](item)
+    return _known[name](pickle.loads(item))
 
 
 def _has_cores() -> bool:
@@ -120,7 +131,7 @@ def _has_cores() -> bool:
 def _helper() -> tuple[ProcessPoolExecutor, Future[None]]:
     """The process, and what is done once it has started."""
     # Of loky: others run a script that has no guard for its main part once more.
-    pool = ProcessPoolExecutor(1, timeout=None, initializer=_begin)
+    pool = ProcessPoolExecutor(1, timeout=None, initializer=_begin, env=NO_LEAK)
     return pool, pool.submit(_nothing)
 
 

@@ -67,9 +67,26 @@ def test_what_is_done_is_told(helper):
 
 
 def test_a_helper_that_forgot_is_told_again(helper):
-    first = module._Elsewhere(abs)
-    for work in (first, *(module._Elsewhere(abs) for _ in range(module.KEPT)), first):
-        assert work(-2) == 2
+    first = module._Asked(abs, [-2])
+    for asked in (first, *(module._Asked(abs, [-2]) for _ in range(module.KEPT)), first):
+        assert asked(0) == 2
+
+
+class Lazy:
+    """Gets attributes as it is used, as `cached_property` does."""
+
+    def called(self, number: int) -> int:
+        time.sleep(0.001)
+        setattr(self, f"seen_{number}", number)
+        return number
+
+
+def test_what_is_sent_may_change_meanwhile(helper):
+    lazy = Lazy()
+    for n in range(2000):
+        setattr(lazy, f"before_{n}", n)
+    for _ in range(5):
+        assert side_by_side(lazy.called, range(100)) == list(range(100))
 
 
 def test_nothing_waits_for_a_helper_that_is_not_there_yet(monkeypatch):
