@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.diagnose.both import SECOND
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
 from planner.diagnose.fit import Fit, Problem, carried_on, fit, settle
@@ -95,14 +96,30 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
     weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
     candidates = _candidates(found, weights, all_)
-    first = candidates[0].places[0][0]
-    verdict = {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
     likeliest = found.finalists[int(np.argmax(weights.log_evidence))]
     best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
     return Diagnosis(
-        verdict, candidates, found.finalists[0], best, weights.temper, seconds, problem
+        _verdict(candidates), candidates, found.finalists[0], best, weights.temper, seconds, problem
     )
+
+
+def beside_another(found: Diagnosis) -> Diagnosis:
+    """The same where something has been found already: every effect is one more then."""
+
+    def weight(c: Candidate) -> float:
+        return c.probability * (1.0 if c.places == (("none", None),) else SECOND)
+
+    total = sum(map(weight, found.candidates))
+    again = [replace(c, probability=weight(c) / total) for c in found.candidates]
+    candidates = tuple(sorted(again, key=lambda c: -c.probability))
+    best = candidates[0].fit or found.best
+    return replace(found, verdict=_verdict(candidates), candidates=candidates, best=best)
+
+
+def _verdict(candidates: Sequence[Candidate]) -> str:
+    first = candidates[0].places[0][0]
+    return {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
 
 
 def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from planner.diagnose.beside import beside, leaves_room
-from planner.diagnose.diagnose import diagnose
+from planner.diagnose.diagnose import beside_another, diagnose
 from planner.diagnose.finding import Finding
 from planner.diagnose.judge import Judged, judge
 from planner.diagnose.recorded import corrected
@@ -38,6 +38,8 @@ def explain(
         effects=None if linear or leaves_room(findings) else (),
         tell=within(tell, 0.2, 0.85),
     )
+    if any(f.effect in ARTEFACTS for f in findings):
+        found = beside_another(found)
     tell("looking for a nonlinear joint beside it", 0.85)
     closer = within(tell, 0.85, 0.95)
     both = beside(visits, findings, found, closer) if visits is not None else None

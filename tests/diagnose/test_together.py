@@ -6,6 +6,9 @@ from typing import Any, cast
 import pytest
 
 from planner.diagnose.beside import leaves_room
+from planner.diagnose.both import SECOND
+from planner.diagnose.diagnose import Candidate, Diagnosis, beside_another
+from planner.diagnose.effect import Effect
 from planner.diagnose.finding import Finding
 from planner.diagnose.together import HONEST, linear_effects_apply, together
 
@@ -107,3 +110,26 @@ def test_rival_laws_share_what_a_finding_is_sure_of():
     assert shares[(("nonlinear_stiffness", "joint_4"),)] == pytest.approx(0.36)
     assert shares[(UNKNOWN,)] == pytest.approx(0.1)
     assert found.established[0][1] == pytest.approx(0.54)
+
+
+class Softer(Effect):
+    name = "joint_stiffness"
+
+
+@pytest.mark.parametrize(("none", "verdict"), [(0.3, "consistent"), (0.1, "explained")])
+def test_beside_something_found_an_effect_is_one_more(none, verdict):
+    fits = {at: cast(Any, f"fit of {at}") for at in ("", "joint_2")}
+    candidates = (
+        Candidate((Softer("joint_2"),), 0.95 - none, fits["joint_2"]),
+        Candidate((Effect(""),), none, fits[""]),
+        Candidate((), 0.05, None),
+    )
+    anything = cast(Any, None)
+    before = Diagnosis("explained", candidates, anything, fits["joint_2"], 1.0, 0.0, anything)
+    after = beside_another(before)
+    shares = {c.fit: c.probability for c in after.candidates}
+    assert after.verdict == verdict
+    assert after.best == max(shares, key=lambda f: shares[f])
+    assert sum(shares.values()) == pytest.approx(1.0)
+    odds = (0.95 - none) / none
+    assert shares[fits["joint_2"]] / shares[fits[""]] == pytest.approx(SECOND * odds)
