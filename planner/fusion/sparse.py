@@ -18,10 +18,8 @@ from jax.scipy.linalg import solve_triangular
 from scipy.linalg import solve_triangular as solve_lower
 from scipy.optimize import minimize
 
-from planner.fusion import (
-    jaxsetup,  # noqa: F401
-    laplace,
-)
+from planner import jaxsetup  # noqa: F401
+from planner.fusion import laplace
 from planner.fusion.ar1 import OutputPrior
 from planner.fusion.kernels import parse
 from planner.fusion.levels import Samples, spread
