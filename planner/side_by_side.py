@@ -42,41 +42,47 @@ def side_by_side(
     """
     waiting, out = deque(range(len(items))), {}
 
-    def take(following: Callable[[], int], call: Callable[[int], R], here: bool) -> None:
-        try:
-            while waiting:
-                try:
-                    number = following()
-                except IndexError:  # the other was faster
-                    return
-                out[number] = call(number)
-                if here:
-                    done(number, len(out))
-        except BaseException:
-            waiting.clear()  # nothing more is begun
-            raise
-
-    def own(number: int) -> R:
-        return work(items[number])
+    def here(number: int) -> None:
+        out[number] = work(items[number])
+        done(number, len(out))
 
     with threadpool_limits(1):
         if len(items) < 2 or not _has_cores():
-            take(waiting.popleft, own, here=True)
+            _take(waiting, waiting.popleft, here)
         else:
             asked = _Asked(work, items)
 
-            def elsewhere() -> None:
-                _, begun = _helper()
-                while waiting and not begun.done():
-                    wait([begun], timeout=POLL_S)
-                if waiting:
-                    take(waiting.pop, asked, here=False)
+            def elsewhere(number: int) -> None:
+                out[number] = asked(number)
 
             with ThreadPoolExecutor(1) as other:
-                helped = other.submit(elsewhere)
-                take(waiting.popleft, own, here=True)
+                helped = other.submit(_once_begun, waiting, elsewhere)
+                _take(waiting, waiting.popleft, here)
                 helped.result()
     return [out[number] for number in range(len(items))]
+
+
+def _take(waiting: deque[int], following: Callable[[], int], call: Callable[[int], None]) -> None:
+    """One after the other, as long as there are any; after an error nothing more is begun."""
+    try:
+        while waiting:
+            try:
+                number = following()
+            except IndexError:  # the other was faster
+                return
+            call(number)
+    except BaseException:
+        waiting.clear()
+        raise
+
+
+def _once_begun(waiting: deque[int], call: Callable[[int], None]) -> None:
+    """From the end, once there is a helper."""
+    _, begun = _helper()
+    while waiting and not begun.done():
+        wait([begun], timeout=POLL_S)
+    if waiting:
+        _take(waiting, waiting.pop, call)
 
 
 class _Asked(Generic[T, R]):
