@@ -27,6 +27,11 @@ OWN = "joint_stiffness", "angle_dependent_stiffness"
 BETTER = 1.5  # factor by which the linear effect then has to lower it
 
 
+def of_levels(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    """What the force levels tell: laws of joints, or that nothing known explains them."""
+    return tuple(f for f in findings if f.effect in (*levels.LAWS, "unknown"))
+
+
 def leaves_room(findings: Sequence[Finding]) -> bool:
     """Whether a joint's law was found, and so crude a fit that something may be beside it.
 
@@ -44,7 +49,7 @@ def beside(
     `findings` are those of the levels without it, "unknown" or a crude law; None where the linear
     effect does not help.
     """
-    before = [f for f in findings if f.effect in (*levels.LAWS, "unknown")]
+    before = of_levels(findings)
     own = {(name, f.at) for f in before for name in OWN}
     possible = [
         c

@@ -63,12 +63,13 @@ def diagnose(
     simulation: Simulation,
     *,
     effects: Sequence[Effect] | None = None,
+    bent: bool = False,
     tell: Tell = quietly,
 ) -> Diagnosis:
     """Which effect explains FRFs at q (n, dof) in rad that the simulation does not.
 
-    `effects` are looked at instead of the whole library. Raises InputError where nothing of the
-    FRFs lies in robot.toml's band.
+    `effects` are looked at instead of the whole library; `bent` is as in `search`. Raises
+    InputError where nothing of the FRFs lies in robot.toml's band.
     """
     started = time.perf_counter()
     band = common_band(frfs, simulation.robot.config.band_hz)
@@ -76,7 +77,7 @@ def diagnose(
     tell("refitting the simulation", 0.0)
     refitted = settle(problem, fit(problem, Effect("")))
     all_ = library(simulation) if effects is None else effects
-    found = search(problem, refitted, all_, tell)
+    found = search(problem, refitted, all_, tell, bent=bent)
     return _diagnosis(problem, found, all_, started)
 
 

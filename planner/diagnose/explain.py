@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass, replace
 
-from planner.diagnose.beside import beside, leaves_room
+from planner.diagnose.beside import beside, leaves_room, of_levels
 from planner.diagnose.diagnose import beside_another, diagnose
 from planner.diagnose.finding import Finding
 from planner.diagnose.judge import Judged, judge
 from planner.diagnose.recorded import corrected
 from planner.diagnose.screens import screen
+from planner.diagnose.taken_back import taken_back
 from planner.diagnose.tell import Tell, within
 from planner.diagnose.together import ARTEFACTS, Together, linear_effects_apply, together
 from planner.diagnose.visits import Recorded as Visits
@@ -36,6 +37,7 @@ def explain(
         recorded.q,
         simulation,
         effects=None if linear or leaves_room(findings) else (),
+        bent=bool(of_levels(findings)),
         tell=within(tell, 0.2, 0.85),
     )
     if any(f.effect in ARTEFACTS for f in findings):
@@ -49,7 +51,14 @@ def explain(
         found = replace(found, best=found.refitted)
     tell("judging at poses set aside", 0.95)
     judged = judge(found)
-    whole = together(findings, judged.diagnosis, linear or both is not None)
+    counts = linear or both is not None
+    if counts:
+        kept, found = taken_back(findings, judged.diagnosis)
+        if len(kept) < len(findings):
+            said = "What explains them takes a correction back: there was no such artefact."
+            recorded = replace(recorded, remarks=(*recorded.remarks, said))
+        findings, judged = kept, replace(judged, diagnosis=found)
+    whole = together(findings, judged.diagnosis, counts)
     return Explained(recorded, judged, whole)
 
 

@@ -7,11 +7,10 @@ from functools import lru_cache, partial
 import numpy as np
 
 from planner.diagnose.effect import Effect, Setting
-from planner.diagnose.objective import ByPose, Misfit, own_names
+from planner.diagnose.objective import ByPose, Misfit, Weighed, own_names
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
 from planner.identify.identify import QUICK, STAGES, Effort, identify
-from planner.identify.objective import Quadratic
 from planner.identify.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.identify.solver import Minimum, minimise
 from planner.physics.gradient import Inertias
@@ -216,7 +215,9 @@ def _approach(problem: Problem, effect: Effect) -> np.ndarray:
     return _best(rough, starts).x
 
 
-def _best(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> Minimum:
+def _best(
+    misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS
+) -> Minimum[Weighed]:
     """Where the best of the starts leads."""
     if len(starts) > KEPT:
         held = replace(misfit, inertial=False)
@@ -256,13 +257,13 @@ def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
 
 
 def _minimise(
-    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: Quadratic | None = None
-) -> Minimum:
+    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: Weighed | None = None
+) -> Minimum[Weighed]:
     return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at)
 
 
-def _at(misfit: Misfit, found: Minimum) -> Fit:
-    return Fit(misfit.effect, misfit, found.x, misfit.by_pose(found.x))
+def _at(misfit: Misfit, found: Minimum[Weighed]) -> Fit:
+    return Fit(misfit.effect, misfit, found.x, found.at.data or misfit.by_pose(found.x))
 
 
 def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:

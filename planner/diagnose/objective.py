@@ -32,6 +32,13 @@ class ByPose:
     normal: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Weighed(Quadratic):
+    """Data and prior at a point, and what the data of each pose say; None where x cannot be."""
+
+    data: ByPose | None
+
+
 def own_names(effect: Effect) -> list[str]:
     """Of an effect's ψ: what, of which effect, where."""
     return [f"{q.name} of {p.name} at {p.at}" for p in effect.parts() for q in p.quantities]
@@ -159,21 +166,22 @@ class Misfit:
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
         return positive(mass)
 
-    def __call__(self, x: np.ndarray) -> Quadratic:
+    def __call__(self, x: np.ndarray) -> Weighed:
         """Data and prior together; ∞ where x cannot be."""
         away, scale = (x - self.mean) / self.sd, 1 / self.sd
         if not self.possible(x):
             nothing = np.zeros(len(x))
-            return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
+            return Weighed(np.inf, nothing, np.diag(nothing), np.inf, None)
         data = self.by_pose(x)
         if self.logarithmic:
             away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
         chi2 = float(data.chi2.sum())
-        return Quadratic(
+        return Weighed(
             (chi2 + float(away @ away)) / 2,
             data.gradient.sum(axis=0) + np.where(self.free, scale * away, 0.0),
             data.normal.sum(axis=0) + np.diag(scale**2),
             chi2,
+            data,
         )
 
     def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

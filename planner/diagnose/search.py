@@ -24,11 +24,10 @@ from planner.diagnose.fit import (
     staged,
 )
 from planner.diagnose.tell import Tell, quietly, within
-from planner.diagnose.weigh import temper_of
+from planner.diagnose.weigh import best_of, cut, lag
 from planner.identify.held_out import farthest_first
 from planner.side_by_side import side_by_side
 
-REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
 STEPS, LAST_STEPS = 12, 30
 FEW = 5  # poses on which all are looked at where something is clearly wrong
@@ -36,6 +35,7 @@ CLEARLY = 3.0  # misfit from which that is so
 ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
+MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
 POINTED = 2  # suspects settled on all lines
 MOVED = 2  # effects at other places, the same
 LESSENED = 3  # explanations that are looked at without one of their effects
@@ -53,8 +53,20 @@ class Found:
     left: tuple[tuple[Effect, float, Fit], ...]  # log evidence behind the best when it was left
 
 
-def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
-    """Fit all effects beside `refitted`, the fit of none, and pairs where one is not enough."""
+def search(
+    problem: Problem,
+    refitted: Fit,
+    effects: Sequence[Effect],
+    tell: Tell,
+    *,
+    bent: bool = False,
+) -> Found:
+    """Fit all effects beside `refitted`, the fit of none, and pairs where one is not enough.
+
+    `bent`: the FRFs are averages over swings of a nonlinear joint, so that no effects will fit as
+    closely as noise allows: fewer pairs are looked for, and no third effect.
+    """
+    most_leaders = MOST_LEADERS_BENT if bent else MOST_LEADERS
     if not effects:
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
@@ -64,16 +76,18 @@ def search(problem: Problem, refitted: Fit, effects: Sequence[Effect], tell: Tel
         found = _lessened(problem, found)
     leaders = _leaders(found) if _best_of_few(found).per_value > ENOUGH else []
     led: list[Place] = []
-    while leaders and (leader := _next(leaders, led, found)) is not None:
-        first = 0.6 + 0.4 * len(led) / MOST_LEADERS
+    while len(led) < most_leaders and (leader := _next(leaders, led, found)) is not None:
+        first = 0.6 + 0.4 * len(led) / most_leaders
         led.append(_place(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
-        along = within(tell, first, first + 0.4 / MOST_LEADERS)
+        along = within(tell, first, first + 0.4 / most_leaders)
         more = _round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
     found = _moved(problem, found, effects)
-    found = _lessened(problem, _composed(problem, found, effects, tell))
+    if not bent:
+        found = _composed(problem, found, effects, tell)
+    found = _lessened(problem, found)
     return _distinct(_spared(problem, _accompanied(problem, found, effects, tell), effects))
 
 
@@ -104,8 +118,8 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
 
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
     """The best to the end, the others, and the first of them if need be, less closely."""
-    few = _and_best(rough, LAST) if first else _first(rough, LAST)
-    return _settled(problem, _first(_settled(problem, few, CLOSE, STEPS), POINTED))
+    few = _and_best(rough, LAST) if first else best_of(rough, LAST)
+    return _settled(problem, best_of(_settled(problem, few, CLOSE, STEPS), POINTED))
 
 
 def _settled(
@@ -116,7 +130,7 @@ def _settled(
 
 def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
     """The first, and the best so many."""
-    return list({id(f): f for f in (*rough[:1], *_first(rough, most))}.values())
+    return list({id(f): f for f in (*rough[:1], *best_of(rough, most))}.values())
 
 
 def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
@@ -124,7 +138,7 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     best = min(found.finalists, key=lambda f: f.per_value)
     if best.per_value <= ENOUGH:
         return found
-    near = _first(elsewhere(problem, best, effects), MOVED)
+    near = best_of(elsewhere(problem, best, effects), MOVED)
     return Found((*found.finalists, *_settled(problem, near)), found.left)
 
 
@@ -216,7 +230,7 @@ def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
     if best.per_value <= ENOUGH:
         members = [_place(e) for e in best.effect.parts()]
         waiting = [f for f in waiting if _place(f.effect) in members]
-    return waiting[0] if waiting and len(led) < MOST_LEADERS else None
+    return waiting[0] if waiting else None
 
 
 def _leaders(found: Found) -> list[Fit]:
@@ -224,7 +238,7 @@ def _leaders(found: Found) -> list[Fit]:
 
     Beside a second effect the best of them need not be right, so that others get their turn.
     """
-    ranked = [found.finalists[i] for i in np.argsort(_behind(found.finalists))]
+    ranked = [found.finalists[i] for i in np.argsort(lag(found.finalists))]
     ranked += [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
     leaders: dict[Place, Fit] = {}
     for f in ranked:
@@ -256,40 +270,19 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     if clearly:
         order = np.argsort([f.misfit(f.x).value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
-        worst = max(_behind([none, *close]))
+        worst = max(lag([none, *close]))
         left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
     else:
-        kept, left = _cut([none, *fits], FIRST)
-        if min(_behind([none, *fits])[1:]) - _behind([none, *fits])[0] > -HOPELESS:
-            kept, more = _cut([none, *fits], 1)
+        kept, left = cut([none, *fits], FIRST)
+        if min(lag([none, *fits])[1:]) - lag([none, *fits])[0] > -HOPELESS:
+            kept, more = cut([none, *fits], 1)
             return Found((settle(problem, none),), tuple(more))
         close = _settled(problem, kept[1:], CLOSE, STEPS)
     tell("following the best", 0.8)
-    kept, more = _cut([none, *close], LAST)
+    kept, more = cut([none, *close], LAST)
     tell("settling", 0.9)
     return Found(tuple(_settled(problem, kept)), (*left, *more))
 
 
 def _words(effect: Effect) -> str:
     return " and ".join(f"{p.name.replace('_', ' ')} at {p.at}" for p in effect.parts())
-
-
-def _behind(fits: Sequence[Fit]) -> np.ndarray:
-    """By how much the tempered log evidence of fits on the same lines is behind the best's."""
-    t = temper_of(fits)
-    evidence = np.array([f.log_evidence(t) for f in fits])
-    return evidence.max() - evidence
-
-
-def _first(fits: Sequence[Fit], most: int) -> list[Fit]:
-    """The best of fits on the same lines."""
-    return [fits[i] for i in np.argsort(_behind(fits))[:most]] if fits else []
-
-
-def _cut(fits: Sequence[Fit], most: int) -> tuple[list[Fit], list[tuple[Effect, float, Fit]]]:
-    """The first, and up to `most` in all; those that are left, by how far they are behind."""
-    behind = _behind(fits)
-    order = [0, *(int(i) for i in np.argsort(behind) if i)]
-    kept = {i for place, i in enumerate(order) if i == 0 or (place < most and behind[i] < REACH)}
-    left = [(fits[i].effect, float(behind[i]), fits[i]) for i in order if i not in kept]
-    return [fits[i] for i in order if i in kept], left

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.diagnose.effect import Effect
 from planner.diagnose.fit import Fit
 
+REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
 LEAST = 0.3  # no noise is overstated by more
@@ -77,3 +79,24 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
 def _volume(fit: Fit, t: float) -> float:
     """Log evidence of a fit without its χ²: what springs and nuisances cost any candidate."""
     return fit.log_evidence(t) + float(fit.data.chi2.sum()) / (2 * t)
+
+
+def lag(fits: Sequence[Fit]) -> np.ndarray:
+    """By how much the tempered log evidence of fits on the same lines is behind the best's."""
+    t = temper_of(fits)
+    evidence = np.array([f.log_evidence(t) for f in fits])
+    return evidence.max() - evidence
+
+
+def best_of(fits: Sequence[Fit], most: int) -> list[Fit]:
+    """The best of fits on the same lines."""
+    return [fits[i] for i in np.argsort(lag(fits))[:most]] if fits else []
+
+
+def cut(fits: Sequence[Fit], most: int) -> tuple[list[Fit], list[tuple[Effect, float, Fit]]]:
+    """The first, and up to `most` in all; those that are left, by how far they are behind."""
+    behind = lag(fits)
+    order = [0, *(int(i) for i in np.argsort(behind) if i)]
+    kept = {i for place, i in enumerate(order) if i == 0 or (place < most and behind[i] < REACH)}
+    left = [(fits[i].effect, float(behind[i]), fits[i]) for i in order if i not in kept]
+    return [fits[i] for i in order if i in kept], left

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 import numpy as np
 import scipy.linalg
@@ -10,13 +11,15 @@ from planner.identify.objective import Quadratic
 
 LONGEST = 1.5  # no parameter moves farther in one step: a factor of 4.5 for a logarithm
 
+Q = TypeVar("Q", bound=Quadratic)
+
 
 @dataclass(frozen=True, eq=False)
-class Minimum:
+class Minimum(Generic[Q]):
     """Where the iteration ended, and whether it had come to rest."""
 
     x: np.ndarray
-    at: Quadratic
+    at: Q
     iterations: int
     converged: bool
 
@@ -33,14 +36,14 @@ def inverse(precision: np.ndarray) -> np.ndarray:
 
 
 def minimise(
-    objective: Callable[[np.ndarray], Quadratic],
+    objective: Callable[[np.ndarray], Q],
     start: np.ndarray,
     tolerance: float,
     most: int,
     progress: Callable[[int, float], None] | None = None,
     longest: float | np.ndarray = LONGEST,
-    at: Quadratic | None = None,
-) -> Minimum:
+    at: Q | None = None,
+) -> Minimum[Q]:
     """Least value from `start`, until a step would gain less than `tolerance` of it.
 
     `at` is the objective there, where that is known.

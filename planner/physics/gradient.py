@@ -7,6 +7,7 @@ Z = K(1+iη) + s C + s² M. Z is symmetric, so that with X = Z⁻¹ Jᵀ any cha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -170,7 +171,7 @@ def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.nd
     and two, are added up in one real product.
     """
     n, r = sensor.shape[:2]
-    upper = np.triu_indices(r)
+    upper = _upper(r)
     products = np.empty((n, len(upper[0]), *out.shape[2:]), dtype=complex)
     end = 0
     for port in range(r):
@@ -181,6 +182,11 @@ def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.nd
     flat = products.reshape(n, len(upper[0]), -1).view(float)
     weights = shapes[..., upper[0], upper[1]]
     np.matmul(weights, flat, out=out.reshape(n, out.shape[1], -1).view(float))
+
+
+@cache
+def _upper(size: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.triu_indices(size)
 
 
 def _moved(ports: np.ndarray, x: np.ndarray) -> np.ndarray:

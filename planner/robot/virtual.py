@@ -9,6 +9,7 @@ import pinocchio as pin
 from planner.robot.robot import BASE, Robot
 
 SMALL = "resonator"  # and its number: a body of its own too
+BETWEEN = 0.75  # share of a rod's second moment that its halves' centres have
 OUTER = ", outer half"  # of a link that bends: a body of its own
 INERTIA_NAMES = ("m", "mx", "my", "mz", "xx", "xy", "yy", "xz", "yz", "zz")  # Pinocchio's order
 
@@ -81,19 +82,21 @@ def _resonators(robot: Robot, model: pin.Model, last: list[int]) -> list[int]:
 
 
 def _halves(values: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A body (10,) cut half-way to the next joint, at `half` (3,): (10,) inner, (10,) outer.
+    """A body (10,) cut across the way to the next joint, at `half` (3,): (10,) inner, (10,) outer.
 
     The outer one is about that point. Mass, centre and moments of both together are the body's;
-    their centres are as far apart as those of a rod's halves, where its moments allow it.
+    they are as heavy, and their centres as far apart, as the halves of a uniform block.
     """
     body = pin.Inertia.FromDynamicParameters(values)
     along = half / np.linalg.norm(half)
-    across = np.eye(3) - np.outer(along, along)
-    least = np.linalg.eigvalsh(across @ body.inertia @ across)[1]
-    apart = min(np.linalg.norm(half) / 2, np.sqrt(0.75 * max(least, 0.0) / body.mass))
-    moments = (body.inertia - body.mass * apart**2 * across) / 2
-    inner = pin.Inertia(body.mass / 2, body.lever - apart * along, moments)
-    outer = pin.Inertia(body.mass / 2, body.lever + apart * along - half, moments)
+    # ∫ x xᵀ dm: three quarters of it along the way lie between the halves, whichever way it leans.
+    spread = np.trace(body.inertia) / 2 * np.eye(3) - body.inertia
+    length = body.mass * along @ spread @ along
+    apart = np.sqrt(BETWEEN / length) * (spread @ along) if length > 0 else np.zeros(3)
+    between = body.mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+    moments = (body.inertia - between) / 2
+    inner = pin.Inertia(body.mass / 2, body.lever - apart, moments)
+    outer = pin.Inertia(body.mass / 2, body.lever + apart - half, moments)
     return np.array(inner.toDynamicParameters()), np.array(outer.toDynamicParameters())
 
 

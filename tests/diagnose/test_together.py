@@ -9,7 +9,10 @@ from planner.diagnose.beside import leaves_room
 from planner.diagnose.both import SECOND
 from planner.diagnose.diagnose import Candidate, Diagnosis, beside_another
 from planner.diagnose.effect import Effect
+from planner.diagnose.effects.channel import ChannelDelay
+from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.finding import Finding
+from planner.diagnose.taken_back import taken_back
 from planner.diagnose.together import HONEST, linear_effects_apply, together
 
 
@@ -133,3 +136,39 @@ def test_beside_something_found_an_effect_is_one_more(none, verdict):
     assert sum(shares.values()) == pytest.approx(1.0)
     odds = (0.95 - none) / none
     assert shares[fits["joint_2"]] / shares[fits[""]] == pytest.approx(SECOND * odds)
+
+
+DELAY = Finding("channel_delay", "sensor", 500.0, {"delay": (2.1e-3, 3e-4, "s")})
+
+
+@dataclass(frozen=True)
+class Delayed:
+    """A fit whose one artefact is a further delay."""
+
+    delay_s: float
+
+    def parameters(self, temper: float, part: Effect) -> dict:
+        return {"delay": (self.delay_s, 1e-6, "s")} if part.name == "channel_delay" else {}
+
+
+def explained(delay_s: float, probability: float = 1.0) -> Diagnosis:
+    fit = cast(Any, Delayed(delay_s))
+    mass, delay = AddedMass("link_4"), ChannelDelay("sensor")
+    candidates = (
+        Candidate((mass, delay), probability, fit),
+        Candidate((mass,), 1 - probability, fit),
+        Candidate((), 0.0, None),
+    )
+    return Diagnosis("explained", candidates, fit, fit, 1.0, 0.0, cast(Any, None))
+
+
+def test_a_delay_that_the_explanation_takes_back_was_none():
+    kept, found = taken_back((DELAY, FRICTION), explained(-2.09e-3))
+    assert kept == (FRICTION,)
+    assert found.candidates[0].places == (("added_mass", "link_4"),)
+    assert found.candidates[-1].places == (UNKNOWN,)
+
+
+@pytest.mark.parametrize("found", [explained(-1e-3), explained(2.1e-3), explained(-2.1e-3, 0.6)])
+def test_a_delay_that_is_only_mended_or_doubted_stays(found):
+    assert taken_back((DELAY,), found) == ((DELAY,), found)
