@@ -44,8 +44,7 @@ def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
         found = approached(misfit, [misfit.mean if x is None else x], steps)
         x = found.x
     assert found is not None
-    end = found
-    return tuple(side_by_side(partial(_from, few, end, most=1), _sets(end, effects)))
+    return tuple(side_by_side(partial(_alone, few, found), _sets(found, effects)))
 
 
 def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) -> tuple[Fit, ...]:
@@ -61,14 +60,28 @@ def resonant(problem: Problem, rough: Sequence[Fit], effects: Sequence[Effect]) 
     return tuple(side_by_side(partial(_both_from, few), pairs))
 
 
-def _from(problem: Problem, fit: Fit, effect: Effect, most: int | None = None) -> Fit:
-    """A rough fit of an effect from where another is, and from `most` starts of what is new."""
+def _alone(problem: Problem, everywhere: Fit, effect: Effect) -> Fit:
+    """A rough fit of few effects from where all are, or with the largest mass of all as theirs."""
     misfit = problem.misfit(effect, GLANCE)
-    return approached(misfit, points(misfit, fit)[:most], FOLLOWED)
+    x = points(misfit, everywhere)[0]
+    shifts = everywhere.named()
+    carried = [shifts[_mass(e)] for e in everywhere.effect.parts() if isinstance(e, AddedMass)]
+    other = x.copy()
+    for e in effect.parts():
+        if isinstance(e, AddedMass):
+            other[misfit.names.index(_mass(e))] = max(carried, key=abs)
+    return approached(misfit, [x, other] if misfit.possible(other) else [x], FOLLOWED)
+
+
+def _mass(effect: Effect) -> str:
+    return f"mass of {effect.name} at {effect.at}"
 
 
 def _both_from(problem: Problem, both: tuple[Fit, Effect]) -> Fit:
-    return _from(problem, *both)
+    """A rough fit of an effect from where another is, and from the starts of what is new."""
+    fit, effect = both
+    misfit = problem.misfit(effect, GLANCE)
+    return approached(misfit, points(misfit, fit), FOLLOWED)
 
 
 def _few(problem: Problem) -> Problem:
@@ -110,7 +123,7 @@ def _sets(found: Fit, effects: Sequence[Effect]) -> list[Effect]:
         for place in sorted(softness, key=lambda p: softness[p])
     ]
     masses = [e for e in effects if isinstance(e, AddedMass)]
-    carried = [abs(shift[f"mass of {e.name} at {e.at}"]) for e in masses]
+    carried = [abs(shift[_mass(e)]) for e in masses]
     sets = [tuple(gave[:k]) for k in range(1, min(len(gave), MOST) + 1)]
     if max(carried, default=0.0) > CARRIED:
         some = [tuple(gave[:k]) for k in range(min(len(gave), MASSES) + 1)]

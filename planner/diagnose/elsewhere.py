@@ -13,7 +13,7 @@ from planner.diagnose.effect import Effect
 from planner.diagnose.fit import CLOSE, Fit, Problem, approached, points
 from planner.side_by_side import side_by_side
 
-MOVABLE = "added_mass", "local_resonator"
+MOVABLE = MASS, RESONATOR = "added_mass", "local_resonator"
 KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
 
 
@@ -40,3 +40,30 @@ def _moved(problem: Problem, fit: Fit, move: tuple[Effect, Effect, Effect]) -> F
         if before in known:
             starts[:, misfit.names.index(now)] = known[before]
     return approached(misfit, list(np.unique(starts, axis=0)))
+
+
+def rigid(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """Rough fits with a mass in the stead of each resonator.
+
+    One that swings faster than the band is wide is nothing else, and a fit does not get there by
+    itself.
+    """
+    pairs: list[tuple[Effect, Effect]] = []
+    for part in fit.effect.parts():
+        if part.name == RESONATOR:
+            rest = [p for p in fit.effect.parts() if p is not part]
+            there = [e for e in effects if e.name == MASS and e.at == part.at]
+            both = (together(Both.of(*rest), e) if rest else e for e in there)
+            pairs += [(part, effect) for effect in both if effect is not None]
+    return tuple(side_by_side(partial(_held, problem, fit), pairs))
+
+
+def _held(problem: Problem, fit: Fit, pair: tuple[Effect, Effect]) -> Fit:
+    part, effect = pair
+    misfit, known = problem.misfit(effect, CLOSE), fit.named()
+    x = points(misfit, fit)[0]
+    for q in part.quantities:
+        now = f"{q.name} of {MASS} at {part.at}"
+        if now in misfit.names:
+            x[misfit.names.index(now)] = q.value(known[f"{q.name} of {part.name} at {part.at}"])
+    return approached(misfit, [x])

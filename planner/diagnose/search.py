@@ -10,7 +10,7 @@ from planner.diagnose.anywhere import resonant, suspects
 from planner.diagnose.both import Both, Family, families, together
 from planner.diagnose.effect import Effect
 from planner.diagnose.effects.resonator import LocalResonator
-from planner.diagnose.elsewhere import elsewhere
+from planner.diagnose.elsewhere import elsewhere, rigid
 from planner.diagnose.fit import (
     CLOSE,
     FINE,
@@ -87,7 +87,7 @@ def search(
     found = _moved(problem, found, effects)
     if not bent:
         found = _composed(problem, found, effects, tell)
-    found = _lessened(problem, found)
+    found = _lessened(problem, _rigid(problem, found, effects))
     return _distinct(_spared(problem, _accompanied(problem, found, effects, tell), effects))
 
 
@@ -140,6 +140,12 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
         return found
     near = best_of(elsewhere(problem, best, effects), MOVED)
     return Found((*found.finalists, *_settled(problem, near)), found.left)
+
+
+def _rigid(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """With the best's resonators as masses that do not swing."""
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    return Found((*found.finalists, *_settled(problem, rigid(problem, best, effects))), found.left)
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
