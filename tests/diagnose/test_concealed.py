@@ -42,6 +42,20 @@ def test_soft_base(tmp_path):
         assert abs(found[f"stiffness of base about {axis}"][0] / k - 1) < 0.02
 
 
+@pytest.mark.parametrize("seed", range(81, 87))
+def test_a_link_that_bends_and_twists_carries_no_mass_beside_it(tmp_path, seed):
+    """How its mass is spread between its halves is not known, and not a mass."""
+    rng = np.random.default_rng(seed)
+    stiffness = np.exp(rng.uniform(np.log(1.0e6), np.log(4e6), 3))
+    extra = tuple(
+        Spring("link_2", (float(x), float(y), float(z)), float(k), 1e-3 * float(k))
+        for (x, y, z), k in zip(np.eye(3), stiffness, strict=True)
+    )
+    diagnosis = diagnose(*hidden(KR210, tmp_path, seed, extra))
+    told(diagnosis)
+    assert diagnosis.candidates[0].places == (("link_flexibility", "link_2"),)
+
+
 def test_gain_of_one_channel(tmp_path):
     def channel(a: np.ndarray) -> np.ndarray:
         return a * np.array([[1.0], [0.8], [1.0]])
