@@ -70,7 +70,9 @@ def beside(
     if law is None or law.misfit * BETTER > min(f.misfit for f in before):
         return None
     kept = [f for f in findings if f not in before and f.effect != "joint_stiffness"]
-    there = [c for c in possible if len(c.effects) <= len(linear.effects)]
+    # Springs make up for what averages tell wrongly of the linear effect.
+    again = [f for f in again if f.effect != "joint_stiffness"]
+    there = [c for c in possible if _numbers(c) <= _numbers(linear)]
     total = sum(c.probability for c in there)
     ranked = tuple(replace(c, probability=c.probability / total) for c in there if total)
     ranked = ranked or (replace(linear, probability=1.0),)
@@ -78,7 +80,10 @@ def beside(
 
 
 def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | None:
-    """The likeliest of the fewest linear effects: none of a set has to be there for what bends."""
+    """The fewest linear effects with the fewest numbers: more of them imitate what bends.
+
+    Of alike ones the likeliest.
+    """
     lines = found.refitted.misfit.counts.sum()
     settled = [
         (c, c.fit.per_value)
@@ -89,7 +94,15 @@ def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | No
         return None
     least = min(misfit for _, misfit in settled)
     enough = [c for c, misfit in settled if misfit <= PAYS * least]
-    return min(enough, key=lambda c: len(c.effects))
+    return min(enough, key=_numbers)
+
+
+def _numbers(candidate: Candidate) -> tuple[int, int]:
+    """Of effects, and of numbers that they may choose."""
+    assert candidate.fit is not None
+    simulation = candidate.fit.misfit.setting.simulation
+    chosen = (len(e.quantities) + len(e.springs(simulation)) for e in candidate.effects)
+    return len(candidate.effects), sum(chosen)
 
 
 def _at_the_noise(candidate: Candidate) -> bool:

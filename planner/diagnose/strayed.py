@@ -7,6 +7,7 @@ from planner.diagnose.finding import Finding
 from planner.diagnose.fit import Fit
 
 FAR = 3.2  # prior sds that a spring does not move by chance, nor by what a fit in time neglects
+MOST = 1  # joints that may be: several at once imitate what the law lacks
 FITS = 2.0  # χ² per value up to which a law is the joint's own; else springs imitate what it lacks
 
 
@@ -38,4 +39,4 @@ def strayed(
         }
         evidence = float(np.max(away[places] ** 2)) / 2
         found[effect.at] = Finding("joint_stiffness", effect.at, evidence, told, effect.text(told))
-    return tuple(found.values())
+    return tuple(found.values()) if len(found) <= MOST else ()
