@@ -9,15 +9,12 @@ from planner.errors import InputError
 from planner.physics.gradient import Inertias
 from planner.physics.simulation import Elasticity, Simulation
 from planner.robot.config import Compliance
-from planner.robot.virtual import OUTER, inertia_basis
+from planner.robot.virtual import inertia_basis
 
 NEAR = 6.0
 KINDS = ("stiffness", "damping", "loss_factor")
 UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
 MOMENTS = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of inertia, in Pinocchio's order
-# Sds of the halves of a link that bends: mass, centre (of the radius of gyration), moments. Of a
-# link's second moment a block has 3/4 between its halves, what is heavy at its ends more.
-HALVES = np.array([0.0, 0.14, 0.5])
 INERTIAL = ("mass", "com_x", "com_y", "com_z", *(f"i_{'xyz'[i]}{'xyz'[j]}" for i, j in MOMENTS))
 
 
@@ -194,26 +191,15 @@ def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...],
         com = nominal[1:4] / m if m > 0 else np.zeros(3)
         central = nominal[4:] - _point(m, com)
         size = np.sqrt(np.abs(central[[0, 2, 5]]))
-        mass, com_m, inertia = priors.mass, priors.com_m, priors.inertia
-        if _is_half(simulation, bodies[b]):
-            radius = np.sqrt(size @ size / (2 * m)) if m > 0 else 0.0
-            mass, com_m, inertia = np.hypot((mass, com_m, inertia), HALVES * [1.0, radius, 1.0])
-        change[b, 0] = mass * nominal
+        change[b, 0] = priors.mass * nominal
         for axis in range(3):
             step = np.eye(3)[axis]
-            change[b, 1 + axis, 1 + axis] = com_m * m
+            change[b, 1 + axis, 1 + axis] = priors.com_m * m
             slope = _point(m, com + step) - _point(m, com) - _point(m, step)
-            change[b, 1 + axis, 4:] = com_m * slope
+            change[b, 1 + axis, 4:] = priors.com_m * slope
         for k, (i, j) in enumerate(MOMENTS, 4):
-            change[b, k, k] = inertia * size[i] * size[j] + m * com_m**2
+            change[b, k, k] = priors.inertia * size[i] * size[j] + m * priors.com_m**2
     return tuple(f"{what} of {body}" for body in bodies for what in INERTIAL), change
-
-
-def _is_half(simulation: Simulation, body: str) -> bool:
-    if body in simulation.robot.joint_names:
-        body = simulation.robot.link_of(body) + OUTER
-        return body in simulation.elastic.bodies
-    return body.endswith(OUTER)
 
 
 def _point(mass: float, at: np.ndarray) -> np.ndarray:

@@ -81,11 +81,33 @@ def _resonators(robot: Robot, model: pin.Model, last: list[int]) -> list[int]:
     return found
 
 
-def _halves(values: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def halves_moved(robot: Robot, link: str) -> tuple[float, np.ndarray]:
+    """How far in m the centres of a link's halves are from its own, and (3, 2, 10) derivatives.
+
+    They are those of the inner and the outer half when their centres move apart along x, y, z.
+    """
+    carried = robot.carries(link)
+    assert carried is not None  # otherwise the link has no halves
+    half = robot.model.jointPlacements[carried[1]].translation / 2
+    whole = _inertia(robot, carried[0])
+    inner, outer = _halves(whole, half)
+    apart = float(np.linalg.norm(outer[1:4] / outer[0] + half - inner[1:4] / inner[0])) / 2
+    slope = np.zeros((3, 2, 10))
+    step = 1e-3 * apart  # any is exact, of numbers of second order, that leaves a possible body
+    for axis, further in enumerate(step * np.eye(3) if apart > 0 else ()):
+        there, back = _halves(whole, half, further), _halves(whole, half, -further)
+        slope[axis] = np.subtract(there, back) / (2 * step)
+    return apart, slope
+
+
+def _halves(
+    values: np.ndarray, half: np.ndarray, further: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """A body (10,) cut across the way to the next joint, at `half` (3,): (10,) inner, (10,) outer.
 
     The outer one is about that point. Mass, centre and moments of both together are the body's;
-    they are as heavy, and their centres as far apart, as the halves of a uniform block.
+    they are as heavy, and their centres as far apart, as the halves of a uniform block, or by
+    `further` (3,) farther.
     """
     body = pin.Inertia.FromDynamicParameters(values)
     along = half / np.linalg.norm(half)
@@ -93,6 +115,7 @@ def _halves(values: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarra
     spread = np.trace(body.inertia) / 2 * np.eye(3) - body.inertia
     length = body.mass * along @ spread @ along
     apart = np.sqrt(BETWEEN / length) * (spread @ along) if length > 0 else np.zeros(3)
+    apart = apart if further is None else apart + further
     between = body.mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
     moments = (body.inertia - between) / 2
     inner = pin.Inertia(body.mass / 2, body.lever - apart, moments)

@@ -3,18 +3,28 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
+from planner.diagnose.effect import Quantity, Setting
 from planner.diagnose.effects.extra import ExtraCompliance, Give, across, told, triple
 from planner.diagnose.effects.places import joint_of, links, own_axis
+from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation
+from planner.robot.virtual import OUTER, halves_moved, inertia_basis
 
 REACH = (0.1, 10.0)  # times the stiffness of the joint that moves the link, about its own axis
 SHORTEST = 0.1  # of the longest link: what is shorter is a block
+# Prior sd of where the halves' centres are, of their distance: where a link's mass is, its inertia
+# does not tell. Of its second moment a block has 3/4 between its halves, heavy ends nearly all.
+APART = 0.12
 
 
 @dataclass(frozen=True)
 class LinkFlexibility(ExtraCompliance):
-    """Bending about two axes and torsion, half-way to the next joint."""
+    """Bending about two axes and torsion, half-way to the next joint.
+
+    By ψ (3,) in m the centres of the link's halves are farther off its own than those of a block.
+    """
 
     name = "link_flexibility"
 
@@ -37,9 +47,24 @@ class LinkFlexibility(ExtraCompliance):
             low, high = (r * _own(simulation, joint_of(simulation, place)) for r in REACH)
             axes = [*across(along / length), along / length]
             gives = tuple(Give(triple(a), low, high) for a in axes)
-            found += [cls(place, (), link, gives[:2]), cls(place, (), link, gives[2:])]
-            found.append(cls(place, (), link, gives))
+            sd = APART * halves_moved(robot, link)[0]
+            own = tuple(Quantity(f"apart_{a}", "m", 0.0, sd) for a in "xyz") if sd > 0 else ()
+            found += [cls(place, own, link, g) for g in (gives[:2], gives[2:], gives)]
         return tuple(found)
+
+    def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
+        """s² Σ Jᵀ ΔI(ψ) J of both halves."""
+        if not len(psi):
+            return ()
+        inner = setting.body(joint_of(setting.simulation, self.at))
+        ports = np.concatenate([inner, setting.body(self.joint + OUTER)], axis=1)
+        changes = halves_moved(setting.simulation.robot, self.joint)[1]
+        basis = inertia_basis()
+        halves = np.einsum("khb,bij->khij", changes, basis)
+        unit = np.array([scipy.linalg.block_diag(*both) for both in halves])
+        shapes = np.concatenate([np.einsum("k,kij->ij", psi, unit)[None], unit])
+        s2 = setting.s**2
+        return (Impedance(ports, shapes, ((0, s2),), tuple(((k, s2),) for k in (1, 2, 3))),)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
