@@ -16,8 +16,8 @@ import numpy as np
 
 from planner.acquire.outputs import AXES
 from planner.acquire.parameters import FrfNoise
-from planner.diagnose.fit import Fit, Problem, carried_on
-from planner.diagnose.predict import misfit_at
+from planner.diagnose.linear.fit import Fit, Problem, carried_on
+from planner.diagnose.linear.predict import misfit_at
 from planner.frf.types import Frf
 from planner.side_by_side import side_by_side
 

@@ -13,11 +13,11 @@ import numpy as np
 from planner.acquire.outputs import AXES
 from planner.acquire.separate import Telling, expected_log_odds
 from planner.diagnose.diagnose import TIED
-from planner.diagnose.equivalent import Receptances, receptances, system_of, waves
-from planner.diagnose.leveldata import DIFFERENCE_ERROR, MODEL_ERROR, own_parameter
-from planner.diagnose.nonlinear import Candidate, Laws, covariance
-from planner.diagnose.predict import misfit_at
-from planner.diagnose.starts import faded
+from planner.diagnose.laws.equivalent import Receptances, receptances, system_of, waves
+from planner.diagnose.laws.leveldata import DIFFERENCE_ERROR, MODEL_ERROR, own_parameter
+from planner.diagnose.laws.nonlinear import Candidate, Laws, covariance
+from planner.diagnose.laws.starts import faded
+from planner.diagnose.linear.predict import misfit_at
 
 LOOKED_AT = 60  # poses: each takes tens of milliseconds
 APART = 2.0  # between two forces, so that hits of each are told from those of the other

@@ -9,11 +9,11 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
+    from planner.diagnose.data.visits import Recorded as Visits
     from planner.diagnose.diagnose import Candidate, Diagnosis
     from planner.diagnose.explain import Explained
     from planner.diagnose.finding import Finding
-    from planner.diagnose.predict import Agreement
-    from planner.diagnose.visits import Recorded as Visits
+    from planner.diagnose.linear.predict import Agreement
     from planner.identify.recorded import Recorded
     from planner.robot.robot import Robot
 
@@ -45,8 +45,8 @@ def diagnose(
     from planner.cli.next_hit import next_hit
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
+    from planner.diagnose.data.recorded import read_ended
     from planner.diagnose.explain import explain
-    from planner.diagnose.recorded import read_ended
     from planner.physics.simulation import Simulation
     from planner.recording.folder import read_poses
     from planner.robot.robot import Robot
@@ -91,7 +91,7 @@ def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
 
 def _visits(folder: Path, robot: "Robot", window_rate_1_s: float) -> "Visits | None":
     """The hits themselves; None where there are only FRFs, or a window is stated."""
-    from planner.diagnose.visits import read_visits
+    from planner.diagnose.data.visits import read_visits
     from planner.errors import RefusedError
 
     try:
@@ -205,7 +205,7 @@ def _predict(found: "Diagnosis", rows: list[tuple[str, tuple[float, ...]]], path
     import numpy as np
 
     from planner.cli.answers import frequency_lines, save_npz
-    from planner.diagnose.predict import predicted
+    from planner.diagnose.linear.predict import predicted
 
     lines = frequency_lines(found.problem.band_hz)
     angles = np.array([joints for _, joints in rows])

@@ -8,9 +8,9 @@ import numpy as np
 from planner.acquire.separate import Telling, most_telling
 from planner.acquire.separate_laws import most_telling_forces, undecided
 from planner.cli.material import Material
+from planner.diagnose.data.visits import Recorded as Visits
 from planner.diagnose.explain import Explained
-from planner.diagnose.nonlinear import Laws
-from planner.diagnose.visits import Recorded as Visits
+from planner.diagnose.laws.nonlinear import Laws
 
 
 def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:

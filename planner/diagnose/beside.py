@@ -10,12 +10,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from planner.diagnose import levels
+from planner.diagnose.data.visits import Recorded
 from planner.diagnose.diagnose import Candidate, Diagnosis
 from planner.diagnose.finding import Finding
-from planner.diagnose.search import ENOUGH
+from planner.diagnose.linear.search import ENOUGH
+from planner.diagnose.screens import levels
 from planner.diagnose.tell import Tell, quietly
-from planner.diagnose.visits import Recorded
 from planner.diagnose.write import write_explained
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot

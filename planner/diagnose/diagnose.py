@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.diagnose.both import SECOND
-from planner.diagnose.effect import Effect
 from planner.diagnose.effects import library
-from planner.diagnose.fit import Fit, Problem, carried_on, fit, settle
-from planner.diagnose.search import Found, search
+from planner.diagnose.effects.both import SECOND
+from planner.diagnose.effects.effect import Effect
+from planner.diagnose.linear.fit import Fit, Problem, carried_on, fit, settle
+from planner.diagnose.linear.search import Found, search
+from planner.diagnose.linear.weigh import Weights, weigh
 from planner.diagnose.tell import Tell, quietly
-from planner.diagnose.weigh import Weights, weigh
 from planner.frf.types import Frf
 from planner.identify.data import common_band
 from planner.physics.simulation import Simulation

@@ -3,15 +3,15 @@
 from dataclasses import dataclass, replace
 
 from planner.diagnose.beside import beside, leaves_room, of_levels
+from planner.diagnose.data.recorded import corrected
+from planner.diagnose.data.visits import Recorded as Visits
 from planner.diagnose.diagnose import beside_another, diagnose
 from planner.diagnose.finding import Finding
 from planner.diagnose.judge import Judged, judge
-from planner.diagnose.recorded import corrected
-from planner.diagnose.screens import screen
+from planner.diagnose.screens.screen import screen
 from planner.diagnose.taken_back import taken_back
 from planner.diagnose.tell import Tell, within
 from planner.diagnose.together import ARTEFACTS, Together, linear_effects_apply, together
-from planner.diagnose.visits import Recorded as Visits
 from planner.identify.recorded import Recorded
 from planner.physics.simulation import Simulation
 

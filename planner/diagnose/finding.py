@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from planner.diagnose.nonlinear import Laws
+    from planner.diagnose.laws.nonlinear import Laws
 
 
 @dataclass(frozen=True)

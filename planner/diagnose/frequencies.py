@@ -13,9 +13,9 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import least_squares
 
-from planner.diagnose.both import SECOND
-from planner.diagnose.effect import NOTHING, Quantity
-from planner.diagnose.weigh import TOLERATED, UNKNOWN_PARAMETERS
+from planner.diagnose.effects.both import SECOND
+from planner.diagnose.effects.effect import NOTHING, Quantity
+from planner.diagnose.linear.weigh import TOLERATED, UNKNOWN_PARAMETERS
 
 Model = Callable[[Mapping[str, float]], np.ndarray]  # values by name to frequencies (n, m) in Hz
 STARTS = (-1.0, 0.0, 1.0)  # of a change's own value, in sds of its prior

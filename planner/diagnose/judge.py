@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from planner.diagnose.diagnose import Candidate, Diagnosis
-from planner.diagnose.predict import Agreement, agreement, held_out
+from planner.diagnose.linear.predict import Agreement, agreement, held_out
 
 WORSE = 0.002  # of the Global FRAC at poses set aside, by which refitting alone must not be better
 DOUBTED = 0.05  # what is left of the probability of explanations that predict worse

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import spearmanr
 
-from planner.diagnose.fit import Fit
+from planner.diagnose.linear.fit import Fit
 from planner.recording.types import AXES
 
 BINS = 64  # of the band

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.diagnose.diagnose import Candidate, Diagnosis
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.finding import Finding
 
 LEAST = 0.9  # probability of the opposite artefact

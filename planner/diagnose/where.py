@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.fit import FINE, Fit, Problem
+from planner.diagnose.linear.fit import FINE, Fit, Problem
 
 BANDS = 12
 CLEARLY = 2.0  # mean square residual, 1 at the noise

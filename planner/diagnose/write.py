@@ -7,7 +7,7 @@ import numpy as np
 import tomlkit
 
 from planner.diagnose.diagnose import Candidate, Diagnosis
-from planner.diagnose.fit import Fit
+from planner.diagnose.linear.fit import Fit
 from planner.errors import InputError
 from planner.identify.parameters import KINDS
 from planner.robot.inertias import urdf_with_inertias

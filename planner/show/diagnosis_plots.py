@@ -8,9 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.diagnose.diagnose import Diagnosis
-from planner.diagnose.effect import Effect
-from planner.diagnose.fit import Fit
-from planner.diagnose.predict import ALL
+from planner.diagnose.effects.effect import Effect
+from planner.diagnose.linear.fit import Fit
+from planner.diagnose.linear.predict import ALL
 from planner.diagnose.where import Where, where
 from planner.show.frf_map import frf_map
 from planner.show.plots import AXES

@@ -9,8 +9,8 @@ from known_robots import KR210
 from planner.acquire.separate import most_telling, separation
 from planner.diagnose.diagnose import Problem
 from planner.diagnose.effects import library
-from planner.diagnose.fit import FINE, Fit, carried_on, fit, settle
-from planner.diagnose.predict import misfit_at
+from planner.diagnose.linear.fit import FINE, Fit, carried_on, fit, settle
+from planner.diagnose.linear.predict import misfit_at
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot

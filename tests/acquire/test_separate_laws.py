@@ -13,15 +13,15 @@ from planner.acquire.separate_laws import accelerance, forces_n, law_separation
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
 from planner.cli.render_diagnosis import _next
-from planner.diagnose.columns import column
-from planner.diagnose.drift import problem_of
-from planner.diagnose.equivalent import receptances, system_of
+from planner.diagnose.data.columns import column
+from planner.diagnose.data.visits import Recorded, Visit
 from planner.diagnose.finding import Finding
-from planner.diagnose.laws import LAWS
-from planner.diagnose.levels import base
-from planner.diagnose.nonlinear import Candidate, Laws
-from planner.diagnose.timedomain import seen, spectra, strokes, torques
-from planner.diagnose.visits import Recorded, Visit
+from planner.diagnose.laws.equivalent import receptances, system_of
+from planner.diagnose.laws.nonlinear import Candidate, Laws
+from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
+from planner.diagnose.laws.torques import LAWS
+from planner.diagnose.linear.visited import problem_of
+from planner.diagnose.screens.levels import base
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot

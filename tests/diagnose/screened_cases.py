@@ -6,8 +6,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from planner.diagnose import screens
-from planner.diagnose.visits import read_visits
+from planner.diagnose.data.visits import read_visits
+from planner.diagnose.screens import screen as screens
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from known_robots import KR210
-from planner.diagnose.columns import Column, column
-from planner.diagnose.equivalent import System
+from planner.diagnose.data.columns import Column, column
+from planner.diagnose.laws.equivalent import System
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.diagnose.visits import Recorded, Visit
+from planner.diagnose.data.visits import Recorded, Visit
 from planner.physics.simulation import Elasticity, Simulation
 from planner.recording.types import Hit
 

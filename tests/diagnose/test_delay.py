@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from known_robots import KR10
-from planner.diagnose import artefacts
-from planner.diagnose.visits import Recorded
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.screens import artefacts
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot

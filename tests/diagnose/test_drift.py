@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.diagnose import drift
-from planner.diagnose.drift import problem_of, screen
+from planner.diagnose.linear.visited import problem_of
+from planner.diagnose.screens import drift
+from planner.diagnose.screens.drift import screen
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from synthetic_hits import recorded

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from beam import first_hz
-from planner.diagnose.effect import Quantity
+from planner.diagnose.effects.effect import Quantity
 from planner.diagnose.frequencies import Change, explain
 from planner.modes.ringdown import ringdown
 from planner.recording.read import read

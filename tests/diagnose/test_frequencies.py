@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.diagnose.effect import Quantity
+from planner.diagnose.effects.effect import Quantity
 from planner.diagnose.frequencies import Change, explain
 
 PLACES = np.linspace(0.2, 0.8, 7)

@@ -5,7 +5,7 @@ import pytest
 
 from known_robots import kr210_folder
 from planner.diagnose.effects import library
-from planner.diagnose.fit import Grade, Problem
+from planner.diagnose.linear.fit import Grade, Problem
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot

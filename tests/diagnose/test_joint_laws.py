@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.diagnose.equivalent import System, receptances
-from planner.diagnose.laws import LAWS
-from planner.diagnose.timedomain import seen, spectra, strokes, torques
+from planner.diagnose.laws.equivalent import System, receptances
+from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
+from planner.diagnose.laws.torques import LAWS
 from planner.physics.simulation import Elasticity
 from struck import VISITS, struck_robot
 

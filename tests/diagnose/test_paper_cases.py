@@ -10,10 +10,10 @@ import pytest
 
 from known_robots import KR10
 from measured_frfs import birk_folder, measured_frfs
+from planner.diagnose.data.visits import Recorded, Visit
 from planner.diagnose.diagnose import diagnose
-from planner.diagnose.predict import predicted
-from planner.diagnose.screens import screen
-from planner.diagnose.visits import Recorded, Visit
+from planner.diagnose.linear.predict import predicted
+from planner.diagnose.screens.screen import screen
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot

@@ -8,15 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from known_robots import KR210
-from planner.diagnose import artefacts, drift, levels, screens
-from planner.diagnose.chain import SensorChain
-from planner.diagnose.effect import Effect
-from planner.diagnose.equivalent import equivalent, system_of
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.effects.chain import SensorChain
+from planner.diagnose.effects.drift import Drift
+from planner.diagnose.effects.effect import Effect, Quantity
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import Grade, fit
+from planner.diagnose.laws.equivalent import equivalent, system_of
+from planner.diagnose.linear.fit import Grade, fit
+from planner.diagnose.linear.visited import problem_of
 from planner.diagnose.locate import locate
-from planner.diagnose.visits import Recorded
-from planner.diagnose.window import screen_window
+from planner.diagnose.screens import artefacts, drift, levels
+from planner.diagnose.screens import screen as screens
+from planner.diagnose.screens.window import screen_window
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from synthetic_hits import RATE_HZ, recorded
@@ -119,9 +122,9 @@ def test_a_pose_that_answers_as_before_has_not_drifted(plain):
 
 
 def test_without_drift_its_misfit_is_the_plain_one_and_gradients_agree(plain, simulation):
-    problem = drift.problem_of(plain, simulation)
-    quantities = (drift.Quantity("change", "1", 0.0, 0.2), drift.Quantity("bend", "1", 0.0, 3.0))
-    misfit = problem.misfit(drift.Drift("campaign", quantities), Grade(8))
+    problem = problem_of(plain, simulation)
+    quantities = (Quantity("change", "1", 0.0, 0.2), Quantity("bend", "1", 0.0, 3.0))
+    misfit = problem.misfit(Drift("campaign", quantities), Grade(8))
     still = problem.misfit(Effect(""), Grade(8))
     x = misfit.mean
     assert np.allclose(misfit.response(x)[0], still.response(still.mean)[0], rtol=1e-12)
@@ -130,7 +133,7 @@ def test_without_drift_its_misfit_is_the_plain_one_and_gradients_agree(plain, si
 
 
 def test_gradient_of_the_chain(plain, simulation):
-    problem = drift.problem_of(plain, simulation)
+    problem = problem_of(plain, simulation)
     misfit = problem.misfit(SensorChain.build([np.eye(3)], windowed=True), Grade(8))
     x = misfit.mean + 0.05 * misfit.sd * np.random.default_rng(1).standard_normal(len(misfit.sd))
     check_gradient(misfit, x, range(len(x) - 11, len(x)))
@@ -159,7 +162,7 @@ def test_equivalent_stiffness_is_that_of_the_joint_that_changed(simulation):
     softer[2] = 0.8
     q = KR210.poses(4, 5)
     data = recorded(simulation, q, lambda _, level: softer if level == 0 else np.ones(6))
-    system = system_of(fit(drift.problem_of(data, simulation), Effect("")))
+    system = system_of(fit(problem_of(data, simulation), Effect("")))
     found = equivalent(data, system)
     assert levels.disproportion(found) > 5
     assert levels.equivalent_share(found) > 0.9
@@ -174,7 +177,7 @@ def test_equivalent_stiffness_is_that_of_the_joint_that_changed(simulation):
 def test_where_names_the_pose_that_differs(simulation):
     q = KR210.poses(6, 6)
     data = recorded(simulation, q, lambda i, _: 0.7 if i == 2 else 1.0)
-    problem = drift.problem_of(data, simulation)
+    problem = problem_of(data, simulation)
     found = fit(problem, Effect(""))
     same = replace(found, x=found.misfit.mean)
     told = locate(same, [v.pose for v in data.visits])

@@ -8,13 +8,13 @@ import pytest
 
 from known_robots import KR10
 from planner.diagnose.beside import leaves_room
-from planner.diagnose.equivalent import receptances
+from planner.diagnose.data.visits import Recorded, Visit
 from planner.diagnose.finding import Finding
-from planner.diagnose.laws import LAWS, Law
-from planner.diagnose.screens import screen
-from planner.diagnose.swings import course, joints_of, rates
-from planner.diagnose.timedomain import seen, spectra, strokes, torques
-from planner.diagnose.visits import Recorded, Visit
+from planner.diagnose.laws.equivalent import receptances
+from planner.diagnose.laws.swings import course, joints_of, rates
+from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
+from planner.diagnose.laws.torques import LAWS, Law
+from planner.diagnose.screens.screen import screen
 from planner.physics.simulation import Elasticity, Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot

@@ -6,8 +6,8 @@ from typing import Any, cast
 import numpy as np
 
 from known_robots import KR210
-from planner.diagnose.fit import PRIORS
-from planner.diagnose.strayed import strayed
+from planner.diagnose.linear.fit import PRIORS
+from planner.diagnose.screens.strayed import strayed
 from planner.identify.parameters import parametrise
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot

@@ -6,10 +6,10 @@ from typing import Any, cast
 import pytest
 
 from planner.diagnose.beside import leaves_room
-from planner.diagnose.both import SECOND
 from planner.diagnose.diagnose import Candidate, Diagnosis, beside_another
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.both import SECOND
 from planner.diagnose.effects.channel import ChannelDelay
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.finding import Finding
 from planner.diagnose.taken_back import taken_back

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.diagnose.visits import Recorded, Visit
+from planner.diagnose.data.visits import Recorded, Visit
 from planner.recording.levels import levels, peak_n
 from planner.recording.types import Hit
 

@@ -20,12 +20,12 @@ from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
 from planner.campaign.proposing import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.diagnose.data.visits import Recorded, Visit
 from planner.diagnose.diagnose import Diagnosis, again, diagnose
 from planner.diagnose.effects import library
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import Fit
-from planner.diagnose.levels import screen
-from planner.diagnose.visits import Recorded, Visit
+from planner.diagnose.linear.fit import Fit
+from planner.diagnose.screens.levels import screen
 from planner.frf.types import Frf
 from planner.recording.types import Hit
 from planner.truth.cases import PEAK_N

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from planner.acquire.separate import odds_after, separation
-from planner.diagnose.fit import carried_on
+from planner.diagnose.linear.fit import carried_on
 from planner.side_by_side import side_by_side
 from planner.truth.effects import NONLINEAR
 from separation_cases import KINDS, Campaign, OfEffects, begun

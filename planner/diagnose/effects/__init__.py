@@ -1,10 +1,10 @@
 """The registry of effects: each kind by name, and all of them at all their places."""
 
-from planner.diagnose.effect import Effect
 from planner.diagnose.effects.angle import AngleDependentStiffness
 from planner.diagnose.effects.base import BaseCompliance
 from planner.diagnose.effects.channel import ChannelDelay, Polarity, SensorGain
 from planner.diagnose.effects.damping import StructuralDamping
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.effects.link import LinkFlexibility
 from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.effects.resonator import LocalResonator

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Quantity, Setting
+from planner.diagnose.effects.effect import Effect, Quantity, Setting
 from planner.diagnose.effects.places import joint_of, joints, own_axis
 from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation

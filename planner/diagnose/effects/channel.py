@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Quantity, Setting, Transfer
+from planner.diagnose.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.physics.simulation import Simulation
 
 AXES = "xyz"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.effect import Effect
 from planner.identify.parameters import place_name
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.effects.places import damping_time, with_blocks
 from planner.identify.parameters import Priors, place_name
 from planner.physics.simulation import Simulation

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from planner.diagnose.effect import Quantity, Setting
+from planner.diagnose.effects.effect import Quantity, Setting
 from planner.diagnose.effects.extra import ExtraCompliance, Give, across, told, triple
 from planner.diagnose.effects.places import joint_of, links, own_axis
 from planner.physics.gradient import Impedance

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Quantity, Setting
+from planner.diagnose.effects.effect import Effect, Quantity, Setting
 from planner.diagnose.effects.mass import REACH, link_size
 from planner.diagnose.effects.places import joint_of, links
 from planner.physics.gradient import Impedance

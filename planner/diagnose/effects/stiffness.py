@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.effects.places import joint_of, joints, own_axis
 from planner.identify.parameters import Priors, place_name
 from planner.physics.simulation import Simulation

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from planner.diagnose.columns import pulse
+from planner.diagnose.data.columns import pulse
+from planner.diagnose.data.visits import Recorded
 from planner.diagnose.finding import Finding
-from planner.diagnose.visits import Recorded
 
 FASTEST_1_S = 50.0  # windows that fall faster leave nothing to look at
 LEAST_1_S = 0.05  # slower ones change no damping that matters

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.equivalent import System
-from planner.diagnose.laws import Law
-from planner.diagnose.timedomain import (
+from planner.diagnose.laws.equivalent import System
+from planner.diagnose.laws.timedomain import (
     NEWTON,
     Strokes,
     free_angles,
@@ -21,6 +20,7 @@ from planner.diagnose.timedomain import (
     spectra,
     weights,
 )
+from planner.diagnose.laws.torques import Law
 
 SAME = 4  # steps over which the tangent is taken as one; Newton's method makes up for it
 NUDGE = 1e-4  # of ln a, for derivatives of the torque at given angles

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.diagnose.visits import Recorded as Visits
+from planner.diagnose.data.visits import Recorded as Visits
 from planner.frf.estimate import estimate
 from planner.frf.types import Frf
 from planner.frf.weighted import weighted

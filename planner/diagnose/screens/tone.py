@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from planner.diagnose.columns import Column
+from planner.diagnose.data.columns import Column
+from planner.diagnose.data.visits import Recorded
 from planner.diagnose.finding import Finding
-from planner.diagnose.visits import Recorded
 
 WIDTH_HZ = 1.0  # half of what a tone takes up under the window
 CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together

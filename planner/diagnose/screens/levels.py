@@ -6,22 +6,22 @@ from functools import partial
 
 import numpy as np
 
-from planner.diagnose import shared
-from planner.diagnose.columns import Column
-from planner.diagnose.drift import problem_of
-from planner.diagnose.equivalent import Equivalent, System, equivalent, system_of
+from planner.diagnose.data.columns import Column
+from planner.diagnose.data.visits import Recorded
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import Fit
-from planner.diagnose.laws import behaviour
-from planner.diagnose.leveldata import Data, data_of, own_parameter, relinearised
-from planner.diagnose.nonlinear import Candidate, Laws, covariance, descend
-from planner.diagnose.refits import base
-from planner.diagnose.shared import INDEPENDENT
-from planner.diagnose.starts import starts
-from planner.diagnose.strayed import strayed
+from planner.diagnose.laws.equivalent import Equivalent, System, equivalent, system_of
+from planner.diagnose.laws.leveldata import Data, data_of, own_parameter, relinearised
+from planner.diagnose.laws.nonlinear import Candidate, Laws, covariance, descend
+from planner.diagnose.laws.refits import base
+from planner.diagnose.laws.starts import starts
+from planner.diagnose.laws.torques import behaviour
+from planner.diagnose.linear.fit import Fit
+from planner.diagnose.linear.visited import problem_of
+from planner.diagnose.screens import shared
+from planner.diagnose.screens.shared import INDEPENDENT
+from planner.diagnose.screens.strayed import strayed
+from planner.diagnose.screens.tone import screen_tone
 from planner.diagnose.tell import Tell, quietly
-from planner.diagnose.tone import screen_tone
-from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
 from planner.side_by_side import side_by_side
 

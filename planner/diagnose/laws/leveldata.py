@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.diagnose.columns import Column
-from planner.diagnose.equivalent import Equivalent, system_of
-from planner.diagnose.fit import Fit
-from planner.diagnose.timedomain import FASTEST, Strokes, spectra, strokes
-from planner.diagnose.visits import Recorded
+from planner.diagnose.data.columns import Column
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.laws.equivalent import Equivalent, system_of
+from planner.diagnose.laws.timedomain import FASTEST, Strokes, spectra, strokes
+from planner.diagnose.linear.fit import Fit
 from planner.physics.gradient import Impedance, response_gradient
 
 LINES = 64

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from planner.diagnose.equivalent import Equivalent, System
-from planner.diagnose.laws import LAWS, Law
-from planner.diagnose.nonlinear import Candidate
+from planner.diagnose.laws.equivalent import Equivalent, System
+from planner.diagnose.laws.nonlinear import Candidate
+from planner.diagnose.laws.torques import LAWS, Law
 
 DECAY = np.linspace(0.0, 1.5, 6)  # ln of how far the swing has faded while it still counts
 EFFECTIVE = 0.7  # of the largest swing: not all modes peak at once

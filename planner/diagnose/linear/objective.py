@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Setting
+from planner.diagnose.effects.effect import Effect, Setting
 from planner.identify.data import Measured
 from planner.identify.objective import (
     FARTHEST,

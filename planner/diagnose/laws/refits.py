@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from planner.diagnose.drift import problem_of
-from planner.diagnose.effect import Effect
-from planner.diagnose.equivalent import receptances, swing, system_of
-from planner.diagnose.fit import FINE, GLANCE, Fit
-from planner.diagnose.laws import Law
-from planner.diagnose.nonlinear import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
-from planner.diagnose.starts import faded
-from planner.diagnose.visits import Recorded
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.effects.effect import Effect
+from planner.diagnose.laws.equivalent import receptances, swing, system_of
+from planner.diagnose.laws.nonlinear import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
+from planner.diagnose.laws.starts import faded
+from planner.diagnose.laws.torques import Law
+from planner.diagnose.linear.fit import FINE, GLANCE, Fit
+from planner.diagnose.linear.visited import problem_of
 from planner.identify.solver import minimise
 from planner.physics.simulation import Simulation
 

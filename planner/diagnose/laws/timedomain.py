@@ -16,9 +16,9 @@ from jax import Array
 from scipy import signal
 
 from planner import jaxsetup
-from planner.diagnose.columns import Column, pulse
-from planner.diagnose.equivalent import System
-from planner.diagnose.laws import Law, Step
+from planner.diagnose.data.columns import Column, pulse
+from planner.diagnose.laws.equivalent import System
+from planner.diagnose.laws.torques import Law, Step
 
 FINER = 5  # steps a sample
 LASTS_S = 1.3  # after the pulse; the window makes the rest of no account

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
-from planner.diagnose.both import Both, Family, together
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.both import Both, Family, together
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.effects.extra import ExtraCompliance
 from planner.diagnose.effects.mass import AddedMass
 from planner.diagnose.effects.resonator import LocalResonator
-from planner.diagnose.fit import GLANCE, Fit, Problem, approached, points
+from planner.diagnose.linear.fit import GLANCE, Fit, Problem, approached, points
 from planner.identify.held_out import farthest_first
 from planner.side_by_side import side_by_side
 

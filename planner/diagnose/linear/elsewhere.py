@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from planner.diagnose.both import Both, together
-from planner.diagnose.effect import Effect
-from planner.diagnose.fit import CLOSE, Fit, Problem, approached, points
+from planner.diagnose.effects.both import Both, together
+from planner.diagnose.effects.effect import Effect
+from planner.diagnose.linear.fit import CLOSE, Fit, Problem, approached, points
 from planner.side_by_side import side_by_side
 
 MOVABLE = MASS, RESONATOR = "added_mass", "local_resonator"

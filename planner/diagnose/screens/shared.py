@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 
-from planner.diagnose.equivalent import own_springs
+from planner.diagnose.data.visits import Recorded
 from planner.diagnose.finding import Finding
-from planner.diagnose.laws import LAWS, Law, behaviour
-from planner.diagnose.refits import Refit, base, refits
-from planner.diagnose.several import (
+from planner.diagnose.laws.equivalent import own_springs
+from planner.diagnose.laws.refits import Refit, base, refits
+from planner.diagnose.laws.several import (
     Family,
     Told,
     beginning,
@@ -22,7 +22,7 @@ from planner.diagnose.several import (
     straightened,
     told_by,
 )
-from planner.diagnose.visits import Recorded
+from planner.diagnose.laws.torques import LAWS, Law, behaviour
 from planner.physics.simulation import Simulation
 from planner.side_by_side import side_by_side
 

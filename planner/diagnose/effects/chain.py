@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Quantity, Setting, Transfer
+from planner.diagnose.effects.effect import Effect, Quantity, Setting, Transfer
 
 MATRIX_SD = 1.0  # of each entry around those of the identity
 DELAY_SD_S = 5e-3

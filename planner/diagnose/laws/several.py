@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.diagnose.equivalent import System, receptances, system_of
-from planner.diagnose.fit import Fit
-from planner.diagnose.laws import Law
-from planner.diagnose.leveldata import LAID, Data, compared, data_of, linearised, own_parameter
-from planner.diagnose.nonlinear import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
-from planner.diagnose.refits import Refit, begin
-from planner.diagnose.swings import course, joints_of, rates
-from planner.diagnose.timedomain import Strokes, strokes
-from planner.diagnose.visits import Recorded
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.laws.equivalent import System, receptances, system_of
+from planner.diagnose.laws.leveldata import LAID, Data, compared, data_of, linearised, own_parameter
+from planner.diagnose.laws.nonlinear import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
+from planner.diagnose.laws.refits import Refit, begin
+from planner.diagnose.laws.swings import course, joints_of, rates
+from planner.diagnose.laws.timedomain import Strokes, strokes
+from planner.diagnose.laws.torques import Law
+from planner.diagnose.linear.fit import Fit
 
 FINER, LASTS_S = 2, 0.7  # steps a sample, and how long hits are followed
 MEAN, SD = (LOG_SHARE, 0.0), (LOG_SHARE_SD, LOG_ANGLE_SD)

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.columns import Column
-from planner.diagnose.fit import Fit
-from planner.diagnose.visits import Recorded
+from planner.diagnose.data.columns import Column
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.linear.fit import Fit
 from planner.physics.simulation import Elasticity, Simulation
 
 LINES = 128  # most lines a column

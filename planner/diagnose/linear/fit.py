@@ -6,8 +6,8 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Setting
-from planner.diagnose.objective import ByPose, Misfit, Weighed, own_names
+from planner.diagnose.effects.effect import Effect, Setting
+from planner.diagnose.linear.objective import ByPose, Misfit, Weighed, own_names
 from planner.frf.types import Frf
 from planner.identify.data import Measured, stack
 from planner.identify.identify import QUICK, STAGES, Effort, identify

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.effect import Effect
-from planner.diagnose.fit import Fit
+from planner.diagnose.effects.effect import Effect
+from planner.diagnose.linear.fit import Fit
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.effect import Effect, Setting
-from planner.diagnose.fit import Fit, Grade, Problem, fit, settle
-from planner.diagnose.objective import Misfit
+from planner.diagnose.effects.effect import Effect, Setting
+from planner.diagnose.linear.fit import Fit, Grade, Problem, fit, settle
+from planner.diagnose.linear.objective import Misfit
 from planner.identify.check import Similarity, similarity_of
 from planner.identify.data import Measured
 from planner.identify.held_out import set_aside
@@ -33,7 +33,7 @@ def predicted(
 
 
 def _without_artefacts(found: Fit) -> Effect:
-    from planner.diagnose.both import Both
+    from planner.diagnose.effects.both import Both
 
     parts = [p for p in found.effect.parts() if not p.artefact and p.at]
     return Both.of(*parts) if len(parts) > 1 else (parts[0] if parts else Effect(""))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnose.effect import NOTHING, Effect, Setting, Transfer
+from planner.diagnose.effects.effect import NOTHING, Effect, Setting, Transfer
 from planner.identify.parameters import Priors
 from planner.physics.gradient import Impedance
 from planner.physics.simulation import Simulation

@@ -6,12 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from planner.diagnose.anywhere import resonant, suspects
-from planner.diagnose.both import Both, Family, families, together
-from planner.diagnose.effect import Effect
+from planner.diagnose.effects.both import Both, Family, families, together
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.effects.resonator import LocalResonator
-from planner.diagnose.elsewhere import elsewhere, rigid
-from planner.diagnose.fit import (
+from planner.diagnose.linear.anywhere import resonant, suspects
+from planner.diagnose.linear.elsewhere import elsewhere, rigid
+from planner.diagnose.linear.fit import (
     CLOSE,
     FINE,
     Fit,
@@ -23,8 +23,8 @@ from planner.diagnose.fit import (
     settle,
     staged,
 )
+from planner.diagnose.linear.weigh import best_of, cut, lag
 from planner.diagnose.tell import Tell, quietly, within
-from planner.diagnose.weigh import best_of, cut, lag
 from planner.identify.held_out import farthest_first
 from planner.side_by_side import side_by_side
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.diagnose.columns import Column, column
+from planner.diagnose.data.columns import Column, column
 from planner.errors import PlannerError, RefusedError
 from planner.frf.estimate import estimate
 from planner.frf.types import Frf

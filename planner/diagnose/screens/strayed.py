@@ -4,7 +4,7 @@ import numpy as np
 
 from planner.diagnose.effects.stiffness import JointStiffness
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import Fit
+from planner.diagnose.linear.fit import Fit
 
 FAR = 3.2  # prior sds that a spring does not move by chance, nor by what a fit in time neglects
 MOST = 1  # other joints that may be: several at once imitate what the law lacks

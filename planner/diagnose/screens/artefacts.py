@@ -14,12 +14,12 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from planner.diagnose.chain import DELAY_SD_S, SensorChain
-from planner.diagnose.effect import Effect
+from planner.diagnose.data.visits import Recorded
+from planner.diagnose.effects.chain import DELAY_SD_S, SensorChain
+from planner.diagnose.effects.effect import Effect
 from planner.diagnose.finding import Finding
-from planner.diagnose.fit import Fit, Problem, fit
-from planner.diagnose.visits import Recorded
-from planner.diagnose.window import screen_window
+from planner.diagnose.linear.fit import Fit, Problem, fit
+from planner.diagnose.screens.window import screen_window
 from planner.identify.data import common_band
 from planner.physics.simulation import Simulation
 from planner.recording.types import AXES, Hit

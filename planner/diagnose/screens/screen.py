@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from planner.diagnose import artefacts, drift, levels
+from planner.diagnose.data.visits import Recorded
 from planner.diagnose.finding import Finding
+from planner.diagnose.screens import artefacts, drift, levels
 from planner.diagnose.tell import Tell, quietly
-from planner.diagnose.visits import Recorded
 from planner.physics.simulation import Simulation
 
 

@@ -10,12 +10,12 @@ from functools import partial
 
 import numpy as np
 
-from planner.diagnose.columns import Column
-from planner.diagnose.equivalent import System, receptances, system_of
-from planner.diagnose.fit import Fit, Problem
-from planner.diagnose.laws import Law
-from planner.diagnose.leveldata import Data, compared, own_parameter
-from planner.diagnose.timedomain import Seen, seen, spectra, torques
+from planner.diagnose.data.columns import Column
+from planner.diagnose.laws.equivalent import System, receptances, system_of
+from planner.diagnose.laws.leveldata import Data, compared, own_parameter
+from planner.diagnose.laws.timedomain import Seen, seen, spectra, torques
+from planner.diagnose.laws.torques import Law
+from planner.diagnose.linear.fit import Fit, Problem
 from planner.side_by_side import side_by_side
 
 SHARE_SD, LOG_SHARE, LOG_SHARE_SD, LOG_ANGLE_SD = 1.5, np.log(0.5), 1.5, 2.0

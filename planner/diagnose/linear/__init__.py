@@ -1,0 +1,1 @@
+"""Fits of linear effects to FRFs, and the search among them."""
