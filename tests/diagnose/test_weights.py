@@ -1,6 +1,6 @@
 """What the weights must do whatever the robot."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -8,6 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner.diagnose.effects.effect import Effect, Quantity
 from planner.diagnose.linear.weigh import shared_noise, temper, weigh
 
 
@@ -32,6 +33,7 @@ class Rough:
 
     misfit_: float
     bent: float
+    effect: Effect = field(default_factory=lambda: Effect(""))
 
     @property
     def per_value(self):
@@ -60,3 +62,22 @@ def test_what_fits_nowhere_is_unknown_however_far_springs_were_bent_to_imitate_i
 def test_what_fits_to_the_noise_is_not_unknown():
     fits = cast(Any, [Rough(200.0, 300.0), Rough(0.9, 150.0)])
     assert weigh(fits, [100.0, 1.0]).probabilities[1] > 0.99
+
+
+@given(st.floats(0.001, 0.0095), st.floats(0.5, 0.99))
+def test_what_changes_frfs_far_below_the_noise_is_not_named(gain, misfit):
+    """As a spring that changed by 1 % with its joint's angle, at two poses: 0.7 % of χ²."""
+    made_up = Effect("joint_4", (Quantity("cosine", "N·m/rad", 0.0, 1e4),))
+    fits = cast(Any, [Rough(misfit, 10.0), Rough(misfit * (1 - gain), 10.0, made_up)])
+    none, effect, _ = weigh(fits, [1.0, 0.02]).probabilities
+    assert none > 0.9 > effect
+
+
+@given(st.floats(0.02, 0.5), st.floats(0.5, 0.99))
+def test_what_changes_them_by_more_counts_as_it_is(gain, misfit):
+    made = Effect("joint_4", (Quantity("cosine", "N·m/rad", 0.0, 1e4),))
+    with_own = weigh(
+        cast(Any, [Rough(misfit, 10.0), Rough(misfit * (1 - gain), 10.0, made)]), [1, 1]
+    )
+    without = weigh(cast(Any, [Rough(misfit, 10.0), Rough(misfit * (1 - gain), 10.0)]), [1, 1])
+    assert np.allclose(with_own.probabilities, without.probabilities)

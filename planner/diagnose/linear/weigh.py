@@ -13,6 +13,7 @@ ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power b
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
 LEAST = 0.3  # no noise is overstated by more
 BOOTSTRAPS = 400
+SLIGHT = 0.01  # of χ²: what an effect gains by less, background gains as well (twice it counts)
 UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each
 
 
@@ -60,12 +61,14 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     3.4), of the poses' own misfits: what rests on one pose alone gets no certainty from it.
     """
     t = temper_of(fits)
-    evidence = np.array([f.log_evidence(t) for f in fits]) + np.log(prior)
+    own = np.array([f.data.chi2 for f in fits])
+    chi2 = _without_slight(fits, own)
+    slight = (chi2 - own).sum(axis=1) / (2 * t)
+    evidence = np.array([f.log_evidence(t) for f in fits]) - slight + np.log(prior)
     count = float(fits[0].misfit.counts.sum())
     charge = UNKNOWN_PARAMETERS / 2 * np.log(max(count / t, 2.0))
     # Springs that a fit has bent to imitate what is not known cost that fit, not the unknown.
     unknown = -TOLERATED * count / (2 * t) - charge + max(_volume(f, t) for f in fits)
-    chi2 = np.array([f.data.chi2 for f in fits])
     n = chi2.shape[1]
     shares = np.random.default_rng(seed).dirichlet(np.ones(n), BOOTSTRAPS) * n
     scores = -((shares - 1) @ (chi2 - chi2[int(np.argmax(evidence))]).T) / (2 * t)
@@ -74,6 +77,20 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     weights = np.exp(total)
     weights /= weights.sum(axis=1, keepdims=True)
     return Weights(weights.mean(axis=0), t, evidence)
+
+
+def _without_slight(fits: Sequence[Fit], chi2: np.ndarray) -> np.ndarray:
+    """χ² (fits, poses), those of the first fit where an effect hardly changes FRFs.
+
+    A simulation is never right to a tenth of the noise, and a spring that differs by 1 % at two
+    poses takes some of that. What widens priors alone gains nothing here and loses nothing.
+    """
+    out = chi2.copy()
+    for i, f in enumerate(fits):
+        gain = 1 - chi2[i].sum() / chi2[0].sum()
+        if gain > 0 and any(part.quantities for part in f.effect.parts()):
+            out[i] += min(1.0, max(2 * SLIGHT / gain - 1, 0.0)) * (chi2[0] - chi2[i])
+    return out
 
 
 def _volume(fit: Fit, t: float) -> float:
