@@ -151,7 +151,7 @@ def check_gradient(misfit, x, which):
 
 @given(st.floats(-8, 8), st.floats(0, 1))
 def test_bend_of_a_course_keeps_its_ends(bend, order):
-    shape = drift._bent(np.array([0.0, order, 1.0]), bend)[0]
+    shape = Drift("campaign").log_factor(np.array([0.0, order, 1.0]), np.array([1.0, bend]))[0]
     assert shape[0] == 0
     assert shape[2] == pytest.approx(1)
     assert -1e-12 <= shape[1] <= 1 + 1e-12
