@@ -35,6 +35,15 @@ class Quadratic:
     chi2: float
 
 
+def weight_of(m: Measured, logarithmic: bool) -> np.ndarray:
+    """(n, 3, 3, F): one over the sd of a residual's real (and imaginary) part."""
+    if not logarithmic:
+        return np.sqrt(2) / m.sd
+    relative = m.sd / np.abs(m.accelerance)
+    kept = relative < LOG_DROP
+    return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Objective:
     """χ²/2 of the data plus that of the prior, over θ (P springs), then φ (R nuisances in sds).
@@ -74,16 +83,7 @@ class Objective:
     @property
     def count(self) -> int:
         """Number of real residuals that carry weight."""
-        return 2 * int(np.count_nonzero(self._weight()))
-
-    def _weight(self) -> np.ndarray:
-        """(n, 3, 3, F): one over the sd of the residual's real (and imaginary) part."""
-        m = self.measured
-        if not self.logarithmic:
-            return np.sqrt(2) / m.sd
-        relative = m.sd / np.abs(m.accelerance)
-        kept = relative < LOG_DROP
-        return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
+        return 2 * int(np.count_nonzero(weight_of(self.measured, self.logarithmic)))
 
     def __call__(self, x: np.ndarray) -> Quadratic:
         """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where that cannot be."""
@@ -129,7 +129,7 @@ class Objective:
 
     def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Weighted residual (n, 3, 3, F) and its derivatives, written over `slope`."""
-        weight = self._weight()
+        weight = weight_of(self.measured, self.logarithmic)
         measured = self.measured.accelerance
         if not self.logarithmic:
             slope *= weight[:, None]

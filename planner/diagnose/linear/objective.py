@@ -9,11 +9,10 @@ from planner.diagnose.effects.effect import Effect, Setting
 from planner.identify.data import Measured
 from planner.identify.objective import (
     FARTHEST,
-    LOG_DROP,
-    LOG_FLOOR,
     LOG_PRIOR,
     Quadratic,
     positive,
+    weight_of,
 )
 from planner.identify.parameters import Parametrisation
 from planner.identify.solver import LONGEST
@@ -95,13 +94,8 @@ class Misfit:
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """(n, 3, 3, F): one over the sd of the residual's real (and imaginary) part."""
-        m = self.measured
-        if not self.logarithmic:
-            return np.sqrt(2) / m.sd
-        relative = m.sd / np.abs(m.accelerance)
-        kept = relative < LOG_DROP
-        return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
+        """See `weight_of`."""
+        return weight_of(self.measured, self.logarithmic)
 
     @cached_property
     def counts(self) -> np.ndarray:
