@@ -36,7 +36,10 @@ class Quadratic:
 
 
 def weight_of(m: Measured, logarithmic: bool) -> np.ndarray:
-    """(n, 3, 3, F): one over the sd of a residual's real (and imaginary) part."""
+    """(n, 3, 3, F): one over the sd of a residual's real (and imaginary) part, 0 where unused.
+
+    In N·s²/m, accelerance being in m/s²/N; of logarithms without a unit.
+    """
     if not logarithmic:
         return np.sqrt(2) / m.sd
     relative = m.sd / np.abs(m.accelerance)

@@ -63,7 +63,10 @@ class DriftProblem(Problem):
 
 
 def problem_of(recorded: Recorded, nominal: Simulation) -> DriftProblem:
-    """Visits, each for itself, as data of `fit`."""
+    """Visits (n), each for itself, as data of `fit`: FRFs in m/s²/N, poses in rad.
+
+    Raises InputError where nothing of them lies in robot.toml's band.
+    """
     band = common_band(recorded.frfs, recorded.band_hz)
     order = np.array([visit.order for visit in recorded.visits])
     return DriftProblem(recorded.frfs, recorded.q, nominal, band, order=order)

@@ -13,7 +13,8 @@ ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power b
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
 LEAST = 0.3  # no noise is overstated by more
 BOOTSTRAPS = 400
-SLIGHT = 0.01  # of χ²: what an effect gains by less, background gains as well (twice it counts)
+# Share of χ² that some background gains as well: up to it a gain counts nothing, from 2 × it whole.
+SLIGHT = 0.01
 UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each
 
 
