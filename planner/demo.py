@@ -14,13 +14,13 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
 from planner.campaign.importing import ImportReport
 from planner.campaign.labels import frequencies, label
-from planner.campaign.logged import from_modal
+from planner.campaign.log_conversion import from_modal
 from planner.campaign.state import Measurement
+from planner.dataset.measure import Source, measure
 from planner.errors import InputError, NoPoseLeftError
-from planner.modes.measure import Source, measure
 from planner.recording.folder import read_recordings
-from planner.recording.types import PoseRow
-from planner.show.story import Story
+from planner.recording.records import PoseRow
+from planner.report.rerun_story import Story
 
 NAME = "kr240_plane"
 Z_95 = 1.959964  # two-sided 95 % of a normal distribution

@@ -21,12 +21,12 @@ from planner.campaign.events import (
     Proposal,
     Proposed,
 )
-from planner.campaign.logged import from_modal
+from planner.campaign.log_conversion import from_modal
 from planner.campaign.model import Model, build
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, fold
+from planner.dataset.measure import MeasuredPose, measure
 from planner.errors import InputError, NoPoseLeftError, PlannerError
-from planner.modes.measure import MeasuredPose, measure
 
 CLOSE = 1e-6  # relative; another processor rounds differently, another program errs by more
 

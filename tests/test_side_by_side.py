@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import pytest
 
-from planner import side_by_side as module
-from planner.side_by_side import side_by_side
+from planner.inference import parallel as module
+from planner.inference.parallel import side_by_side
 
 
 def who(seconds: float) -> tuple[float, int]:

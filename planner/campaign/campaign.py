@@ -15,6 +15,7 @@ from planner.campaign.config import (
     config_from_builtins,
     load_campaign_config,
 )
+from planner.campaign.deliveries import Delivery, sort_paths
 from planner.campaign.events import (
     AnyEvent,
     Configured,
@@ -35,15 +36,14 @@ from planner.campaign.importing import (
     measure_files,
     place,
 )
-from planner.campaign.intake import Delivery, sort_paths
 from planner.campaign.journal import Journal
-from planner.campaign.logged import from_homogeneity, from_modal
+from planner.campaign.log_conversion import from_homogeneity, from_modal
 from planner.campaign.model import Model, build
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement, fold, last_act
+from planner.dataset.measure import Source, frf_of
 from planner.errors import InputError
-from planner.frf.types import Frf
-from planner.modes.measure import Source, frf_of
+from planner.frf.frf import Frf
 
 
 class Campaign:

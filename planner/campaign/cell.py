@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.acquire.propose import check_name
 from planner.campaign.config import CampaignConfig
-from planner.campaign.fidelity import LowFidelity
+from planner.campaign.low_fidelity import LowFidelity
+from planner.design.propose import check_name
+from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
-from planner.physics.dynamics import SimulatedModes
-from planner.physics.simulation import Simulation
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace

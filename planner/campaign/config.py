@@ -6,7 +6,7 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
-from planner.tomlfile import load_toml
+from planner.toml_file import load_toml
 
 
 class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -2,7 +2,7 @@
 
 import msgspec
 
-from planner.modes.types import LEAST_PROBABILITY
+from planner.modal.modes import LEAST_PROBABILITY
 
 
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):

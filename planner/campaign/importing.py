@@ -8,12 +8,12 @@ import numpy as np
 from planner.campaign import store
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
+from planner.campaign.deliveries import Delivery
 from planner.campaign.events import HitRecord
-from planner.campaign.intake import Delivery
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
+from planner.dataset.measure import MeasuredPose, Source, measure
 from planner.errors import InputError
-from planner.modes.measure import MeasuredPose, Source, measure
 
 SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.campaign.cell import Cell
-from planner.campaign.fidelity import LowFidelity
-from planner.campaign.logged import to_mode
+from planner.campaign.log_conversion import to_mode
+from planner.campaign.low_fidelity import LowFidelity
 from planner.campaign.state import Measurement
-from planner.fusion.surrogate import ModalObservations
-from planner.modes.track import Guide, track
-from planner.modes.types import Mode
-from planner.physics.dynamics import SimulatedModes
+from planner.dynamics.vibration import SimulatedModes
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, track
+from planner.surrogate.modal_surrogate import ModalObservations
 
 # Simulated modes above those modelled that a measured mode may be instead: where one of the
 # modelled ones cannot be seen (nodal point), the next one must not take its label.
@@ -36,7 +36,7 @@ def label(
     """Label every pose's modes, guided by the simulation and by the poses labelled before.
 
     Labels are places in the order of frequency: they are continuous over any workspace, which
-    families of shapes are not where modes veer (see `planner.physics.families`).
+    families of shapes are not where modes veer (see `planner.dynamics.mode_families`).
     """
     if not measurements:
         return ()

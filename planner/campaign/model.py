@@ -6,27 +6,27 @@ from functools import cached_property
 
 import numpy as np
 
-from planner.acquire.mixed import mixed
-from planner.acquire.outputs import FrequencyOutputs, Poses
-from planner.acquire.parameters import FrfNoise
-from planner.acquire.repeats import repeat_gain
-from planner.acquire.stopping import Forecast, forecast
+from planner.campaign.acquisition_inputs import outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.fidelity import LowFidelity, learn
 from planner.campaign.labels import LabelledPose, frequencies, label, observations
-from planner.campaign.outlook import outlook
+from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.state import CampaignState, Measurement
-from planner.frf.types import Frf
-from planner.fusion.frf_bands import ModalPrediction, frf_moments
-from planner.fusion.hedged import HedgedAR1
-from planner.fusion.surrogate import (
+from planner.design.frequency_posterior import FrequencyOutputs, Poses
+from planner.design.mixed import mixed
+from planner.design.parameter_sensitivity import FrfNoise
+from planner.design.repeats import repeat_gain
+from planner.design.stopping import Forecast, forecast
+from planner.dynamics.vibration import SimulatedModes
+from planner.frf.frf import Frf
+from planner.surrogate.frf_bands import ModalPrediction, frf_moments
+from planner.surrogate.hedged import HedgedAR1
+from planner.surrogate.modal_surrogate import (
     ModalObservations,
     Surrogate,
     fit_primary,
     fit_surrogate,
 )
-from planner.physics.dynamics import SimulatedModes
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits

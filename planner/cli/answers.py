@@ -230,7 +230,7 @@ def replayed(
     With an `acquisition` also what that would have proposed, and saved.
     """
     from planner.replay import replay
-    from planner.show.story import Story
+    from planner.report.rerun_story import Story
 
     steps, model = [], None
     simulated = any(m.simulated for m in campaign.state.measurements.values())
@@ -267,7 +267,7 @@ def replayed(
 
 
 def _otherwise(campaign: Campaign, acquisition: str | None) -> dict[str, Any] | None:
-    from planner.compare.otherwise import otherwise
+    from planner.compare.counterfactual import otherwise
 
     found = otherwise(campaign, acquisition) if acquisition else None
     if found is None:

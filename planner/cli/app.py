@@ -108,7 +108,7 @@ def status(
     from planner.campaign.campaign import Campaign
     from planner.cli import answers, render
     from planner.cli.left_out import left_out
-    from planner.show.pictures import Pictures
+    from planner.report.plot_files import Pictures
 
     campaign, pictures = Campaign(directory), Pictures(plot, format_)
     answer = answers.status(campaign) | left_out(campaign, pictures)
@@ -262,7 +262,7 @@ def modes(
     """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv."""
     from planner.cli import modal, render, survey
     from planner.cli.progress import reporting
-    from planner.show.pictures import Pictures
+    from planner.report.plot_files import Pictures
 
     pictures = Pictures(plot, format_, rrd)
     if modal.several_poses(paths):

@@ -13,10 +13,10 @@ from planner.errors import InputError
 if TYPE_CHECKING:
     from planner.compare.bench import Bench
     from planner.compare.curves import Curves
-    from planner.compare.local import Failure
     from planner.compare.pool import PoolPose
-    from planner.compare.study import Run, Study, Task
-    from planner.show.learning import Learning
+    from planner.compare.processes import Failure
+    from planner.compare.tasks import Run, Study, Task
+    from planner.report.learning_curves import Learning
 
 SIMULATIONS = ("frozen", "updated", "none")
 PICTURE, TABLE = "learning_curves.png", "comparison.json"
@@ -57,8 +57,8 @@ def compare(
     from planner.cli.progress import bars
     from planner.cli.render_comparison import compared
     from planner.compare.bench import assemble, decide
-    from planner.compare.conduct import conduct, recorded
-    from planner.compare.study import Study
+    from planner.compare.resume import conduct, recorded
+    from planner.compare.tasks import Study
     from planner.recording.folder import read_recordings
     from planner.robot.robot import Robot
 
@@ -85,10 +85,10 @@ def compare(
 
 
 def _cache_folder() -> Path:
-    from planner import cache
+    from planner import cache_folder
 
     try:
-        return cache.folder("compare")
+        return cache_folder.folder("compare")
     except RuntimeError:
         raise InputError(
             "There is no home folder to keep results in; name one with --out."
@@ -100,7 +100,7 @@ def _by_name(
 ) -> "tuple[dict[str, Curves], list[dict[str, Any]]]":
     """Curves by the names that the user gave, and the runs that failed."""
     from planner.compare.curves import Curves
-    from planner.compare.study import Run
+    from planner.compare.tasks import Run
 
     failed = [
         {"strategy": task.strategy, "seed": task.seed, "reason": answer.reason}
@@ -193,7 +193,7 @@ def _shown(
     shown: dict[str, Any] = {"out": None, "plots": [], "rrd": None}
     if out is None and rrd is None:
         return shown
-    from planner.show.learning import learning_figure
+    from planner.report.learning_curves import learning_figure
 
     curves = {name: _learning(curve) for name, curve in _by_name(study, found)[0].items()}
     mark = "SIMULATED recordings · " if answer["simulated"] else ""
@@ -203,12 +203,12 @@ def _shown(
     )
     figure = learning_figure(curves, title)
     if out is not None:
-        from planner.show.plots import save
+        from planner.report.frf_plots import save
 
         shown |= {"out": str(out.absolute()), "plots": [str(out.absolute() / PICTURE)]}
         save(figure, out / PICTURE)
     if rrd is not None:
-        from planner.show.rerun_learning import write
+        from planner.report.rerun_learning import write
 
         shown["rrd"] = str(rrd.absolute())
         write(curves, figure, rrd, bench.key, title)
@@ -216,7 +216,7 @@ def _shown(
 
 
 def _learning(curve: "Curves") -> "Learning":
-    from planner.show.learning import Band, Learning
+    from planner.report.learning_curves import Band, Learning
 
     parts = (curve.frequency_rmse_percent, curve.r2, curve.coverage95)
     return Learning(curve.n, *(Band.of(part) for part in parts))

@@ -9,12 +9,12 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
-    from planner.diagnose.data.visits import Recorded as Visits
-    from planner.diagnose.diagnose import Candidate, Diagnosis
-    from planner.diagnose.explain import Explained
-    from planner.diagnose.finding import Finding
-    from planner.diagnose.linear.predict import Agreement
-    from planner.identify.recorded import Recorded
+    from planner.dataset.recorded import Recorded
+    from planner.dataset.visits import Recorded as Visits
+    from planner.diagnosis.diagnose import Explained
+    from planner.diagnosis.finding import Finding
+    from planner.diagnosis.linear.predict import Agreement
+    from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
     from planner.robot.robot import Robot
 
 
@@ -45,9 +45,9 @@ def diagnose(
     from planner.cli.next_hit import next_hit
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
-    from planner.diagnose.data.recorded import read_ended
-    from planner.diagnose.explain import explain
-    from planner.physics.simulation import Simulation
+    from planner.dataset.windowed import read_ended
+    from planner.diagnosis.diagnose import explain
+    from planner.dynamics.simulation import Simulation
     from planner.recording.folder import read_poses
     from planner.robot.robot import Robot
 
@@ -91,7 +91,7 @@ def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
 
 def _visits(folder: Path, robot: "Robot", window_rate_1_s: float) -> "Visits | None":
     """The hits themselves; None where there are only FRFs, or a window is stated."""
-    from planner.diagnose.data.visits import read_visits
+    from planner.dataset.visits import read_visits
     from planner.errors import RefusedError
 
     try:
@@ -102,7 +102,7 @@ def _visits(folder: Path, robot: "Robot", window_rate_1_s: float) -> "Visits | N
 
 
 def _answer(explained: "Explained") -> dict[str, Any]:
-    from planner.diagnose.where import where
+    from planner.diagnosis.residual_location import where
 
     recorded, judged, whole = explained.recorded, explained.judged, explained.whole
     found = judged.diagnosis
@@ -205,7 +205,7 @@ def _predict(found: "Diagnosis", rows: list[tuple[str, tuple[float, ...]]], path
     import numpy as np
 
     from planner.cli.answers import frequency_lines, save_npz
-    from planner.diagnose.linear.predict import predicted
+    from planner.diagnosis.linear.predict import predicted
 
     lines = frequency_lines(found.problem.band_hz)
     angles = np.array([joints for _, joints in rows])
@@ -217,10 +217,10 @@ def _predict(found: "Diagnosis", rows: list[tuple[str, tuple[float, ...]]], path
 
 def _written(out: Path, robot: "Robot", recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
     """The explained robot and the pictures, in a folder."""
-    from planner.diagnose.diagnose import Candidate
-    from planner.diagnose.write import write_explained
-    from planner.show.diagnosis_plots import diagnosis_figures
-    from planner.show.pictures import Pictures
+    from planner.diagnosis.linear_diagnosis import Candidate
+    from planner.diagnosis.write_explained import write_explained
+    from planner.report.diagnosis_plots import diagnosis_figures
+    from planner.report.plot_files import Pictures
 
     parts = found.best.effect.parts()
     places = {(e.name, e.at or None) for e in parts}

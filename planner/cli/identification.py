@@ -10,14 +10,14 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
-    from planner.identify.check import Similarity
-    from planner.identify.held_out import Judged
-    from planner.identify.identify import Progress
-    from planner.identify.recorded import Recorded
-    from planner.identify.result import Identification
-    from planner.physics.simulation import Simulation
+    from planner.dataset.recorded import Recorded
+    from planner.dynamics.simulation import Simulation
+    from planner.identification.agreement import Similarity
+    from planner.identification.held_out import Judged
+    from planner.identification.identify import Progress
+    from planner.identification.result import Identification
+    from planner.report.plot_files import Pictures
     from planner.robot.robot import Robot
-    from planner.show.pictures import Pictures
 
 MASS = INERTIA = 0.05
 COM_M = 0.01
@@ -63,14 +63,14 @@ def identify(
     from planner.cli import modal
     from planner.cli.progress import reporting
     from planner.cli.render_identification import identified
-    from planner.identify.extended import Structure, extended
-    from planner.identify.held_out import identify_judged
-    from planner.identify.parameters import Priors
-    from planner.identify.recorded import read_recorded
-    from planner.identify.write import check_target
-    from planner.physics.simulation import Simulation
+    from planner.dataset.recorded import read_recorded
+    from planner.dynamics.simulation import Simulation
+    from planner.identification.extended_structure import Structure, extended
+    from planner.identification.held_out import identify_judged
+    from planner.identification.parameters import Priors
+    from planner.identification.write_robot import check_target
+    from planner.report.plot_files import Pictures
     from planner.robot.robot import Robot
-    from planner.show.pictures import Pictures
 
     started = time.perf_counter()
     modal.check(band_hz, "h1", None, window_rate_1_s)
@@ -114,9 +114,9 @@ def _write(
     answer: dict[str, Any], out: Path, robot: "Robot", recorded: "Recorded", judged: "Judged"
 ) -> None:
     """Write the identified robot, read it again, and say how well that one agrees."""
-    from planner.identify.check import fit_similarity
-    from planner.identify.write import write_robot
-    from planner.physics.simulation import Simulation
+    from planner.dynamics.simulation import Simulation
+    from planner.identification.agreement import fit_similarity
+    from planner.identification.write_robot import write_robot
     from planner.robot.robot import Robot
 
     written = write_robot(out, robot, judged.final)
@@ -136,7 +136,7 @@ def _drawn(
 ) -> dict[str, Any]:
     if not pictures.wanted:
         return {"plots": [], "rrd": None}
-    from planner.show.identification_plots import Pose, identification_figures
+    from planner.report.identification_plots import Pose, identification_figures
 
     poses = []
     for i, name in enumerate(recorded.poses):

@@ -7,8 +7,8 @@ import numpy as np
 from planner.campaign.campaign import Campaign
 from planner.campaign.labels import frequencies
 from planner.campaign.model import Model
-from planner.fusion.diagnostics import LEVELS, LeaveOneOut, leave_one_out, report
-from planner.show.pictures import Pictures
+from planner.report.plot_files import Pictures
+from planner.surrogate.leave_one_out import LEVELS, LeaveOneOut, leave_one_out, report
 
 
 def left_out(campaign: Campaign, pictures: Pictures) -> dict[str, Any]:
@@ -29,7 +29,7 @@ def left_out(campaign: Campaign, pictures: Pictures) -> dict[str, Any]:
     }
     if not pictures.wanted or not values:
         return {**answer, "plots": [], "rrd": None}
-    from planner.show.left_out_plots import left_out_figure
+    from planner.report.leave_one_out_plots import left_out_figure
 
     simulated = any(m.simulated for m in campaign.state.measurements.values())
     mark = "SIMULATED recordings · " if simulated else ""

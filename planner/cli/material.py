@@ -9,7 +9,7 @@ from planner.campaign import store
 from planner.campaign.campaign import Campaign
 from planner.campaign.table import write_table
 from planner.errors import InputError
-from planner.recording.types import PoseRow
+from planner.recording.records import PoseRow
 
 OFFERED = 200  # of a campaign's candidates, evenly spread, that are looked at
 

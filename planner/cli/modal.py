@@ -5,17 +5,17 @@ from typing import Any
 
 import msgspec
 
-from planner.campaign.logged import from_homogeneity
+from planner.campaign.log_conversion import from_homogeneity
+from planner.dataset.measure import Source, measure
 from planner.errors import InputError, PlannerError, RefusedError
+from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
-from planner.frf.types import Frf
-from planner.modes.estimate import identification
-from planner.modes.identify import Identification
-from planner.modes.measure import Source, measure
-from planner.modes.types import ModalModel
+from planner.modal.estimate_modes import identification
+from planner.modal.modes import ModalModel
+from planner.modal.pole_identification import Identification
 from planner.recording.folder import TABLE, files_in
-from planner.recording.types import FrfRecord
-from planner.show.pictures import Pictures
+from planner.recording.records import FrfRecord
+from planner.report.plot_files import Pictures
 
 DEFAULT_BAND_HZ = (4.0, 60.0)
 LONGEST_NAME = 40  # characters of a file's name in a title
@@ -98,7 +98,7 @@ def _draw(
     """Draw what is wanted; part of the answer."""
     if found is None or not pictures.wanted:
         return {"plots": [], "rrd": None}
-    from planner.show.modal_plots import modal_figures
+    from planner.report.modal_plots import modal_figures
 
     more = f" and {len(accepted) - 1} more" if len(accepted) > 1 else ""
     name = f"{Path(accepted[0]).name[-LONGEST_NAME:]}{more}"
@@ -124,9 +124,9 @@ def _by_channel(
     pictures: Pictures,
 ) -> dict[str, Any]:
     """Long records with unlabelled channels: the user names the force channel."""
-    from planner.modes.record import analyse_record
+    from planner.modal.free_decays import analyse_record
     from planner.recording.read import read
-    from planner.recording.types import TimeRecord
+    from planner.recording.records import TimeRecord
 
     if len(sources) != 1:
         raise InputError("--force analyses one long record at a time; name one file.")
@@ -165,12 +165,12 @@ def _by_transfer(
     pictures: Pictures,
 ) -> dict[str, Any]:
     """FRFs without directions: poles and unscaled shapes."""
-    from planner.modes.transfer import modes_from_transfer_functions
+    from planner.modal.transfer_functions import modes_from_transfer_functions
 
     modal = modes_from_transfer_functions(record, quantity, band_hz)
     drawn: dict[str, Any] = {"plots": [], "rrd": None}
     if pictures.wanted:
-        from planner.show.modal_plots import cmif_figure, mac_figure
+        from planner.report.modal_plots import cmif_figure, mac_figure
 
         name = record.source.name[-LONGEST_NAME:]
         figures = {

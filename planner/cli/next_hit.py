@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from planner.acquire.separate import Telling, most_telling
-from planner.acquire.separate_laws import most_telling_forces, undecided
 from planner.cli.material import Material
-from planner.diagnose.data.visits import Recorded as Visits
-from planner.diagnose.explain import Explained
-from planner.diagnose.laws.nonlinear import Laws
+from planner.dataset.visits import Recorded as Visits
+from planner.design.discrimination import Telling, most_telling
+from planner.design.law_discrimination import most_telling_forces, undecided
+from planner.diagnosis.diagnose import Explained
+from planner.diagnosis.laws.one_joint import Laws
 
 
 def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:

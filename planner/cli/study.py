@@ -21,10 +21,10 @@ def study(
 ) -> int:
     """Do a paper's study again on simulated recordings: tables, pictures, what holds."""
     from planner.cli.progress import counting
-    from planner.studies import run
+    from planner.studies import registry
     from planner.studies.report import check_folder, write
 
-    made = run.find(name)
+    made = registry.find(name)
     check_folder(out)
     start = time.perf_counter()
     with counting(quiet=as_json) as progress:

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from planner.dataset.measure import Source, measure
 from planner.errors import RefusedError
-from planner.modes.measure import Source, measure
-from planner.modes.track import Guide, Tracks, track
-from planner.modes.types import Mode
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import joint_columns, read_recordings
-from planner.recording.types import PoseRow, RecordingsFolder
-from planner.show.pictures import Pictures
+from planner.recording.records import PoseRow, RecordingsFolder
+from planner.report.plot_files import Pictures
 
 ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 
@@ -92,7 +92,7 @@ def _labelled(
     labels = max(map(len, found))
     if robot_toml is None:
         return track(found, Guide.by_example(found), x), None
-    from planner.physics.simulation import Simulation
+    from planner.dynamics.simulation import Simulation
     from planner.robot.robot import Robot
 
     simulation = Simulation(Robot.load(robot_toml))
@@ -121,7 +121,7 @@ def _answer(
     ]
     drawn: dict[str, Any] = {"plots": [], "rrd": None}
     if pictures.wanted:
-        from planner.show.modal_plots import frequency_figure
+        from planner.report.modal_plots import frequency_figure
 
         seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
         mark = "SIMULATED recordings · " if survey.simulated else ""

@@ -18,10 +18,10 @@ from planner.campaign.config import (
 )
 from planner.campaign.labels import label, observations
 from planner.campaign.state import Measurement
-from planner.compare import content
+from planner.compare import content_hash
 from planner.compare.pool import PoolPose
 from planner.errors import InputError
-from planner.frf.types import Frf
+from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
@@ -109,15 +109,15 @@ def assemble(
     usable, remarks = _usable(robot, cell.workspace, poses)
     measured = tuple(pose.measurement for pose in usable)
     seen = observations(cell, label(cell, measured))
-    names = content.of([(m.pose, m.joints_deg, m.modes) for m in measured])
+    names = content_hash.of([(m.pose, m.joints_deg, m.modes) for m in measured])
     numbers = [np.ascontiguousarray(pose.frf.accelerance) for pose in usable if pose.frf]
-    key = content.digest(
-        content.of(config), content.of(robot.config), robot.urdf_text, names,
+    key = content_hash.digest(
+        content_hash.of(config), content_hash.of(robot.config), robot.urdf_text, names,
         *(a.tobytes() for a in numbers),
     )  # fmt: skip
     bench = Bench(
         replace(robot), config, measured, tuple(pose.frf for pose in usable if pose.frf),
-        seen.frequency_hz, seen.frequency_sd_hz, content.program(), key,
+        seen.frequency_hz, seen.frequency_sd_hz, content_hash.program(), key,
     )  # fmt: skip
     return bench, remarks
 

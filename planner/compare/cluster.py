@@ -4,7 +4,7 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from planner.compare.local import ATTEMPTS, Failure, attempt
+from planner.compare.processes import ATTEMPTS, Failure, attempt
 from planner.errors import InputError
 
 TIMEOUT_S = 10.0

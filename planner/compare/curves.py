@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.compare.study import Run
+from planner.compare.tasks import Run
 
 GOAL_PERCENT = 1.0
 RESAMPLES = 2000

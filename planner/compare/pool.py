@@ -10,14 +10,14 @@ import numpy as np
 
 from planner.campaign.config import ModesTable
 from planner.campaign.journal import write_synced
-from planner.campaign.logged import from_modal
+from planner.campaign.log_conversion import from_modal
 from planner.campaign.state import Measurement
 from planner.campaign.store import read_bytes
-from planner.compare import content
-from planner.frf.types import Frf
-from planner.modes.measure import Source, measure
+from planner.compare import content_hash
+from planner.dataset.measure import Source, measure
+from planner.frf.frf import Frf
 from planner.recording.folder import read_recordings
-from planner.recording.types import PoseRow
+from planner.recording.records import PoseRow
 
 ARRAYS = ("frequency_hz", "accelerance", "variance", "coherence")
 
@@ -104,10 +104,10 @@ def poses_of(folder: Path, joint_names: Sequence[str], table: ModesTable) -> tup
 
 def _files(rows: tuple[PoseRow, ...], table: ModesTable) -> PoseFiles:
     told = [(r.joints_deg, r.hit, r.repeat, r.file and r.file.name) for r in rows]
-    data = [content.digest(read_bytes(r.file)) for r in rows if r.file]
+    data = [content_hash.digest(read_bytes(r.file)) for r in rows if r.file]
     how = (table.band_hz, table.window_rate_1_s)
-    parts = content.program(), rows[0].pose, content.of(told), content.of(how)
-    return PoseFiles(rows, table, content.digest(*parts, *data))
+    parts = content_hash.program(), rows[0].pose, content_hash.of(told), content_hash.of(how)
+    return PoseFiles(rows, table, content_hash.digest(*parts, *data))
 
 
 def make(_: None, pose: PoseFiles) -> bytes:
@@ -130,7 +130,7 @@ def make(_: None, pose: PoseFiles) -> bytes:
         FrfText.of(found.frf) if found.frf else None,
     )
     buffer = io.BytesIO()
-    np.savez(buffer, made=np.frombuffer(content.of(made), np.uint8), **arrays)
+    np.savez(buffer, made=np.frombuffer(content_hash.of(made), np.uint8), **arrays)
     return buffer.getvalue()
 
 

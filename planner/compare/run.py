@@ -6,15 +6,15 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from planner.acquire.designs import NESTED
+from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.model import Model, build
-from planner.campaign.outlook import cost_of
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
-from planner.compare import content
+from planner.compare import content_hash
 from planner.compare.bench import Bench, PoolCell, cell_of
 from planner.compare.score import Score, score
-from planner.compare.study import Run, Task
+from planner.compare.tasks import Run, Task
+from planner.design.pool_designs import NESTED
 from planner.errors import InputError
 
 INITIAL = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself
@@ -30,7 +30,7 @@ def run(bench: Bench, task: Task) -> Run:
     Poses are chosen, and the model refitted, as a campaign does it; only that they come from the
     pool. Raises InputError if this machine runs another version of the program.
     """
-    if bench.program != content.program():
+    if bench.program != content_hash.program():
         raise InputError("This worker runs another version of planner; install the same one.")
     with _one_at_a_time, threadpool_limits(1):
         return _run(bench, task)

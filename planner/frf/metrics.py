@@ -141,7 +141,7 @@ def modal_error(
 ) -> ModalError:
     """Errors of natural frequencies (Hz) and damping ratios, all (n, k), column k the same mode.
 
-    NaN where a mode was not found (labels come from `planner.modes.compare.align`). A measured
+    NaN where a mode was not found (labels come from `planner.modal.mac.align`). A measured
     damping ratio of 0 has no relative error: NaN.
     """
     return ModalError(

@@ -8,9 +8,9 @@ weight, and scatter pooled over lines and channels says how far that is from the
 
 import numpy as np
 
-from planner.frf.estimate import Estimated, Spectra, assembled, estimate, transformed
-from planner.frf.types import Frf
-from planner.recording.types import Hit
+from planner.frf.estimator import Estimated, Spectra, assembled, estimate, transformed
+from planner.frf.frf import Frf
+from planner.recording.records import Hit
 
 SMOOTH = 15  # lines
 PRIOR = 12.0  # real values of scatter that the pooled level counts for, beside those near a line

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from planner import itself
+from planner import program
 from planner.errors import InputError
 
 SEALS = "seals.json"
@@ -80,7 +80,7 @@ def told(proof: Proof, name: str) -> Path:
 def _diagnose(proof: Proof, name: str) -> str:
     case, path = proof.folder / name, told(proof, name)
     path.parent.mkdir(exist_ok=True)
-    command = itself.command(
+    command = program.command(
         "diagnose", str(case / "recordings"), "--robot", str(case / "robot" / "robot.toml"),
         "--predict", str(case / "recordings" / "predict.csv"), "--json",
     )  # fmt: skip

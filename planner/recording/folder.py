@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 
 from planner.errors import InputError
-from planner.recording.tables import hit_direction
-from planner.recording.types import PoseRow, RecordingsFolder
+from planner.recording.named_columns import hit_direction
+from planner.recording.records import PoseRow, RecordingsFolder
 
 TABLE = "recordings.csv"
 MAX_BYTES = 32 * 1024 * 1024

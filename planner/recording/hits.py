@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.tables import hit_direction
-from planner.recording.types import AXES, Channel, Hit, Record, TimeRecord
+from planner.recording.named_columns import hit_direction
+from planner.recording.records import AXES, Channel, Hit, Record, TimeRecord
 
 
 def hits_from(records: Sequence[Record], axis: str | None = None) -> tuple[Hit, ...]:

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.tables import Named, to_records
-from planner.recording.text import read_text
-from planner.recording.types import FrfRecord, Record
+from planner.recording.named_columns import Named, to_records
+from planner.recording.records import FrfRecord, Record
+from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
 
 MAX_BYTES = 512 * 1024 * 1024

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.recording.levels import SAME_LEVEL, peak_n
-from planner.recording.types import AXES, Fault, Hit
+from planner.recording.force_levels import SAME_LEVEL, peak_n
+from planner.recording.records import AXES, Fault, Hit
 
 
 @dataclass(frozen=True)

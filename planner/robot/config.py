@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.tomlfile import load_toml
+from planner.toml_file import load_toml
 
 
 class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

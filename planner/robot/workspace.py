@@ -9,7 +9,7 @@ from scipy.stats import qmc
 
 from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
-from planner.robot.inverse import solve
+from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 
 TRIES = 4  # points tried per candidate wanted, before a sparse workspace is accepted as such

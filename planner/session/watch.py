@@ -15,15 +15,15 @@ from planner.campaign.events import Entry, Imported, Proposal
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
+from planner.dataset.measure import MeasuredPose
 from planner.errors import InputError, NoPoseLeftError, PlannerError
-from planner.modes.measure import MeasuredPose
 from planner.recording.folder import TABLE
 from planner.replay import replay
-from planner.session.explaining import LEAST, Explaining
+from planner.report import session_text
+from planner.report.rerun_story import Story
+from planner.session.diagnosis_process import LEAST, Explaining
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
-from planner.show import terminal
-from planner.show.story import Story
 
 POLL_S = 0.2
 
@@ -128,7 +128,7 @@ class _Session:
             return None
         self._note()
         number = len(self.campaign.model.labelled) + 1
-        self.console.print(terminal.proposal_panel(proposal, self.campaign.model, number))
+        self.console.print(session_text.proposal_panel(proposal, self.campaign.model, number))
         self._tell()
         return proposal
 
@@ -158,7 +158,7 @@ class _Session:
         shown: tuple = ()
         since = time.monotonic()
         if not self.auto:
-            self.console.print(Text(terminal.KEYS, style="dim"))
+            self.console.print(Text(session_text.KEYS, style="dim"))
         while not self.stop:
             self._explained()
             whole, waiting = self.inbox.scan(self._done())
@@ -218,7 +218,7 @@ class _Session:
                 case "q":
                     self.stop = "quit"
                 case "?":
-                    self.console.print(Text(terminal.HELP))
+                    self.console.print(Text(session_text.HELP))
         except PlannerError as error:
             self.console.print(Text(str(error), style="red"))
         return False
@@ -251,13 +251,13 @@ class _Session:
     def _after(self, report: ImportReport) -> None:
         state, stop = self.campaign.state, self.campaign.cell.config.stop
         simulated = bool(report.measurement and report.measurement.simulated)
-        self.console.print(terminal.import_panel(report, simulated))
+        self.console.print(session_text.import_panel(report, simulated))
         self.measured.append(report.pose)
         overall = float(np.sqrt(np.mean(report.model.frequency_sd_percent**2)))
         self.history.append(overall)
         per_pose = (time.monotonic() - self.started) / len(self.measured)
         self.console.print(
-            terminal.progress_line(
+            session_text.progress_line(
                 self.history, stop.frequency_sd_percent, per_pose, stop.measurements_min
             )
         )

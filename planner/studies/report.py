@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planner.errors import InputError
-from planner.show.pictures import Pictures
+from planner.report.plot_files import Pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

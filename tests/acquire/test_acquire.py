@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from planner.acquire.integrated_variance import integrated_variance
-from planner.acquire.outputs import FrequencyOutputs, Poses, Target
-from planner.acquire.propose import ACQUISITIONS, DESIGNS, propose
+from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.integrated_variance import integrated_variance
+from planner.design.propose import ACQUISITIONS, DESIGNS, propose
 from planner.errors import InputError
-from planner.fusion.surrogate import fit_surrogate
+from planner.surrogate.modal_surrogate import fit_surrogate
 from test_fusion import observed, simulated
 
 X = np.random.default_rng(4).random((120, 2))

@@ -4,29 +4,29 @@ import numpy as np
 import pytest
 from test_acquire import X, conditioned_variance, over, with_parameters
 
-from planner.acquire import reduction as module
-from planner.acquire.axes import axis_shares, best_axes
-from planner.acquire.cost import Cost, shortest_tour
-from planner.acquire.goal import goal
-from planner.acquire.mixed import mixed
-from planner.acquire.mutual_information import mutual_information
-from planner.acquire.outputs import FrequencyOutputs, Poses, Target
-from planner.acquire.parameter_information import (
+from planner.design import variance_reduction as module
+from planner.design.cost import Cost, shortest_tour
+from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.goal import goal
+from planner.design.hit_axes import axis_shares, best_axes
+from planner.design.mixed import mixed
+from planner.design.mutual_information import mutual_information
+from planner.design.parameter_information import (
     SUBSETS,
     by_axes,
     d_information,
     parameter_information,
 )
-from planner.acquire.parameters import FrfNoise, OpenParameters
-from planner.acquire.propose import ACQUISITIONS, Travel, propose
-from planner.acquire.reduction import reduction
-from planner.acquire.repeats import repeat_gain
-from planner.acquire.stopping import forecast, left_out, mean_squares
-from planner.fusion.surrogate import fit_surrogate
-from planner.identify.parameters import Priors, parametrise
-from planner.identify.uncertainty import log_frequency_slope
-from planner.physics.simulation import Simulation
+from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
+from planner.design.propose import ACQUISITIONS, Travel, propose
+from planner.design.repeats import repeat_gain
+from planner.design.stopping import forecast, left_out, mean_squares
+from planner.design.variance_reduction import reduction
+from planner.dynamics.simulation import Simulation
+from planner.identification.frequency_uncertainty import log_frequency_slope
+from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
+from planner.surrogate.modal_surrogate import fit_surrogate
 from robots import BAND_HZ, JOINTS_DEG, make_arm
 from test_fusion import observed, simulated
 

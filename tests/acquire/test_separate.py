@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.acquire.separate import most_telling, separation
-from planner.diagnose.diagnose import Problem
-from planner.diagnose.effects import library
-from planner.diagnose.linear.fit import FINE, Fit, carried_on, fit, settle
-from planner.diagnose.linear.predict import misfit_at
-from planner.frf.types import Frf
-from planner.physics.simulation import Simulation
+from planner.design.discrimination import most_telling, separation
+from planner.diagnosis.effects import library
+from planner.diagnosis.linear.fit import FINE, Fit, carried_on, fit, settle
+from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear_diagnosis import Problem
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 
 LINES = np.linspace(6.0, 60.0, 96)

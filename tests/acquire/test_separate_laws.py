@@ -9,21 +9,21 @@ import pytest
 from scipy.stats import spearmanr
 
 from known_robots import KR210
-from planner.acquire.separate_laws import accelerance, forces_n, law_separation
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
 from planner.cli.render_diagnosis import _next
-from planner.diagnose.data.columns import column
-from planner.diagnose.data.visits import Recorded, Visit
-from planner.diagnose.finding import Finding
-from planner.diagnose.laws.equivalent import receptances, system_of
-from planner.diagnose.laws.nonlinear import Candidate, Laws
-from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
-from planner.diagnose.laws.torques import LAWS
-from planner.diagnose.linear.visited import problem_of
-from planner.diagnose.screens.levels import base
-from planner.physics.simulation import Simulation
-from planner.recording.types import Hit
+from planner.dataset.level_columns import column
+from planner.dataset.visits import Recorded, Visit
+from planner.design.law_discrimination import accelerance, forces_n, law_separation
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.laws.equivalent_stiffness import receptances, system_of
+from planner.diagnosis.laws.one_joint import Candidate, Laws
+from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
+from planner.diagnosis.laws.torque_laws import LAWS
+from planner.diagnosis.linear.drift_fit import problem_of
+from planner.diagnosis.screens.force_levels import base
+from planner.dynamics.simulation import Simulation
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 
 RATE_HZ, SAMPLES, PORT = 400.0, 1024, 2

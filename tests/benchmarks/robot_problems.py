@@ -11,7 +11,7 @@ import numpy as np
 
 from fusion_problems import Problem
 from known_robots import KNOWN_ROBOTS
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import load_truth

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.acquire.outputs import FrequencyOutputs, Poses, Target
-from planner.acquire.reduction import reduction
-from planner.fusion.gp import Posterior, Prior
-from planner.fusion.kernels import matern52
+from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.variance_reduction import reduction
+from planner.surrogate.gp import Posterior, Prior
+from planner.surrogate.kernels import matern52
 
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 HAS_PEERS = "PEERS_PYTHON" in os.environ or importlib.util.find_spec("emukit") is not None

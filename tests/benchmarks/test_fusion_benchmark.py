@@ -12,8 +12,8 @@ import time
 import numpy as np
 import pytest
 
-from planner.acquire.propose import propose
-from planner.fusion.surrogate import ModalObservations, fit_surrogate
+from planner.design.propose import propose
+from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 from test_fusion import observed, simulated
 
 X = np.random.default_rng(9).random((1000, 2))
@@ -74,7 +74,7 @@ def test_times_of_a_start(tmp_path):
     code = (
         "import time; a = time.perf_counter()\n"
         "from test_fusion import observed, simulated\n"
-        "from planner.fusion.surrogate import fit_surrogate\n"
+        "from planner.surrogate.modal_surrogate import fit_surrogate\n"
         "b = time.perf_counter()\n"
         "x = observed(9, 1).x; fit_surrogate(observed(5, 0)).predict(x, simulated(x))\n"
         "print(b - a, time.perf_counter() - b)"

@@ -21,10 +21,10 @@ import pytest
 
 import fusion_peers
 from fusion_problems import PROBLEMS, Design, design
-from planner.fusion.fused import fit_fused, fit_low
-from planner.fusion.levels import Samples
-from planner.fusion.predictive import Predictive
-from planner.fusion.recursive import fit_recursive
+from planner.studies.models.fidelity_levels import Samples
+from planner.studies.models.fused import fit_fused, fit_low
+from planner.studies.models.recursive_ar1 import fit_recursive
+from planner.surrogate.predictive import Predictive
 from robot_problems import ROBOT_PROBLEMS
 
 COUNTS = (3, 5, 8, 11, 15)

@@ -6,13 +6,13 @@ from scipy.optimize import least_squares
 
 from known_robots import KR10
 from measured_frfs import birk_bounds, birk_folder, measured_frfs
-from planner.identify.data import stack
-from planner.identify.identify import identify
-from planner.identify.parameters import Priors, parametrise
-from planner.physics.gradient import Inertias, laplace, response, response_gradient
-from planner.physics.simulation import Elasticity, Simulation
+from planner.dynamics.gradient import Inertias, laplace, response, response_gradient
+from planner.dynamics.simulation import Elasticity, Simulation
+from planner.identification.identify import identify
+from planner.identification.measured_frfs import stack
+from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
-from planner.robot.virtual import inertia_basis
+from planner.robot.virtual_joints import inertia_basis
 from planner.truth.model import load_truth
 from test_speed import seconds
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from known_robots import KNOWN_ROBOTS
-from planner.fusion.levels import Samples
-from planner.fusion.multitask import fit_multitask
-from planner.fusion.single import fit_gp
+from planner.studies.models.fidelity_levels import Samples
+from planner.studies.models.multitask import fit_multitask
+from planner.studies.models.single_output_gp import fit_gp
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth
 

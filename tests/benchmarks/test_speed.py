@@ -8,12 +8,12 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
+from planner.dataset.measure import Source, measure
 from planner.demo import Pool, shipped
-from planner.fusion.surrogate import fit_surrogate
-from planner.modes.measure import Source, measure
-from planner.modes.track import Guide, track
-from planner.modes.types import Mode
-from planner.physics.dynamics import direct_accelerance
+from planner.dynamics.vibration import direct_accelerance
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, track
+from planner.surrogate.modal_surrogate import fit_surrogate
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import load_truth

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from planner.campaign.fidelity import PRIORS, LowFidelity, learn
-from planner.frf.estimate import estimate
-from planner.identify.feasible import pseudo_inertia
-from planner.identify.parameters import parametrise
-from planner.identify.uncertainty import frequency_sd, frequency_sensitivity
-from planner.physics.families import undamped_modes
-from planner.physics.simulation import Simulation
+from planner.campaign.low_fidelity import PRIORS, LowFidelity, learn
+from planner.dynamics.mode_families import undamped_modes
+from planner.dynamics.simulation import Simulation
+from planner.frf.estimator import estimate
+from planner.identification.feasible_inertias import pseudo_inertia
+from planner.identification.frequency_uncertainty import frequency_sd, frequency_sensitivity
+from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Resonator
 from planner.truth.hits import Hammer

@@ -9,9 +9,9 @@ import pytest
 
 from outside import HAMMER, planner
 from outside import answer as planner_json
-from planner.identify.check import fit_similarity
-from planner.identify.recorded import read_recorded
-from planner.physics.simulation import Simulation
+from planner.dataset.recorded import read_recorded
+from planner.dynamics.simulation import Simulation
+from planner.identification.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses

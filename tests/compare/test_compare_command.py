@@ -12,13 +12,13 @@ import pytest
 
 from outside import PLANNER, planner
 from planner.campaign.model import build
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from planner.cli.run import run as call
 from planner.compare.bench import assemble, cell_of, decide
-from planner.compare.conduct import recorded
+from planner.compare.resume import recorded
 from planner.compare.run import run
-from planner.compare.study import Task
+from planner.compare.tasks import Task
 from planner.robot.robot import Robot
 from pools import make_pool
 

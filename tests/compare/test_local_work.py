@@ -3,7 +3,7 @@
 import os
 
 import items
-from planner.compare.local import Failure, each
+from planner.compare.processes import Failure, each
 
 
 def test_every_item_is_done_by_other_processes():

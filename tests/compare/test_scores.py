@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from planner.compare.curves import Curves, baseline_of, paired
 from planner.compare.score import score
-from planner.compare.study import Run
+from planner.compare.tasks import Run
 
 HZ = np.array([[10.0, 20.0], [11.0, 24.0], [12.0, 22.0]])
 SMALL = np.full_like(HZ, 1e-6)

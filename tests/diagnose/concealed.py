@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from known_robots import KnownRobot
-from planner.frf.estimate import estimate
-from planner.frf.types import Frf
-from planner.physics.simulation import Simulation
-from planner.recording.types import Hit
+from planner.dynamics.simulation import Simulation
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
 from planner.truth.hits import Hammer, simulate_hit

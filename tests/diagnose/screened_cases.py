@@ -6,9 +6,9 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from planner.diagnose.data.visits import read_visits
-from planner.diagnose.screens import screen as screens
-from planner.physics.simulation import Simulation
+from planner.dataset.visits import read_visits
+from planner.diagnosis.screens import screen as screens
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 
 OWN = (

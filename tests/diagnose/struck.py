@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from known_robots import KR210
-from planner.diagnose.data.columns import Column, column
-from planner.diagnose.laws.equivalent import System
-from planner.physics.simulation import Simulation
-from planner.recording.types import Hit
+from planner.dataset.level_columns import Column, column
+from planner.diagnosis.laws.equivalent_stiffness import System
+from planner.dynamics.simulation import Simulation
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 
 VISITS = [0, 0, 0, 1, 1, 1]

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.diagnose.data.visits import Recorded, Visit
-from planner.physics.simulation import Elasticity, Simulation
-from planner.recording.types import Hit
+from planner.dataset.visits import Recorded, Visit
+from planner.dynamics.simulation import Elasticity, Simulation
+from planner.recording.records import Hit
 
 RATE_HZ, RECORD_S, LONG = 400.0, 2.56, 8
 PULSE_S, BEFORE_S = 0.01, 0.06

@@ -4,10 +4,10 @@ import pytest
 
 from concealed import hidden
 from known_robots import IRB6640
-from planner.diagnose.diagnose import diagnose
-from planner.diagnose.effects import library
-from planner.diagnose.linear.anywhere import resonant, suspects
-from planner.diagnose.linear.fit import Problem
+from planner.diagnosis.effects import library
+from planner.diagnosis.linear.fit import Problem
+from planner.diagnosis.linear.suspects import resonant, suspects
+from planner.diagnosis.linear_diagnosis import diagnose
 from planner.truth.deviation import AddedMass, Resonator, Spring
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from planner import itself
+from planner import program
 from planner.truth.arms import ARMS
 from planner.truth.cases import make_case
 from planner.truth.mishaps import ARTEFACTS
@@ -20,7 +20,7 @@ SEEDS, FIRST = int(os.environ.get("STUDY_SEEDS", "5")), int(os.environ.get("STUD
 
 def diagnosed(folder: Path) -> dict:
     robot, recordings = folder / "robot" / "robot.toml", folder / "recordings"
-    command = itself.command("diagnose", str(recordings), "--robot", str(robot), "--json")
+    command = program.command("diagnose", str(recordings), "--robot", str(robot), "--json")
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return json.loads(done.stdout)
 

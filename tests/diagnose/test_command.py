@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.cli.run import run
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.cases import make_case
 

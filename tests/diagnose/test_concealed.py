@@ -5,7 +5,7 @@ import pytest
 
 from concealed import hidden
 from known_robots import IRB6640, KR210
-from planner.diagnose.diagnose import diagnose
+from planner.diagnosis.linear_diagnosis import diagnose
 from planner.truth.deviation import Spring
 
 pytestmark = pytest.mark.slow

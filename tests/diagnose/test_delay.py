@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from known_robots import KR10
-from planner.diagnose.data.visits import Recorded
-from planner.diagnose.screens import artefacts
-from planner.physics.simulation import Simulation
-from planner.recording.types import Hit
+from planner.dataset.visits import Recorded
+from planner.diagnosis.screens import artefacts
+from planner.dynamics.simulation import Simulation
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from synthetic_hits import RATE_HZ, recorded
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.diagnose.linear.visited import problem_of
-from planner.diagnose.screens import drift
-from planner.diagnose.screens.drift import screen
-from planner.physics.simulation import Simulation
+from planner.diagnosis.linear.drift_fit import problem_of
+from planner.diagnosis.screens import drift
+from planner.diagnosis.screens.drift import screen
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from synthetic_hits import recorded
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from beam import first_hz
-from planner.diagnose.effects.effect import Quantity
-from planner.diagnose.frequencies import Change, explain
-from planner.modes.ringdown import ringdown
+from planner.diagnosis.effects.effect import Quantity
+from planner.diagnosis.frequencies import Change, explain
+from planner.modal.ringdown import ringdown
 from planner.recording.read import read
 from test_dropbear import FIRST_MODE, dwells
 

@@ -4,11 +4,11 @@ import pytest
 
 from concealed import hidden
 from known_robots import IRB6640
-from planner.diagnose.diagnose import again, diagnose
-from planner.diagnose.effects import library
-from planner.diagnose.effects.effect import Effect
-from planner.diagnose.linear.elsewhere import elsewhere
-from planner.diagnose.linear.fit import Problem, fit, settle
+from planner.diagnosis.effects import library
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.fit import Problem, fit, settle
+from planner.diagnosis.linear.other_places import elsewhere
+from planner.diagnosis.linear_diagnosis import again, diagnose
 from planner.truth.deviation import Resonator
 
 LOOSE = Resonator("link_3", (0.2, 0.05, 0.1), (0.0, 0.0, 1.0), 14.0, 22.0, 0.02)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from planner.diagnose.effects.effect import Quantity
-from planner.diagnose.frequencies import Change, explain
+from planner.diagnosis.effects.effect import Quantity
+from planner.diagnosis.frequencies import Change, explain
 
 PLACES = np.linspace(0.2, 0.8, 7)
 NUISANCE = Quantity("stiffness of all", "1", 0.0, 0.02, logarithmic=True)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from known_robots import kr210_folder
-from planner.diagnose.effects import library
-from planner.diagnose.linear.fit import Grade, Problem
-from planner.frf.types import Frf
-from planner.physics.simulation import Simulation
+from planner.diagnosis.effects import library
+from planner.diagnosis.linear.fit import Grade, Problem
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 
 EFFECTS = (

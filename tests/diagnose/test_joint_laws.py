@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from planner.diagnose.laws.equivalent import System, receptances
-from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
-from planner.diagnose.laws.torques import LAWS
-from planner.physics.simulation import Elasticity
+from planner.diagnosis.laws.equivalent_stiffness import System, receptances
+from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
+from planner.diagnosis.laws.torque_laws import LAWS
+from planner.dynamics.simulation import Elasticity
 from struck import VISITS, struck_robot
 
 STIFFENING, DAHL, DEAD_ZONE = LAWS

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.diagnose import judge as module
-from planner.diagnose.diagnose import diagnose
-from planner.diagnose.effects import library
-from planner.diagnose.judge import WORSE, judge
-from planner.frf.types import Frf
-from planner.physics.simulation import Simulation
+from planner.diagnosis import held_out_check as module
+from planner.diagnosis.effects import library
+from planner.diagnosis.held_out_check import WORSE, judge
+from planner.diagnosis.linear_diagnosis import diagnose
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 
 LINES = np.linspace(6.0, 60.0, 96)

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from planner import itself
+from planner import program
 from planner.truth.arms import ARMS
 from planner.truth.cases import make_case
 
@@ -24,7 +24,7 @@ def test_both_of_two_effects_are_named(tmp_path):
     right = 0
     for seed in range(FIRST, FIRST + SEEDS):
         case = make_case("pair", sorted(ARMS)[seed % len(ARMS)], seed, tmp_path / str(seed))
-        command = itself.command(
+        command = program.command(
             "diagnose", str(case.recordings), "--robot", str(case.robot_toml), "--json"
         )
         started = time.perf_counter()

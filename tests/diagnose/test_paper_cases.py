@@ -10,14 +10,14 @@ import pytest
 
 from known_robots import KR10
 from measured_frfs import birk_folder, measured_frfs
-from planner.diagnose.data.visits import Recorded, Visit
-from planner.diagnose.diagnose import diagnose
-from planner.diagnose.linear.predict import predicted
-from planner.diagnose.screens.screen import screen
-from planner.physics.simulation import Simulation
-from planner.recording.types import Hit
+from planner.dataset.visits import Recorded, Visit
+from planner.diagnosis.linear.predict import predicted
+from planner.diagnosis.linear_diagnosis import diagnose
+from planner.diagnosis.screens.screen import screen
+from planner.dynamics.simulation import Simulation
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.studies.sweep import ACROSS, BEYOND_DEG, DRESS_PACK, poses, sweep
+from planner.studies.busch2020_data import ACROSS, BEYOND_DEG, DRESS_PACK, poses, sweep
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.hits import Hammer
 from planner.truth.laws import Hardening

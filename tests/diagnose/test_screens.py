@@ -8,19 +8,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from known_robots import KR210
-from planner.diagnose.data.visits import Recorded
-from planner.diagnose.effects.chain import SensorChain
-from planner.diagnose.effects.drift import Drift
-from planner.diagnose.effects.effect import Effect, Quantity
-from planner.diagnose.finding import Finding
-from planner.diagnose.laws.equivalent import equivalent, system_of
-from planner.diagnose.linear.fit import Grade, fit
-from planner.diagnose.linear.visited import problem_of
-from planner.diagnose.locate import locate
-from planner.diagnose.screens import artefacts, drift, levels
-from planner.diagnose.screens import screen as screens
-from planner.diagnose.screens.window import screen_window
-from planner.physics.simulation import Simulation
+from planner.dataset.visits import Recorded
+from planner.diagnosis.effects.drift import Drift
+from planner.diagnosis.effects.effect import Effect, Quantity
+from planner.diagnosis.effects.sensor_chain import SensorChain
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
+from planner.diagnosis.linear.drift_fit import problem_of
+from planner.diagnosis.linear.fit import Grade, fit
+from planner.diagnosis.locate import locate
+from planner.diagnosis.screens import artefacts, drift, force_levels
+from planner.diagnosis.screens import screen as screens
+from planner.diagnosis.screens.exponential_window import screen_window
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from synthetic_hits import RATE_HZ, recorded
 
@@ -164,8 +164,8 @@ def test_equivalent_stiffness_is_that_of_the_joint_that_changed(simulation):
     data = recorded(simulation, q, lambda _, level: softer if level == 0 else np.ones(6))
     system = system_of(fit(problem_of(data, simulation), Effect("")))
     found = equivalent(data, system)
-    assert levels.disproportion(found) > 5
-    assert levels.equivalent_share(found) > 0.9
+    assert force_levels.disproportion(found) > 5
+    assert force_levels.equivalent_share(found) > 0.9
     assert system.ports[int(np.argmin(found.chi2.sum(axis=0)))] == "joint_3"
     weight = found.precision[:, 2]
     delta = np.sum(weight * found.delta[:, 2]) / weight.sum()

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from known_robots import KR10
-from planner.diagnose.beside import leaves_room
-from planner.diagnose.data.visits import Recorded, Visit
-from planner.diagnose.finding import Finding
-from planner.diagnose.laws.equivalent import receptances
-from planner.diagnose.laws.swings import course, joints_of, rates
-from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
-from planner.diagnose.laws.torques import LAWS, Law
-from planner.diagnose.screens.screen import screen
-from planner.physics.simulation import Elasticity, Simulation
-from planner.recording.types import Hit
+from planner.dataset.visits import Recorded, Visit
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.law_beside_linear import leaves_room
+from planner.diagnosis.laws.equivalent_stiffness import receptances
+from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
+from planner.diagnosis.laws.several_joint_response import course, joints_of, rates
+from planner.diagnosis.laws.torque_laws import LAWS, Law
+from planner.diagnosis.screens.screen import screen
+from planner.dynamics.simulation import Elasticity, Simulation
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer

@@ -6,10 +6,10 @@ from typing import Any, cast
 import numpy as np
 
 from known_robots import KR210
-from planner.diagnose.linear.fit import PRIORS
-from planner.diagnose.screens.strayed import strayed
-from planner.identify.parameters import parametrise
-from planner.physics.simulation import Simulation
+from planner.diagnosis.linear.fit import PRIORS
+from planner.diagnosis.screens.implausible_springs import strayed
+from planner.dynamics.simulation import Simulation
+from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
 
 

@@ -5,15 +5,15 @@ from typing import Any, cast
 
 import pytest
 
-from planner.diagnose.beside import leaves_room
-from planner.diagnose.diagnose import Candidate, Diagnosis, beside_another
-from planner.diagnose.effects.both import SECOND
-from planner.diagnose.effects.channel import ChannelDelay
-from planner.diagnose.effects.effect import Effect
-from planner.diagnose.effects.mass import AddedMass
-from planner.diagnose.finding import Finding
-from planner.diagnose.taken_back import taken_back
-from planner.diagnose.together import HONEST, linear_effects_apply, together
+from planner.diagnosis.effects.added_mass import AddedMass
+from planner.diagnosis.effects.combined import SECOND
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.sensor_channel import ChannelDelay
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.law_beside_linear import leaves_room
+from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis, beside_another
+from planner.diagnosis.revoked_artefacts import taken_back
+from planner.diagnosis.verdict import HONEST, linear_effects_apply, together
 
 
 @dataclass(frozen=True)

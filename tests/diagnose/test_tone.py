@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.diagnose.data.visits import Recorded
-from planner.diagnose.screens.tone import screen_tone
-from planner.physics.simulation import Simulation
+from planner.dataset.visits import Recorded
+from planner.diagnosis.screens.tone import screen_tone
+from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from synthetic_hits import RATE_HZ, recorded
 

@@ -8,8 +8,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.diagnose.effects.effect import Effect, Quantity
-from planner.diagnose.linear.weigh import shared_noise, temper, weigh
+from planner.diagnosis.effects.effect import Effect, Quantity
+from planner.diagnosis.linear.evidence import shared_noise, temper, weigh
 
 
 @given(st.floats(0.5, 1e6), st.floats(1.0, 10.0))

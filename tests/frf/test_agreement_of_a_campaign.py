@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from planner.dataset.measure import Source, measure
 from planner.demo import Pool, shipped
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
 from planner.frf.metrics import Agreement, agreement, direct_mean, stack
-from planner.frf.types import Frf
-from planner.modes.measure import Source, measure
-from planner.physics.simulation import Simulation
+from planner.report.frf_map import frf_map
+from planner.report.frf_plots import save
 from planner.robot.robot import Robot
-from planner.show.frf_map import frf_map
-from planner.show.plots import save
 
 BAND_HZ = (4.0, 60.0)
 PATHS = {"along y": [f"A3{j}" for j in range(1, 8)], "along x": [f"A{i}3" for i in range(1, 6)]}

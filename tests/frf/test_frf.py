@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from planner.errors import RefusedError
-from planner.frf.estimate import estimate, from_records
-from planner.modes.estimate import estimate_modes
-from planner.recording.types import FrfRecord
+from planner.frf.estimator import estimate, from_records
+from planner.modal.estimate_modes import estimate_modes
+from planner.recording.records import FrfRecord
 from simulated_hits import RATE_HZ, exact_accelerance, make_hit
 
 BAND = (4.0, 60.0)

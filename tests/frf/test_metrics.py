@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from planner.frf import metrics
-from planner.modes.compare import align
-from planner.modes.types import ModalModel, Mode
+from planner.modal.mac import align
+from planner.modal.modes import ModalModel, Mode
 
 SHAPE = (3, 3, 3, 24)  # pose, response, hit, line
 PART = st.floats(-1e60, 1e60, allow_nan=False).map(lambda x: x if abs(x) > 1e-60 else 0.0)

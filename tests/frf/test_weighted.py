@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.frf.estimate import estimate
+from planner.frf.estimator import estimate
 from planner.frf.weighted import weighted
-from planner.recording.types import Hit
+from planner.recording.records import Hit
 
 RATE_HZ, SAMPLES = 400.0, 1024
 

@@ -5,9 +5,9 @@ import pytest
 from scipy.stats import norm
 
 from planner.errors import InputError
-from planner.fusion import gp
-from planner.fusion.ar1 import OutputPrior, fit_ar1
-from planner.fusion.data import Padded, TrainingData
+from planner.surrogate import gp
+from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.training_data import Padded, TrainingData
 
 PRIOR = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
 QUERY = np.linspace(0, 1, 9)[:, None]

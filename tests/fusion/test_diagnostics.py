@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from planner.fusion.ar1 import OutputPrior, fit_ar1
-from planner.fusion.data import TrainingData
-from planner.fusion.diagnostics import leave_one_out, report
+from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.leave_one_out import leave_one_out, report
+from planner.surrogate.training_data import TrainingData
 
 PRIOR = OutputPrior(bias_sd=0.5, slope_sd=0.5, amplitude=0.3, nugget=0.02)
 

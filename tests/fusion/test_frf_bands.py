@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.frf import modal
-from planner.fusion.frf_bands import ModalPrediction, frf_band, frf_moments
-from planner.fusion.surrogate import fit_surrogate
+from planner.frf import synthesis
+from planner.surrogate.frf_bands import ModalPrediction, frf_band, frf_moments
+from planner.surrogate.modal_surrogate import fit_surrogate
 from test_fusion import observed, simulated
 
 LINES = np.linspace(4, 50, 60)
@@ -26,7 +26,9 @@ def test_a_certain_prediction_is_the_modal_sum():
     low, zero = simulated(x), np.full((2, 4), 1e-9)
     p = ModalPrediction(low.frequency_hz, zero, low.damping_ratio, zero * 0.01, low.residue,
                         np.full((2, 4, 3, 3), 1e-18))  # fmt: skip
-    exact = modal.accelerance(LINES, modal.pole(low.frequency_hz, low.damping_ratio), low.residue)
+    exact = synthesis.accelerance(
+        LINES, synthesis.pole(low.frequency_hz, low.damping_ratio), low.residue
+    )
     band = frf_band(p, LINES, samples=256)
     size = np.abs(exact).max()
     for mean, sd in (frf_moments(p, LINES), (band.mean, band.sd)):

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.fusion import gp
-from planner.fusion.ar1 import OutputPrior, fit_ar1
-from planner.fusion.data import TrainingData
-from planner.fusion.kernels import KERNELS
-from planner.fusion.surrogate import ModalObservations, fit_surrogate
-from planner.physics.dynamics import SimulatedModes
+from planner.dynamics.vibration import SimulatedModes
+from planner.surrogate import gp
+from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.kernels import KERNELS
+from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
+from planner.surrogate.training_data import TrainingData
 
 PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.3, amplitude=0.1, nugget=0.01)
 

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from planner.fusion.grid import fit_grid
-from planner.fusion.kernels import parse
+from planner.studies.models.grid_gp import fit_grid
+from planner.surrogate.kernels import parse
 
 
 def surface(a, b):

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from planner.errors import InputError
-from planner.fusion import marginal
-from planner.fusion.kernels import KERNELS, parse
+from planner.surrogate import marginal
+from planner.surrogate.kernels import KERNELS, parse
 
 EXPRESSIONS = [
     *KERNELS,

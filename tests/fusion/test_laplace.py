@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from planner.fusion import laplace
-from planner.fusion.levels import Exact, Samples
-from planner.fusion.mfdgp import fit_mfdgp
-from planner.fusion.mixture import Mixture
-from planner.fusion.multitask import fit_multitask
-from planner.fusion.sparse import average_sparse, fit_sparse
-from planner.fusion.task_average import average_tasks
+from planner.studies.models import laplace
+from planner.studies.models.fidelity_levels import Exact, Samples
+from planner.studies.models.mfdgp import fit_mfdgp
+from planner.studies.models.mixture import Mixture
+from planner.studies.models.multitask import fit_multitask
+from planner.studies.models.sparse_gp import average_sparse, fit_sparse
+from planner.studies.models.task_average import average_tasks
 
 GRID = np.random.default_rng(8).random((50, 2))
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from planner.fusion import gp, marginal
-from planner.fusion.ar1 import OutputPrior, fit_ar1
-from planner.fusion.data import TrainingData
-from planner.fusion.hedged import fit_hedged
-from planner.fusion.kernels import parse
-from planner.fusion.levels import Exact, Samples
-from planner.fusion.mfdgp import fit_mfdgp
-from planner.fusion.multitask import fit_multitask
-from planner.fusion.shapes import fit_shapes
-from planner.fusion.sparse import average_sparse, fit_sparse
+from planner.studies.models.fidelity_levels import Exact, Samples
+from planner.studies.models.mfdgp import fit_mfdgp
+from planner.studies.models.multitask import fit_multitask
+from planner.studies.models.sparse_gp import average_sparse, fit_sparse
+from planner.surrogate import gp, marginal
+from planner.surrogate.ar1 import OutputPrior, fit_ar1
+from planner.surrogate.hedged import fit_hedged
+from planner.surrogate.kernel_average import fit_shapes
+from planner.surrogate.kernels import parse
+from planner.surrogate.training_data import TrainingData
 
 GRID = np.random.default_rng(8).random((30, 2))
 PRIOR = OutputPrior(bias_sd=0.5, slope_sd=0.5, amplitude=0.3, nugget=0.02)

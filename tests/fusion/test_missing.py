@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.fusion.surrogate import fit_surrogate
+from planner.surrogate.modal_surrogate import fit_surrogate
 from test_fusion import observed, simulated, true_hz
 
 X = np.random.default_rng(4).random((20, 2))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.fusion.multitask import (
+from planner.studies.models.multitask import (
     Hyperparameters,
     Tasks,
     fit_multitask,

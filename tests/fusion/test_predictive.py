@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from planner.fusion.predictive import Predictive, together
+from planner.surrogate.predictive import Predictive, together
 
 ONE = Predictive(np.ones(1), np.array([[0.3, -2.0]]), np.array([[0.5, 2.0]]))
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.fusion.kernels import parse
-from planner.fusion.levels import Exact, Samples
-from planner.fusion.mfdgp import fit_mfdgp
-from planner.fusion.sparse import PRIOR, bound, choose_inducing, fit_sparse
+from planner.studies.models.fidelity_levels import Exact, Samples
+from planner.studies.models.mfdgp import fit_mfdgp
+from planner.studies.models.sparse_gp import PRIOR, bound, choose_inducing, fit_sparse
+from planner.surrogate.kernels import parse
 
 GRID = np.random.default_rng(8).random((50, 2))
 

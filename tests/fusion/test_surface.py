@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.fusion import surface
-from planner.fusion.surface import SURFACES, Grid, fit_surface
+from planner.studies.models import frf_surface
+from planner.studies.models.frf_surface import SURFACES, Grid, fit_surface
 
 LINES, POSES = np.linspace(5, 30, 40), np.linspace(0, 1, 9)
 
@@ -23,7 +23,7 @@ def measured(lines, poses):
 
 @pytest.mark.parametrize("model", SURFACES)
 def test_between_measured_poses_the_surface_is_met(model, monkeypatch):
-    monkeypatch.setattr(surface, "INDUCING", 80)
+    monkeypatch.setattr(frf_surface, "INDUCING", 80)
     seen, wanted = POSES[::2], POSES[1::2]
     fine = np.linspace(0, 1, 17)
     low = Grid(LINES, fine, simulated(LINES, fine))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from known_robots import KR10
-from planner.frf.types import Frf
+from planner.frf.frf import Frf
 from planner.truth.model import Truth
 
 DEGREE = 180 / np.pi  # per degree to per radian

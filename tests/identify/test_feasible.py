@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from known_robots import kr10_folder
-from planner.identify.feasible import Barrier, pseudo_inertia
-from planner.identify.parameters import Priors, parametrise
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
+from planner.identification.feasible_inertias import Barrier, pseudo_inertia
+from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 
 

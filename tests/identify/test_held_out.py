@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from known_robots import KR10
 from measured_frfs import measured_frfs
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.identify.check import fit_similarity
-from planner.identify.held_out import identify_judged, set_aside
-from planner.physics.simulation import Simulation
+from planner.identification.agreement import fit_similarity
+from planner.identification.held_out import identify_judged, set_aside
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth

@@ -8,17 +8,17 @@ import pytest
 
 from known_robots import KR10
 from measured_frfs import measured_frfs
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.frf.estimate import estimate
-from planner.identify.check import fit_similarity, residuals
-from planner.identify.data import stack
-from planner.identify.identify import identify
-from planner.identify.objective import Objective
-from planner.identify.parameters import Parametrisation, Priors, parametrise
-from planner.identify.result import _words, undetermined
-from planner.identify.write import updated_toml
-from planner.physics.simulation import Simulation
-from planner.recording.types import Hit
+from planner.frf.estimator import estimate
+from planner.identification.agreement import fit_similarity, residuals
+from planner.identification.identify import identify
+from planner.identification.measured_frfs import stack
+from planner.identification.objective import Objective
+from planner.identification.parameters import Parametrisation, Priors, parametrise
+from planner.identification.result import _words, undetermined
+from planner.identification.write_robot import updated_toml
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, simulate_hit

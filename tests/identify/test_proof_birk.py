@@ -10,10 +10,10 @@ import pytest
 
 from known_robots import KR10
 from measured_frfs import birk_bounds, birk_folder, measured_frfs
-from planner.identify.check import fit_similarity
-from planner.identify.identify import identify
-from planner.identify.parameters import Priors, parametrise
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
+from planner.identification.agreement import fit_similarity
+from planner.identification.identify import identify
+from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from measured_frfs import measured_frfs
+from planner.dataset.recorded import read_recorded
 from planner.demo import shipped
-from planner.identify.check import fit_similarity
-from planner.identify.identify import identify
-from planner.identify.parameters import Priors
-from planner.identify.recorded import read_recorded
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
+from planner.identification.agreement import fit_similarity
+from planner.identification.identify import identify
+from planner.identification.parameters import Priors
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses

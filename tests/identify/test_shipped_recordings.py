@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.dataset.measure import Source, measure
 from planner.demo import Pool, shipped
-from planner.identify.check import fit_similarity
-from planner.identify.identify import identify
-from planner.identify.parameters import Priors
-from planner.modes.measure import Source, measure
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
+from planner.identification.agreement import fit_similarity
+from planner.identification.identify import identify
+from planner.identification.parameters import Priors
 from planner.robot.robot import Robot
 
 pytestmark = pytest.mark.slow

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.stats import ortho_group
 
-from planner.identify.solver import inverse
+from planner.inference.least_squares import inverse
 
 
 def test_inverse_of_a_precision():

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.frf.modal import accelerance, pole
-from planner.frf.types import Frf
+from planner.frf.frf import Frf
+from planner.frf.synthesis import accelerance, pole
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from planner.frf.estimate import estimate
-from planner.modes.amplitude import homogeneity
-from planner.modes.estimate import estimate_modes
-from planner.recording.levels import by_level, peak_n
-from planner.recording.types import Hit
+from planner.frf.estimator import estimate
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.homogeneity import homogeneity
+from planner.recording.force_levels import by_level, peak_n
+from planner.recording.records import Hit
 from simulated_hits import POLES, make_hit
 
 BAND = (4.0, 60.0)

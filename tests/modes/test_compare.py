@@ -5,8 +5,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from planner.modes.compare import align, mac, mac_matrix
-from planner.modes.types import ModalModel, Mode
+from planner.modal.mac import align, mac, mac_matrix
+from planner.modal.modes import ModalModel, Mode
 
 numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0 or abs(x) > 1e-3)
 shapes = st.builds(

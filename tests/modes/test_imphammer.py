@@ -2,9 +2,9 @@
 
 import pytest
 
-from planner.modes.record import modes_from_record
+from planner.modal.free_decays import modes_from_record
 from planner.recording.read import read
-from planner.recording.types import TimeRecord
+from planner.recording.records import TimeRecord
 
 REPORTED_HZ = (2.17, 6.89, 13.26)
 FILES = ("imp_ham_set1_nomass.CSV", "imp_ham_set2_nomass.CSV", "imp_ham_set3_no_mass.CSV")

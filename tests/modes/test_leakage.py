@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.frf.estimate import estimate
-from planner.frf.modal import pole
-from planner.modes.estimate import estimate_modes
-from planner.recording.types import Hit
+from planner.frf.estimator import estimate
+from planner.frf.synthesis import pole
+from planner.modal.estimate_modes import estimate_modes
+from planner.recording.records import Hit
 from simulated_hits import make_hit
 
 BAND = (4.0, 60.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.modes.matching import best, chances
+from planner.modal.mode_matching import best, chances
 
 
 def every_matching(labels: int, modes: int, ordered: bool):

@@ -6,9 +6,9 @@ from scipy import linalg
 
 from planner.errors import InputError, RefusedError
 from planner.frf.quantities import convert, convert_variance
-from planner.modes.data import Data
-from planner.modes.eigenvectors import Eigenvectors
-from planner.modes.mdof import _evaluate, _join, fit_mdof
+from planner.modal.eigenvectors import Eigenvectors
+from planner.modal.fit_data import Data
+from planner.modal.mdof import _evaluate, _join, fit_mdof
 
 LINES = np.arange(4.0, 70.0, 0.2)
 POINTS = [0, 1, 4, 5]  # two points with two directions each

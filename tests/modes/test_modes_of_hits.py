@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from modal_systems import System, random_system
-from planner.frf.estimate import estimate
-from planner.modes.estimate import estimate_modes
+from planner.frf.estimator import estimate
+from planner.modal.estimate_modes import estimate_modes
 from simulated_hits import make_hit
 
 BAND = (4.0, 60.0)

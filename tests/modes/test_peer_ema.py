@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from modal_systems import as_frf, exact_frf, noisy, random_system
-from planner.modes.estimate import estimate_modes
+from planner.modal.estimate_modes import estimate_modes
 
 LINES = np.arange(2.0, 80.0, 0.1)
 BAND = (4.0, 60.0)

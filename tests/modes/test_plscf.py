@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from modal_systems import System, exact_frf, noisy, random_system
-from planner.modes.plscf import plscf
-from planner.modes.residues import rank_one
-from planner.modes.stabilisation import diagram, stable
+from planner.modal.plscf import plscf
+from planner.modal.residues import rank_one
+from planner.modal.stabilisation import diagram, stable
 
 LINES = np.arange(3.0, 70.0, 0.15)
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from modal_systems import exact_frf, random_system
-from planner.frf.modal import accelerance
-from planner.modes.data import Data
-from planner.modes.refine import refine, shared_error
-from planner.modes.residues import (
+from planner.frf.synthesis import accelerance
+from planner.modal.fit_data import Data
+from planner.modal.refine import refine, shared_error
+from planner.modal.residues import (
     Residues,
     basis,
     basis_slope,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError, RefusedError
-from planner.modes.record import modes_from_record
-from planner.modes.ringdown import ringdown
-from planner.recording.types import Channel, TimeRecord
+from planner.modal.free_decays import modes_from_record
+from planner.modal.ringdown import ringdown
+from planner.recording.records import Channel, TimeRecord
 
 RATE = 500.0
 

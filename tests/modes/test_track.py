@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.modes.track import Guide, track
-from planner.modes.types import Mode
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, track
 
 SHAPES = np.array([[1, 0.1, 0], [0.1, 1, 0.2], [0, 0.2, 1], [0.7, -0.7, 0.1]], complex)
 X = np.linspace(0, 1, 20)[:, None]

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError, RefusedError
-from planner.frf.modal import accelerance, pole
-from planner.modes.transfer import modes_from_transfer_functions
+from planner.frf.synthesis import accelerance, pole
+from planner.modal.transfer_functions import modes_from_transfer_functions
 from planner.recording.read import read
-from planner.recording.types import FrfRecord
+from planner.recording.records import FrfRecord
 
 # Peaks picked by eye from the CMIF, below 2 kHz and above the suspension (6.7 and 9.2 Hz), and
 # what else stands there: mains hum at 50, 150 and 250 Hz.

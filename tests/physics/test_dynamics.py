@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.frf import modal
-from planner.physics import dynamics
-from planner.physics.simulation import Simulation
+from planner.dynamics import vibration
+from planner.dynamics.simulation import Simulation
+from planner.frf import synthesis
 from planner.robot.robot import Robot
 from robots import make_arm
 
@@ -28,43 +28,43 @@ def random_system(seed: int, e: int = 6, overdamped: bool = False):
 def test_modal_sum_is_the_direct_solution(overdamped, proportional):
     mass, damping, stiffness, (hit, sensor) = random_system(1, overdamped=overdamped)
     damping = 1e-3 * stiffness if proportional else damping
-    solved = dynamics.solve_poles(mass, damping, stiffness, hit, sensor)
-    ours = dynamics.accelerance(solved, LINES)[0]
-    direct = dynamics.direct_accelerance(mass[0], damping, stiffness, hit[0], sensor[0], LINES)
+    solved = vibration.solve_poles(mass, damping, stiffness, hit, sensor)
+    ours = vibration.accelerance(solved, LINES)[0]
+    direct = vibration.direct_accelerance(mass[0], damping, stiffness, hit[0], sensor[0], LINES)
     assert np.abs(ours - direct).max() < 1e-9 * np.abs(direct).max()
 
 
 def test_one_oscillator_in_closed_form():
     m, k, c = 2.5, 4.0e4, 25.0
     j = np.array([[[0.3], [0.0], [-0.2]]])
-    solved = dynamics.solve_poles(np.array([[[m]]]), np.array([[c]]), np.array([[k]]), j, j)
-    modes = dynamics.oscillatory(solved, 2)
+    solved = vibration.solve_poles(np.array([[[m]]]), np.array([[c]]), np.array([[k]]), j, j)
+    modes = vibration.oscillatory(solved, 2)
     w = np.sqrt(k / m)
     assert modes.frequency_hz[0, 0] == pytest.approx(w / (2 * np.pi), rel=1e-12)
     assert modes.damping_ratio[0, 0] == pytest.approx(c / (2 * np.sqrt(k * m)), rel=1e-12)
     assert np.isnan(modes.frequency_hz[0, 1])
     omega = 2 * np.pi * LINES
     exact = -(omega**2) * 0.3**2 / (k - m * omega**2 + 1j * omega * c)
-    np.testing.assert_allclose(dynamics.accelerance(solved, LINES)[0, 0, 0], exact, rtol=1e-10)
+    np.testing.assert_allclose(vibration.accelerance(solved, LINES)[0, 0, 0], exact, rtol=1e-10)
 
 
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 10_000))
 def test_reciprocity_at_one_point(seed):
     mass, damping, stiffness, (hit, _) = random_system(seed)
-    frf = dynamics.accelerance(dynamics.solve_poles(mass, damping, stiffness, hit, hit), LINES)[0]
+    frf = vibration.accelerance(vibration.solve_poles(mass, damping, stiffness, hit, hit), LINES)[0]
     np.testing.assert_allclose(frf, np.swapaxes(frf, 0, 1), atol=1e-9 * np.abs(frf).max())
 
 
 def test_oscillatory_modes_make_the_frf():
     mass, damping, stiffness, (hit, sensor) = random_system(3)
-    solved = dynamics.solve_poles(mass, damping, stiffness, hit, sensor)
-    modes = dynamics.oscillatory(solved, 6)
+    solved = vibration.solve_poles(mass, damping, stiffness, hit, sensor)
+    modes = vibration.oscillatory(solved, 6)
     assert np.isfinite(modes.frequency_hz).all()
     assert np.all(np.diff(modes.frequency_hz[0]) >= 0)
-    poles = modal.pole(modes.frequency_hz, modes.damping_ratio)
-    sum_of_modes = modal.accelerance(LINES, poles, modes.residue)[0]
-    whole = dynamics.accelerance(solved, LINES)[0]
+    poles = synthesis.pole(modes.frequency_hz, modes.damping_ratio)
+    sum_of_modes = synthesis.accelerance(LINES, poles, modes.residue)[0]
+    whole = vibration.accelerance(solved, LINES)[0]
     np.testing.assert_allclose(sum_of_modes, whole, atol=1e-9 * np.abs(whole).max())
 
 

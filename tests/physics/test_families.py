@@ -10,9 +10,9 @@ import pytest
 
 from known_robots import KR10
 from pendulums import pendulum_urdf
+from planner.dynamics import vibration
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.physics import dynamics
-from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Spring
 from planner.truth.model import load_truth
@@ -81,7 +81,7 @@ def test_loss_factors_against_a_direct_solution(tmp_path):
     m = simulation.elastic.matrices(q)
     for i in range(2):
         matrices = m.mass[i], simulation.damping, simulation.stiffness, m.hit[i], m.sensor[i]
-        direct = dynamics.direct_accelerance(*matrices, LINES)
+        direct = vibration.direct_accelerance(*matrices, LINES)
         found = simulation.accelerance(q, LINES)[i]
         assert np.abs(found - direct).max() < 1e-9 * np.abs(direct).max()
 
@@ -89,13 +89,13 @@ def test_loss_factors_against_a_direct_solution(tmp_path):
 def test_structural_damping_of_one_oscillator_in_closed_form():
     m, k, eta = np.array([[[2.0]]]), 5.0e4, 0.08
     j, k_complex = np.array([[[1.0], [0.0], [0.0]]]), np.array([[k * (1 + 1j * eta)]])
-    modes = dynamics.oscillatory(dynamics.solve_poles(m, np.zeros((1, 1)), k_complex, j, j), 2)
+    modes = vibration.oscillatory(vibration.solve_poles(m, np.zeros((1, 1)), k_complex, j, j), 2)
     pole = 1j * np.sqrt(k / 2.0 * (1 + 1j * eta))
     assert modes.frequency_hz[0, 0] == pytest.approx(abs(pole) / (2 * np.pi), rel=1e-12)
     assert modes.damping_ratio[0, 0] == pytest.approx(-pole.real / abs(pole), rel=1e-10)
     assert np.isnan(modes.frequency_hz[0, 1])
-    overdamped = dynamics.solve_poles(m, np.array([[2e3]]), k_complex, j, j)
-    assert np.isnan(dynamics.oscillatory(overdamped, 2).frequency_hz).all()
+    overdamped = vibration.solve_poles(m, np.array([[2e3]]), k_complex, j, j)
+    assert np.isnan(vibration.oscillatory(overdamped, 2).frequency_hz).all()
 
 
 def test_gravity_stiffens_what_hangs_and_softens_what_stands(tmp_path):

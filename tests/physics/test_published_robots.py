@@ -10,12 +10,12 @@ from scipy.spatial.transform import Rotation
 
 from planner.campaign.config import load_campaign_config
 from planner.demo import shipped
+from planner.dynamics.simulation import Simulation
 from planner.frf.metrics import agreement
-from planner.physics.simulation import Simulation
+from planner.report.frf_map import frf_map
+from planner.report.frf_plots import save
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from planner.show.frf_map import frf_map
-from planner.show.plots import save
 from planner.truth.model import load_truth
 
 ROBOTS = [

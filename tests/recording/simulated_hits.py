@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from planner.recording.types import Hit
+from planner.recording.records import Hit
 
 RATE_HZ = 512.0
 POLES = 2j * np.pi * np.array([11.0, 27.0]) - 2 * np.pi * np.array([11.0, 27.0]) * 0.025

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.diagnose.data.visits import Recorded, Visit
-from planner.recording.levels import levels, peak_n
-from planner.recording.types import Hit
+from planner.dataset.visits import Recorded, Visit
+from planner.recording.force_levels import levels, peak_n
+from planner.recording.records import Hit
 
 
 def pushed(peak):

@@ -7,7 +7,7 @@ from planner.cli.run import run
 from planner.errors import InputError
 from planner.recording.hits import hits_from
 from planner.recording.read import read
-from planner.recording.types import FrfRecord, TimeRecord
+from planner.recording.records import FrfRecord, TimeRecord
 
 
 def test_ascii_and_binary_of_the_same_record_agree(shared_data):

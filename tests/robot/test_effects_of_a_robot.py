@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.robot.robot import Robot
-from planner.robot.virtual import virtual_model
+from planner.robot.virtual_joints import virtual_model
 from planner.truth.arms import ARMS
 
 LENGTH, WIDTH, HEIGHT, MASS = 1.2, 0.5, 0.3, 90.0

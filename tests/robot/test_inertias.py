@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from known_robots import KNOWN_ROBOTS
-from planner.robot.elastic import ElasticModel
-from planner.robot.inertias import urdf_with_inertias
+from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
+from planner.robot.urdf_inertias import urdf_with_inertias
 
 
 @pytest.mark.parametrize("name", list(KNOWN_ROBOTS))

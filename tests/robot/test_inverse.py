@@ -5,7 +5,7 @@ import pytest
 
 from known_robots import KNOWN_ROBOTS
 from planner.robot.collision import Collisions
-from planner.robot.inverse import solve
+from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 from robots import make_arm
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from planner.campaign.config import WorkspaceTable
 from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
-from planner.robot.elastic import ElasticModel
-from planner.robot.inverse import solve
+from planner.robot.elastic_model import ElasticModel
+from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from robots import JOINTS_DEG, LIMITS_DEG, make_arm

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from planner.errors import InputError
-from planner.robot.elastic import ElasticModel
+from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from robots import make_arm
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from known_robots import KR10
-from planner.robot.elastic import ElasticModel
+from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 
 

@@ -12,11 +12,11 @@ from rerun.chunk import RrdReader
 from rich.console import Console
 
 from outside import make_cell, record
-from planner import itself
+from planner import program
 from planner.campaign.campaign import Campaign
-from planner.session.explaining import Explaining
+from planner.report.rerun_story import Story
+from planner.session.diagnosis_process import Explaining
 from planner.session.watch import watch
-from planner.show.story import Story
 
 WANTED = (
     "joint_a1",
@@ -198,7 +198,7 @@ def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(ce
         f"print(json.dumps({answers!r}[min(asked, 1)]))\n"
     )
     stand_in = [sys.executable, "-c", script, str(counter)]
-    monkeypatch.setattr(itself, "command", lambda *arguments: stand_in)
+    monkeypatch.setattr(program, "command", lambda *arguments: stand_in)
     monkeypatch.setattr("planner.session.watch.LEAST", 1)
     inbox = tmp_path / "inbox"
     console = screen()
@@ -217,7 +217,7 @@ def test_a_diagnosis_that_was_asked_for_meanwhile_follows_and_says_only_what_is_
 ):
     said = {"verdict": "unexplained", "findings": [{"text": "At 20 Hz."}]}
     stand_in = [sys.executable, "-c", f"import json; print(json.dumps({said!r}))"]
-    monkeypatch.setattr(itself, "command", lambda *arguments: stand_in)
+    monkeypatch.setattr(program, "command", lambda *arguments: stand_in)
     explaining = Explaining(tmp_path)
     assert explaining.told() is None
     explaining.ask()

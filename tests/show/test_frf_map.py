@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.collections import QuadMesh
 
-from planner.show.frf_map import frf_map
-from planner.show.plots import png
+from planner.report.frf_map import frf_map
+from planner.report.frf_plots import png
 
 FREQUENCY = np.arange(0.0, 30.0)
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from planner.fusion.diagnostics import LeaveOneOut
-from planner.show.left_out_plots import left_out_figure
+from planner.report.leave_one_out_plots import left_out_figure
+from planner.surrogate.leave_one_out import LeaveOneOut
 
 
 def texts(figure):

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from known_robots import IRB6640, KR10, KR210
+from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
-from planner.campaign.logged import from_mode
+from planner.campaign.log_conversion import from_mode
 from planner.campaign.model import Model, build
-from planner.campaign.outlook import cost_of
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
+from planner.frf.frf import Frf
 from planner.frf.metrics import global_frac
-from planner.frf.types import Frf
-from planner.modes.types import Mode
+from planner.modal.modes import Mode
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import Truth, load_truth
 

@@ -11,13 +11,13 @@ import numpy as np
 from known_robots import IRB6640, KR10, KR210, KnownRobot
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins, load_campaign_config
-from planner.campaign.logged import from_modal
+from planner.campaign.log_conversion import from_modal
 from planner.campaign.state import Measurement
+from planner.dataset.measure import Source, frf_of, measure
 from planner.demo import NAME, Pool, shipped
-from planner.frf.estimate import estimate
-from planner.frf.types import Frf
-from planner.modes.estimate import estimate_modes
-from planner.modes.measure import Source, frf_of, measure
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.modal.estimate_modes import estimate_modes
 from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
 from planner.truth.hits import Hammer

@@ -10,9 +10,9 @@ import numpy as np
 from known_robots import KR10
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.modes.track import Tracks
-from planner.modes.types import Mode
-from planner.physics.families import Families
+from planner.dynamics.mode_families import Families
+from planner.modal.modes import Mode
+from planner.modal.tracking import Tracks
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import Truth, load_truth
 from true_modes import Measured, undamped

@@ -13,21 +13,21 @@ from pathlib import Path
 import numpy as np
 
 from acquisition_cases import LINES, MODES, ROBOTS, Case
-from planner.acquire.separate import most_telling
-from planner.acquire.separate_laws import most_telling_forces, undecided
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
-from planner.diagnose.data.visits import Recorded, Visit
-from planner.diagnose.diagnose import Diagnosis, again, diagnose
-from planner.diagnose.effects import library
-from planner.diagnose.finding import Finding
-from planner.diagnose.linear.fit import Fit
-from planner.diagnose.screens.levels import screen
-from planner.frf.types import Frf
-from planner.recording.types import Hit
+from planner.dataset.visits import Recorded, Visit
+from planner.design.discrimination import most_telling
+from planner.design.law_discrimination import most_telling_forces, undecided
+from planner.diagnosis.effects import library
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear_diagnosis import Diagnosis, again, diagnose
+from planner.diagnosis.screens.force_levels import screen
+from planner.frf.frf import Frf
+from planner.recording.records import Hit
 from planner.truth.cases import PEAK_N
 from planner.truth.deviation import Deviation
 from planner.truth.effects import LINEAR, NONLINEAR

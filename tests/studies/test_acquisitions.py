@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from acquisition_cases import CELLS, campaign, make
-from planner.acquire.designs import NESTED
 from planner.campaign.config import CostTable
+from planner.design.pool_designs import NESTED
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")

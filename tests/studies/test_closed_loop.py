@@ -14,7 +14,7 @@ from fidelity_cells import MODES, UNUSED, band_of, cell_of, hit, soft, truth_of
 from known_robots import IRB6640, KR10, KR210
 from planner.campaign.events import Proposal
 from planner.campaign.model import build
-from planner.campaign.proposing import propose
+from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(6000)]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.studies import run
+from planner.studies import registry
 from planner.studies.report import write
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
 @pytest.fixture
 def report(request, tmp_path):
     """A study's report, printed and written."""
-    made = run.find(request.param)(lambda text, share: None)
+    made = registry.find(request.param)(lambda text, share: None)
     for table in made.tables:
         print(f"\n{table.title}\n" + " | ".join(table.columns))
         for row in table.rows:

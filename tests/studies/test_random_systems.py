@@ -11,8 +11,8 @@ from scipy.optimize import linear_sum_assignment
 
 from modal_systems import System, as_frf, exact_frf, noisy, random_system
 from planner.errors import RefusedError
-from planner.modes.estimate import estimate_modes
-from planner.modes.types import Mode
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.modes import Mode
 from test_peer_ema import peer_poles
 
 pytestmark = pytest.mark.slow

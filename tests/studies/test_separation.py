@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.acquire.separate import odds_after, separation
-from planner.diagnose.linear.fit import carried_on
-from planner.side_by_side import side_by_side
+from planner.design.discrimination import odds_after, separation
+from planner.diagnosis.linear.fit import carried_on
+from planner.inference.parallel import side_by_side
 from planner.truth.effects import NONLINEAR
 from separation_cases import KINDS, Campaign, OfEffects, begun
 

@@ -4,53 +4,59 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.studies import plane, recorded, run, seed_002, sweep
+from planner.studies import (
+    busch2020_data,
+    busch2022_data,
+    lei2023_data,
+    registry,
+    seyedhosseini2025,
+)
 from planner.studies.report import Finding, Report, Table, check_folder, write
 
 
 @pytest.fixture(scope="module")
 def truth():
-    return plane.true_robot(1)
+    return lei2023_data.true_robot(1)
 
 
 def test_the_sweep_has_the_papers_points():
-    seen = sweep.sweep(1)
+    seen = busch2020_data.sweep(1)
     assert seen.simulated.size == 12_801
     assert seen.amplitude.size == 2_622
     assert seen.angles_deg.max() == 105
-    assert sweep.BEYOND_DEG.min() > 105
+    assert busch2020_data.BEYOND_DEG.min() > 105
     assert np.array_equal(seen.every(3).angles_deg, seen.angles_deg[::3])
 
 
 def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks():
     """In the band, across the arm: two simulated, three true ones (and in-plane ones in both)."""
-    seen, truth = sweep.sweep(1), sweep.true_robot(1)
+    seen, truth = busch2020_data.sweep(1), busch2020_data.true_robot(1)
     for angle in (70.0, 105.0, 120.0):
         simulated = seen.modes(np.array([angle]), 6)
-        f, _, residue = truth.modes(sweep.poses(np.array([angle]))[0], 6)
+        f, _, residue = truth.modes(busch2020_data.poses(np.array([angle]))[0], 6)
         across = {
             "simulated": (simulated.frequency_hz[0], simulated.residue[0]),
             "true": (f, residue),
         }
         count = {}
         for name, (hz, r) in across.items():
-            size = np.abs(r[:, sweep.ACROSS, sweep.ACROSS]) / hz
+            size = np.abs(r[:, busch2020_data.ACROSS, busch2020_data.ACROSS]) / hz
             count[name] = np.count_nonzero((hz < 30) & (size > 0.003 * size.max()))
         assert count == {"simulated": 2, "true": 3}
 
 
 def test_parameters_of_the_plane_are_reciprocal(truth):
     """L is R over its reference entry, for the robot has no feedback; frequencies rise."""
-    q, x = plane.postures(truth)
+    q, x = lei2023_data.postures(truth)
     assert x.shape == (112, 3)
     few = q[::40]
-    parameters = plane.parameters(truth, few)
+    parameters = lei2023_data.parameters(truth, few)
     for posture, rows in zip(few, parameters, strict=True):
         poles = truth.poles(posture)[0]
-        order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][: plane.MODES]
+        order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][: lei2023_data.MODES]
         for k, row in zip(order, rows, strict=True):
-            left = row[plane.LEFT].reshape(3, 2) @ [1, 1j]
-            right = row[plane.RIGHT].reshape(4, 2) @ [1, 1j]
+            left = row[lei2023_data.LEFT].reshape(3, 2) @ [1, 1j]
+            right = row[lei2023_data.RIGHT].reshape(4, 2) @ [1, 1j]
             assert np.isclose(row[0], np.abs(poles[k]) / (2 * np.pi))
             # Reciprocity: L is R over its own reference entry.
             candidates = [np.insert(left, i, 1.0) for i in range(4)]
@@ -59,8 +65,8 @@ def test_parameters_of_the_plane_are_reciprocal(truth):
 
 
 def test_scatter_is_relative(truth):
-    clean = plane.parameters(truth, plane.postures(truth)[0][:3])
-    sd = plane.scatter(clean)
+    clean = lei2023_data.parameters(truth, lei2023_data.postures(truth)[0][:3])
+    sd = lei2023_data.scatter(clean)
     assert np.allclose(sd[..., 0], 0.002 * clean[..., 0])
     assert np.allclose(sd[..., 1], 0.05 * clean[..., 1])
     assert np.allclose(sd[..., 2], sd[..., 7])
@@ -68,11 +74,11 @@ def test_scatter_is_relative(truth):
 
 def test_splits_are_nested_spread_and_complete():
     grid = np.stack(np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 7)), axis=-1).reshape(-1, 2)
-    train, test = recorded.split(grid, 3)
+    train, test = busch2022_data.split(grid, 3)
     assert sorted([*train, *test]) == list(range(35))
     assert len(train) == len(set(train)) == 15
-    assert np.array_equal(train, recorded.split(grid, 3)[0])
-    assert not np.array_equal(train, recorded.split(grid, 4)[0])
+    assert np.array_equal(train, busch2022_data.split(grid, 3)[0])
+    assert not np.array_equal(train, busch2022_data.split(grid, 4)[0])
     # From every pose a trained one is near.
     apart = np.linalg.norm(grid[:, None] - grid[train][None], axis=2).min(axis=1)
     assert apart.max() < 0.5
@@ -80,15 +86,15 @@ def test_splits_are_nested_spread_and_complete():
 
 def test_modes_of_a_posture_give_its_frf_back(tmp_path):
     """Six true modes nearly are the truth's FRF in their band."""
-    truth = seed_002.load_truth(seed_002.KR210.write(tmp_path, 3))
+    truth = seyedhosseini2025.load_truth(seyedhosseini2025.KR210.write(tmp_path, 3))
     q = np.deg2rad([0.0, -80.0, 90.0, 0.0, 70.0, 180.0])
-    told = seed_002._synthesised(seed_002._parameters(truth, q)[None])[0]
-    true = truth.accelerance(q, seed_002.LINES_HZ)[np.arange(3), np.arange(3)]
+    told = seyedhosseini2025._synthesised(seyedhosseini2025._parameters(truth, q)[None])[0]
+    true = truth.accelerance(q, seyedhosseini2025.LINES_HZ)[np.arange(3), np.arange(3)]
     assert np.linalg.norm(told - true) < 0.1 * np.linalg.norm(true)
 
 
 def test_a_report_is_written_as_tables_and_pictures(tmp_path):
-    from planner.studies.draw import new
+    from planner.studies.drawing import new
 
     figure = new((3, 2), "empty")
     table = Table("t", "T", ("a", "b"), (("x", 1.5),))
@@ -102,7 +108,7 @@ def test_a_report_is_written_as_tables_and_pictures(tmp_path):
 
 def test_bad_input_is_one_sentence(tmp_path):
     with pytest.raises(InputError, match=r"no study seed-9; choose one of seed-000"):
-        run.find("seed-9")
+        registry.find("seed-9")
     file = tmp_path / "file"
     file.write_text("")
     with pytest.raises(InputError, match="name another folder"):

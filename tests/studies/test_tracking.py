@@ -12,8 +12,8 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.modes.track import Guide, Tracks, track
-from planner.physics.simulation import Simulation
+from planner.dynamics.simulation import Simulation
+from planner.modal.tracking import Guide, Tracks, track
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth

@@ -8,14 +8,14 @@ import numpy as np
 import scipy.linalg
 from scipy.optimize import linear_sum_assignment
 
+from planner.dynamics.mode_families import Families, rearranged
+from planner.dynamics.vibration import SimulatedModes
 from planner.errors import RefusedError
-from planner.frf.estimate import estimate
-from planner.modes.compare import mac_matrix
-from planner.modes.estimate import estimate_modes
-from planner.modes.types import Mode
-from planner.physics.dynamics import SimulatedModes
-from planner.physics.families import Families, rearranged
-from planner.recording.types import Hit
+from planner.frf.estimator import estimate
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.mac import mac_matrix
+from planner.modal.modes import Mode
+from planner.recording.records import Hit
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.model import Truth
 

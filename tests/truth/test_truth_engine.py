@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 
 from known_robots import KNOWN_ROBOTS, KR10
 from pendulums import pendulum_urdf
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth import inverse

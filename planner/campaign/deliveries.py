@@ -1,0 +1,77 @@
+"""What the user names on the command line, sorted into poses with their files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from planner.dataset.measure import Source
+from planner.errors import InputError
+from planner.recording.folder import TABLE, files_in, read_recordings
+from planner.recording.records import PoseRow
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """Files of one pose; `joints_deg` is the readback, None where no table states it."""
+
+    pose: str
+    joints_deg: tuple[float, ...] | None
+    sources: tuple[Source, ...]
+    row: str = ""  # "file, row n" for messages
+
+
+def sort_paths(
+    paths: tuple[Path, ...],
+    joint_names: tuple[str, ...],
+    pose: str | None,
+    default_pose: str | None,
+) -> tuple[Delivery, ...]:
+    """Deliveries by pose, in recording order.
+
+    A folder with recordings.csv says itself which pose a file belongs to (`pose` then picks one,
+    or renames the only one); bare files belong to `pose` or, without it, to `default_pose`.
+    """
+    deliveries: list[Delivery] = []
+    bare: list[Path] = []
+    for path in paths:
+        table = path if path.name == TABLE else path / TABLE
+        if table.is_file():
+            deliveries += _from_table(table.parent, joint_names, pose)
+        elif path.is_dir():
+            bare += files_in(path)
+        elif path.is_file():
+            bare.append(path)
+        else:
+            raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
+    if bare:
+        name = pose or default_pose
+        if name is None:
+            raise InputError(
+                f"{bare[0]}: it is not clear at which pose it was recorded; say --pose ID."
+            )
+        sources = tuple(Source(path, str(path)) for path in bare)
+        deliveries.append(Delivery(name, None, sources))
+    return tuple(deliveries)
+
+
+def _from_table(folder: Path, joint_names: tuple[str, ...], pose: str | None) -> list[Delivery]:
+    recordings = read_recordings(folder, joint_names)
+    rows: dict[str, list[PoseRow]] = {}
+    for row in recordings.rows:
+        rows.setdefault(row.pose, []).append(row)
+    if pose is not None and pose not in rows and len(rows) == 1:
+        rows = {pose: next(iter(rows.values()))}
+    elif pose is not None and pose not in rows:
+        raise InputError(
+            f"{folder / TABLE} has no pose {pose}; its poses are {', '.join(list(rows)[:8])}."
+        )
+    elif pose is not None:
+        rows = {pose: rows[pose]}
+    return [
+        Delivery(
+            name,
+            group[0].joints_deg,
+            tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in group if r.file),
+            f"{folder / TABLE}, row {group[0].row}",
+        )
+        for name, group in rows.items()
+    ]

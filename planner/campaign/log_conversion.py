@@ -1,0 +1,74 @@
+"""Modes and force levels as the log keeps them, and back."""
+
+import numpy as np
+
+from planner.campaign.events import Amplitude, ForceLevel, MeasuredMode
+from planner.modal.homogeneity import Homogeneity
+from planner.modal.modes import ModalModel, Mode
+
+
+def to_mode(measured: MeasuredMode) -> Mode:
+    """A mode as the numerics want it, from how the log keeps it."""
+    cells = np.array(
+        [[np.nan if v is None else v for v in cell] for cell in measured.residue], dtype=float
+    )
+    residue = (cells[:, 0] + 1j * cells[:, 1]).reshape(3, 3)
+    shape = np.array([complex(re, im) for re, im in measured.shape])
+    return Mode(
+        measured.frequency_hz,
+        measured.frequency_sd_hz,
+        measured.damping_ratio,
+        measured.damping_sd,
+        residue,
+        cells[:, 2].reshape(3, 3),
+        shape,
+        measured.probability,
+    )
+
+
+def from_mode(mode: Mode) -> MeasuredMode:
+    """A mode as the log keeps it."""
+
+    def number(value: float) -> float | None:
+        return float(value) if np.isfinite(value) else None
+
+    cells = zip(mode.residue.ravel(), mode.residue_sd.ravel(), strict=True)
+    return MeasuredMode(
+        frequency_hz=float(mode.frequency_hz),
+        frequency_sd_hz=float(mode.frequency_sd_hz),
+        damping_ratio=float(mode.damping_ratio),
+        damping_sd=float(mode.damping_sd),
+        shape=tuple((float(s.real), float(s.imag)) for s in mode.shape),
+        residue=tuple((number(r.real), number(r.imag), number(sd)) for r, sd in cells),
+        probability=float(mode.probability),
+    )
+
+
+def from_modal(modal: ModalModel | None) -> tuple[MeasuredMode, ...]:
+    """All modes of a pose as the log keeps them, doubtful ones too, in order of frequency."""
+    if modal is None:
+        return ()
+    every = sorted((*modal.modes, *modal.doubtful), key=lambda mode: mode.frequency_hz)
+    return tuple(from_mode(mode) for mode in every)
+
+
+def from_homogeneity(found: Homogeneity | None) -> Amplitude | None:
+    """The comparison of force levels as the log keeps it."""
+    if found is None:
+        return None
+
+    def numbers(values: np.ndarray) -> tuple[float | None, ...]:
+        return tuple(float(v) if np.isfinite(v) else None for v in values)
+
+    levels = tuple(
+        ForceLevel(
+            level.peak_force_n,
+            level.hits,
+            numbers(level.frequency_hz),
+            numbers(level.frequency_sd_hz),
+            numbers(level.damping_ratio),
+            numbers(level.damping_sd),
+        )
+        for level in found.levels
+    )
+    return Amplitude(levels, found.difference, found.p_value, found.homogeneous)

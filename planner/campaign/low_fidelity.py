@@ -1,0 +1,278 @@
+"""The low fidelity of a campaign: the simulation as it stands, or as the recordings teach it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import SimulatedModes
+from planner.frf import synthesis
+from planner.frf.frf import Frf
+from planner.identification.extended_structure import FLOOR, Structure, extended
+from planner.identification.frequency_uncertainty import frequency_sd
+from planner.identification.identify import QUICK, Effort, identify
+from planner.identification.parameters import Priors
+from planner.identification.result import Identification
+from planner.surrogate.hedged import BELIEF
+
+# CAD masses and moments are right to 5 %, centres of mass to 1 cm.
+PRIORS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
+# Misfit (χ² per value) from which the simulation is suspected to lack physics. Where springs that
+# robot.toml does not state do not mend that, what it says of a pose is tested by identifying it
+# without that pose; into so many parts at most.
+SUSPECT, FOLDS = 3.0, 2
+BEST = 0.95  # misfit below which no springs that are added can bring it
+# A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
+KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
+BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
+RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
+LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
+
+
+def _effort(poses: int) -> Effort:
+    """Lines a pose that keep the time about the same however many poses there are."""
+    lines, log_lines = (max(12, min(QUICK.lines, LINES // poses)), max(12, LOG_LINES // poses))
+    last = max(20, min(QUICK.last_lines, LAST_LINES // poses))
+    log_lines = min(QUICK.log_lines, log_lines)
+    return replace(QUICK, lines=lines, log_lines=log_lines, last_lines=last)
+
+
+@dataclass(frozen=True, eq=False)
+class Learned:
+    """What the recordings taught the simulation."""
+
+    structure: Structure
+    identified: Identification
+
+    @property
+    def fits(self) -> bool:
+        """Whether nothing speaks for physics that it lacks."""
+        return self.identified.misfit <= SUSPECT
+
+    @property
+    def priors(self) -> Priors:
+        """Those it was identified with."""
+        return self.structure.priors
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """Springs that robot.toml does not state, that matter and that the recordings determine.
+
+        The softest first, in units of the stiffest that is stated at the same place.
+        """
+        size = self.structure.simulation.elastic.size
+        springs = [
+            e
+            for e in self.identified.estimates
+            if e.kind == "stiffness" and min(e.blocks) >= size - self.structure.added
+        ]
+        told = [e for e in springs if e.log_sd < KNOWN and e.value < MATTERS * e.prior_median]
+        told.sort(key=lambda e: e.value / e.prior_median)
+        return tuple(
+            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} N·m/rad"
+            for e in told
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class LowFidelity:
+    """What the simulation says at any pose; None: the campaign uses none.
+
+    `left_out` (n, count) is what simulations that were identified without a pose say of its
+    natural frequencies (Hz), NaN where that was not asked.
+    """
+
+    count: int
+    nominal: Simulation | None
+    learned: Learned | None = None
+    left_out: np.ndarray | None = None
+    suspect: Learned | None = None  # what was identified and then found worse than nominal
+
+    @property
+    def identified(self) -> Identification | None:
+        """What was identified and is used."""
+        return self.learned.identified if self.learned else None
+
+    @property
+    def taught(self) -> bool:
+        """Whether it was identified from the recordings and fits them to their noise."""
+        return self.learned is not None and self.learned.fits
+
+    @property
+    def simulation(self) -> Simulation | None:
+        """The identified simulation where there is one."""
+        return self.learned.identified.simulation if self.learned else self.nominal
+
+    def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
+        """Simulated modes of poses q (n, dof) in rad; NaN without a simulation.
+
+        As many as the campaign models, and `more` above them.
+        """
+        count = self.count + more
+        if self.simulation is None:
+            empty = np.full((len(q), count), np.nan)
+            residue = np.full((len(q), count, 3, 3), np.nan + 0j)
+            return SimulatedModes(empty, empty, residue)
+        return self.simulation.modes(q, count)
+
+    def frequencies(self, q: np.ndarray) -> SimulatedModes:
+        """The same without residues, for many poses."""
+        if self.simulation is None:
+            return self.simulate(q)
+        return self.simulation.frequencies(q, self.count)
+
+    def above(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
+        """What modes above those modelled add to the accelerance, (n, 3, 3, F) in m/s²/N.
+
+        0 unless the simulation was identified and fits: it is not known then.
+        """
+        if self.learned is None or not self.taught:
+            return np.zeros((len(q), 3, 3, len(frequency_hz)), dtype=complex)
+        simulation = self.learned.identified.simulation
+        modes = simulation.modes(q, self.count)
+        known = np.isfinite(modes.frequency_hz)
+        pole = synthesis.pole(
+            np.where(known, modes.frequency_hz, 1.0), np.where(known, modes.damping_ratio, 0.1)
+        )
+        residue = np.where(known[..., None, None], modes.residue, 0.0)
+        below = synthesis.accelerance(frequency_hz, pole, residue)
+        return simulation.accelerance(q, frequency_hz) - below
+
+    def discrepancy(self, measured_hz: np.ndarray) -> np.ndarray | None:
+        """Size of ln f's error (count,) where the simulation was not fitted; None: not known.
+
+        measured_hz (n, count), NaN where a mode was not found. A simulation that explains its
+        recordings is nearly right; another is as uncertain as ever before a pose was left out.
+        """
+        if self.learned is None:
+            return None
+        if self.learned.fits:
+            return np.full(self.count, RIGHT * max(self.learned.identified.misfit, 1.0))
+        if self.left_out is None:
+            return None
+        error = np.log(measured_hz / self.left_out)
+        known = np.isfinite(error)
+        square = np.where(known, error, 0.0) ** 2
+        # A prior observation keeps few errors that happen to be small from being trusted.
+        return np.sqrt((RIGHT**2 + square.sum(axis=0)) / np.maximum(known.sum(axis=0), 1))
+
+    @property
+    def remark(self) -> str:
+        """What the engineer should know of the simulation; empty where it follows as stated."""
+        learned = self.learned or self.suspect
+        if learned is None:
+            return ""
+        if learned.fits:
+            return _lacking(learned.found) if learned.structure.added else ""
+        text = (
+            f"Identified from the recordings, the simulation still misses them by "
+            f"{np.sqrt(learned.identified.misfit):.0f} times their noise: it lacks physics"
+        )
+        if self.learned is None:
+            return f"{text}, so that it is used as robot.toml states it, or not at all."
+        return f"{text}, or its geometry is off."
+
+    @property
+    def belief(self) -> float:
+        """Probability that it is of use, by the FRFs: a whole matrix of them is hard to fit."""
+        return BELIEVED if self.taught else BELIEF
+
+    def frequency_sd(self, q: np.ndarray) -> np.ndarray:
+        """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation."""
+        if self.learned is None:
+            return np.zeros((len(q), self.count))
+        nominal, identified = self.learned.structure.simulation, self.learned.identified
+        return frequency_sd(identified, nominal, self.learned.priors, q, self.count)
+
+
+def _lacking(found: tuple[str, ...]) -> str:
+    text = "robot.toml lacks compliance that the recordings show"
+    if not found:
+        return f"{text}, but not yet where; tilts of all joints and the floor are identified."
+    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
+    named = "; ".join(found[:NAMED])
+    bolts = " Check the anchor bolts." if FLOOR in named else ""
+    return f"{text}, identified beside what it states: {named}{more}.{bolts}"
+
+
+def learn(
+    before: LowFidelity, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+) -> LowFidelity:
+    """The simulation identified again from the FRFs measured at q (n, dof) in rad.
+
+    A function of its arguments alone, whatever was identified before: replays must agree.
+    """
+    nominal = before.nominal
+    if nominal is None or not frfs:
+        return before
+    learned = _wider(_identified(Structure(nominal, PRIORS), frfs, q, band_hz), frfs, q, band_hz)
+    left_out = None
+    if not learned.fits and len(frfs) > 1:
+        left_out = _left_out(learned, frfs, q, band_hz, before.count)
+    return LowFidelity(before.count, nominal, learned, left_out)
+
+
+def _wider(
+    stated: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+) -> Learned:
+    """With springs that robot.toml does not state, where the recordings speak for them.
+
+    That is where χ² falls by more than ln n for each of their parameters (Schwarz 1978).
+    """
+    structure = extended(stated.structure.simulation, stated.structure.priors)
+    first = stated.identified
+    penalty = 2 * structure.added * np.log(first.values)
+    if first.values * (first.misfit - BEST) < penalty:
+        return stated
+    wider = _identified(structure, frfs, q, band_hz, first if stated.fits else None)
+    gain = first.values * (first.misfit - wider.identified.misfit)
+    return wider if gain > penalty else stated
+
+
+def _identified(
+    structure: Structure,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float],
+    warm: Identification | None = None,
+) -> Learned:
+    effort, nominal, priors = _effort(len(frfs)), structure.simulation, structure.priors
+    found = identify(frfs, q, nominal, priors, band_hz=band_hz, starts=1, warm=warm, effort=effort)
+    return Learned(structure, found)
+
+
+def _left_out(
+    warm: Learned,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float],
+    count: int,
+) -> np.ndarray:
+    out = np.full((len(frfs), count), np.nan)
+    folds = min(len(frfs), FOLDS)
+    for fold in range(folds):
+        away = np.arange(len(frfs)) % folds == fold
+        kept = [frf for frf, gone in zip(frfs, away, strict=True) if not gone]
+        found = _again(warm, kept, q[~away], band_hz)
+        out[away] = found.simulation.modes(q[away], count).frequency_hz
+    return out
+
+
+def _again(
+    warm: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+) -> Identification:
+    """From fewer poses, starting where all of them led."""
+    # Beside an error of a percent, forty lines and no completion are exact enough.
+    rough = replace(_effort(len(frfs)), last_lines=40, last_completions=0)
+    structure, first = warm.structure, warm.identified
+    return identify(
+        frfs,
+        q,
+        structure.simulation,
+        structure.priors,
+        band_hz=band_hz,
+        starts=1,
+        warm=first,
+        effort=rough,
+    )

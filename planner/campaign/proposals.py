@@ -1,0 +1,95 @@
+"""Where to measure next, as the campaign's log records it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from planner.campaign.acquisition_inputs import cost_of, informed_candidates
+from planner.campaign.events import Proposal
+from planner.campaign.model import Model
+from planner.campaign.state import CampaignState
+from planner.design.hit_axes import axis_shares
+from planner.design.propose import DESIGNS, INFORMED, Pick, Travel
+from planner.design.propose import propose as choose
+from planner.errors import NoPoseLeftError
+
+# Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
+AVOIDED = 0.1
+
+
+def propose(
+    model: Model, state: CampaignState, count: int, acquisition: str
+) -> tuple[Proposal, ...]:
+    """The next poses to measure; NoPoseLeftError when no candidate is left."""
+    cell = model.cell
+    candidates = cell.candidates
+    picks = _picks(model, state, count, acquisition)
+    if not picks:
+        raise NoPoseLeftError(
+            f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
+            f"widen [workspace] or raise candidates in campaign.toml."
+        )
+    return tuple(
+        Proposal(
+            pose=f"P{state.proposals_made + i + 1:03d}",
+            joints_deg=tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])),
+            position_m=_xyz(candidates.position_m[pick.index]),
+            score=float(pick.score),
+            reason=_reason(model, pick.index, acquisition),
+            hits=tuple("xyz"[axis] for axis in pick.axes),
+            minutes=round(pick.minutes, 2) if np.isfinite(pick.minutes) else None,
+        )
+        for i, pick in enumerate(picks)
+    )
+
+
+def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
+    cell = model.cell
+    x = cell.candidates.features
+    taken = [m.joints_deg for m in state.measurements.values()]
+    at = np.deg2rad(taken[-1]) if taken else None
+    shares = None
+    if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
+        shares = axis_shares(model.low.simulate(cell.candidates.q).residue)
+    travel = Travel(cost_of(cell), cell.candidates.q, at, shares)
+    taken += [state.proposals[pose].joints_deg for pose in state.skipped]
+    allowed = cell.allowed
+    for pose in state.avoided:
+        there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
+        allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
+    asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
+    if acquisition in INFORMED:
+        asked, seen = informed_candidates(cell), model.informed
+    elif acquisition not in DESIGNS:
+        seen = model.outlook
+    picks = choose(
+        acquisition,
+        model.surrogate,
+        x[asked],
+        said[asked],
+        count=count,
+        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
+        seed=state.events,
+        outlook=seen,
+        travel=travel.among(asked),
+        allowed=allowed[asked],
+    )
+    return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
+
+
+def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 5) for v in position_m)
+    return x, y, z
+
+
+def _reason(model: Model, index: int, acquisition: str) -> str:
+    p = model.expected(index)
+    sd = 100 * p.frequency_sd_hz[0] / p.frequency_hz[0]
+    k = int(np.argmax(sd))
+    text = f"mode {k + 1} is expected at {p.frequency_hz[0, k]:.2f} Hz ± {sd[k]:.1f} %"
+    if model.labelled:
+        x = model.cell.features(np.array([pose.q for pose in model.labelled]))
+        distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)
+        near = model.labelled[int(np.argmin(distance))].pose
+        text += f" here, nearest measured pose {near}"
+    return f"{acquisition.replace('_', ' ')}: {text}"

@@ -1,0 +1,75 @@
+"""What another strategy would have saved in a campaign: played on the poses that were measured."""
+
+from dataclasses import dataclass
+
+from threadpoolctl import threadpool_limits
+
+from planner.campaign.campaign import Campaign
+from planner.compare.bench import assemble, cell_of
+from planner.compare.curves import Curves
+from planner.compare.pool import PoolPose
+from planner.compare.run import planned, play
+from planner.compare.tasks import LEFT, Run, Task
+from planner.design.pool_designs import NESTED
+from planner.design.propose import check_name
+from planner.errors import InputError
+
+LEAST = 2 + LEFT  # measured poses: one to begin with, one to choose, and some to judge by
+
+
+@dataclass(frozen=True, eq=False)
+class Otherwise:
+    """The campaign in the order in which it was measured, and as the strategy would have chosen.
+
+    Both begin with the pose measured first and are judged on the poses not yet used.
+    """
+
+    acquisition: str
+    pool: int
+    measured: Run
+    instead: Run
+
+    @property
+    def text(self) -> str:
+        """One sentence for the engineer."""
+        was, other = (_to_goal(run) for run in (self.measured, self.instead))
+        return (
+            f"To an RMSE of 1 % on the poses not yet used, {self.acquisition} would have needed "
+            f"{other}, the campaign as it was {was} (chosen among the {self.pool} poses measured)."
+        )
+
+
+def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
+    """What `acquisition` would have saved; None with too few measured poses to tell.
+
+    Raises InputError for an unknown acquisition.
+    """
+    if acquisition not in NESTED:
+        check_name(acquisition)
+    cell = campaign.cell
+    used = [m for m in campaign.state.measurements.values() if not m.withdrawn and m.modes]
+    if len(used) < LEAST:
+        return None
+    table = cell.config.modes
+    poses = [PoolPose(m, campaign.frf_of(m, table), (), "", m.simulated) for m in used]
+    try:
+        bench, _ = assemble(cell.robot, cell.config, poses)
+    except InputError:
+        return None
+    count = len(bench.measurements)
+    if count < LEAST:
+        return None
+    task = Task(acquisition, 0, 1, count - LEFT)
+    order = list(range(count - LEFT))
+    with threadpool_limits(1):
+        rest = [i for i in planned(cell_of(bench), task) if i] if acquisition in NESTED else []
+        measured = play(bench, order[:1], order[1:], task)
+        instead = play(bench, order[:1], rest[: task.budget - 1], task)
+    return Otherwise(acquisition, count, measured, instead)
+
+
+def _to_goal(run: Run) -> str:
+    curve = Curves.of([run])
+    if curve.to_goal is None:
+        return f"more than {run.n[-1]}"
+    return f"{curve.to_goal} ({curve.minutes_to_goal:.0f} min of robot time)"

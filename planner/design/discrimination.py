@@ -1,0 +1,193 @@
+"""What one more measurement would do to tell apart candidates that the recordings leave tied.
+
+Of each pair, the χ² by which one candidate's FRFs would miss the other's even if it were fitted to
+them too, its posterior being the prior: T-optimality (Atkinson & Fedorov 1975), after which what
+mere refitting follows counts for nothing, as it still does in Hunter & Reiner (1965). In closed
+form refitting is a linear step; a mass that may lie on this link or that goes farther, so that the
+most promising hits are tried: every candidate is fitted to what every other one foretells.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import permutations
+
+import numpy as np
+
+from planner.design.frequency_posterior import AXES
+from planner.design.parameter_sensitivity import FrfNoise
+from planner.diagnosis.linear.fit import Fit, Problem, carried_on
+from planner.diagnosis.linear.predict import misfit_at
+from planner.frf.frf import Frf
+from planner.inference.parallel import side_by_side
+
+LINES = 96  # evenly over the band
+TRIED = 8  # poses at which fits are tried, the most promising in closed form
+LIKELIEST = 4  # fits that are tried there
+STEPS = 20  # of each
+
+
+@dataclass(frozen=True)
+class Telling:
+    """A hit at the pose with this number along tcp axis 0, 1 or 2 (x, y, z).
+
+    `log_odds` is the natural logarithm of the odds it is expected to give.
+    """
+
+    pose: int
+    axis: int
+    log_odds: float
+
+
+def most_telling(
+    problem: Problem,
+    fits: Sequence[Fit],
+    probability: Sequence[float],
+    q: np.ndarray,
+    temper: float,
+) -> Telling:
+    """The hit that best separates two or more fits, at one of q (n, dof) in rad.
+
+    `probability` of each fit; χ² counts 1/`temper`. Only the LIKELIEST are looked at.
+    """
+    likeliest = np.argsort(-np.asarray(probability))[:LIKELIEST].tolist()
+    fits, probability = [fits[i] for i in likeliest], [probability[i] for i in likeliest]
+    gain = np.nan_to_num(separation(problem, fits, probability, q, temper))
+    share = np.array(probability) / np.sum(probability)
+    axes = np.argmax(gain, axis=1)
+    promising = np.argsort(-np.max(gain, axis=1))[:TRIED].tolist()
+    settled = side_by_side(partial(_to_the_end, problem), fits)
+    hits = [(pose, int(axes[pose])) for pose in promising]
+    odds = side_by_side(partial(_tried, problem, settled, share, q, temper), hits)
+    return max(map(Telling, *zip(*hits, strict=True), odds), key=lambda t: t.log_odds)
+
+
+def _to_the_end(problem: Problem, fit: Fit) -> Fit:
+    return carried_on(problem, fit, fit.effect)
+
+
+def _tried(
+    problem: Problem,
+    fits: Sequence[Fit],
+    share: np.ndarray,
+    q: np.ndarray,
+    temper: float,
+    hit: tuple[int, int],
+) -> float:
+    pose, axis = hit
+    return odds_after(problem, fits, share, q[pose], axis, temper)
+
+
+def odds_after(
+    problem: Problem,
+    fits: Sequence[Fit],
+    share: np.ndarray,
+    q: np.ndarray,
+    axis: int,
+    temper: float,
+) -> float:
+    """Logarithm of the odds that a hit at q (dof,) gives, all fitted to what each foretells.
+
+    `fits` are settled on the problem's recordings; `share` (fits,) sums to 1.
+    """
+    before = np.array([f.log_evidence(temper) for f in fits])
+    out = 0.0
+    for true, source in enumerate(fits):
+        frfs = (*problem.frfs, _foretold(problem, source, q, axis))
+        more = replace(problem, frfs=frfs, q=np.vstack([problem.q, q]))
+        refitted = [carried_on(more, f, f.effect, STEPS) for f in fits]
+        after = np.array([f.log_evidence(temper) for f in refitted])
+        gained = after - before
+        for other in range(len(fits)):
+            if other != true:
+                weight = share[true] * share[other] / (1 - share[true])
+                out += float(weight * (gained[true] - gained[other]))
+    return out
+
+
+def _foretold(problem: Problem, source: Fit, q: np.ndarray, axis: int) -> Frf:
+    """The FRF column that a fit foretells at q (dof,), with the noise of those measured."""
+    like, noise = problem.frfs[0], FrfNoise.of(problem.frfs, problem.band_hz, 1.0)
+    rate = like.exponential_rate_1_s
+    there = misfit_at(problem, source.effect, q[None], like.frequency_hz, rate)
+    h = there.response(source.x)[0][0]
+    # The model's own error is no part of an FRF's variance; fits add it.
+    floor = _sd(noise, h) if noise.floor is None else np.full(h.shape, noise.floor)
+    unknown = np.full(h.shape, np.nan)
+    seen, variance = unknown.astype(complex), unknown.copy()
+    seen[:, axis], variance[:, axis] = h[:, axis], floor[:, axis] ** 2
+    hits = int(axis == 0), int(axis == 1), int(axis == 2)
+    return Frf(like.frequency_hz, seen, variance, unknown, hits, like.usable_band_hz, rate)
+
+
+def separation(
+    problem: Problem,
+    fits: Sequence[Fit],
+    probability: Sequence[float],
+    q: np.ndarray,
+    temper: float,
+) -> np.ndarray:
+    """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
+
+    q in rad; of the true one of the fits to each other one, averaged as probable as they are.
+    0 where there are fewer than two.
+    """
+    q = np.atleast_2d(q)
+    gain = np.zeros((len(q), AXES))
+    if len(fits) < 2:
+        return gain
+    share = np.array(probability) / np.sum(probability)
+    noise = FrfNoise.of(problem.frfs, problem.band_hz, temper)
+    lines = np.linspace(*problem.band_hz, LINES)
+    # Lines closer than those of a record are not measured apart; farther ones stand for several.
+    each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
+    known = [fit.precision(temper) for fit in fits]
+    rate = problem.frfs[0].exponential_rate_1_s
+    for place, row in enumerate(q):
+        told = [
+            tuple(
+                one[0] for one in misfit_at(problem, f.effect, row[None], lines, rate).response(f.x)
+            )
+            for f in fits
+        ]
+        scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in told]
+        gain[place] = expected_log_odds(told, scales, known, share)
+    return gain
+
+
+def expected_log_odds(
+    told: Sequence[tuple[np.ndarray, np.ndarray]],
+    scales: Sequence[np.ndarray],
+    known: Sequence[np.ndarray],
+    share: np.ndarray,
+) -> np.ndarray:
+    """Of the true candidate to each other one (3,), for a hit along each axis.
+
+    Each candidate tells an FRF (3, 3, F) and its slopes (D, 3, 3, F), weighs what it would be
+    measured as with its scale (3, 3, F), and has `known` (D, D), the precision of its parameters.
+    """
+    gain = np.zeros(AXES)
+    for true, other in permutations(range(len(told)), 2):
+        weight = share[true] * share[other] / (1 - share[true])
+        missed = scales[true] * (told[true][0] - told[other][0])
+        moved = scales[true] * told[other][1]
+        for axis in range(AXES):
+            left = _left(missed[:, axis], moved[:, :, axis], known[other])
+            gain[axis] += weight * left / 2
+    return gain
+
+
+def _sd(noise: FrfNoise, h: np.ndarray) -> np.ndarray:
+    """Root of E|δH|² of an FRF h (3, 3, F)."""
+    floor = noise.floor
+    if floor is None:
+        floor = noise.relative * np.sqrt(np.mean(np.abs(h) ** 2))
+    return np.hypot(noise.relative * np.abs(h), floor)
+
+
+def _left(missed: np.ndarray, slope: np.ndarray, precision: np.ndarray) -> float:
+    """χ² of `missed` (3, F) that moving along `slope` (D, 3, F) leaves; prior `precision`."""
+    r = np.ascontiguousarray(missed).reshape(-1).view(float)
+    j = np.ascontiguousarray(slope).reshape(len(slope), -1).view(float)
+    pull = j @ r
+    return float(r @ r - pull @ np.linalg.solve(precision + j @ j.T, pull))

@@ -1,0 +1,152 @@
+"""The pose, axis and forces of the hits that best tell apart laws of a joint that is not linear.
+
+Friction, play and a softening spring answer alike over a short range of force, and differ beyond.
+What each would answer follows from its equivalent stiffness at the swing that the hit gives the
+joint (describing function; Worden & Tomlinson 2001, chapter 3), found by iteration. As where laws
+are fitted, the difference between two forces is compared: what else is wrong is the same in both.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.design.discrimination import Telling, expected_log_odds
+from planner.design.frequency_posterior import AXES
+from planner.diagnosis.laws.equivalent_stiffness import Receptances, receptances, system_of, waves
+from planner.diagnosis.laws.level_data import DIFFERENCE_ERROR, MODEL_ERROR, own_parameter
+from planner.diagnosis.laws.one_joint import Candidate, Laws, covariance
+from planner.diagnosis.laws.starting_values import faded
+from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear_diagnosis import TIED
+
+LOOKED_AT = 60  # poses: each takes tens of milliseconds
+APART = 2.0  # between two forces, so that hits of each are told from those of the other
+LEVELS = 6  # forces that are looked at, evenly in logarithms
+ROUNDS = 8  # of the iteration between swing and stiffness
+STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's own stiffness
+STILL = 1e-15  # rad: a swing as small as none
+
+
+@dataclass(frozen=True)
+class TellingForces:
+    """A pose and an axis to hit, once or more with each of two peak forces (N)."""
+
+    hit: Telling
+    force_n: tuple[float, float]
+
+
+def undecided(laws: Laws) -> Laws:
+    """Those of the laws that the recordings leave tied, as probable as they were."""
+    tied = [i for i, share in enumerate(laws.probability) if share > TIED]
+    return replace(
+        laws,
+        candidates=tuple(laws.candidates[i] for i in tied),
+        probability=tuple(laws.probability[i] for i in tied),
+    )
+
+
+def most_telling_forces(
+    laws: Laws, weakest_n: float, hardest_n: float, q: np.ndarray
+) -> TellingForces:
+    """The hits that best separate laws, at one of LOOKED_AT of q (n, dof) in rad.
+
+    `weakest_n` and `hardest_n` are the peaks (N) of the hits so far: no harder ones are asked for,
+    and the two forces are APART, so that levels can be told.
+    """
+    force = forces_n(weakest_n, hardest_n)
+    last = len(q) - 1
+    looked_at = np.unique(np.linspace(0, last, LOOKED_AT).round().astype(int))
+    gain = np.nan_to_num(law_separation(laws, q[looked_at], force))
+    gain[:, :, force[:-1] > hardest_n / APART] = 0.0
+    row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
+    best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
+    return TellingForces(best, (float(force[level]), float(force[-1])))
+
+
+def forces_n(weakest_n: float, hardest_n: float) -> np.ndarray:
+    """Forces (LEVELS,) in N: as far below the weakest as a hammer goes well, none beyond."""
+    return np.geomspace(weakest_n / 2, hardest_n, LEVELS)
+
+
+def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray:
+    """Expected logarithm of the odds (n, 3, L − 1) that two hits give at q (n, dof) in rad.
+
+    Along each tcp axis, with one of the peaks force_n (L,) in N, and with the last of them; 0
+    where there is one law only.
+    """
+    q = np.atleast_2d(q)
+    gain = np.zeros((len(q), AXES, len(force_n) - 1))
+    if len(laws.candidates) < 2:
+        return gain
+    share = np.array(laws.probability) / np.sum(laws.probability)
+    known = [_precision(laws, c) for c in laws.candidates]
+    floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
+    quiet = floor * (laws.hit.peak_n / force_n) ** 2
+    for place, row in enumerate(q):
+        told = [_told(laws, c, row, force_n) for c in laws.candidates]
+        for level in range(len(force_n) - 1):
+            now = [(h[level] - h[-1], slope[level] - slope[-1]) for h, slope in told]
+            scales = [
+                _scale(h[level], h[-1], quiet[level] + quiet[-1], laws.temper) for h, _ in told
+            ]
+            gain[place, :, level] = expected_log_odds(now, scales, known, share)
+    return gain
+
+
+def accelerance(
+    found: Receptances, candidate: Candidate, hit_force: np.ndarray, share: np.ndarray
+) -> np.ndarray:
+    """FRFs (L, 3, 3, F) in m/s²/N of a system with a law at one of its joints.
+
+    `hit_force` (F,) in N·s is the spectrum of a hit, `share` (L,) how many times as hard it is.
+    """
+    own = found.port_port[:, candidate.port]
+    driven = found.port_hit[:, candidate.port].T  # (3, F)
+    course = hit_force[:, None] * waves(found.s)
+    stiffer = np.zeros((len(share), AXES), dtype=complex)
+    for _ in range(ROUNDS):
+        angle = driven / (1 + stiffer[..., None] * own)  # (L, 3, F) per N
+        swing = share[:, None] * np.max(np.abs((angle @ course).real), axis=2)
+        slow = faded(candidate.law, np.maximum(swing, STILL), candidate.a)
+        stiffer = 0.5 * (stiffer + candidate.k * slow)
+    angle = driven / (1 + stiffer[..., None] * own)
+    through = np.moveaxis(found.sensor_port[:, :, candidate.port], 0, 1)  # (3, F)
+    torque = (stiffer[..., None] * angle)[:, None]  # (L, 1, 3, F)
+    return found.s**2 * (np.moveaxis(found.sensor_hit, 0, 2) - through[:, None, :] * torque)
+
+
+def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> np.ndarray:
+    """What differences of FRFs (3, 3, F) weigh, as in `leveldata`."""
+    error = (MODEL_ERROR * np.abs(h - hardest)) ** 2 + (DIFFERENCE_ERROR * np.abs(h)) ** 2
+    return np.sqrt(2 / (temper * (quiet + error)))
+
+
+def _told(
+    laws: Laws, candidate: Candidate, row: np.ndarray, force_n: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """FRFs (L, 3, 3, F) of a law at a pose, and slopes (L, 3, 3, 3, F) by ν and its own spring."""
+    hit = laws.hit
+    misfit = misfit_at(laws.problem, laws.plain.effect, row[None], hit.frequency_hz, hit.rate_1_s)
+    there, s = replace(laws.plain, misfit=misfit), misfit.setting.s[0]
+    stiffer = candidate.x.copy()
+    stiffer[_own(laws, candidate)] += STEP
+    here, moved = (receptances(system_of(there, x), 0, s) for x in (candidate.x, stiffer))
+    share = force_n / hit.peak_n
+    h = accelerance(here, candidate, hit.force, share)
+    near = [
+        accelerance(here, replace(candidate, nu=candidate.nu + step), hit.force, share)
+        for step in STEP * np.eye(2)
+    ]
+    near.append(accelerance(moved, candidate, hit.force, share))
+    return h, np.stack([(one - h) / STEP for one in near], axis=1)
+
+
+def _own(laws: Laws, candidate: Candidate) -> int:
+    return own_parameter(laws.plain, int(system_of(laws.plain).blocks[candidate.port]))
+
+
+def _precision(laws: Laws, candidate: Candidate) -> np.ndarray:
+    """(3, 3) of ν and the own spring's logarithm, all else averaged out."""
+    full = covariance(candidate, laws.temper)
+    at = np.array([len(full) - 2, len(full) - 1, _own(laws, candidate)])
+    return np.linalg.inv(full[np.ix_(at, at)])

@@ -1,0 +1,120 @@
+"""What a pose would tell of the simulation's own parameters: sensitivities and Fisher information.
+
+The parameters are those that `identify` fits: logarithms of springs and dampers, inertias in sds
+of their prior.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.design.frequency_posterior import AXES, Poses
+from planner.dynamics.gradient import laplace, response_gradient
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.identification.agreement import MODEL_ERROR
+from planner.identification.frequency_uncertainty import log_frequency_slope
+from planner.identification.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
+from planner.identification.parameters import Parametrisation
+
+# Lines around each mode at which the information is summed up, in half-widths of its resonance.
+AROUND = np.array([-6.0, -3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0, 6.0])
+BETWEEN = 9  # lines spread over the band besides
+CHUNK = 8
+
+
+@dataclass(frozen=True)
+class FrfNoise:
+    """Sd of an FRF: a share of it and a floor (m/s²/N; None: a share of its rms), a line `step_hz`.
+
+    `misfit` is χ² per value of what was identified; above 1 everything tells that much less.
+    """
+
+    relative: float
+    floor: float | None
+    step_hz: float
+    misfit: float = 1.0
+
+    @classmethod
+    def of(cls, frfs: tuple[Frf, ...], band_hz: tuple[float, float], misfit: float) -> "FrfNoise":
+        """As in the FRFs measured so far; assumed where there are none."""
+        floors, steps = [], []
+        for frf in frfs:
+            inside = (frf.frequency_hz >= band_hz[0]) & (frf.frequency_hz <= band_hz[1])
+            sd = noise_sd(frf)[..., inside]
+            known = np.isfinite(sd) & (sd > 0)
+            if known.any() and np.sum(inside) > 1:
+                floors.append(float(np.median(sd[known])))
+                steps.append(float(frf.frequency_hz[1] - frf.frequency_hz[0]))
+        if not floors:
+            return cls(ASSUMED_RELATIVE, None, (band_hz[1] - band_hz[0]) / 200, max(misfit, 1.0))
+        return cls(MODEL_ERROR, float(np.median(floors)), float(np.median(steps)), max(misfit, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class OpenParameters:
+    """A simulation's parameters with covariance (p, p), and how FRFs to come would be measured."""
+
+    simulation: Simulation
+    parametrisation: Parametrisation
+    covariance: np.ndarray
+    noise: FrfNoise
+    band_hz: tuple[float, float]
+
+    def poses(self, x: np.ndarray, low: np.ndarray, q: np.ndarray, informed: bool) -> Poses:
+        """Poses q (n, dof) in rad with their slopes and, where `informed`, their information."""
+        count = low.shape[1]
+        slope = np.zeros((0, count, len(self.covariance)))
+        if len(q):
+            slope = log_frequency_slope(self.simulation, self.parametrisation, q, count)
+        information = self.information(q) if informed else np.zeros((len(q), AXES, 0, 0))
+        return Poses(x, low, np.nan_to_num(slope), information)
+
+    def information(self, q: np.ndarray) -> np.ndarray:
+        """Fisher information (n, 3, p, p) of one hit along each tcp axis at q (n, dof) in rad."""
+        parts = [self._information(q[i : i + CHUNK]) for i in range(0, len(q), CHUNK)]
+        p = len(self.covariance)
+        return np.concatenate(parts) if parts else np.zeros((0, AXES, p, p))
+
+    def _information(self, q: np.ndarray) -> np.ndarray:
+        frequency, count = self._lines(q)
+        matrices = self.simulation.elastic.matrices(q)
+        inertias = None
+        if self.parametrisation.nuisances:
+            inertias = self.parametrisation.inertias(self.simulation.elastic.body_jacobians(q))
+        springs = self.simulation.elasticity
+        h, slope = response_gradient(matrices, springs, laplace(frequency), None, inertias)
+        weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / self._sd(h)
+        slope = slope * weight[:, None]
+        spread = self.parametrisation.spread
+        n, p = len(q), len(self.covariance)
+        out = np.empty((n, AXES, p, p))
+        for i in range(n):
+            both = np.concatenate(
+                [np.tensordot(spread.T, slope[i, : len(spread)], 1), slope[i, len(spread) :]]
+            )
+            for axis in range(AXES):
+                j = np.ascontiguousarray(both[:, :, axis]).reshape(p, -1).view(float)
+                out[i, axis] = j @ j.T
+        return out
+
+    def _sd(self, h: np.ndarray) -> np.ndarray:
+        """Root of E|δH|² of one hit's FRF h (n, 3, 3, F)."""
+        floor = self.noise.floor
+        if floor is None:
+            floor = ASSUMED_FLOOR * np.sqrt(np.mean(np.abs(h) ** 2, axis=(1, 3), keepdims=True))
+        return np.hypot(self.noise.relative * np.abs(h), floor)
+
+    def _lines(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lines (n, F) in Hz, close where the resonances are, and how many real ones each is."""
+        low, high = self.band_hz
+        modes = self.simulation.modes(q, self.simulation.elastic.size)
+        f, zeta = modes.frequency_hz[..., None], modes.damping_ratio[..., None]
+        near = (f * (1 + np.minimum(zeta, 0.1) * AROUND)).reshape(len(q), -1)
+        near = np.where((near > low) & (near < high), near, low)
+        even = np.broadcast_to(np.linspace(low, high, BETWEEN), (len(q), BETWEEN))
+        lines = np.sort(np.concatenate([near, even], axis=1), axis=1)
+        edges = np.concatenate(
+            [lines[:, :1], (lines[:, 1:] + lines[:, :-1]) / 2, lines[:, -1:]], axis=1
+        )
+        return lines, np.diff(edges, axis=1) / self.noise.step_hz

@@ -1,0 +1,126 @@
+"""When to stop: the RMSE over the workspace as the model itself predicts it, with a probability.
+
+Samples of the error field (discrepancy and parameters together) give samples of its root mean
+square. The model's sds are not taken for granted: residuals of measurements that were left out say
+how large its errors are in units of them, to within what few residuals can say (a scaled inverse
+χ² distribution, Gelman et al. 2013, section 2.6).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.design.frequency_posterior import FrequencyOutputs, Poses
+from planner.surrogate.gp import Posterior
+
+SAMPLES = 400
+# Errors are as large as the model says, to within a factor of two, before any is seen.
+PRIOR_COUNT = 4.0
+POINTS = 64  # of the workspace, the first ones, over which the mean is taken
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """Predicted frequency RMSE over the workspace (%): median, and what it is below with
+    `probability`; `reached` is the probability that it is below `target`.
+    """
+
+    rmse_percent: float
+    bound_percent: float
+    probability: float
+    target_percent: float
+    reached: float
+    calibration: float  # size of left-out residuals in sds, 1 where the model is right
+    gain_percent: float  # of the RMSE, by one more measurement
+    measurements: int
+
+    @property
+    def text(self) -> str:
+        """One or two sentences for the engineer."""
+        known = (
+            f"The frequencies' RMSE over the workspace is about {self.rmse_percent:.2g} %, below "
+            f"{self.bound_percent:.2g} % with {100 * self.probability:.0f} % probability."
+        )
+        return f"{known} One more measurement would gain about {self.gain_percent:.1g} %."
+
+
+def forecast(
+    outputs: FrequencyOutputs,
+    best: Poses | None,
+    target_percent: float,
+    probability: float,
+    seed: int = 0,
+) -> Forecast:
+    """What the model expects of itself; `best` (n = 1) is the pose that would be measured next."""
+    squares = mean_squares(outputs, seed)
+    count, size = left_out(outputs.posterior, outputs.count)
+    rng = np.random.default_rng(seed)
+    # The residuals of one pose go together: they count as one.
+    freedom, total = PRIOR_COUNT + count, PRIOR_COUNT + count * size**2
+    scale = total / rng.chisquare(freedom, len(squares))
+    rmse = 100 * np.sqrt(squares * scale)
+    bound = float(np.quantile(rmse, probability))
+    after = squares if best is None else mean_squares(outputs.planning(best), seed)
+    median = float(np.median(rmse))
+    gain = median * (1 - np.sqrt(np.mean(after) / np.mean(squares)))
+    return Forecast(
+        median, bound, probability, target_percent, float(np.mean(rmse <= target_percent)),
+        float(np.sqrt(total / freedom)), max(float(gain), 0.0), count,
+    )  # fmt: skip
+
+
+def mean_squares(outputs: FrequencyOutputs, seed: int = 0) -> np.ndarray:
+    """Samples (≥ SAMPLES,) of the weighted mean square error of ln f over the workspace."""
+    rng = np.random.default_rng(seed)
+    poses = outputs.workspace.poses[:POINTS]
+    importance = outputs.workspace.importance[:POINTS]
+    importance = importance / importance.sum()
+    samples = outputs.posterior.theta.shape[1]
+    each = -(-SAMPLES // samples)
+    p = len(outputs.covariance_root)
+    parameters = rng.standard_normal((samples * each, p)) @ outputs.covariance_root.T
+    total = np.zeros(samples * each)
+    for k in range(outputs.count):
+        error = outputs.trust[k] * parameters @ poses.slope[:, k].T
+        between, _, _ = outputs.covariance(k, poses, poses)
+        apart = _means_apart(outputs.posterior, k, poses)
+        for s, one in enumerate(between):
+            root = _root(one)
+            drawn = rng.standard_normal((each, len(poses))) @ root.T
+            error[s * each : (s + 1) * each] += drawn + apart[s]
+        total += error**2 @ importance[:, k]
+    return total
+
+
+def left_out(posterior: Posterior, count: int) -> tuple[int, float]:
+    """Measured poses, and the size (rms) of their residuals, left out, in sds of the prediction.
+
+    In closed form (Rasmussen & Williams 2006, eq. 5.12), averaged over the hyperparameters.
+    """
+    squares, poses = [], 0
+    for k in range(count):
+        known = np.flatnonzero(posterior.mask[k])
+        poses = max(poses, len(known))
+        if len(known) < 2:
+            continue
+        whiten = posterior.whiten[k][:, known[:, None], known[None, :]]
+        precision = np.swapaxes(whiten, 1, 2) @ whiten
+        variance = 1 / np.diagonal(precision, axis1=1, axis2=2)
+        residual = posterior.weights[k][:, known] * variance
+        mixed = np.mean(variance, axis=0) + np.var(residual, axis=0)
+        squares.append(np.mean(residual, axis=0) ** 2 / mixed)
+    if not squares:
+        return 0, 1.0
+    return poses, float(np.sqrt(np.mean(np.concatenate(squares))))
+
+
+def _means_apart(posterior: Posterior, k: int, poses: Poses) -> np.ndarray:
+    """How far the mean of each hyperparameter sample (s, u) is from that of all."""
+    cross, _ = posterior._cross(k, poses.x, poses.low[:, k])
+    means = (posterior.weights[k][:, None, :] @ cross)[:, 0]
+    return means - means.mean(axis=0)
+
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.maximum(values, 0.0))

@@ -1,1 +1,0 @@
-"""Recordings as the diagnosis looks at them: visits, force levels, columns of the FRF matrix."""

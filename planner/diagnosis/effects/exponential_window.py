@@ -1,0 +1,33 @@
+"""An exponential window of the analyser of which nobody said anything."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnosis.effects.effect import Effect, Quantity
+from planner.dynamics.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class ExponentialWindow(Effect):
+    """Force and responses were multiplied by e^(−rate t): H is that at s + rate."""
+
+    name = "exponential_window"
+    artefact = True
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["ExponentialWindow", ...]:
+        """Of the sensor's channels."""
+        return (cls("sensor", (Quantity("rate", "1/s", float(np.log(1.5)), 1.0, True),)),)
+
+    def rate(self, psi: np.ndarray) -> float:
+        """e^ψ."""
+        return float(np.exp(psi[0]))
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        value, sd, _ = values["rate"]
+        return (
+            f"All modes decay {value:.3g} ± {sd:.1g} 1/s too fast: an exponential window was "
+            f"applied and not corrected; switch it off or state it."
+        )

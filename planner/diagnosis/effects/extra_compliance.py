@@ -1,0 +1,101 @@
+"""Elastic degrees of freedom that the simulation lacks: what base, bearings and links share."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.places import damping_time, with_blocks
+from planner.dynamics.simulation import Simulation
+from planner.identification.parameters import Priors, place_name
+from planner.robot.config import Compliance
+
+DAMPING_FACTOR = 8.0
+
+
+@dataclass(frozen=True)
+class Give:
+    """One degree of freedom: rotation about an axis, or shift along it, of stiffness in a range."""
+
+    axis: tuple[float, float, float]
+    lower: float
+    upper: float
+    slide: bool = False
+
+    @property
+    def median(self) -> float:
+        """Of a log-uniform prior."""
+        return float(np.sqrt(self.lower * self.upper))
+
+
+@dataclass(frozen=True)
+class ExtraCompliance(Effect):
+    """Further degrees of freedom of `joint` (a joint, a link, the base)."""
+
+    joint: str = ""
+    gives: tuple[Give, ...] = ()
+
+    def structure(self, simulation: Simulation) -> Simulation:
+        """With one more [[compliance]] block each."""
+        return with_blocks(simulation, self.blocks(damping_time(simulation)))
+
+    def blocks(self, time: float) -> tuple[Compliance, ...]:
+        """At the prior's median; damping is `time` in s by stiffness."""
+        return tuple(
+            Compliance(self.joint, g.axis, g.median, time * g.median, slide=g.slide)
+            for g in self.gives
+        )
+
+    def priors(self, simulation: Simulation, priors: Priors) -> Priors:
+        """Log-uniform ones of the new springs' stiffness and damping."""
+        time, bounds = damping_time(simulation), dict(priors.bounds)
+        blocks = simulation.robot.config.compliance
+        undamped = {place_name(b) for b in blocks if b.damping == 0}
+        for give, block in zip(self.gives, self.blocks(time), strict=True):
+            place = place_name(block)
+            bounds[f"stiffness of {place}"] = (give.lower, give.upper)
+            low, high = give.lower * time, give.upper * time
+            if place not in undamped:
+                bounds[f"damping of {place}"] = (low / DAMPING_FACTOR, high * DAMPING_FACTOR)
+        return replace(priors, bounds=bounds)
+
+    def springs(self, simulation: Simulation) -> tuple[str, ...]:
+        """Stiffness and damping of each new degree of freedom."""
+        places = [place_name(b) for b in self.blocks(1.0)]
+        return tuple(f"{kind} of {p}" for p in places for kind in ("stiffness", "damping"))
+
+    def elements(
+        self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
+    ) -> dict[str, list[dict[str, Any]]]:
+        """See `Effect.elements`."""
+        fitted = {place_name(b): b for b in simulation.robot.config.compliance}
+        blocks = []
+        for block in self.blocks(1.0):
+            place = place_name(block)
+            entry = {"joint": block.joint, "axis": list(block.axis), "slide": block.slide}
+            entry["stiffness"] = values[f"stiffness of {place}"][0]
+            entry["damping"] = values.get(f"damping of {place}", (0.0, 0.0, ""))[0]
+            blocks.append(entry | {"loss_factor": fitted[place].loss_factor})
+        return {"compliance": blocks}
+
+
+def told(values: dict[str, tuple[float, float, str]]) -> str:
+    """The stiffnesses in words."""
+    names = {n: v for n, v in values.items() if n.startswith("stiffness")}
+    return ", ".join(
+        f"{v:.2g} ± {sd:.1g} {u} {n.split(' ', 3)[-1]}" for n, (v, sd, u) in names.items()
+    )
+
+
+def triple(axis: np.ndarray) -> tuple[float, float, float]:
+    """The numbers of a vector (3,)."""
+    x, y, z = (float(a) for a in axis)
+    return x, y, z
+
+
+def across(axis: np.ndarray) -> np.ndarray:
+    """(2, 3): two unit vectors normal to a unit vector (3,) and to each other."""
+    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(axis, first)])

@@ -1,0 +1,92 @@
+"""What can be wrong with a channel of the sensor: gain, polarity, delay."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
+from planner.dynamics.simulation import Simulation
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class SensorGain(Effect):
+    """One channel too large or too small: calibration, range."""
+
+    name = "sensor_gain"
+    artefact = True
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["SensorGain", ...]:
+        """On every channel."""
+        gain = Quantity("gain", "1", 0.0, 0.5, True)
+        return tuple(cls(f"sensor_{a}", (gain,)) for a in AXES)
+
+    def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
+        """diag(1, …, g, …, 1)."""
+        axis, gain = AXES.index(self.at[-1]), float(np.exp(psi[0]))
+        left, slope = _ones(setting.s), np.zeros((len(setting.s), 1, 3, 3, setting.s.shape[1]))
+        left[:, axis, axis] = gain
+        slope[:, 0, axis, axis] = gain
+        return Transfer(left, slope)
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        value, sd, _ = values["gain"]
+        return f"Channel {self.at} shows {value:.3g} ± {sd:.1g} times too much: check calibration."
+
+
+@dataclass(frozen=True)
+class Polarity(Effect):
+    """One channel has the wrong sign."""
+
+    name = "polarity"
+    artefact = True
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["Polarity", ...]:
+        """On every channel."""
+        return tuple(cls(f"sensor_{a}") for a in AXES)
+
+    def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
+        """diag(1, …, −1, …, 1)."""
+        axis, left = AXES.index(self.at[-1]), _ones(setting.s)
+        left[:, axis, axis] = -1.0
+        return Transfer(left, np.zeros((len(left), 0, 3, 3, left.shape[-1])))
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        return f"Channel {self.at} has the wrong sign: check mounting and wiring."
+
+
+@dataclass(frozen=True)
+class ChannelDelay(Effect):
+    """All responses late against the force: e^(−sτ)."""
+
+    name = "channel_delay"
+    artefact = True
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["ChannelDelay", ...]:
+        """Of the sensor."""
+        return (cls("sensor", (Quantity("delay", "s", 0.0, 2e-3),)),)
+
+    def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
+        """e^(−sτ) times the identity."""
+        late = np.exp(-setting.s * psi[0])
+        left = _ones(setting.s) * late[:, None, None]
+        slope = -setting.s[:, None, None] * left
+        return Transfer(left, slope[:, None])
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        value, sd, _ = values["delay"]
+        return (
+            f"The responses come {1e3 * value:.3g} ± {1e3 * sd:.1g} ms after the force: check "
+            f"filters and sampling of the channels."
+        )
+
+
+def _ones(s: np.ndarray) -> np.ndarray:
+    return np.broadcast_to(np.eye(3)[None, :, :, None], (len(s), 3, 3, s.shape[1])).astype(complex)

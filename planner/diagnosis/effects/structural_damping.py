@@ -1,0 +1,52 @@
+"""Structural damping, K(1 + iη), where the simulation has viscous dampers."""
+
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from planner.diagnosis.effects.effect import Effect
+from planner.dynamics.simulation import Simulation
+from planner.identification.parameters import place_name
+from planner.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class StructuralDamping(Effect):
+    """Every damper becomes a loss factor that dissipates as much in the middle of the band."""
+
+    name = "structural_damping"
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["StructuralDamping", ...]:
+        """At all joints together, where robot.toml knows no loss factor."""
+        blocks = simulation.robot.config.compliance
+        known = any(b.loss_factor > 0 for b in blocks) or not any(b.damping > 0 for b in blocks)
+        return () if known else (cls("joints"),)
+
+    def structure(self, simulation: Simulation) -> Simulation:
+        """With loss factors instead of dampers."""
+        robot: Robot = simulation.robot
+        middle = 2 * np.pi * float(np.sqrt(np.prod(robot.config.band_hz)))
+        blocks = tuple(
+            msgspec.structs.replace(
+                b, damping=0.0, loss_factor=min(1.0, b.damping * middle / b.stiffness)
+            )
+            for b in robot.config.compliance
+        )
+        config = msgspec.structs.replace(robot.config, compliance=blocks)
+        return Simulation(replace(robot, config=config))
+
+    def springs(self, simulation: Simulation) -> tuple[str, ...]:
+        """Loss factors."""
+        return tuple(
+            f"loss_factor of {b.tie or place_name(b)}" for b in simulation.robot.config.compliance
+        )
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        eta = [v for v, _, _ in values.values()]
+        return (
+            f"Damping does not grow with frequency: loss factors of {min(eta):.2g} to "
+            f"{max(eta):.2g} describe it better than viscous dampers."
+        )

@@ -1,0 +1,34 @@
+"""Bearings that give across a joint's own axis (seed 004, section 2.2)."""
+
+from dataclasses import dataclass
+
+from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, across, told, triple
+from planner.diagnosis.effects.places import joints, missing_axes, own_axis, stiffest
+from planner.dynamics.simulation import Simulation
+
+REACH = (0.2, 20.0)  # times the joint's own stiffness
+
+
+@dataclass(frozen=True)
+class TransverseCompliance(ExtraCompliance):
+    """Tilts about two axes across the joint's own."""
+
+    name = "transverse_compliance"
+
+    @classmethod
+    def everywhere(cls, simulation: Simulation) -> tuple["TransverseCompliance", ...]:
+        """At every joint whose tilts robot.toml does not list."""
+        found = []
+        for place, joint in joints(simulation):
+            axes = missing_axes(simulation, joint, across(own_axis(simulation, joint)))
+            if len(axes):
+                low, high = (float(r * stiffest(simulation, joint)) for r in REACH)
+                found.append(cls(place, (), joint, tuple(Give(triple(a), low, high) for a in axes)))
+        return tuple(found)
+
+    def text(self, values: dict[str, tuple[float, float, str]]) -> str:
+        """See `Effect.text`."""
+        return (
+            f"{self.at} gives across its own axis, with a stiffness of {told(values)}: check its "
+            f"bearing and bolts."
+        )

@@ -1,0 +1,178 @@
+"""What laws of a joint are fitted to: strongest hits, and differences of weaker ones to them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dataset.level_columns import Column
+from planner.dataset.visits import Recorded
+from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
+from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
+from planner.diagnosis.linear.fit import Fit
+from planner.dynamics.gradient import Impedance, response_gradient
+
+LINES = 64
+LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
+MODEL_ERROR = 0.01  # of an FRF, and of a difference
+DIFFERENCE_ERROR = 0.003  # of the FRFs between which the difference is taken
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """c columns of n visits on common lines s (F,): FRFs (c, 3, F), `best` (c,) the strongest one.
+
+    `weight` (c, 3, F) is 1/E|error|² of what is compared: a strongest column itself, the
+    difference to it of a weaker one. `slope` (b, D, 3, F) are derivatives of what is compared by
+    the linear parameters, for the columns `rows` (b,), at first the strongest only; `normal`
+    (D, D) is what they alone tell.
+    """
+
+    s: np.ndarray
+    h: np.ndarray
+    weight: np.ndarray
+    best: np.ndarray
+    level: np.ndarray  # (c,)
+    rows: np.ndarray
+    hits: Strokes
+    force: np.ndarray  # (c, F) in N·s
+    slope: np.ndarray
+    normal: np.ndarray
+    fastest_hz: float
+
+
+def data_of(recorded: Recorded, plain: Fit) -> Data:
+    """Columns of all visits, and what the linear simulation says of the strongest."""
+    columns: list[Column] = []
+    visits: list[int] = []
+    for number, group in enumerate(recorded.columns_at(LAID)):
+        columns += group
+        visits += [number] * len(group)
+    frequency = columns[0].frequency_hz
+    lines = np.unique(np.linspace(0, len(frequency) - 1, LINES).round().astype(int))
+    s = 2j * np.pi * frequency[lines] + columns[0].rate_1_s
+    h = np.array([c.accelerance[:, lines] for c in columns])
+    variance = np.array([c.variance[:, lines] for c in columns])
+    places = [(v, c.axis) for v, c in zip(visits, columns, strict=True)]
+    best = np.array([max(i for i, p in enumerate(places) if p == place) for place in places])
+    weaker = best != np.arange(len(best))
+    change = np.abs(h - h[best])
+    error = np.where(
+        weaker[:, None, None],
+        variance
+        + variance[best]
+        + (MODEL_ERROR * change) ** 2
+        + (DIFFERENCE_ERROR * np.abs(h)) ** 2,
+        variance + (MODEL_ERROR * np.abs(h)) ** 2,
+    )
+    weight = np.where(np.isfinite(error), 1 / error, 0.0)
+    rows = np.flatnonzero(~weaker)
+    hits = strokes(visits, columns)
+    slope = np.empty((len(rows), len(plain.x), 3, len(s)), dtype=complex)
+    full = _slopes(plain, s, plain.x)
+    slope[:] = full[hits.visit[rows], :, :, hits.axis[rows]]
+    force = spectra(hits.force.T, hits, s)
+    level = np.array([c.level for c in columns])
+    fastest = FASTEST * float(frequency[-1])
+    normal = _normal(slope, weight[rows])
+    return Data(s, h, weight, best, level, rows, hits, force, slope, normal, fastest)
+
+
+def _normal(slope: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Σ Re slope* weight slope, (D, D)."""
+    d = slope.shape[1]
+    normal = np.zeros((d, d))
+    for row, w in zip(slope, weight, strict=True):
+        scaled = np.ascontiguousarray((row * np.sqrt(w)).reshape(d, -1)).view(float)
+        normal += scaled @ scaled.T
+    return normal
+
+
+def relinearised(data: Data, plain: Fit, found: Equivalent, port: int, x: np.ndarray) -> Data:
+    """The same data with derivatives at x, of the differences too.
+
+    Every column has the stiffness that the joint has for it: that of the linear fit at the highest
+    level, and Δ more at the others. How far a joint swings depends on inertias and springs:
+    without the differences' derivatives, k would seem to be known better than it is.
+    """
+    visit, axis = data.hits.visit, data.hits.axis
+    block = int(system_of(plain).blocks[port])
+    strongest = system_of(plain).elasticity.stiffness[block]
+    there = strongest - system_of(plain, x).elasticity.stiffness[block]
+    places = zip(found.visit.tolist(), found.axis.tolist(), found.level.tolist(), strict=True)
+    delta = dict(zip(places, found.delta[:, port], strict=True))
+    n, blocks = int(visit.max()) + 1, np.array([block])
+    slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
+    plainly = _slopes(plain, data.s, x, blocks, np.full((n, 1), there))
+    for a, level in sorted({(int(i), int(j)) for _, i, j in delta}):
+        stiffer = np.array([there + delta.get((v, a, level), 0.0) for v in range(n)])
+        moved = _slopes(plain, data.s, x, blocks, stiffer[:, None])
+        for c in np.flatnonzero((axis == a) & (data.level == level)):
+            slope[c] = moved[visit[c], :, :, a] - plainly[visit[c], :, :, a]
+    for c in np.flatnonzero(data.best == np.arange(len(data.h))):
+        slope[c] = plainly[visit[c], :, :, axis[c]]
+    rows = np.arange(len(data.h))
+    return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
+
+
+def compared(data: Data, h: np.ndarray) -> np.ndarray:
+    """Strongest columns as they are, weaker ones as differences to them; h (c, 3, F)."""
+    weaker = (data.best != np.arange(len(h)))[:, None, None]
+    return np.where(weaker, h - h[data.best], h)
+
+
+def linearised(
+    data: Data, plain: Fit, x: np.ndarray, blocks: np.ndarray, stiffer: np.ndarray
+) -> Data:
+    """The same data with derivatives at x of every column, whose springs `blocks` are stiffer.
+
+    `stiffer` (c, m) in N·m/rad.
+    """
+    visit, axis = data.hits.visit, data.hits.axis
+    n = int(visit.max()) + 1
+    slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
+    places = sorted({(int(a), int(level)) for a, level in zip(axis, data.level, strict=True)})
+    for a, level in places:
+        here = np.flatnonzero((axis == a) & (data.level == level))
+        there = np.zeros((n, len(blocks)))
+        there[visit[here]] = stiffer[here]
+        slope[here] = _slopes(plain, data.s, x, blocks, there)[visit[here], :, :, a]
+    weaker = data.best != np.arange(len(data.h))
+    slope = np.where(weaker[:, None, None, None], slope - slope[data.best], slope)
+    rows = np.arange(len(data.h))
+    return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
+
+
+def _slopes(
+    plain: Fit,
+    s: np.ndarray,
+    x: np.ndarray,
+    blocks: np.ndarray | None = None,
+    stiffer: np.ndarray | None = None,
+) -> np.ndarray:
+    """Derivatives (n, D, 3, 3, F) at x, springs `blocks` (m,) being `stiffer` (n, m), complex."""
+    misfit = plain.misfit
+    a, b = misfit.split
+    p, n = misfit.parametrisation, len(misfit.matrices.mass)
+    mass = misfit.matrices.mass + misfit.inertias.mass_change(x[a:b])
+    every = np.broadcast_to(s, (n, len(s)))
+    added = ()
+    if blocks is not None and stiffer is not None:
+        for j, block in enumerate(blocks):
+            port = np.zeros((n, 1, p.size))
+            port[:, 0, block] = 1.0
+            spring = np.broadcast_to(stiffer[:, j, None], every.shape)
+            added += (Impedance(port, np.ones((1, 1, 1)), ((0, spring),)),)
+    full = response_gradient(
+        misfit.matrices, p.elasticity(x[:a]), every, mass, misfit.inertias, added
+    )[1]
+    springs = len(p.held)
+    theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
+    return np.concatenate([theta, full[:, springs:]], axis=1)
+
+
+def own_parameter(plain: Fit, block: int) -> int:
+    """Which entry of x is the logarithm of a spring's stiffness."""
+    for i, parameter in enumerate(plain.misfit.parametrisation.parameters):
+        if parameter.kind == "stiffness" and block in parameter.blocks:
+            return i
+    raise ValueError("the joint's spring is no parameter")

@@ -1,0 +1,100 @@
+"""The linear simulation refitted to the hits of each force level by themselves.
+
+Of joints that are not linear, springs that follow the force level: what each does as the swing
+grows tells, joint by joint, about where a law's numbers lie.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import optimize
+
+from planner.dataset.visits import Recorded
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.laws.equivalent_stiffness import receptances, swing, system_of
+from planner.diagnosis.laws.one_joint import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
+from planner.diagnosis.laws.starting_values import faded
+from planner.diagnosis.laws.torque_laws import Law
+from planner.diagnosis.linear.drift_fit import problem_of
+from planner.diagnosis.linear.fit import FINE, GLANCE, Fit
+from planner.dynamics.simulation import Simulation
+from planner.inference.least_squares import minimise
+
+LOG_STEPS = 20
+SPRING_SD = 0.05  # of ln stiffness that a refit gives a joint that is not linear
+LINEAR_SD = 1.0  # of ln stiffness of a joint without its law
+LINEAR, SHARES, ANGLES = (0.6, 1.0, 1.5), (0.1, 0.5, 1.5), (0.05, 0.2, 0.6, 1.5)  # of the grid
+LEAST_SHARE, MOST_SHARE, MOST_LACKING = 1e-3, 20.0, 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Refit:
+    """A linear fit to one force level: stiffness (m,) of the joints, swing (hits, m) in rad."""
+
+    plain: Fit
+    stiffness: np.ndarray
+    swing: np.ndarray
+
+
+def base(recorded: Recorded, nominal: Simulation) -> Fit:
+    """The springs that fit best with the stated inertias, by logarithms.
+
+    A full fit would bend inertias until they imitate what is not linear, and does not come back.
+    """
+    problem = problem_of(recorded, nominal)
+    rough = problem.misfit(Effect(""), GLANCE)
+    found = minimise(rough, rough.mean, 1e-4, LOG_STEPS)
+    misfit = problem.misfit(Effect(""), FINE)
+    return Fit(Effect(""), misfit, found.x, misfit.by_pose(found.x))
+
+
+def refits(recorded: Recorded, nominal: Simulation) -> tuple[Refit, ...]:
+    """Of every force level, weakest first."""
+    out = []
+    for level in range(len(recorded.level_n)):
+        of_level = [
+            replace(v, hits=tuple(h for h in v.hits if recorded.level(h) == level))
+            for v in recorded.visits
+        ]
+        own = replace(recorded, visits=tuple(v for v in of_level if v.hits))
+        plain = base(own, nominal)
+        system, swings = system_of(plain), []
+        for number, columns in enumerate(own.columns):
+            for c in columns:
+                s = 2j * np.pi * c.frequency_hz + c.rate_1_s
+                swings.append(swing(receptances(system, number, s), c))
+        stiffness = system.elasticity.stiffness[system.blocks]
+        out.append(Refit(plain, stiffness, np.array(swings)))
+    return tuple(out)
+
+
+def begin(
+    seen: Sequence[Refit], law: Law, sign: int, scale: float, joint: int, middle: float
+) -> tuple[float, float, float]:
+    """ln of the joint's linear stiffness, ln share of k and ln a / e^middle that refits tell.
+
+    `scale` in N·m/rad and `middle` (ln rad) are about where the stiffness and a lie.
+    """
+    told = np.log([level.stiffness[joint] for level in seen])
+    swings = [np.median(level.swing[:, joint]) for level in seen]
+    most = np.log(MOST_LACKING if law.effect == "backlash" or sign < 0 else MOST_SHARE)
+
+    def residual(v: np.ndarray) -> np.ndarray:
+        linear, k, a = np.exp(v[0]), sign * scale * np.exp(v[1]), float(np.exp(middle + v[2]))
+        each = [linear + k * faded(law, swing, a).real for swing in swings]
+        off = (told - np.log(np.maximum(each, 1e-3 * linear))) / SPRING_SD
+        prior = (v - [np.log(scale), LOG_SHARE, 0.0]) / [LINEAR_SD, LOG_SHARE_SD, LOG_ANGLE_SD]
+        return np.concatenate([off, prior])
+
+    low = [np.log(scale) - 3, np.log(LEAST_SHARE), -6.0]
+    high = [np.log(scale) + 3, most, 3.0]
+    grid = [
+        np.array([np.log(linear * scale), min(np.log(share), most - 0.01), np.log(a)])
+        for linear in LINEAR
+        for share in SHARES
+        for a in ANGLES
+    ]
+    start = min(grid, key=lambda v: float(np.sum(residual(v) ** 2)))
+    best = optimize.least_squares(residual, start, bounds=(low, high), max_nfev=20).x
+    return float(best[0]), float(best[1]), float(best[2])

@@ -1,0 +1,72 @@
+"""Visits of poses, each for itself, as data of the fit: with drift each has springs of its own."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from planner.dataset.visits import Recorded
+from planner.diagnosis.effects.drift import Drift
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.fit import Grade, Problem
+from planner.diagnosis.linear.objective import Misfit
+from planner.dynamics.gradient import Inertias, response_gradient
+from planner.dynamics.simulation import Simulation
+from planner.identification.measured_frfs import common_band
+from planner.robot.elastic_model import Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class DriftMisfit(Misfit):
+    """As `Misfit`, each visit with springs of its own: those of x times e^ψ."""
+
+    order: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See `Misfit.response`."""
+        assert isinstance(self.effect, Drift)
+        p, (a, b) = self.parametrisation, self.split
+        elasticity = p.elasticity(x[:a])
+        psi, slope = self.effect.log_factor(self.order, x[b:])
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        values, slopes = [], []
+        for i in range(len(self.order)):
+            now = replace(elasticity, stiffness=elasticity.stiffness * np.exp(psi[i]))
+            one = slice(i, i + 1)
+            m = self.matrices
+            matrices = Matrices(m.mass[one], m.hit[one], m.sensor[one], m.geometric[one])
+            inertias = None
+            if self.inertial:
+                inertias = Inertias(self.inertias.jacobians[one], self.inertias.basis)
+            h, full = response_gradient(matrices, now, self.setting.s[one], mass[one], inertias)
+            e, springs = p.size, len(p.held)
+            theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
+            along = full[:, :e].sum(axis=1)
+            own = slope[i][None, :, None, None, None] * along[:, None]
+            values.append(h)
+            slopes.append(np.concatenate([theta, full[:, springs:], own], axis=1))
+        return np.concatenate(values), np.concatenate(slopes)
+
+
+@dataclass(frozen=True, eq=False)
+class DriftProblem(Problem):
+    """A problem whose FRFs are those of visits at `order` (n,)."""
+
+    order: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    def misfit(self, effect: Effect, grade: Grade) -> Misfit:
+        """See `Problem.misfit`."""
+        plain = super().misfit(effect, grade)
+        if not isinstance(effect, Drift):
+            return plain
+        fields = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
+        return DriftMisfit(**fields, order=self.order)
+
+
+def problem_of(recorded: Recorded, nominal: Simulation) -> DriftProblem:
+    """Visits (n), each for itself, as data of `fit`: FRFs in m/s²/N, poses in rad.
+
+    Raises InputError where nothing of them lies in robot.toml's band.
+    """
+    band = common_band(recorded.frfs, recorded.band_hz)
+    order = np.array([visit.order for visit in recorded.visits])
+    return DriftProblem(recorded.frfs, recorded.q, nominal, band, order=order)

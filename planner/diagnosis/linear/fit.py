@@ -1,0 +1,287 @@
+"""Fit of one candidate: all springs, inertial nuisances and its own parameters together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+
+import numpy as np
+
+from planner.diagnosis.effects.effect import Effect, Setting
+from planner.diagnosis.linear.objective import ByPose, Misfit, Weighed, own_names
+from planner.dynamics.gradient import Inertias
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.identification.identify import QUICK, STAGES, Effort, identify
+from planner.identification.measured_frfs import Measured, stack
+from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
+from planner.inference.least_squares import Minimum, minimise
+from planner.inference.parallel import side_by_side
+from planner.robot.elastic_model import Matrices
+
+# Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
+PRIORS = Priors(stiffness_factor=1.17, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
+
+
+@dataclass(frozen=True)
+class Grade:
+    """How closely one looks: lines a pose, relative sd of all that no simulation follows.
+
+    As in `Misfit`: whether logarithms are compared, and whether inertias are free.
+    """
+
+    lines: int
+    model_error: float = 0.003
+    logarithmic: bool = False
+    inertial: bool = True
+
+
+GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
+CLOSE, FINE = Grade(40), Grade(72)
+ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
+LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
+SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
+# The way home from afar: all bands, and every step that logarithms need.
+PATIENT = replace(QUICK, stages=STAGES, log_steps=40)
+KEPT = 2  # starts that are followed
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation."""
+
+    frfs: tuple[Frf, ...]
+    q: np.ndarray
+    simulation: Simulation
+    band_hz: tuple[float, float]
+    priors: Priors = PRIORS
+
+    def misfit(self, effect: Effect, grade: Grade) -> Misfit:
+        """Misfit with an effect."""
+        body, measured = _prepared(self, effect), _measured(self, grade)
+        setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
+        inertias, p = body.inertias, body.parametrisation
+        kind = grade.logarithmic, grade.inertial
+        return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
+
+    def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:
+        """The simulation with an effect's structure, and its parameters."""
+        body = _prepared(self, effect)
+        return body.simulation, body.parametrisation
+
+    def at(self, poses: Sequence[int]) -> "Problem":
+        """The same with some of the poses only."""
+        kept = list(poses)
+        return replace(self, frfs=tuple(self.frfs[i] for i in kept), q=self.q[kept])
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What does not depend on the lines."""
+
+    simulation: Simulation
+    parametrisation: Parametrisation
+    matrices: Matrices
+    jacobians: np.ndarray
+    inertias: Inertias
+
+
+@lru_cache(maxsize=512)
+def _prepared(problem: Problem, effect: Effect) -> _Prepared:
+    simulation = effect.structure(problem.simulation)
+    p = parametrise(simulation, effect.priors(simulation, problem.priors))
+    jacobians = simulation.elastic.body_jacobians(problem.q)
+    matrices = simulation.elastic.matrices(problem.q)
+    return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
+
+
+@lru_cache(maxsize=16)
+def _measured(problem: Problem, grade: Grade) -> Measured:
+    return stack(problem.frfs, problem.band_hz, grade.lines, grade.model_error)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """One candidate at its best x."""
+
+    effect: Effect
+    misfit: Misfit
+    x: np.ndarray
+    data: ByPose
+
+    @property
+    def per_value(self) -> float:
+        """χ² per real value, 1 at the noise."""
+        return float(self.data.chi2.sum() / max(self.misfit.counts.sum(), 1))
+
+    def named(self) -> dict[str, float]:
+        """x by name: springs, nuisances, then the effect's own."""
+        return dict(zip(self.misfit.names, self.x, strict=True))
+
+    def precision(self, temper: float) -> np.ndarray:
+        """(D, D) inverse covariance of x where χ² counts 1/temper."""
+        return self.data.normal.sum(axis=0) / temper + np.diag(1 / self.misfit.sd**2)
+
+    def log_evidence(self, temper: float) -> float:
+        """Laplace: −χ²/2T − prior/2 − ½ ln |posterior precision · prior covariance|."""
+        sd = self.misfit.sd
+        away = (self.x - self.misfit.mean) / sd
+        volume = np.linalg.slogdet(self.precision(temper) * np.outer(sd, sd))[1]
+        chi2 = float(self.data.chi2.sum())
+        return -chi2 / (2 * temper) - float(away @ away) / 2 - volume / 2
+
+    def held_out(self, temper: float) -> np.ndarray:
+        """(n,) χ² of each pose when it is left out: one Newton step on what the others tell."""
+        total = self.precision(temper)
+        prior = (self.x - self.misfit.mean) / self.misfit.sd**2
+        gradient = self.data.gradient.sum(axis=0) / temper + prior
+        out = np.empty(len(self.data.chi2))
+        for i, (chi2, g, n) in enumerate(
+            zip(self.data.chi2, self.data.gradient, self.data.normal, strict=True)
+        ):
+            step = -np.linalg.solve(total - n / temper, gradient - g / temper)
+            out[i] = chi2 + 2 * g @ step + step @ n @ step
+        return out
+
+    def parameters(
+        self, temper: float, part: Effect | None = None
+    ) -> dict[str, tuple[float, float, str]]:
+        """Value, sd and unit of what belongs to the effect, or to one of its parts."""
+        part = part or self.effect
+        sd = np.sqrt(np.diagonal(np.linalg.inv(self.precision(temper))))
+        p, names = self.misfit.parametrisation, self.misfit.names
+        chosen = part.springs(self.misfit.setting.simulation)
+        out = {}
+        for i, s in enumerate(p.parameters):
+            if s.name in chosen:
+                value, unit = float(np.exp(self.x[i])), UNITS[s.kind]
+                if " along " in s.name:
+                    unit = unit.replace("·m", "", 1).replace("rad", "m")
+                out[s.name] = (value, value * float(sd[i]), unit)
+        for q, name in zip(part.quantities, own_names(part), strict=True):
+            i = names.index(name)
+            psi = float(self.x[i])
+            out[q.name] = (q.value(psi), q.value_sd(psi, float(sd[i])), q.unit)
+        return out
+
+
+def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
+    """From the prior's median by way of logarithms, and from each warm one; on the finest lines."""
+    coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
+    ends = [_best(coarse, [_approach(problem, effect)]).x]
+    for earlier in warm:
+        ends.append(_best(close, points(close, earlier)).x)
+    fine = problem.misfit(effect, FINE)
+    return _at(fine, _minimise(fine, _best(close, ends).x, LOOSE, LAST_STEPS))
+
+
+def staged(problem: Problem, effect: Effect) -> Fit:
+    """Of many springs at once, by an identification in bands that widen; settled on all lines.
+
+    Only for effects without parameters but springs.
+    """
+    ends = side_by_side(partial(_identified, problem, effect), (QUICK, PATIENT))
+    return min(ends, key=lambda f: f.misfit(f.x).value)
+
+
+def _identified(problem: Problem, effect: Effect, effort: Effort) -> Fit:
+    body = _prepared(problem, effect)
+    priors = effect.priors(body.simulation, problem.priors)
+    found = identify(
+        problem.frfs, problem.q, body.simulation, priors,
+        band_hz=problem.band_hz, starts=1, effort=effort,
+    )  # fmt: skip
+    return _settled(problem.misfit(effect, FINE), found.mean)
+
+
+def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """A rough fit with inertias as they are: from the prior's median, and from an earlier fit."""
+    coarse = problem.misfit(effect, COARSE)
+    ends = [_best(coarse, points(coarse, warm))]
+    if len(effect.parts()) == 1:
+        ends.append(_best(coarse, [_approach(problem, effect)]))
+    return _at(coarse, min(ends, key=lambda m: m.at.value))
+
+
+def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """A few steps with all that is free, from an earlier fit."""
+    close = problem.misfit(effect, CLOSE)
+    return approached(close, points(close, warm), PROMISE_STEPS)
+
+
+def _approach(problem: Problem, effect: Effect) -> np.ndarray:
+    rough = problem.misfit(effect, GLANCE)
+    b = rough.split[1]
+    starts = [np.concatenate([rough.mean[:b], psi]) for psi in effect.starts()]
+    return _best(rough, starts).x
+
+
+def _best(
+    misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS
+) -> Minimum[Weighed]:
+    """Where the best of the starts leads."""
+    if len(starts) > KEPT:
+        held = replace(misfit, inertial=False)
+        starts = sorted(starts, key=lambda x: _hope(held, x))[:KEPT]
+    if len(starts) == 1:
+        return _minimise(misfit, starts[0], LOOSE, steps)
+    tried = [_minimise(misfit, x, LOOSE, 2) for x in starts]
+    first = min(tried, key=lambda m: m.at.value)
+    return _minimise(misfit, first.x, LOOSE, steps, first.at)
+
+
+def _hope(misfit: Misfit, x: np.ndarray) -> float:
+    """The value, less what the best of the effect's own parameters would gain at once."""
+    at, own = misfit(x), slice(misfit.split[1], None)
+    gains = at.gradient[own] ** 2 / (2 * np.maximum(np.diagonal(at.normal)[own], 1e-300))
+    return at.value - float(gains.max(initial=0.0))
+
+
+def approached(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS) -> Fit:
+    """Where the best of the starts leads in so many steps."""
+    return _at(misfit, _best(misfit, starts, steps))
+
+
+def carried_on(problem: Problem, fit: Fit, effect: Effect, steps: int = SETTLED[1]) -> Fit:
+    """An effect fitted to the end from where another fit, perhaps of other data, is."""
+    misfit = problem.misfit(effect, FINE)
+    return _settled(misfit, points(misfit, fit)[0], steps)
+
+
+def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
+    """The same fit on the lines of a grade, followed until nothing more is to be gained."""
+    return _settled(problem.misfit(found.effect, grade), found.x, steps)
+
+
+def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
+    return _at(misfit, _minimise(misfit, x, SETTLED[0], steps))
+
+
+def _minimise(
+    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: Weighed | None = None
+) -> Minimum[Weighed]:
+    return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at)
+
+
+def _at(misfit: Misfit, found: Minimum[Weighed]) -> Fit:
+    return Fit(misfit.effect, misfit, found.x, found.at.data or misfit.by_pose(found.x))
+
+
+def points(misfit: Misfit, earlier: Fit) -> list[np.ndarray]:
+    """x of an earlier fit, with what is new at its starts.
+
+    Further springs start once as they may be, and once so stiff that they change little.
+    """
+    known, b = earlier.named(), misfit.split[1]
+    names = misfit.names
+    there = np.array([name in known for name in names])
+    values = np.array([known.get(name, 0.0) for name in names])
+    springs = np.arange(len(names)) < misfit.split[0]
+    x = np.where(there, values, misfit.mean)
+    bases = [x]
+    if np.any(springs & ~there):
+        bases.append(x + np.where(springs & ~there, 1.5 * misfit.sd, 0.0))
+    starts = [np.where(there[b:], values[b:], psi) for psi in misfit.effect.starts()]
+    found = [np.concatenate([base[:b], psi]) for base in bases for psi in starts]
+    possible = [point for point in np.unique(found, axis=0) if misfit.possible(point)]
+    # Inertias that went with an effect which is not there now may be those of no body.
+    return possible or [np.concatenate([misfit.mean[:b], psi]) for psi in starts]

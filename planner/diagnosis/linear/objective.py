@@ -1,0 +1,187 @@
+"""Misfit of a simulation with one effect to measured FRFs, pose by pose, with its gradient."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from planner.diagnosis.effects.effect import Effect, Setting
+from planner.dynamics.gradient import Inertias, response_gradient
+from planner.identification.measured_frfs import Measured
+from planner.identification.objective import (
+    FARTHEST,
+    LOG_PRIOR,
+    positive,
+    weight_of,
+)
+from planner.identification.parameters import Parametrisation
+from planner.inference.least_squares import LONGEST, Quadratic
+from planner.robot.elastic_model import Matrices
+
+STRIDE = 1.5  # sds by which an effect's own parameters may move in one step
+
+
+@dataclass(frozen=True, eq=False)
+class ByPose:
+    """χ² (n,), its half gradients (n, D) and Gauss-Newton matrices (n, D, D), data only."""
+
+    chi2: np.ndarray
+    gradient: np.ndarray
+    normal: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed(Quadratic):
+    """Data and prior at a point, and what the data of each pose say; None where x cannot be."""
+
+    data: ByPose | None
+
+
+def own_names(effect: Effect) -> list[str]:
+    """Of an effect's ψ: what, of which effect, where."""
+    return [f"{q.name} of {p.name} at {p.at}" for p in effect.parts() for q in p.quantities]
+
+
+@dataclass(frozen=True, eq=False)
+class Misfit:
+    """χ²/2 of data and prior over x: springs θ (P), inertial nuisances φ (R), the effect's ψ (p).
+
+    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`. Unless
+    `inertial`, φ stays where it is.
+    """
+
+    measured: Measured
+    setting: Setting
+    matrices: Matrices
+    inertias: Inertias
+    parametrisation: Parametrisation
+    effect: Effect
+    logarithmic: bool = False
+    inertial: bool = True
+
+    @cached_property
+    def split(self) -> tuple[int, int]:
+        """Where φ and ψ begin in x."""
+        count = len(self.parametrisation.parameters)
+        return count, count + len(self.parametrisation.nuisances)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Of the entries of x."""
+        p = self.parametrisation
+        return [*(s.name for s in p.parameters), *p.nuisances, *own_names(self.effect)]
+
+    @cached_property
+    def mean(self) -> np.ndarray:
+        """Prior mean of x."""
+        p = self.parametrisation
+        own = [q.mean for q in self.effect.quantities]
+        return np.concatenate([p.mean, np.zeros(len(p.nuisances)), own])
+
+    @cached_property
+    def sd(self) -> np.ndarray:
+        """Prior sd of x."""
+        p = self.parametrisation
+        own = [q.sd for q in self.effect.quantities]
+        return np.concatenate([p.log_sd, np.ones(len(p.nuisances)), own])
+
+    @cached_property
+    def longest(self) -> np.ndarray:
+        """(D,) by how much an entry of x may move in one step."""
+        b = self.split[1]
+        return np.concatenate([np.full(b, LONGEST), STRIDE * self.sd[b:]])
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """See `weight_of`."""
+        return weight_of(self.measured, self.logarithmic)
+
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """(n,) numbers of real residuals."""
+        return 2 * np.count_nonzero(self.weight, axis=(1, 2, 3))
+
+    @cached_property
+    def free(self) -> np.ndarray:
+        """(D,) bool: which entries of x may move."""
+        a, b = self.split
+        out = np.ones(b + len(self.effect.quantities), dtype=bool)
+        out[a:b] = self.inertial
+        return out
+
+    def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """FRFs as they would be measured (n, 3, 3, F), and derivatives (n, free, 3, 3, F)."""
+        p, (a, b), s = self.parametrisation, self.split, self.setting.s
+        psi = x[b:]
+        rate = self.effect.rate(psi)
+        s = s if rate is None else s + rate
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        setting = self.setting if rate is None else replace(self.setting, s=s)
+        added = self.effect.impedance(setting, psi)
+        inertias = self.inertias if self.inertial else None
+        h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
+        springs, slope = len(p.held), full
+        if not np.array_equal(p.spread, np.eye(springs)):
+            theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
+            slope = np.concatenate([theta, full[:, springs:]], axis=1)
+        if rate is not None:
+            # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
+            e = p.size
+            down = 2 * full[:, :e].sum(axis=1) + full[:, e : 2 * e].sum(axis=1)
+            along = -rate * down / s[:, None, None]
+            slope = np.concatenate([slope, along[:, None]], axis=1)
+        seen = self.effect.transfer(self.setting, psi)
+        if seen is not None:
+            own = np.einsum("npijf,njkf->npikf", seen.slope, h)
+            slope = np.einsum("nijf,npjkf->npikf", seen.left, slope, optimize=True)
+            slope = np.concatenate([slope, own], axis=1)
+            h = np.einsum("nijf,njkf->nikf", seen.left, h)
+        return h, slope
+
+    def by_pose(self, x: np.ndarray) -> ByPose:
+        """Misfit of each pose at x."""
+        h, slope = self.response(x)
+        residual, slope = self._residual(h, slope)
+        n, d = slope.shape[:2]
+        j = np.ascontiguousarray(slope).reshape(n, d, -1).view(float)
+        r = np.ascontiguousarray(residual).reshape(n, -1).view(float)
+        free, size = np.flatnonzero(self.free), len(x)
+        gradient, normal = np.zeros((n, size)), np.zeros((n, size, size))
+        gradient[:, free] = (j @ r[..., None])[..., 0]
+        normal[:, free[:, None], free] = j @ np.swapaxes(j, 1, 2)
+        return ByPose(np.sum(r**2, axis=1), gradient, normal)
+
+    def possible(self, x: np.ndarray) -> bool:
+        """Whether masses are positive at x, and nothing is farther off than is looked for."""
+        a, b = self.split
+        if np.abs((x - self.mean) / self.sd).max() > FARTHEST:
+            return False
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        return positive(mass)
+
+    def __call__(self, x: np.ndarray) -> Weighed:
+        """Data and prior together; ∞ where x cannot be."""
+        away, scale = (x - self.mean) / self.sd, 1 / self.sd
+        if not self.possible(x):
+            nothing = np.zeros(len(x))
+            return Weighed(np.inf, nothing, np.diag(nothing), np.inf, None)
+        data = self.by_pose(x)
+        if self.logarithmic:
+            away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
+        chi2 = float(data.chi2.sum())
+        return Weighed(
+            (chi2 + float(away @ away)) / 2,
+            data.gradient.sum(axis=0) + np.where(self.free, scale * away, 0.0),
+            data.normal.sum(axis=0) + np.diag(scale**2),
+            chi2,
+            data,
+        )
+
+    def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        weight, measured = self.weight, self.measured.accelerance
+        if not self.logarithmic:
+            slope *= weight[:, None]
+            return weight * (h - measured), slope
+        least = 1e-9 * np.abs(measured) + 1e-300
+        safe = np.where(np.abs(h) >= least, h, least)
+        return weight * np.log(safe / measured), slope * (weight / safe)[:, None]

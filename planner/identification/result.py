@@ -1,0 +1,139 @@
+"""What an identification found, and what the data could not tell."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.dynamics.simulation import Simulation
+from planner.identification.agreement import Similarity
+from planner.identification.parameters import Parametrisation
+
+# The data have told something of a direction once its sd is half of what it was before.
+TOLD = 0.5
+SHOWN = 0.35  # least share of a parameter in a direction that is worth its name
+NAMED = 4  # parameters that one sentence names at most
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: value, the sd of its logarithm, and what was known before.
+
+    `blocks` are the [[compliance]] blocks that share it, from 0. `identifiable`: the data at
+    least halved the sd of its logarithm.
+    """
+
+    name: str
+    kind: str
+    blocks: tuple[int, ...]
+    value: float
+    log_sd: float
+    prior_median: float
+    prior_log_sd: float
+
+    @property
+    def sd(self) -> float:
+        """Standard deviation in the parameter's unit, for small ones; the factor is e^log_sd."""
+        return self.value * self.log_sd
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data say more than the prior did."""
+        return self.log_sd < TOLD * self.prior_log_sd
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A combination of parameters (log, in prior sds) and the share of its prior sd that is left.
+
+    `weights` are those of the springs' parameters, of length 1 together with the inertial ones.
+    """
+
+    sd_ratio: float
+    weights: tuple[float, ...]
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Result of `identify`.
+
+    `mean` (P + R,) and `covariance` (P + R, P + R) are those of the parameters' logarithms, then
+    of the inertial deviations in prior sds, named in `nuisances` (none where inertias were taken
+    for exact). `misfit` is χ² per real value, 1 at the noise; the covariance is that of the stated
+    noise, or of the misfit where that is larger. `starts` lists the misfit that each start came to
+    before inertias were freed.
+    """
+
+    simulation: Simulation
+    estimates: tuple[Estimate, ...]
+    nuisances: tuple[str, ...]
+    mean: np.ndarray
+    covariance: np.ndarray
+    misfit: float
+    values: int  # real values that were fitted
+    misfit_by_pose: np.ndarray  # (n,)
+    fit: Similarity
+    undetermined: tuple[Direction, ...]
+    starts: tuple[float, ...]
+    converged: bool
+    seconds: float
+    remarks: tuple[str, ...] = ()
+
+    def estimate(self, name: str) -> Estimate:
+        """The parameter of a name; KeyError if there is none."""
+        return {e.name: e for e in self.estimates}[name]
+
+
+def estimates(
+    parametrisation: Parametrisation, mean: np.ndarray, covariance: np.ndarray
+) -> tuple[Estimate, ...]:
+    """Marginal estimates of the springs' parameters."""
+    sd = np.sqrt(np.diagonal(covariance))
+    return tuple(
+        Estimate(
+            p.name,
+            p.kind,
+            p.blocks,
+            float(np.exp(mean[i])),
+            float(sd[i]),
+            p.median,
+            p.log_sd,
+        )
+        for i, p in enumerate(parametrisation.parameters)
+    )
+
+
+def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tuple[Direction, ...]:
+    """Directions of the springs' parameters of which the data told little, least told first.
+
+    They are the eigenvectors of the posterior covariance in units of the prior's sds whose
+    eigenvalues exceed TOLD².
+    """
+    sd, names = parametrisation.log_sd, [p.name for p in parametrisation.parameters]
+    count = len(names)
+    whitened = covariance[:count, :count] / np.outer(sd, sd)
+    values, vectors = np.linalg.eigh(whitened)
+    found = []
+    for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda v: -v[0]):
+        if value > TOLD**2:
+            ratio = float(np.sqrt(value))
+            found.append(Direction(ratio, tuple(map(float, vector)), _words(names, vector, ratio)))
+    return tuple(found)
+
+
+def _words(names: list[str], vector: np.ndarray, ratio: float) -> str:
+    by_share = np.argsort(-np.abs(vector))
+    # Where many have a small share, those with the largest stand for all.
+    order = [i for i in by_share if abs(vector[i]) > SHOWN][:NAMED] or list(by_share[:NAMED])
+    left = f"{100 * min(ratio, 1.0):.0f} % of the prior's spread is left"
+    if len(order) == 1:
+        return f"The {names[order[0]]} is not determined: {left}."
+    same = [names[i] for i in order if vector[i] * vector[order[0]] > 0]
+    other = [names[i] for i in order if vector[i] * vector[order[0]] < 0]
+    if not other:
+        return f"The product of {_list(same)} is not determined: {left}."
+    return f"The ratio of {_list(same)} to {_list(other)} is not determined: {left}."
+
+
+def _list(names: list[str]) -> str:
+    return " and ".join(", ".join(names).rsplit(", ", 1)) if len(names) > 1 else names[0]

@@ -1,0 +1,107 @@
+"""An identified robot as a folder: robot.toml, whose comments and order stay, and its URDF."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import tomlkit
+
+from planner.errors import InputError
+from planner.identification.result import Identification
+from planner.robot.config import Compliance
+from planner.robot.elastic_model import ElasticModel
+from planner.robot.robot import Robot
+from planner.robot.urdf import copy_meshes
+from planner.robot.urdf_inertias import urdf_with_inertias
+
+DIGITS = 6  # significant ones: more than any identification knows
+
+
+def updated_toml(
+    text: str, result: Identification, urdf: str | None = None, added: Sequence[Compliance] = ()
+) -> str:
+    """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
+
+    `added` blocks, which the identification counts last, follow those in the text.
+    """
+    document = tomlkit.parse(text)
+    listed = document["compliance"]
+    blocks = [*listed]
+    blocks += [b for e in document.get("effects", ()) for b in e.get("compliance", ())]
+    for block in added:
+        table = tomlkit.table()
+        table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
+        listed.append(table)
+        blocks.append(table)
+    for estimate in result.estimates:
+        for number in estimate.blocks:
+            blocks[number][estimate.kind] = float(f"{estimate.value:.{DIGITS}g}")
+    if urdf is not None:
+        document["urdf"] = urdf
+    return tomlkit.dumps(document)
+
+
+@dataclass(frozen=True)
+class Written:
+    """Files of an identified robot, absolute, and what they leave out."""
+
+    robot_toml: Path
+    urdf: Path
+    remarks: tuple[str, ...]
+
+
+def check_target(out: Path, robot: Robot) -> None:
+    """InputError where `out` cannot be written without losing something."""
+    if out.exists() or out.is_symlink():
+        raise InputError(f"{out} exists already; name a new file, so that nothing is lost.")
+    if out.suffix != ".toml":
+        raise InputError(f"{out} does not end in .toml; name a robot.toml to write.")
+    folder = next(p for p in (out.absolute().parent, *out.absolute().parents) if p.exists())
+    if not folder.is_dir():
+        raise InputError(f"{folder} is no folder; {out} cannot be written there, name another.")
+
+
+def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
+    """Write robot.toml at `out`, and its URDF beside it where it is another.
+
+    It is another where inertias were identified too (springs alone would fit worse than before),
+    or where the folder is another. Nothing that exists is overwritten; InputError instead.
+    """
+    check_target(out, robot)
+    out, bodies = out.absolute(), result.simulation.elastic.bodies
+    change = result.simulation.elastic.inertia - ElasticModel(robot).inertia
+    elsewhere = out.parent.resolve() != robot.path.parent.resolve()
+    urdf, name, shares = robot.urdf_path, None, {}
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        if elsewhere or np.any(change):
+            name = robot.urdf_path.name if elsewhere else f"{out.stem}.urdf"
+            urdf = out.parent / name
+            text, shares = urdf_with_inertias(robot, bodies, change)
+            _write_new(urdf, text)
+            if elsewhere:
+                copy_meshes(robot.urdf_path, urdf)
+        stated = robot.path.read_text(encoding="utf-8")
+        inside = sum(len(e.compliance) for e in robot.config.effects)
+        added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
+        _write_new(out, updated_toml(stated, result, name, added))
+    except OSError as error:
+        raise InputError(
+            f"{out} cannot be written ({error.strerror}); name another file with --out."
+        ) from None
+    return Written(out, urdf, tuple(_impossible(body, share) for body, share in shares.items()))
+
+
+def _impossible(body: str, share: float) -> str:
+    return (
+        f"No matter can form the inertia identified for what turns with {body}; the URDF takes "
+        f"{100 * share:.0f} % of its change."
+    )
+
+
+def _write_new(path: Path, text: str) -> None:
+    if path.exists():
+        raise InputError(f"{path} exists already; name another file or folder with --out.")
+    with open(path, "x", encoding="utf-8") as file:
+        file.write(text)

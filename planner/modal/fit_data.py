@@ -1,0 +1,98 @@
+"""What is fitted, and the plane in which its poles lie."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.modal.residues import Lines, laplace
+
+# Chance, in standard normal quantiles, that noise alone passes as a mode somewhere in the band.
+QUANTILE = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class Data:
+    """What is fitted: responses on frequency lines, and the plane in which their poles lie.
+
+    Accelerance (`step_s` None): the s-plane. Transforms of free decays sampled every `step_s`,
+    taken at the lines of the DFT without padding: the z-plane, where they are exactly rational
+    (the end of the record only scales the residues). `rate_1_s` is that of the exponential
+    window which the records carry; poles are those of the structure, without it. `tail_s` is the
+    time from the pulse to the end of the record (see `residues`). `force_share` and
+    `force_window_s` say how the noise of the force spoils whole columns (see `Frf`).
+    """
+
+    frequency_hz: np.ndarray  # (F,)
+    response: np.ndarray  # (outputs, inputs, F)
+    variance: np.ndarray | None  # like response, None where unknown
+    rate_1_s: float = 0.0
+    step_s: float | None = None
+    tail_s: float = np.inf
+    force_share: np.ndarray | None = None  # (inputs, F)
+    force_window_s: float = 0.0
+
+    @cached_property
+    def lines(self) -> Lines:
+        if self.step_s is None:
+            return laplace(self.frequency_hz, self.rate_1_s, self.tail_s)
+        s = 2j * np.pi * self.frequency_hz + self.rate_1_s
+        x = np.exp(s * self.step_s)
+        return Lines(x, x, np.stack([np.ones_like(x), x]))
+
+    def to_plane(self, poles: np.ndarray) -> np.ndarray:
+        """From rad/s to the plane of the lines."""
+        return poles if self.step_s is None else np.exp(poles * self.step_s)
+
+    def to_poles(self, values: np.ndarray) -> np.ndarray:
+        """From the plane of the lines to rad/s."""
+        return values if self.step_s is None else np.log(values) / self.step_s
+
+    def allowed(self, values: np.ndarray) -> bool:
+        """Near the band, and decaying as recorded (under the window)."""
+        if np.any(values == 0):
+            return False
+        poles = self.to_poles(values)
+        low, high = 2 * np.pi * self.frequency_hz[[0, -1]]
+        span = high - low
+        inside = (poles.imag > max(0.0, low - span)) & (poles.imag < high + span)
+        damped = (poles.real < self.rate_1_s) & (-poles.real < 0.5 * np.abs(poles))
+        return bool(np.all(inside & damped))
+
+    @property
+    def correlated(self) -> float:
+        """Lines that carry one line's worth of information: the window smears noise over them.
+
+        The noise of neighbours k lines apart correlates as 1/(1 + iπk·Δf/rate); the sum of the
+        real parts, over all k, is what the variance of anything wider than that grows by.
+        """
+        lines = self.rate_1_s / (self.frequency_hz[1] - self.frequency_hz[0])
+        return float(lines / np.tanh(lines)) if lines > 1e-6 else 1.0
+
+    def force_errors(self, response: np.ndarray) -> np.ndarray:
+        """What noise of the force adds to responses (outputs, inputs, F), one sd of each source.
+
+        Returns (n, outputs, inputs, F): white noise of the window is a sum of independent pulses,
+        as many as tell its spectra apart in the band, each of which scales one input's column.
+        """
+        if self.force_share is None:
+            return np.zeros((0, *response.shape), complex)
+        count = int(np.ceil(2 * self.force_window_s * self.frequency_hz[-1])) + 4
+        times = self.force_window_s * ((np.arange(count) + 0.5) / count - 0.5)
+        pulses = np.exp(-2j * np.pi * times[:, None] * self.frequency_hz) / np.sqrt(count)
+        inputs = response.shape[1]
+        errors = np.zeros((inputs, count, *response.shape), complex)
+        for j, share in enumerate(self.force_share):
+            scale = np.sqrt(share) * pulses
+            errors[j, :, :, j] = -scale[:, None] * response[:, j]
+        return errors.reshape(-1, *response.shape)
+
+    @property
+    def entries(self) -> int:
+        return self.response.shape[0] * self.response.shape[1]
+
+    @property
+    def threshold(self) -> float:
+        """Fall of χ² that a mode (pole and residues) reaches by chance with negligible odds."""
+        k = 2 * self.entries + 2
+        return k * (1 - 2 / (9 * k) + QUANTILE * np.sqrt(2 / (9 * k))) ** 3

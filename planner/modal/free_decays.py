@@ -1,0 +1,299 @@
+"""Modes of a record whose force cannot be used: free decays after its hits."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.errors import InputError, RefusedError
+from planner.modal.mac import mac
+from planner.modal.mode_selection import model
+from planner.modal.modes import ModalModel, Mode
+from planner.modal.pole_identification import Identification, Identified
+from planner.modal.residues import rank_one
+from planner.modal.ringdown import identify_decays
+from planner.recording.records import Channel, TimeRecord
+
+# A hit stands out of the force channel's own noise by this factor and reaches this share of the
+# largest one.
+HIT_FACTOR, HIT_SHARE = 20.0, 0.15
+# The decay starts where the force has fallen to this share of its peak, at latest after that time.
+PULSE_END, PULSE_LONGEST_S = 0.02, 0.3
+LEAST_DECAY_S = 1.0
+# Samples above half the peak that a pulse needs for its amplitude to mean anything.
+LEAST_PULSE_SAMPLES = 4
+# A channel responds if its energy in the band after the hit exceeds that at the end this much, in
+# units of the scatter of such a ratio, or if the modes found explain this share of it.
+LEAST_EXPLAINED = 0.2
+# Decays longer than this many samples are cut: their tail is noise.
+LONGEST = 8192
+# The decay is taken to last while its blocks hold this much more energy than the record's median.
+BLOCK_S, ALIVE = 1.0, 1.5
+LEAST_PROBABILITY = 0.5
+# MAC above which neighbours within a bandwidth are one mode.
+SAME_SHAPE = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class _Decays:
+    """What is identified: responses (channels, decays, n) from the end of each pulse on."""
+
+    samples: np.ndarray
+    names: tuple[str, ...]
+    rate_hz: float
+
+
+def modes_from_record(
+    record: TimeRecord,
+    force_channel: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+) -> ModalModel:
+    """Modes of the free decays after each hit of a record; no use is made of the force's size.
+
+    The hits are found in `force_channel` (default: the channel of quantity force, else the only
+    one whose quantity differs from all others and that holds pulses; without one, the record is
+    one decay). `band_hz` defaults to what rate and length allow. Every mode's `shape` has one
+    entry per responding channel, in the order that the remarks name; residues are NaN because
+    nothing scales them. Remarks say which channels and pulses are faulty. Raises InputError for
+    an unknown force channel and RefusedError where no mode can be found.
+    """
+    return analyse_record(record, force_channel, band_hz)[0]
+
+
+def analyse_record(
+    record: TimeRecord, force_channel: str | None, band_hz: tuple[float, float] | None
+) -> tuple[ModalModel, Identification]:
+    """The same with everything in between (stabilisation diagram, fit)."""
+    remarks = list(record.remarks)
+    force = _force(record, force_channel)
+    decays = _decays(record, force, remarks)
+    band = band_hz or _band(decays)
+    decays, found = _identify_sound(record, decays, band, remarks)
+    sure = [mode for mode in found.modes if mode.probability >= LEAST_PROBABILITY]
+    kept = [mode for mode in sure if band[0] <= mode.frequency_hz <= band[1]]
+    modes = _merge(kept, remarks)
+    if not modes:
+        raise RefusedError(_nothing(record, band))
+    remarks.append(
+        "Modes are from free decays, shapes in the order "
+        + ", ".join(decays.names)
+        + "; without a usable force they are not scaled."
+    )
+    return ModalModel(modes, band, found.fit_error, found.order, tuple(remarks)), found
+
+
+def _nothing(record: TimeRecord, band: tuple[float, float]) -> str:
+    return (
+        f"{record.source}: no decaying oscillation stands out between {band[0]:g} and"
+        f" {band[1]:g} Hz; record longer after the hit or hit harder."
+    )
+
+
+def _force(record: TimeRecord, name: str | None) -> Channel | None:
+    names = [channel.name for channel in record.channels]
+    if name is not None:
+        if name not in names:
+            raise InputError(f"{record.source} has no channel {name!r}; it has {', '.join(names)}.")
+        return record.channels[names.index(name)]
+    forces = [channel for channel in record.channels if channel.quantity == "force"]
+    if forces:
+        return forces[0]
+    kinds = [channel.quantity for channel in record.channels]
+    odd = [c for c in record.channels if kinds.count(c.quantity) == 1 and len(kinds) > 2]
+    return odd[0] if len(odd) == 1 and _hits(odd[0].samples).size else None
+
+
+def _hits(force: np.ndarray, apart: int = 1) -> np.ndarray:
+    """Samples at which pulses peak, `apart` samples from each other at least."""
+    size = np.abs(force - np.median(force))
+    noise = max(float(np.median(size)), 1e-12 * float(np.max(size, initial=0.0)))
+    limit = max(HIT_FACTOR * noise, HIT_SHARE * float(np.max(size, initial=0.0)))
+    above = np.flatnonzero(size > limit)
+    hits: list[int] = []
+    for index in above:
+        if hits and index - hits[-1] < apart:
+            if size[index] > size[hits[-1]]:
+                hits[-1] = int(index)
+        else:
+            hits.append(int(index))
+    return np.array(hits, int)
+
+
+def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _Decays:
+    rate = record.sampling_rate_hz
+    responses = [c for c in record.channels if c is not force]
+    values = np.array([c.samples for c in responses], float)
+    if values.size == 0:
+        raise RefusedError(f"{record.source} holds no response channel; record accelerations.")
+    starts = [0]
+    if force is not None:
+        apart = int(LEAST_DECAY_S * rate)
+        hits = _hits(force.samples, apart)
+        hits = hits[hits < values.shape[1] - apart]
+        if not hits.size:
+            raise RefusedError(
+                f"{record.source}: no hit stands out of channel {force.name}; hit harder."
+            )
+        starts = [_pulse_end(force.samples, hit, rate) for hit in hits]
+        _remark_on_pulse(force, hits, rate, remarks)
+    ends = [*starts[1:], values.shape[1]]
+    margin = int(0.05 * rate)  # the foot of the next pulse
+    length = min(e - s for s, e in zip(starts, ends, strict=True)) - margin
+    length = max(8, min(length, LONGEST, _lifetime(values, starts, length, rate)))
+    samples = np.stack([values[:, s : s + length] for s in starts if s + length <= values.shape[1]])
+    names = tuple(c.name for c in responses)
+    if not np.all(np.isfinite(samples)):
+        raise RefusedError(f"{record.source}: the decays hold missing values; export them again.")
+    return _Decays(samples.transpose(1, 0, 2), names, rate)
+
+
+def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -> int:
+    """Samples until the responses of the longest-lived decay have sunk to the background."""
+    block = max(8, int(BLOCK_S * rate))
+    count = length // block
+    if count < 4:
+        return length
+    # Differences, because drifts would pass for background.
+    steps = np.diff(values, axis=1, append=values[:, -1:])
+    energy = np.stack(
+        [
+            np.sum(steps[:, s : s + count * block].reshape(len(values), count, block) ** 2, axis=2)
+            for s in starts
+        ]
+    )
+    level = energy / np.maximum(np.median(energy, axis=2, keepdims=True), 1e-300)
+    alive = np.flatnonzero(np.max(np.median(level, axis=1), axis=0) < ALIVE)
+    quiet = int(alive[0]) if alive.size else count
+    return max(int(LEAST_DECAY_S * rate), (quiet + 1) * block)
+
+
+def _pulse_end(force: np.ndarray, hit: int, rate: float) -> int:
+    size = np.abs(force - np.median(force))
+    last = min(force.size, hit + max(2, int(PULSE_LONGEST_S * rate)))
+    still = np.flatnonzero(size[hit:last] > PULSE_END * size[hit])
+    return hit + int(still[-1]) + 1
+
+
+def _remark_on_pulse(force: Channel, hits: np.ndarray, rate: float, remarks: list[str]) -> None:
+    size = np.abs(force.samples - np.median(force.samples))
+    widths = []
+    for hit in hits:
+        low = high = int(hit)
+        while low > 0 and size[low - 1] > 0.5 * size[hit]:
+            low -= 1
+        while high + 1 < size.size and size[high + 1] > 0.5 * size[hit]:
+            high += 1
+        widths.append(high - low + 1)
+    if np.median(widths) < LEAST_PULSE_SAMPLES:
+        remarks.append(
+            f"The hammer pulse in {force.name} is under-sampled ({np.median(widths):g} samples"
+            f" above half its peak at {rate:g} Hz): its amplitude is useless and was not used."
+        )
+    if force.unit and force.unit != "N":
+        remarks.append(f"{force.name} is in {force.unit}, not N: FRFs cannot be scaled.")
+
+
+def _band(decays: _Decays) -> tuple[float, float]:
+    lowest = max(10 * decays.rate_hz / decays.samples.shape[-1], 0.01 * decays.rate_hz)
+    return lowest, 0.45 * decays.rate_hz
+
+
+def _identify_sound(
+    record: TimeRecord, decays: _Decays, band: tuple[float, float], remarks: list[str]
+) -> tuple[_Decays, Identification]:
+    """Identify, leave out channels that the modes do not explain, identify again."""
+    scale = np.std(decays.samples, axis=(1, 2), keepdims=True)
+    scale[scale == 0] = 1.0
+    found = identify_decays(decays.samples / scale, decays.rate_hz, band)
+    if found is None or not found.modes:
+        raise RefusedError(_nothing(record, band))
+    explained = _explained(found, band)
+    sound = explained >= LEAST_EXPLAINED * np.max(explained)
+    if not np.all(sound):
+        for name, share in zip(np.array(decays.names)[~sound], explained[~sound], strict=True):
+            remarks.append(
+                f"Sensor {name} does not follow the hits (the modes explain {100 * share:.0f} % of"
+                " it): it was left out; check the sensor and its cable."
+            )
+        names = tuple(np.array(decays.names)[sound].tolist())
+        decays = _Decays(decays.samples[sound], names, decays.rate_hz)
+        scale = scale[sound]
+        found = identify_decays(decays.samples / scale, decays.rate_hz, band)
+        if found is None:
+            raise RefusedError(_nothing(record, band))
+    return decays, _rescaled(found, scale)
+
+
+def _explained(found: Identification, band: tuple[float, float]) -> np.ndarray:
+    """Share of each channel's energy in the band that the modes explain."""
+    data = found.data
+    inside = (data.frequency_hz >= band[0]) & (data.frequency_hz <= band[1])
+    fitted = model(data, found.fit.refined)
+    error = np.sum(np.abs(data.response - fitted)[..., inside] ** 2, axis=(1, 2))
+    return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
+
+
+def _rescaled(found: Identification, scale: np.ndarray) -> Identification:
+    factor = scale[:, :, 0]
+    modes = tuple(
+        replace(m, residue=m.residue * factor, residue_sd=m.residue_sd * factor)
+        for m in found.modes
+    )
+    return replace(found, modes=modes)
+
+
+def _merge(modes: list[Identified], remarks: list[str]) -> tuple[Mode, ...]:
+    """One mode for neighbours within a bandwidth that share their shape.
+
+    A mode whose frequency or damping changes as it dies away (friction, play) decays in several
+    exponentials; two modes of one structure at one place would differ in shape.
+    """
+    groups: list[list[Identified]] = []
+    for mode in modes:
+        last = groups[-1][-1] if groups else None
+        if last is not None and _same(last, mode):
+            groups[-1].append(mode)
+        else:
+            groups.append([mode])
+    return tuple(_merged(group, remarks) for group in groups)
+
+
+def _same(a: Identified, b: Identified) -> bool:
+    width = max(a.damping_ratio * a.frequency_hz, b.damping_ratio * b.frequency_hz)
+    return abs(a.frequency_hz - b.frequency_hz) < width and mac(_shape(a), _shape(b)) > SAME_SHAPE
+
+
+def _merged(group: list[Identified], remarks: list[str]) -> Mode:
+    energy = [float(np.sum(np.abs(m.residue) ** 2) / -m.pole.real) for m in group]
+    main = _mode(group[int(np.argmax(energy))])
+    if len(group) == 1:
+        return main
+    frequency = np.array([mode.frequency_hz for mode in group])
+    damping = np.array([mode.damping_ratio for mode in group])
+    remarks.append(
+        f"The mode at {main.frequency_hz:.4g} Hz decays in {len(group)} exponentials of one shape"
+        f" ({frequency.min():.5g} to {frequency.max():.5g} Hz, damping {damping.min():.2g} to"
+        f" {damping.max():.2g}): it depends on amplitude; the strongest is given."
+    )
+    return replace(
+        main,
+        frequency_sd_hz=max(main.frequency_sd_hz, float(np.ptp(frequency)) / 2),
+        damping_sd=max(main.damping_sd, float(np.ptp(damping)) / 2),
+    )
+
+
+def _shape(mode: Identified) -> np.ndarray:
+    return rank_one(mode.residue)[0]
+
+
+def _mode(mode: Identified) -> Mode:
+    nothing = np.full((3, 3), np.nan)
+    return Mode(
+        mode.frequency_hz,
+        mode.frequency_sd_hz,
+        mode.damping_ratio,
+        mode.damping_sd,
+        nothing.astype(complex),
+        nothing,
+        _shape(mode),
+        mode.probability,
+    )

@@ -1,0 +1,158 @@
+"""Does the structure answer in proportion? FRFs and modes per force level.
+
+A linear structure has one FRF however hard it is hit (homogeneity; Worden & Tomlinson,
+Nonlinearity in Structural Dynamics, 2001, section 2.3). Friction, play and hardening make its
+frequencies and damping depend on the level.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from planner.errors import RefusedError
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.mac import mac
+from planner.modal.modes import ModalModel, Mode
+from planner.recording.force_levels import by_level, peak_n
+from planner.recording.records import Hit
+
+# What is worth telling: FRFs that differ by this share, with such odds against chance.
+SHARE, CHANCE = 0.03, 1e-3
+NEAR, ALIKE = 0.1, 0.5  # log frequency and MAC within which it is the same mode
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Hits of about one strength; k modes, those of the whole pose, by frequency.
+
+    NaN where a mode cannot be told at this level.
+    """
+
+    peak_force_n: float  # mean of the hits' peaks
+    hits: int
+    frequency_hz: np.ndarray  # (k,)
+    frequency_sd_hz: np.ndarray
+    damping_ratio: np.ndarray
+    damping_sd: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Homogeneity:
+    """Comparison of the levels of one pose, weakest first.
+
+    `difference` is the largest relative difference ‖ΔH‖/‖H‖ between the FRFs of two levels in the
+    band beyond what their scatter explains; `p_value` the chance of so much scatter alone.
+    """
+
+    levels: tuple[Level, ...]
+    difference: float
+    p_value: float
+
+    @property
+    def homogeneous(self) -> bool:
+        """Whether nothing worth telling depends on the level."""
+        return self.difference < SHARE or self.p_value > CHANCE
+
+    @property
+    def remark(self) -> str:
+        """One sentence for the engineer; empty where the structure answers in proportion."""
+        if self.homogeneous:
+            return ""
+        low, high = self.levels[0], self.levels[-1]
+        text = (
+            f"The response is not proportional to the force: FRFs at {low.peak_force_n:.0f} N and "
+            f"{high.peak_force_n:.0f} N differ by {100 * self.difference:.0f} %"
+        )
+        change = np.log(high.frequency_hz / low.frequency_hz)
+        sd = np.hypot(
+            low.frequency_sd_hz / low.frequency_hz, high.frequency_sd_hz / high.frequency_hz
+        )
+        clear = np.flatnonzero(np.abs(change) > 3 * sd)
+        if clear.size:
+            k = clear[np.argmax(np.abs(change[clear]) / sd[clear])]
+            text += (
+                f"; mode {k + 1} moves from {low.frequency_hz[k]:.2f} to "
+                f"{high.frequency_hz[k]:.2f} Hz and its damping from "
+                f"{100 * low.damping_ratio[k]:.1f} to {100 * high.damping_ratio[k]:.1f} %"
+            )
+        return text + "."
+
+
+def homogeneity(
+    hits: tuple[Hit, ...],
+    modal: ModalModel,
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
+) -> Homogeneity | None:
+    """Compare the force levels among the hits of one pose; None if there is only one level.
+
+    `window_rate_1_s` is that of an exponential window that the records carry.
+    """
+    groups = by_level(hits)
+    if len(groups) < 2:
+        return None
+    try:
+        estimated = [estimate(group, band_hz) for group in groups]
+        frfs = [replace(frf, exponential_rate_1_s=window_rate_1_s) for frf in estimated]
+    except RefusedError:
+        return None
+    levels = tuple(
+        _level(group, frf, modal, band_hz) for group, frf in zip(groups, frfs, strict=True)
+    )
+    worst, p = 0.0, 1.0
+    pairs = [(a, b) for a in range(len(frfs)) for b in range(a)]
+    for a, b in pairs:
+        difference, chance = _compare(frfs[a], frfs[b], band_hz)
+        worst, p = max(worst, difference), min(p, chance)
+    return Homogeneity(levels, worst, min(1.0, p * len(pairs)))
+
+
+def _compare(a: Frf, b: Frf, band_hz: tuple[float, float]) -> tuple[float, float]:
+    """Relative difference of two FRFs beyond their scatter, and the chance of scatter alone."""
+    low = max(band_hz[0], a.usable_band_hz[0], b.usable_band_hz[0])
+    high = min(band_hz[1], a.usable_band_hz[1], b.usable_band_hz[1])
+    lines = (a.frequency_hz >= low) & (a.frequency_hz <= high)
+    both = np.flatnonzero(a.measured & b.measured)
+    if a.frequency_hz.shape != b.frequency_hz.shape or not lines.any() or not both.size:
+        return 0.0, 1.0
+    ha, hb = a.accelerance[:, both][..., lines], b.accelerance[:, both][..., lines]
+    noise = a.variance[:, both][..., lines] + b.variance[:, both][..., lines]
+    square = np.abs(ha - hb) ** 2
+    mean = float(np.mean(square / noise))
+    # E|ΔH|²/noise is 1 with sd 1 a line; the noise is itself estimated from few hits.
+    spread = np.sqrt(2 / square.size) * 1.5
+    beyond = max(0.0, float(np.sum(square - noise)) / float(np.sum(np.abs(ha * hb))))
+    return float(np.sqrt(beyond)), float(norm.sf((mean - 1) / spread))
+
+
+def _level(
+    hits: tuple[Hit, ...], frf: Frf, modal: ModalModel, band_hz: tuple[float, float]
+) -> Level:
+    """The pose's modes refined on one level's FRF."""
+    k = len(modal.modes)
+    values = [np.full(k, np.nan) for _ in range(4)]
+    force = float(np.mean([peak_n(hit) for hit in hits]))
+    try:
+        found = estimate_modes(frf, band_hz).modes
+    except RefusedError:
+        found = ()
+    for j, mode in enumerate(modal.modes):
+        near = _same(mode, found)
+        if near is not None:
+            values[0][j], values[1][j] = near.frequency_hz, near.frequency_sd_hz
+            values[2][j], values[3][j] = near.damping_ratio, near.damping_sd
+    return Level(force, len(hits), *values)
+
+
+def _same(mode: Mode, found: tuple[Mode, ...]) -> Mode | None:
+    """The mode of one level that is a mode of the whole pose: near in frequency, alike in shape."""
+    near = [
+        other
+        for other in found
+        if abs(np.log(other.frequency_hz / mode.frequency_hz)) < NEAR
+        and mac(other.shape, mode.shape) > ALIKE
+    ]
+    return min(near, key=lambda other: abs(other.frequency_hz - mode.frequency_hz), default=None)

@@ -1,0 +1,225 @@
+"""Which poles are modes: fit, leave out what the data do not need, add what they still miss."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from planner.modal.fit_data import Data
+from planner.modal.matched_filter import falls
+from planner.modal.refine import Refined, refine
+from planner.modal.residues import rank_one, synthesize
+
+MAX_ROUNDS = 12
+MAX_DAMPING = 0.3
+# Neighbours closer than this (half bandwidths, share of frequency) and alike by MAC are one mode.
+TWIN_WIDTHS, TWIN_SHARE, TWIN_MAC = 1.5, 0.02, 0.95
+# Least noise relative to the FRF: below it rounding rules.
+FLOOR = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Refined poles, the variance that weighted them, and the excess of χ² per line."""
+
+    refined: Refined
+    variance: np.ndarray
+    excess: np.ndarray  # (F,) ≥ 1: χ² per degree of freedom (and of information) around a line
+
+    def scale_at(self, frequency_hz: float, lines_hz: np.ndarray) -> float:
+        """Factor by which the error around a frequency exceeds its stated variance."""
+        return float(np.interp(frequency_hz, lines_hz, self.excess))
+
+
+def fit(data: Data, start: np.ndarray) -> Fit:
+    """Fit from starting poles (m,), leaving out and adding modes until neither helps."""
+    current = _refine(data, start, None)
+    current = _prune(data, current)
+    tried: list[complex] = []
+    for _ in range(MAX_ROUNDS):
+        candidate = _missing(data, current, tried)
+        if candidate is None:
+            break
+        tried.append(candidate)
+        poles = np.append(current.refined.poles, candidate)
+        grown = _refine(data, poles, current)
+        if _worth(data, current, grown):
+            current = _prune(data, grown)
+    return _unsplit(data, current)
+
+
+def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
+    """Refined fit; an unknown variance is taken from the error itself."""
+    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
+    variance = data.variance
+    if variance is None and before is not None:
+        variance = before.variance
+    rounds = 1 if data.variance is not None else 2
+    if variance is None:
+        variance, rounds = np.broadcast_to(power, data.response.shape), 3
+    refined = None
+    for k in range(rounds):
+        start = poles if refined is None else refined.poles
+        plane = data.to_plane(start)
+        refined = refine(data.lines, data.response, variance, plane, data.allowed)
+        refined = _in_rad_s(data, refined)
+        if data.variance is None and k < rounds - 1:
+            variance = _scatter(data, refined, power)
+    assert refined is not None
+    error = _error(data, refined)
+    return Fit(refined, variance, excess(data, error, variance, refined.degrees))
+
+
+def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
+    """Variance from the error of the fit, a running mean over a tenth of the lines."""
+    square = np.abs(_error(data, refined)) ** 2
+    lines = data.frequency_hz.size
+    lost = 1 - (2 * refined.poles.size + 2 * len(data.lines.rest)) / (2 * lines)
+    low, high = _windows(lines, max(10, lines // 20))
+    total = np.concatenate([np.zeros((*square.shape[:2], 1)), np.cumsum(square, axis=-1)], axis=-1)
+    local = (total[..., high] - total[..., low]) / (high - low)
+    flat = np.mean(square, axis=-1, keepdims=True)
+    # A little of the overall level keeps quiet stretches from being trusted without limit.
+    return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + FLOOR**2 * power
+
+
+def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:
+    """First and one past the last line of a window around every line, clipped at the ends."""
+    index = np.arange(lines)
+    return np.clip(index - half, 0, None), np.clip(index + half + 1, None, lines)
+
+
+def _error(data: Data, refined: Refined) -> np.ndarray:
+    return data.response - model(data, refined)
+
+
+def model(data: Data, refined: Refined) -> np.ndarray:
+    """Fitted responses (outputs, inputs, F)."""
+    return synthesize(data.lines, data.to_plane(refined.poles), refined.residues)
+
+
+def _in_rad_s(data: Data, refined: Refined) -> Refined:
+    """Poles and their covariance carried from the plane of the lines to the s-plane."""
+    if data.step_s is None:
+        return refined
+    slope = 1 / (refined.poles * data.step_s)
+    real, imag = np.diag(slope.real), np.diag(slope.imag)
+    turn = np.block([[real, -imag], [imag, real]])
+    covariance = turn @ refined.pole_covariance @ turn.T
+    return replace(refined, poles=data.to_poles(refined.poles), pole_covariance=covariance)
+
+
+def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) -> np.ndarray:
+    """(F,) χ² per degree of freedom in a window of lines, at least 1 and the overall one.
+
+    error and variance (outputs, inputs, F); `degrees` of freedom that the fit left.
+    """
+    error = np.mean(np.abs(error) ** 2 / variance, axis=(0, 1))
+    lines = error.size
+    freedom = degrees / (2 * lines * data.entries)
+    low, high = _windows(lines, max(5, lines // 40))
+    total = np.concatenate([[0.0], np.cumsum(error)])
+    local = (total[high] - total[low]) / (high - low) / max(freedom, 0.1)
+    # A window of few lines scatters by itself; only what exceeds that is excess.
+    noise = 1 + 2 / np.sqrt((high - low) * data.entries / data.correlated)
+    local = np.maximum(local / noise, np.mean(error) / max(freedom, 0.1))
+    return data.correlated * np.maximum(1.0, local)
+
+
+def _prune(data: Data, current: Fit) -> Fit:
+    """Leave out modes that the data do not carry, the weakest of each neighbourhood first."""
+    while current.refined.poles.size > 1:
+        weak = weakness(data, current)
+        poles = current.refined.poles
+        dropped: list[int] = []
+        for k in np.argsort(-weak):
+            apart = [abs(poles[k] - poles[d]) > 3 * abs(poles[[k, d]].real).max() for d in dropped]
+            # What looks weak may be strong once its twin is gone.
+            if weak[k] > 1 and all(apart) and len(dropped) < poles.size - 1:
+                dropped.append(int(k))
+        if not dropped:
+            break
+        current = _refine(data, np.delete(poles, dropped), current)
+    return current
+
+
+def _unsplit(data: Data, current: Fit) -> Fit:
+    """One pole for twins of one shape: hit directions that disagree split a mode in two.
+
+    Between two hits a mode moves a little (warmth, amplitude, a clamp that settles); its second
+    pole then has the same shape. Two modes of a structure within a bandwidth differ in shape.
+    """
+    while (pair := _twins(data, current)) is not None:
+        refined = current.refined
+        weight = refined.significance[list(pair)]
+        middle = np.sum(weight * refined.poles[list(pair)]) / np.sum(weight)
+        poles = np.append(np.delete(refined.poles, pair), middle)
+        current = _refine(data, poles, current)
+    return current
+
+
+def _twins(data: Data, current: Fit) -> tuple[int, int] | None:
+    if data.response.shape[0] < 2:
+        return None
+    refined = current.refined
+    order = np.argsort(refined.poles.imag)
+    shapes = [rank_one(refined.residues.residue[..., k])[0] for k in range(order.size)]
+    for a, b in pairwise(order):
+        apart = abs(refined.poles[a] - refined.poles[b])
+        width = np.max(data.rate_1_s - refined.poles[[a, b]].real)
+        near = apart < min(TWIN_WIDTHS * width, TWIN_SHARE * abs(refined.poles[a]))
+        if near and abs(np.vdot(shapes[a], shapes[b])) ** 2 > TWIN_MAC:
+            return int(a), int(b)
+    return None
+
+
+def weakness(data: Data, current: Fit) -> np.ndarray:
+    """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
+    refined = current.refined
+    m = refined.poles.size
+    sd = np.sqrt(np.maximum(0.0, np.diag(refined.pole_covariance)))
+    scale = scales(data, current)
+    decay = np.maximum(data.rate_1_s - refined.poles.real, 1e-12 * np.abs(refined.poles))
+    found = data.threshold * scale / np.maximum(refined.significance, 1e-300)
+    blurred = 2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay
+    damped = -refined.poles.real / (MAX_DAMPING * np.abs(refined.poles))
+    return np.max([found, blurred, damped], axis=0)
+
+
+def scales(data: Data, current: Fit) -> np.ndarray:
+    """(m,) factor on the covariance of each mode, from the error around it."""
+    frequency = np.abs(current.refined.poles) / (2 * np.pi)
+    return np.array([current.scale_at(f, data.frequency_hz) for f in frequency])
+
+
+def _worth(data: Data, before: Fit, after: Fit) -> bool:
+    weight = 2 / before.variance
+    rise = np.sum(weight * np.abs(_error(data, before.refined)) ** 2)
+    rise -= np.sum(weight * np.abs(_error(data, after.refined)) ** 2)
+    new = int(np.argmax(weakness(data, after)))
+    scale = scales(data, after)[new]
+    if data.variance is None:
+        scale *= float(np.mean(after.variance / before.variance))
+    return bool(rise > data.threshold * scale)
+
+
+def _missing(data: Data, current: Fit, tried: list[complex]) -> complex | None:
+    """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
+    weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
+    error = weight * _error(data, current.refined).reshape(data.entries, -1)
+    poles, fall = falls(data, weight, error)
+    for pole in tried:
+        fall[np.abs(poles - pole) < 0.5 * abs(pole.real)] = 0.0
+    best = int(np.argmax(fall))
+    return complex(poles[best]) if fall[best] > data.threshold else None
+
+
+def strongest(data: Data) -> np.ndarray:
+    """(0 or 1,) pole of the atom that explains most of the responses, alone."""
+    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
+    variance = np.broadcast_to(power, data.response.shape)
+    if data.variance is not None:
+        variance = data.variance
+    weight = (2 / variance).reshape(data.entries, -1)
+    poles, fall = falls(data, weight, weight * data.response.reshape(data.entries, -1))
+    return poles[[int(np.argmax(fall))]] if np.max(fall) > data.threshold else poles[:0]

@@ -1,0 +1,206 @@
+"""Maximum-likelihood refinement of poles and residues in the frequency domain.
+
+The residues enter linearly and are eliminated (variable projection, Golub and Pereyra 1973, in
+Kaufman's form), so that Gauss–Newton with Levenberg–Marquardt damping runs over the poles only.
+The noise of a line is circular complex normal with the stated variance E|δH|²; at the solution
+the linearised equations give the covariance of poles and residues (Pintelon and Schoukens,
+System Identification, 2012, ch. 9).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.modal.descend import descend
+from planner.modal.residues import Lines, Residues, basis, basis_slope, unpack
+
+MAX_ITERATIONS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """The problem at one set of poles: χ², step equations and what they rest on."""
+
+    chi2: float
+    coefficients: np.ndarray  # (entries, columns)
+    gradient: np.ndarray  # (2m,)
+    hessian: np.ndarray  # (2m, 2m)
+    inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
+    sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Poles and residues at the minimum of χ² = Σ 2|H − fit|²/variance, and their covariance."""
+
+    poles: np.ndarray  # (m,) in the plane of the lines
+    residues: Residues  # (outputs, inputs, m)
+    chi2: float
+    degrees: int  # degrees of freedom left
+    pole_covariance: np.ndarray  # (2m, 2m) of real parts (all modes), then imaginary parts
+    residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
+    significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
+    converged: bool
+    point: Point
+
+
+def refine(
+    lines: Lines,
+    response: np.ndarray,
+    variance: np.ndarray,
+    poles: np.ndarray,
+    allowed: Callable[[np.ndarray], bool],
+    residual_terms: bool = True,
+    max_iterations: int = MAX_ITERATIONS,
+) -> Refined:
+    """Minimise the weighted error over poles and residues, starting from `poles`.
+
+    response and variance (outputs, inputs, F), finite, variance > 0, at `lines`; poles (m,),
+    m ≥ 1, in the plane of `lines`; a step to poles that are not `allowed` is shortened.
+    """
+    outputs, inputs, count = response.shape
+    data = response.reshape(-1, count)
+    weight = 2 / variance.reshape(-1, count)
+    poles = np.asarray(poles, complex)
+
+    def evaluate(parts: np.ndarray) -> Point:
+        return _evaluate(lines, data, weight, _complex(parts), residual_terms)
+
+    start = np.concatenate([poles.real, poles.imag])
+    parts, point, converged = descend(
+        evaluate, start, lambda parts: allowed(_complex(parts)), max_iterations
+    )
+    return _finish(lines, _complex(parts), point, (outputs, inputs), count, converged)
+
+
+def shared_error(
+    lines: Lines, variance: np.ndarray, refined: Refined, errors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Covariance of poles (2m, 2m) and variance of residues that errors common to lines add.
+
+    errors (n, outputs, inputs, F): what each of n independent sources, at one standard deviation,
+    adds to the response. The residues' variance (outputs, inputs, 2, m) is that of real and
+    imaginary part.
+    """
+    m, count = refined.poles.size, variance.shape[-1]
+    point, shape = refined.point, variance.shape[:2]
+    if not len(errors):
+        return np.zeros((2 * m, 2 * m)), np.zeros((*shape, 2, m))
+    p = point.coefficients.shape[1]
+    poles = refined.poles
+    columns = np.concatenate([basis(lines, poles), basis_slope(lines, poles)])
+    both = np.concatenate([columns.real, columns.imag], axis=1)
+    weighted = (errors * 2 / variance).reshape(len(errors), -1, count)
+    cross = np.concatenate([weighted.real, weighted.imag], axis=-1) @ both.T
+    turn = slope_turn(point.coefficients, m)
+    gradient = np.einsum("eka,nek->na", turn, cross[..., p:])
+    gradient += np.einsum("eka,nek->na", point.sensitivity, cross[..., :p])
+    change = gradient @ refined.pole_covariance
+    moved = np.einsum("ekl,nel->nek", point.inverse, cross[..., :p])
+    moved += np.einsum("eka,na->nek", point.sensitivity, change)
+    residue = np.sum(moved[..., : 2 * m] ** 2, axis=0)
+    return change.T @ change, residue.reshape(*shape, 2, m)
+
+
+def _complex(parts: np.ndarray) -> np.ndarray:
+    real, imag = np.split(parts, 2)
+    return real + 1j * imag
+
+
+def _evaluate(
+    lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
+) -> Point:
+    m = poles.size
+    linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
+    p = linear.shape[0]
+    columns = np.concatenate([linear, slope])
+    norm = np.sqrt(np.mean(np.abs(columns) ** 2, axis=1))
+    columns /= norm[:, None]
+    gram, cross, square = products(columns, data, weight)
+    size = np.sqrt(np.einsum("ekk->ek", gram))[:, :p]
+    scaled = gram[:, :p, :p] / size[:, :, None] / size[:, None, :]
+    inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
+    inverse /= size[:, :, None] * size[:, None, :]
+    coefficients = np.einsum("ekl,el->ek", inverse, cross[:, :p])
+    chi2 = float(np.sum(square) - np.einsum("ek,ek->", coefficients, cross[:, :p]))
+    # Jacobian columns as combinations of the slope basis: J = slope · turn.
+    turn = slope_turn(coefficients / norm[:p], m) * norm[p:, None]
+    mixed = gram[:, :p, p:] @ turn
+    sensitivity = -inverse @ mixed
+    gradient = np.einsum("eka,ek->a", turn, cross[:, p:])
+    gradient -= np.einsum("eka,ek->a", mixed, coefficients)
+    jtj = turn.transpose(0, 2, 1) @ gram[:, p:, p:] @ turn
+    hessian = np.sum(jtj + mixed.transpose(0, 2, 1) @ sensitivity, axis=0)
+    return Point(
+        max(chi2, 0.0),
+        coefficients / norm[:p],
+        gradient,
+        hessian,
+        inverse / norm[:p, None] / norm[:p],
+        sensitivity / norm[:p, None],
+    )
+
+
+def products(
+    columns: np.ndarray, data: np.ndarray, weight: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gram matrix of the columns, their products with the data, ‖data‖², per entry."""
+    square = np.sum(weight * np.abs(data) ** 2, axis=1)
+    both = np.concatenate([columns.real, columns.imag], axis=1)
+    wide = np.concatenate([weight, weight], axis=1)
+    values = np.concatenate([data.real, data.imag], axis=1)
+    cross = (wide * values) @ both.T
+    common = np.all(weight == weight[:, :1])
+    if common:
+        gram = weight[:, 0, None, None] * (both @ both.T)
+    else:
+        gram = np.stack([(both * row) @ both.T for row in wide])
+    return gram, cross, square
+
+
+def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
+    """(entries, 2m, 2m): how the slope basis combines into ∂H/∂Re λ and ∂H/∂Im λ."""
+    real, imag = coefficients[:, :m], coefficients[:, m : 2 * m]
+    turn = np.zeros((coefficients.shape[0], 2 * m, 2 * m))
+    index = np.arange(m)
+    turn[:, index, index] = real
+    turn[:, m + index, index] = imag
+    turn[:, index, m + index] = -imag
+    turn[:, m + index, m + index] = real
+    return turn
+
+
+def _finish(
+    lines: Lines,
+    poles: np.ndarray,
+    point: Point,
+    shape: tuple[int, int],
+    count: int,
+    converged: bool,
+) -> Refined:
+    m = poles.size
+    entries, p = point.coefficients.shape
+    covariance = np.linalg.pinv(point.hessian, hermitian=True)
+    spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
+    variance = np.einsum("ekk->ek", point.inverse) + spread
+    residues = unpack(point.coefficients.reshape(*shape, p), m)
+    return Refined(
+        poles,
+        residues,
+        point.chi2,
+        2 * count * entries - entries * p - 2 * m,
+        covariance,
+        variance[:, : 2 * m].reshape(*shape, 2, m),
+        _significance(point, m),
+        converged,
+        point,
+    )
+
+
+def _significance(point: Point, m: int) -> np.ndarray:
+    """Wald statistic of each mode's residues: 2 · entries degrees of freedom without a mode."""
+    index = np.stack([np.arange(m), m + np.arange(m)], axis=1)
+    value = point.coefficients[:, index]
+    block = point.inverse[:, index[:, :, None], index[:, None, :]]
+    return np.einsum("emk,emkl,eml->m", value, np.linalg.pinv(block, hermitian=True), value)

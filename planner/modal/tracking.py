@@ -1,0 +1,299 @@
+"""Following each mode through the workspace: one label per mode over all measured poses.
+
+Modes are first put in the order of frequency, then named from pose to pose (`names`). What a
+label should look like at a pose comes from a guide (the simulation's frequency and shape there)
+and from the poses labelled so far: the log ratio of measured to guided frequency is
+smooth over the workspace (kriging, leaving the pose itself out), shapes resemble those of the
+neighbours (carried over by the rotation that the guide's shapes undergo), damping that of all
+poses. A mode may be missing at a pose, unexpected, or change places with another; the
+probabilities sum over all matchings.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from planner.modal.label_permutations import name_chances
+from planner.modal.mac import align, unexpected_cost
+from planner.modal.mode_matching import best, chances
+from planner.modal.modes import ModalModel, Mode
+
+# Log frequency: how far an unfitted guide may be off, by how much its error varies over the
+# workspace, and what is left between neighbours; the distance over which it varies (per √d).
+OFFSET_SD, VARIATION_SD, LOCAL_SD, LENGTH = 0.25, 0.08, 0.01, 0.4
+TYPICAL_SD = 0.1  # of log frequency, for which the cost of a missing mode was chosen
+DAMPING_SD = 0.6  # of log damping ratio around a label's median
+MISSING_COST, SHAPE_WEIGHT = 9.0, 8.0
+NEIGHBOURS, GUIDE_WEIGHT = 6, 0.5  # shapes that are compared; the guide's weight among them
+MAX_ROUNDS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Guide:
+    """What is expected: frequency_hz (n, k) and shape (n, k, 3) of k labels at n poses.
+
+    NaN where a label does not exist. Columns are labels, in any order of frequency; a label
+    may cross others from pose to pose. At pose `reference` labels are named after the columns.
+    """
+
+    frequency_hz: np.ndarray
+    shape: np.ndarray
+    reference: int = 0
+
+    @classmethod
+    def by_example(cls, poses: Sequence[Sequence[Mode]], labels: int | None = None) -> "Guide":
+        """Without a simulation the pose with the most modes says what there is everywhere."""
+        reference = max(range(len(poses)), key=lambda i: len(poses[i]))
+        example = poses[reference][:labels]
+        count = len(example) if labels is None else labels
+        frequency, shape = np.full(count, np.nan), np.full((count, 3), np.nan + 0j)
+        frequency[: len(example)] = [mode.frequency_hz for mode in example]
+        shape[: len(example)] = [mode.shape for mode in example]
+        n = len(poses)
+        return cls(np.tile(frequency, (n, 1)), np.tile(shape, (n, 1, 1)), reference)
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """Labelled modes of n poses.
+
+    `modes[i][k]` is the mode that carries label k at pose i, None where it was not found;
+    `probability` (n, k) that this is right; `unexpected[i]` are modes without a label.
+    """
+
+    modes: tuple[tuple[Mode | None, ...], ...]
+    probability: np.ndarray
+    unexpected: tuple[tuple[Mode, ...], ...]
+
+    @property
+    def frequency_hz(self) -> np.ndarray:
+        """(n, k), NaN where a label was not found."""
+        rows = [[np.nan if m is None else m.frequency_hz for m in row] for row in self.modes]
+        return np.array(rows, dtype=float).reshape(self.probability.shape)
+
+
+def track(
+    poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, ordered: bool = False
+) -> Tracks:
+    """Label the modes of n poses at x (n, d), in coordinates scaled to the workspace.
+
+    With `ordered`, labels are places in the order of frequency, which is continuous over the
+    workspace even where modes cross, and keep that order; the guide's columns must do so too.
+    """
+    if not ordered and len(poses):
+        return _named(poses, guide, x)
+    return _matched(poses, guide, x, ordered)
+
+
+def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Tracks:
+    """Places in the order of frequency first, then which label each place carries.
+
+    Where a mode is missing between others its place is doubtful: there the guide's families decide.
+    """
+    order = np.argsort(guide.frequency_hz, axis=1, kind="stable")  # NaN comes last
+    ranked = _columns(guide, order)
+    placed = _matched(poses, ranked, x, ordered=True)
+    chance = name_chances(placed.modes, np.argsort(order, axis=1), x, guide.reference)
+    place = np.array([linear_sum_assignment(-c)[1] for c in chance])
+    rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
+    sure = placed.probability[rows, place]
+    modes = [tuple(row[b] for b in p) for row, p in zip(placed.modes, place, strict=True)]
+    rest = list(placed.unexpected)
+    gaps = [i for i, row in enumerate(placed.modes) if _gap(row)]
+    if gaps:
+        free = _matched(poses, guide, x, ordered=False)
+        sure[gaps] = free.probability[gaps]
+        for i in gaps:
+            modes[i], rest[i] = free.modes[i], free.unexpected[i]
+    return Tracks(tuple(modes), sure * chance[rows, labels, place], tuple(rest))
+
+
+def _columns(guide: Guide, chosen: np.ndarray) -> Guide:
+    """The guide with the chosen columns (n, k) of every pose."""
+    rows = np.arange(len(chosen))[:, None]
+    return Guide(guide.frequency_hz[rows, chosen], guide.shape[rows, chosen], guide.reference)
+
+
+def _gap(row: Sequence[Mode | None]) -> bool:
+    """Whether a mode is missing below one that was found."""
+    return any(now is None and later is not None for now, later in pairwise(row))
+
+
+def _matched(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray, ordered: bool) -> Tracks:
+    expected = np.log(guide.frequency_hz)
+    chosen = [_first(modes, *row) for modes, row in zip(poses, _rows(guide), strict=True)]
+    gains: list[np.ndarray] = []
+    seen: list[list[np.ndarray]] = [chosen]
+    certain = np.ones(expected.shape)
+    for _ in range(MAX_ROUNDS):
+        belief = _Belief.of(poses, chosen, certain, expected, guide, x)
+        gains = [belief.gain(i, modes) for i, modes in enumerate(poses)]
+        chosen = [best(gain, ordered) for gain in gains]
+        chance = [chances(gain, ordered) for gain in gains]
+        certain = np.array([_of(c, row) for c, row in zip(chance, chosen, strict=True)])
+        if any(all(map(np.array_equal, chosen, before)) for before in seen):
+            break
+        seen.append(chosen)
+    return _tracks(poses, chosen, certain.reshape(expected.shape))
+
+
+def _rows(guide: Guide) -> list[tuple[np.ndarray, np.ndarray]]:
+    return list(zip(guide.frequency_hz, guide.shape, strict=True))
+
+
+def _first(modes: Sequence[Mode], expected_hz: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Labels in the guide's order of frequency at this pose: it holds nearly everywhere."""
+    order = np.argsort(expected_hz)[: np.count_nonzero(np.isfinite(expected_hz))]
+    chosen = np.full(len(expected_hz), -1)
+    if not len(modes) or not len(order):
+        return chosen
+    band = modes[0].frequency_hz, modes[-1].frequency_hz
+    model = ModalModel(tuple(modes), band, 0.0, 0)
+    found = align(model, expected_hz[order], shape[order], OFFSET_SD).modes
+    for label, mode in zip(order, found, strict=True):
+        if mode is not None:
+            chosen[label] = next(j for j, m in enumerate(modes) if m is mode)
+    return chosen
+
+
+def _of(chance: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    column = np.where(chosen < 0, chance.shape[1] - 1, chosen)
+    return chance[np.arange(len(chosen)), column]
+
+
+def _tracks(
+    poses: Sequence[Sequence[Mode]], chosen: list[np.ndarray], probability: np.ndarray
+) -> Tracks:
+    labelled, rest = [], []
+    for modes, row in zip(poses, chosen, strict=True):
+        labelled.append(tuple(None if j < 0 else modes[j] for j in row))
+        rest.append(tuple(m for j, m in enumerate(modes) if j not in row))
+    return Tracks(tuple(labelled), probability, tuple(rest))
+
+
+@dataclass(frozen=True, eq=False)
+class _Belief:
+    """What is expected of every label at every pose, that pose's own modes left out."""
+
+    log_hz: np.ndarray  # (n, k)
+    sd: np.ndarray  # (n, k)
+    shape: np.ndarray  # (n, k, 3, 3) unit-trace mixture of expected shapes, as s sᴴ
+    log_damping: np.ndarray  # (k,)
+
+    @classmethod
+    def of(
+        cls,
+        poses: Sequence[Sequence[Mode]],
+        chosen: list[np.ndarray],
+        certain: np.ndarray,
+        expected: np.ndarray,
+        guide: Guide,
+        x: np.ndarray,
+    ) -> "_Belief":
+        """From the labels chosen so far and how certain they are (n, k)."""
+        n, k = expected.shape
+        log_hz, own, damping = (np.full((n, k), np.nan) for _ in range(3))
+        shape = np.full((n, k, 3), np.nan + 0j)
+        for i, (modes, row) in enumerate(zip(poses, chosen, strict=True)):
+            for label in np.flatnonzero(row >= 0):
+                mode = modes[row[label]]
+                log_hz[i, label] = np.log(mode.frequency_hz)
+                own[i, label] = mode.frequency_sd_hz / mode.frequency_hz
+                damping[i, label] = np.log(max(mode.damping_ratio, 1e-6))
+                shape[i, label] = mode.shape
+        ratio, sd = _kriged(log_hz - expected, own, certain, x)
+        known = np.isfinite(damping)
+        middle = np.array(
+            [
+                np.median(c[f]) if f.any() else np.nan
+                for c, f in zip(damping.T, known.T, strict=True)
+            ]
+        )
+        return cls(expected + ratio, sd, _mixture(shape, certain, guide.shape, x), middle)
+
+    def gain(self, i: int, modes: Sequence[Mode]) -> np.ndarray:
+        """(k, modes) of pose i: what each match is better than leaving both unmatched."""
+        k = self.log_hz.shape[1]
+        if not len(modes):
+            return np.zeros((k, 0))
+        log_hz = np.log([mode.frequency_hz for mode in modes])
+        own = np.nan_to_num([mode.frequency_sd_hz / mode.frequency_hz for mode in modes])
+        spread = self.sd[i][:, None] ** 2 + own**2
+        # The sharper the expectation, the less likely is a stranger to meet it.
+        cost = (log_hz - self.log_hz[i][:, None]) ** 2 / spread + np.log(spread / TYPICAL_SD**2)
+        zeta = np.log([max(mode.damping_ratio, 1e-6) for mode in modes])
+        cost += np.nan_to_num((zeta - self.log_damping[:, None]) / DAMPING_SD) ** 2
+        shape = np.array([mode.shape for mode in modes])
+        shape = shape / np.linalg.norm(shape, axis=1, keepdims=True)
+        alike = np.einsum("mi,kij,mj->km", shape.conj(), self.shape[i], shape).real
+        cost += SHAPE_WEIGHT * (1 - alike)
+        spurious = np.array([unexpected_cost(mode) for mode in modes])
+        return np.where(np.isfinite(cost), MISSING_COST + spurious - cost, -np.inf)
+
+
+def _kriged(
+    ratio: np.ndarray, own_sd: np.ndarray, certain: np.ndarray, x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and sd (n, k) of the log ratio at every pose from all others (Dubrule 1983)."""
+    n, k = ratio.shape
+    distance = np.linalg.norm(x[:, None] - x[None], axis=2) / (LENGTH * max(1, x.shape[1]) ** 0.5)
+    prior = OFFSET_SD**2 + VARIATION_SD**2 * np.exp(-(distance**2) / 2)
+    mean, variance = np.zeros((n, k)), np.zeros((n, k))
+    for label in range(k):
+        known = np.flatnonzero(np.isfinite(ratio[:, label]))
+        noise = LOCAL_SD**2 + np.nan_to_num(own_sd[known, label]) ** 2
+        # A label that may be wrong counts less for the others.
+        noise = noise / np.maximum(certain[known, label], 1e-3) ** 2
+        inverse = np.linalg.inv(prior[np.ix_(known, known)] + np.diag(noise))
+        y = ratio[known, label]
+        cross = prior[:, known] @ inverse
+        mean[:, label] = cross @ y
+        variance[:, label] = np.diagonal(prior) - np.sum(cross * prior[:, known], axis=1)
+        mean[known, label] = y - (inverse @ y) / np.diagonal(inverse)
+        variance[known, label] = 1 / np.diagonal(inverse) - noise
+    return mean, np.sqrt(np.maximum(variance, 0.0) + LOCAL_SD**2)
+
+
+def _mixture(
+    shape: np.ndarray, certain: np.ndarray, guide: np.ndarray, x: np.ndarray
+) -> np.ndarray:
+    """Expected shapes (n, k, 3, 3): the guide's and those of the nearest poses, as Σ w s sᴴ."""
+    n, k = certain.shape
+    out = np.zeros((n, k, 3, 3), complex)
+    size = np.linalg.norm(x[:, None] - x[None], axis=2) / max(1, x.shape[1]) ** 0.5
+    np.fill_diagonal(size, np.inf)
+    filled = np.nan_to_num(guide)
+    for i in range(n):
+        weight = np.full(k, 0.0) + GUIDE_WEIGHT * np.isfinite(guide[i, :, 0])
+        out[i] = weight[:, None, None] * _projector(filled[i])
+        for j in np.argsort(size[i], kind="stable")[: min(NEIGHBOURS, n - 1)]:
+            turn = _rotation(filled[i], filled[j])
+            known = np.isfinite(shape[j, :, 0])
+            w = np.where(known, certain[j] * np.exp(-((size[i, j] / LENGTH) ** 2) / 2), 0.0)
+            out[i] += w[:, None, None] * _projector(np.nan_to_num(shape[j]) @ turn.T)
+            weight += w
+        out[i] /= np.maximum(weight, 1e-12)[:, None, None]
+    return out
+
+
+def _projector(shape: np.ndarray) -> np.ndarray:
+    """s sᴴ of unit shapes (k, 3)."""
+    size = np.linalg.norm(shape, axis=1, keepdims=True)
+    unit = np.divide(shape, size, out=np.zeros_like(shape), where=size > 0)
+    return unit[:, :, None] * unit[:, None, :].conj()
+
+
+def _rotation(here: np.ndarray, there: np.ndarray) -> np.ndarray:
+    """Orthogonal (3, 3) that best carries the guide's shapes there (k, 3) to those here.
+
+    Signs of shapes are arbitrary, so they are made to agree first (Schönemann 1966).
+    """
+    phase = np.sum(here.conj() * there, axis=1)
+    phase = np.where(np.abs(phase) > 1e-12, phase / np.maximum(np.abs(phase), 1e-12), 1.0)
+    product = (here * phase[:, None]).T @ there.conj()
+    # A little of the identity decides directions in which no guided mode moves.
+    left, _, right = np.linalg.svd(product.real + 1e-3 * np.eye(3))
+    return left @ right

@@ -1,0 +1,39 @@
+"""How hard the hits were: peaks and force levels."""
+
+import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
+
+from planner.recording.records import Hit
+
+# Levels differ by this factor or more: nobody hits alike twice.
+SAME_LEVEL = 1.8
+
+
+def peak_n(hit: Hit) -> float:
+    """Largest force of a hit over its offset, in N."""
+    return float(np.max(np.abs(hit.force_n - np.median(hit.force_n))))
+
+
+def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:
+    """The hits by strength, weakest level first; a gap of SAME_LEVEL between peaks separates."""
+    groups: list[list[Hit]] = []
+    for hit in sorted(hits, key=peak_n):
+        if groups and peak_n(hit) < SAME_LEVEL * peak_n(groups[-1][-1]):
+            groups[-1].append(hit)
+        else:
+            groups.append([hit])
+    return tuple(tuple(group) for group in groups)
+
+
+def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
+    """Peaks (n,) in N, sorted, by level: weakest first.
+
+    Clusters in logarithms by average linkage: means of two levels differ by SAME_LEVEL or more,
+    also where forces in between leave no gap.
+    """
+    if len(peaks_n) < 2:
+        return [peaks_n]
+    logarithms = np.log(np.maximum(peaks_n, np.finfo(float).tiny))
+    tree = linkage(logarithms[:, None], "average")
+    which = fcluster(tree, np.log(SAME_LEVEL), "distance")
+    return np.split(peaks_n, np.flatnonzero(np.diff(which)) + 1)

@@ -1,0 +1,102 @@
+"""Pictures of a diagnosis: FRFs before and after, FRF maps, residuals beside the noise."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.predict import ALL
+from planner.diagnosis.linear_diagnosis import Diagnosis
+from planner.diagnosis.residual_location import Where, where
+from planner.report.frf_map import frf_map
+from planner.report.frf_plots import AXES
+
+MOST = 4  # poses whose FRFs are shown, those that differed most
+SIDES = (
+    ("as given", "tab:blue", ":"),
+    ("refitted", "tab:orange", "--"),
+    ("explained", "tab:red", "-"),
+)
+
+
+def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") -> dict[str, Figure]:
+    """Residuals by band, pose and direction; FRF maps; direct FRFs of the worst poses."""
+    before, after = where(found.problem, found.refitted), where(found.problem, found.best)
+    figures = {"residuals": _residuals(before, after, names, mark)}
+    misfit = found.problem.misfit(Effect(""), ALL)
+    measured = np.where(misfit.measured.used, np.abs(misfit.measured.accelerance), np.nan)
+    lines = misfit.measured.frequency_hz
+    sides = [_simulated(found, f) for f in (None, found.refitted, found.best)]
+    number = np.arange(1.0, len(names) + 1)
+    for i, axis in enumerate(AXES):
+        for (side, _, _), h in zip(SIDES, sides, strict=True):
+            title = f"{mark}Map of H {axis}{axis}, simulation {side}"
+            figures[f"map_{axis}{axis}_{side.replace(' ', '_')}"] = frf_map(
+                number, measured[:, i, i], h[:, i, i], lines[0], "pose, in recorded order", title
+            )
+    for k in np.argsort(-before.by_pose)[:MOST].tolist():
+        name = re.sub(r"[^\w.-]", "_", str(names[k]))
+        curves = [h[k] for h in sides]
+        figures[f"frf_{name}"] = _overlay(lines[k], measured[k], curves, f"{mark}Pose {names[k]}")
+    return figures
+
+
+def _simulated(found: Diagnosis, fit: Fit | None) -> np.ndarray:
+    misfit = found.problem.misfit(Effect("") if fit is None else fit.effect, ALL)
+    return np.abs(misfit.response(misfit.mean if fit is None else fit.x)[0])
+
+
+def _figure(width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _overlay(
+    lines: np.ndarray, measured: np.ndarray, curves: Sequence[np.ndarray], title: str
+) -> Figure:
+    figure = _figure(7.5, 7.0)
+    panels = figure.subplots(3, 1, sharex=True)
+    for i, panel in enumerate(panels):
+        panel.semilogy(lines, measured[i, i], color="black", lw=1.5, label="measured")
+        for (label, colour, style), h in zip(SIDES, curves, strict=True):
+            panel.semilogy(lines, h[i, i], style, color=colour, lw=1.1, label=label)
+        panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
+        panel.grid(True, which="both", alpha=0.25)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    panels[-1].set_xlabel("frequency (Hz)")
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> Figure:
+    figure = _figure(9.0, 6.5)
+    (bands, poses), (left, right) = figure.subplots(2, 2)
+    middle = (before.edges_hz[1:] + before.edges_hz[:-1]) / 2
+    for place, label, colour in (
+        (before, "refitted", "tab:orange"),
+        (after, "explained", "tab:red"),
+    ):
+        bands.semilogy(middle, np.maximum(place.by_band, 0.1), "o-", color=colour, label=label)
+        number = np.arange(len(names))
+        poses.semilogy(number, np.maximum(place.by_pose, 0.1), "o-", color=colour, label=label)
+    for panel, what in ((bands, "frequency (Hz)"), (poses, "pose")):
+        panel.axhline(1.0, color="black", lw=0.8, ls=":")
+        panel.set_xlabel(what)
+        panel.set_ylabel("mean square residual (1: noise)", fontsize=8)
+        panel.legend()
+    poses.set_xticks(np.arange(len(names)), names, rotation=60, fontsize=7)
+    for panel, place, label in ((left, before, "refitted"), (right, after, "explained")):
+        panel.imshow(np.log10(np.maximum(place.by_direction, 0.1)), cmap="magma", vmin=-1, vmax=3)
+        for i in range(3):
+            for j in range(3):
+                panel.text(j, i, f"{place.by_direction[i, j]:.2g}", ha="center", color="tab:cyan")
+        panel.set_xticks(range(3), [f"hit {a}" for a in AXES])
+        panel.set_yticks(range(3), [f"response {a}" for a in AXES])
+        panel.set_title(f"by direction, {label}", fontsize=9)
+    figure.suptitle(f"{mark}Residuals in units of the noise's variance", fontsize=10)
+    return figure

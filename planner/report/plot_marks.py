@@ -1,0 +1,117 @@
+"""What the pictures of a modal analysis share: panels, marked modes, labels that keep apart."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from scipy.optimize import isotonic_regression
+
+from planner.frf.frf import Frf
+from planner.modal.modes import ModalModel
+
+MODE, USABLE = "tab:blue", "tab:green"
+COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
+
+
+def panels(
+    size: tuple[float, float], title: str, rows: int = 1, columns: int = 1, **layout: Any
+) -> tuple[Figure, Any]:
+    """A figure (size in inches) with panels (rows, columns) that share the frequency axis."""
+    figure = Figure(figsize=size, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=11)
+    return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
+
+
+def spread(x: np.ndarray, gap: float, low: float, high: float) -> np.ndarray:
+    """Increasing positions (k,) moved as little as it takes to lie `gap` apart in [low, high].
+
+    Least squares: with the gaps taken off, the positions only must not decrease.
+    """
+    if not x.size:
+        return x
+    steps = gap * np.arange(x.size)
+    level = isotonic_regression(x - steps).x
+    return np.clip(level, low, max(low, high - steps[-1])) + steps
+
+
+def with_sd(value: float, sd: float) -> str:
+    """A value and its standard deviation, both to the digit where the latter begins (1 to 4)."""
+    if not np.isfinite(sd):
+        return f"{value:.2f}"
+    decimals = int(np.clip(np.ceil(-np.log10(max(sd, 1e-300))), 1, 4))
+    small = f"{sd:.0e}" if sd < 0.5e-4 else f"{sd:.{decimals}f}"
+    return f"{value:.{decimals}f} ± {small}"
+
+
+def label_modes(panel: Axes, modal: ModalModel) -> None:
+    """Modes as vertical lines, with frequency, damping and probability above the panel."""
+    upright = len(modal.modes) > COLUMNS
+    low, high = panel.get_xlim()
+    gap = (high - low) / (max(40, len(modal.modes)) if upright else COLUMNS)
+    frequency = np.array([mode.frequency_hz for mode in modal.modes])
+    for k, (mode, x) in enumerate(zip(modal.modes, spread(frequency, gap, low, high), strict=True)):
+        panel.axvline(mode.frequency_hz, color=MODE, lw=1.2, alpha=0.8)
+        rows = (
+            f"mode {k + 1}",
+            f"{with_sd(mode.frequency_hz, mode.frequency_sd_hz)} Hz",
+            f"ζ {with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd)} %",
+            f"physical {100 * mode.probability:.0f} %",
+        )
+        panel.annotate(
+            ("   " if upright else "\n").join(rows),
+            xy=(mode.frequency_hz, 1.0),
+            xycoords=panel.get_xaxis_transform(),
+            xytext=(x, 1.06),
+            textcoords=panel.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            rotation=90 if upright else 0,
+            fontsize=7.5,
+            color=MODE,
+            arrowprops={"arrowstyle": "-", "color": MODE, "lw": 0.8, "relpos": (0.5, 0.0)},
+        )
+
+
+def number_modes(panel: Axes, modal: ModalModel) -> None:
+    """Modes as thin vertical lines, with their numbers inside at the top."""
+    low, high = panel.get_xlim()
+    frequency = np.array([mode.frequency_hz for mode in modal.modes])
+    places = spread(frequency, 0.026 * (high - low), low, high)
+    for k, (line, x) in enumerate(zip(frequency, places, strict=True)):
+        panel.axvline(line, color=MODE, lw=0.8, ls=":")
+        panel.text(
+            x, 0.98, str(k + 1), transform=panel.get_xaxis_transform(),
+            ha="center", va="top", fontsize=7, color=MODE, clip_on=True,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.5, "alpha": 0.8},
+        )  # fmt: skip
+
+
+def mark_band(panel: Axes, frf: Frf) -> None:
+    """The whole frequency axis of the FRF, its usable band shaded."""
+    panel.set_xlim(0, frf.frequency_hz[-1])
+    panel.axvspan(*frf.usable_band_hz, color=USABLE, alpha=0.08, lw=0)
+    panel.grid(True, alpha=0.25)
+    panel.tick_params(labelsize=8)
+
+
+def label_ends(panel: Axes, x: np.ndarray, values: np.ndarray, names: list[str]) -> None:
+    """Name of each curve of values (n, k) over x (n,) beside its last point, kept apart."""
+    drawn = [k for k in range(values.shape[1]) if np.any(np.isfinite(values[:, k]))]
+    last = np.array([values[np.isfinite(values[:, k]), k][-1] for k in drawn])
+    order = np.argsort(last, kind="stable")
+    low, high = panel.get_ylim()
+    heights = spread(last[order], 0.035 * (high - low), low, high)
+    for k, height in zip(np.array(drawn, int)[order], heights, strict=True):
+        panel.annotate(
+            names[k],
+            xy=(1.0, height),
+            xycoords=panel.get_yaxis_transform(),
+            xytext=(5, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=9,
+            color=f"C{k % 10}",
+        )

@@ -1,0 +1,80 @@
+"""A campaign told step by step to Rerun: the same steps give the same recording."""
+
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.cell import Cell
+from planner.campaign.events import Entry, Imported, Proposed, Skipped, Starred, Undone, Withdrawn
+from planner.campaign.model import Model
+from planner.campaign.state import CampaignState
+from planner.dataset.measure import MeasuredPose
+
+
+class Story:
+    """Tells each event of a campaign to a Rerun recording and/or live viewer, or to nobody."""
+
+    def __init__(self, cell: Cell, rrd: Path | None, viewer: bool, simulated: bool = False):
+        self._view = None
+        if rrd is not None or viewer:
+            from planner.report.rerun_view import RerunView
+
+            self._view = RerunView(cell, rrd, viewer, simulated)
+
+    def __enter__(self) -> "Story":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._view is not None:
+            self._view.close()
+
+    def tell(
+        self,
+        entry: Entry,
+        state: CampaignState,
+        model: Model,
+        measured: MeasuredPose | None = None,
+    ) -> None:
+        """Show one event; `state` and `model` are those after it."""
+        if self._view is None:
+            return
+        view, event, number = self._view, entry.event, len(model.labelled)
+        match event:
+            case Proposed():
+                for proposal in event.proposals:
+                    view.proposal(number, proposal, model)
+            case Imported():
+                self._imported(event, model, measured)
+            case Skipped() | Withdrawn():
+                reason = f": {event.reason}" if event.reason else ""
+                view.text(number, f"{type(event).__name__} {event.pose}{reason}", "WARN")
+            case Starred():
+                view.text(number, f"Starred {event.pose}", "INFO")
+            case Undone():
+                view.text(number, f"Took back entry {event.act} of the log", "WARN")
+            case _:
+                view.text(number, f"Configured {model.cell.robot.name}", "INFO")
+        if not isinstance(event, Proposed | Starred):
+            view.learning(number, _learning(model))
+
+    def _imported(self, event: Imported, model: Model, measured: MeasuredPose | None) -> None:
+        assert self._view is not None
+        number = len(model.labelled)
+        pose = next((p for p in model.labelled if p.pose == event.pose), None)
+        found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes if m.likely)
+        text = f"Imported {event.pose}: {found or 'no usable modes'}"
+        if any(hit.simulated for hit in event.hits):
+            self._view.label_simulated()
+        for hit in event.hits:
+            if not hit.accepted:
+                self._view.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
+        if pose is None:
+            self._view.text(number, text, "WARN")
+        else:
+            self._view.measurement(number, model, pose, measured, text)
+
+
+def _learning(model: Model) -> dict[str, float]:
+    sd = model.frequency_sd_percent
+    values = {f"frequency_sd_percent/mode_{k + 1}": float(v) for k, v in enumerate(sd)}
+    return {**values, "frequency_sd_percent/all": float(np.sqrt(np.mean(sd**2)))}

@@ -1,0 +1,178 @@
+"""Elastic degrees of freedom as virtual joints: mass matrix and Jacobians at a pose.
+
+Each [[compliance]] of robot.toml is a small rotation right after (outboard of) its joint's own,
+about an axis of the joint's child frame; joints themselves are held by their brakes. The mass
+matrix does not depend on stiffness or damping (seed 004, section 2; seed 001, section 2.1), and
+is linear in the inertias of the bodies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from planner.errors import InputError
+from planner.robot.robot import Robot
+from planner.robot.virtual_joints import virtual_model
+
+SINGULAR = 1e-12  # smallest eigenvalue of the mass matrix scaled to ones on its diagonal
+SAG_STEPS = 4  # each gains three digits or more where sagging is small at all
+
+
+@dataclass(frozen=True, eq=False)
+class Matrices:
+    """Of n poses and e elastic degrees of freedom: M (n, e, e) in kg·m²; Jacobians in m/rad.
+
+    `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
+    s sensors; unless others were named, that is the tcp and the sensor. `geometric` (n, e, e) in
+    N·m/rad is the stiffness that goes with the pose: gravity's own, harmonics of joint angles; 0
+    unless robot.toml asks for it.
+    """
+
+    mass: np.ndarray
+    hit: np.ndarray
+    sensor: np.ndarray
+    geometric: np.ndarray
+
+
+class ElasticModel:
+    """A robot with its elastic degrees of freedom. Raises InputError if there are none.
+
+    `inertia_change` (bodies, 10) is added to the inertias (see `inertia`).
+    """
+
+    def __init__(self, robot: Robot, inertia_change: np.ndarray | None = None):
+        blocks = robot.config.compliance
+        if not blocks:
+            raise InputError(
+                f"{robot.path} has no [[compliance]] block, so there is nothing to simulate; add "
+                f'the elastic joints, or set [fidelity] simulation = "none" in campaign.toml.'
+            )
+        self.robot = robot
+        small = robot.config.resonator
+        springs = [r.mass * (2 * np.pi * r.frequency_hz) ** 2 for r in small]
+        dampers = [4 * np.pi * r.damping_ratio * r.mass * r.frequency_hz for r in small]
+        self.stiffness = np.array([c.stiffness for c in blocks] + springs)
+        self.damping = np.array([c.damping for c in blocks] + dampers)
+        self.loss_factor = np.array([c.loss_factor for c in blocks] + [0.0] * len(small))
+        self._waves = tuple((self._own(w.joint), w) for w in robot.config.harmonic)
+        self._virtual = virtual_model(robot, inertia_change)
+        self._model = self._virtual.model
+        self._elastic = self._virtual.elastic
+        self._grid = np.ix_(self._elastic, self._elastic)
+        self._check_mass()
+
+    def _check_mass(self) -> None:
+        """Every elastic rotation must move inertia of its own; otherwise no M⁻¹ exists."""
+        middle = (self.robot.lower_rad + self.robot.upper_rad) / 2
+        mass = self.matrices(middle).mass[0]
+        scale = np.sqrt(np.maximum(np.diagonal(mass), np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(mass / np.outer(scale, scale))
+        if not values[0] > SINGULAR:
+            number = int(np.argmax(np.abs(vectors[:, 0])))
+            blocks = self.robot.config.compliance
+            block = blocks[min(number, len(blocks) - 1)]
+            raise InputError(
+                f"{self.robot.path}: [[compliance]] number {number + 1} ({block.joint}) moves no "
+                f"inertia of its own; give the links outboard of it an <inertial> in "
+                f"{self.robot.urdf_path.name}, or remove the block if its axis is listed twice."
+            )
+
+    def _own(self, joint: str) -> int:
+        """Number of the block about a joint's own axis; InputError if there is none."""
+        axis = self.robot.joint_axes[self.robot.joint_names.index(joint)]
+        for number, block in enumerate(self.robot.config.compliance):
+            if block.joint == joint and not block.slide and abs(np.array(block.axis) @ axis) > 0.9:
+                return number
+        raise InputError(
+            f"{self.robot.path}: [[effects]] has a harmonic of {joint}, which has no "
+            f"[[compliance]] about its own axis; add that."
+        )
+
+    @property
+    def size(self) -> int:
+        """Number e of elastic degrees of freedom, in the order of robot.toml."""
+        return len(self.stiffness)
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """What moves: all links that turn with a joint, by the joint's name; "base" if elastic."""
+        return self._virtual.bodies
+
+    @property
+    def inertia(self) -> np.ndarray:
+        """(bodies, 10): m in kg, m·c in kg·m, moments xx xy yy xz yz zz in kg·m² about the joint.
+
+        In the frame of the joint that carries the body, payloads included.
+        """
+        return self._virtual.inertia
+
+    def matrices(
+        self, q: np.ndarray, hits: Sequence[str] = (), sensors: Sequence[str] = ()
+    ) -> Matrices:
+        """Matrices of poses q (n, dof) in rad, between named frames of the URDF.
+
+        Raises InputError where a frame does not exist.
+        """
+        q = np.atleast_2d(q)
+        n, e, robot = len(q), self.size, self.robot
+        ids = [[robot.frame_id("hit frame", name) for name in hits] or [robot.tcp_id]]
+        ids += [[robot.frame_id("sensor frame", name) for name in sensors] or [robot.sensor_id]]
+        data = self._model.createData()  # one for each call, so that threads do not meet in it
+        mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
+        out = [np.empty((n, len(group), 3, e)) for group in ids]
+        for i, row in enumerate(q):
+            full = self._standing(row, data)
+            if robot.config.geometric_stiffness:
+                geometric[i] = self._gravity_stiffness(full, data)
+            for number, wave in self._waves:
+                angle = wave.order * row[robot.joint_names.index(wave.joint)]
+                change = wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
+                geometric[i, number, number] += change
+            crba = pin.crba(self._model, data, full)
+            upper = np.triu(crba)
+            mass[i] = (upper + np.triu(crba, 1).T)[self._grid]
+            for group, jacobians in zip(ids, out, strict=True):
+                for k, number in enumerate(group):
+                    frame = self._virtual.frames[number]
+                    jacobians[i, k] = pin.computeFrameJacobian(
+                        self._model, data, full, frame, pin.LOCAL
+                    )[:3, self._elastic]
+        hit, sensor = (jacobians.reshape(n, -1, e) for jacobians in out)
+        return Matrices(mass, hit, sensor, geometric)
+
+    def body_jacobians(self, q: np.ndarray) -> np.ndarray:
+        """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
+
+        In the frame of the joint that carries the body, linear part (m/rad) first. With the
+        spatial inertias I of the bodies (`virtual.inertia_basis`), M = Σ Jᵀ I J.
+        """
+        q = np.atleast_2d(q)
+        data = self._model.createData()
+        out = np.empty((len(q), len(self.bodies), 6, self.size))
+        for i, row in enumerate(q):
+            pin.computeJointJacobians(self._model, data, self._standing(row, data))
+            for b, joint in enumerate(self._virtual.carriers):
+                jacobian = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
+                out[i, b] = jacobian[:, self._elastic]
+        return out
+
+    def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
+        """Coordinates of the virtual model at q (dof,), sagged if robot.toml asks for it."""
+        full = np.zeros(self._model.nq)
+        full[self._virtual.rigid] = q
+        return self._sagged(full, data) if self.robot.config.geometric_stiffness else full
+
+    def _sagged(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
+        """Where springs of the stated stiffness carry the weight: K δ = −g(q + δ)."""
+        for _ in range(SAG_STEPS):
+            weight = pin.computeGeneralizedGravity(self._model, data, full)
+            full[self._elastic] = -weight[self._elastic] / self.stiffness
+        return full
+
+    def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
+        """Second derivative of the potential energy of the weight, (e, e)."""
+        gradient = pin.computeGeneralizedGravityDerivatives(self._model, data, full)
+        part = np.array(gradient)[self._grid]
+        return (part + part.T) / 2

@@ -1,0 +1,132 @@
+"""A robot's URDF with other inertias: how identified ones are handed on."""
+
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pinocchio as pin
+import scipy.linalg
+
+from planner.robot.robot import BASE, Robot
+from planner.robot.virtual_joints import OUTER, SMALL
+
+ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
+ORDER = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of moments in Pinocchio's ten numbers
+SAFE = 0.99  # of the largest share of a change that leaves a body possible
+
+
+def urdf_with_inertias(
+    robot: Robot, bodies: tuple[str, ...], change: np.ndarray
+) -> tuple[str, dict[str, float]]:
+    """Text of the URDF after change (B, 10) of the bodies' inertias, which `bodies` names.
+
+    Bodies, their frames and the ten numbers are those of `ElasticModel.inertia`. Of the links
+    that make up a body the heaviest takes the change, or the share of it that leaves a link which
+    matter can form; shares below 1 are returned by body.
+    """
+    text = robot.urdf_path.read_bytes().decode("utf-8")
+    keep = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
+    root = ElementTree.fromstring(text[text.index("<robot") :], keep)
+    links = {link.get("name"): link for link in root.findall("link")}
+    shares = {}
+    for body, values in zip(bodies, change, strict=True):
+        if body.endswith(OUTER):
+            body, values = _of_whole(robot, body.removesuffix(OUTER), values)
+        if np.any(values) and not body.startswith(f"{SMALL} "):
+            frame = _heaviest(robot, body, links)
+            share = _change(links[frame.name], _seen_from(frame.placement, values))
+            shares |= {body: share} if share < 1 else {}
+    return text[: text.index("<robot")] + ElementTree.tostring(root, encoding="unicode"), shares
+
+
+def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndarray]:
+    """The joint that moves a link, and a change (10,) of its outer half as one of the link's."""
+    carried = robot.carries(link)
+    assert carried is not None  # otherwise the link has no halves
+    half = robot.model.jointPlacements[carried[1]].translation / 2
+    return str(robot.model.names[carried[0]]), _seen_from(pin.SE3(np.eye(3), -half), values)
+
+
+def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
+    names = list(robot.model.names)
+    joint = 0 if body == BASE and BASE not in robot.joint_names else names.index(body)
+    frames = [
+        frame
+        for frame in robot.model.frames
+        if frame.type == pin.FrameType.BODY and frame.parentJoint == joint and frame.name in links
+    ]
+    return max(frames, key=lambda frame: _inertia(links[frame.name]).mass)
+
+
+def _inertia(link: ElementTree.Element) -> pin.Inertia:
+    """Of a link in its own frame; 0 where the URDF states none."""
+    inertial = link.find("inertial")
+    if inertial is None:
+        return pin.Inertia.Zero()
+    origin, mass, entries = (inertial.find(key) for key in ("origin", "mass", "inertia"))
+    xyz, rpy = np.zeros(3), np.zeros(3)
+    if origin is not None:
+        xyz = np.array([float(v) for v in origin.get("xyz", "0 0 0").split()])
+        rpy = np.array([float(v) for v in origin.get("rpy", "0 0 0").split()])
+    moments = np.zeros((3, 3))
+    if entries is not None:
+        for name, (i, j) in ENTRIES.items():
+            moments[i, j] = moments[j, i] = float(entries.get(name, "0"))
+    turn = pin.rpy.rpyToMatrix(rpy)
+    value = 0.0 if mass is None else float(mass.get("value", "0"))
+    return pin.Inertia(value, xyz, turn @ moments @ turn.T)
+
+
+def _seen_from(placement: pin.SE3, values: np.ndarray) -> np.ndarray:
+    """Inertial numbers (10,), or a change of them, in a frame that is placed in theirs."""
+    turn, at = placement.rotation, placement.translation
+    toward = np.eye(4)
+    toward[:3, :3], toward[:3, 3] = turn.T, -turn.T @ at
+    moved = toward @ _spread(values) @ toward.T
+    second = moved[:3, :3]
+    moments = np.trace(second) * np.eye(3) - second
+    return np.array([moved[3, 3], *moved[:3, 3], *(moments[ij] for ij in ORDER)])
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    """Pseudo-inertia (4, 4): ∫ (x, 1)(x, 1)ᵀ dm, positive where matter can form the body.
+
+    Wensing, Kim & Slotine 2018, eq. 12.
+    """
+    moments = np.zeros((3, 3))
+    for (i, j), value in zip(ORDER, values[4:], strict=True):
+        moments[i, j] = moments[j, i] = value
+    second = np.trace(moments) / 2 * np.eye(3) - moments
+    return np.block([[second, values[1:4, None]], [values[None, 1:4], values[:1, None]]])
+
+
+def _change(link: ElementTree.Element, values: np.ndarray) -> float:
+    """Add the share of `values` (10,) that is possible to a link; returns it."""
+    nominal = np.array(_inertia(link).toDynamicParameters())
+    share = _possible(_spread(nominal), _spread(values))
+    if share > 0:
+        _write(link, pin.Inertia.FromDynamicParameters(nominal + share * values))
+    return share
+
+
+def _possible(nominal: np.ndarray, change: np.ndarray) -> float:
+    """Share of a change of a pseudo-inertia that keeps it positive; 0 where it is not so before."""
+    try:
+        least = scipy.linalg.eigh(change, nominal, eigvals_only=True)[0]
+    except np.linalg.LinAlgError:
+        return 0.0
+    return 1.0 if least > -SAFE else float(SAFE / -least)
+
+
+def _write(link: ElementTree.Element, inertia: pin.Inertia) -> None:
+    inertial = link.find("inertial")
+    assert inertial is not None
+    tail = inertial.text
+    for child in list(inertial):
+        inertial.remove(child)
+    parts = {
+        "origin": {"xyz": " ".join(f"{v:.9g}" for v in inertia.lever), "rpy": "0 0 0"},
+        "mass": {"value": f"{inertia.mass:.9g}"},
+        "inertia": {name: f"{inertia.inertia[at]:.9g}" for name, at in ENTRIES.items()},
+    }
+    for name, attributes in parts.items():
+        ElementTree.SubElement(inertial, name, attributes).tail = tail

@@ -1,0 +1,162 @@
+"""Seed 000 again (Busch et al. 2022): kernels and fusions for modal parameters over a plane.
+
+Figures 7, 8, 10, 11 and 12 of the paper on the shipped campaign; medians over several splits into
+15 poses to train with and 20 to tell, for one split is luck.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.studies.busch2022_data import Recorded, load, split
+from planner.studies.busch2022_findings import findings
+from planner.studies.busch2022_frf import figure_12
+from planner.studies.busch2022_names import (
+    COUNTS,
+    FREQUENCY_MODELS,
+    FUSIONS,
+    KERNELS,
+    RESIDUES,
+)
+from planner.studies.busch2022_pictures import pictures
+from planner.studies.models.fidelity_levels import Exact, Samples
+from planner.studies.models.nargp import fit_nargp
+from planner.studies.models.recursive_ar1 import fit_recursive
+from planner.studies.models.single_output_gp import fit_gp
+from planner.studies.report import Progress, Report, Table
+
+SPLITS = 5
+Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """One modal parameter at all poses (35,), its sd, and the models that are to tell it."""
+
+    y: np.ndarray
+    sd: np.ndarray
+    fits: dict[str, Fit]
+
+
+def study(progress: Progress) -> Report:
+    """All figures, and whether what the paper found in its own holds here."""
+    seen = load(progress)
+    modes = seen.modes
+    progress("frequencies", 0.2)
+    frequencies = [_frequency(seen, k) for k in range(modes.frequency_hz.shape[1])]
+    seven = _scores(seen, frequencies, 15)
+    eight = []
+    for i, count in enumerate(COUNTS):
+        progress(f"frequencies with {count} poses", 0.3 + 0.4 * i / len(COUNTS))
+        eight.append(_scores(seen, [_only(o, FUSIONS) for o in frequencies], count))
+    eight = np.array(eight)
+    progress("damping ratios", 0.7)
+    damping = zip(100 * modes.damping_ratio.T, 100 * modes.damping_sd.T, strict=True)
+    ten = _scores(seen, [Output(y, sd, _kernels(KERNELS)) for y, sd in damping], 15)
+    eleven = []
+    for i, name in enumerate(RESIDUES):
+        progress(f"residues {name}", 0.75 + 0.2 * i / len(RESIDUES))
+        eleven.append(_scores(seen, _residues(seen, name), 15))
+    eleven = np.array(eleven)
+    progress("FRFs", 0.95)
+    twelve = figure_12(seen)
+    return Report(
+        "seed-000",
+        "SIMULATED: the shipped campaign kr240_plane, 35 poses recorded in MuJoCo with a hammer's "
+        "noise, modes as the planner finds them.",
+        _tables(seven, eight, ten, eleven),
+        findings(seven, eight, ten, eleven, twelve),
+        pictures(seven, eight, ten, eleven) | {"seed_000_figure_12": twelve.figure},
+    )
+
+
+def _scores(seen: Recorded, outputs: list[Output], count: int) -> np.ndarray:
+    """Medians over splits (outputs, models, 3) of R², RMSE and the 95 % interval's coverage."""
+    runs = np.empty((SPLITS, len(outputs), len(outputs[0].fits), 3))
+    for seed in range(SPLITS):
+        train, test = split(seen.x, seed)
+        for k, output in enumerate(outputs):
+            for i, fit in enumerate(output.fits.values()):
+                runs[seed, k, i] = _run(seen.x, output, fit, train[:count], test)
+    return np.concatenate([np.median(runs[..., :2], axis=0), runs[..., 2:].mean(axis=0)], axis=-1)
+
+
+def _run(
+    x: np.ndarray, output: Output, fit: Fit, train: np.ndarray, test: np.ndarray
+) -> tuple[float, float, float]:
+    test = test[np.isfinite(output.y[test])]
+    mean, sd = fit(Samples.of(x[train], output.y[train], output.sd[train]))(x[test])
+    off = mean - output.y[test]
+    inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test])
+    r2 = 1 - np.mean(off**2) / np.var(output.y[test])
+    return float(r2), float(np.sqrt(np.mean(off**2))), float(inside.mean())
+
+
+def _kernels(names: tuple[str, ...]) -> dict[str, Fit]:
+    return {name: (lambda s, kernel=name: fit_gp(s, kernel).predict) for name in names}
+
+
+def _frequency(seen: Recorded, k: int) -> Output:
+    """A mode's frequency, with the simulation's known at every pose."""
+    low = seen.modes.simulated.frequency_hz[:, k]
+
+    def value(x: np.ndarray) -> np.ndarray:
+        return low[np.argmin(np.linalg.norm(seen.x[None] - x[:, None], axis=-1), axis=1)]
+
+    def fused(fit: Callable) -> Fit:
+        return lambda s: fit(s, Exact(value), float(np.std(low)), kernel="rbf").predict
+
+    def bent(s: Samples) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        return fit_nargp(s, Exact(value), float(np.std(low))).predict
+
+    fits = _kernels(KERNELS[1:]) | {"AR1": fused(fit_recursive), "NARGP": bent}
+    return Output(seen.modes.frequency_hz[:, k], seen.modes.frequency_sd_hz[:, k], fits)
+
+
+def _only(output: Output, names: tuple[str, ...]) -> Output:
+    return Output(output.y, output.sd, {name: output.fits[name] for name in names})
+
+
+def _residues(seen: Recorded, name: str) -> list[Output]:
+    """Real or imaginary parts of a direct residue, mode by mode, over the mode's rms there."""
+    direction, part = name.split()
+    axis = "xyz".index(direction[0])
+    value = seen.modes.residue[:, :, axis, axis]
+    scale = np.sqrt(np.nanmean(np.abs(value) ** 2, axis=0))
+    sd = seen.modes.residue_sd[:, :, axis, axis] / scale
+    columns = (value.real if part == "real" else value.imag) / scale
+    return [Output(y, s, _kernels(KERNELS)) for y, s in zip(columns.T, sd.T, strict=True)]
+
+
+def _table(
+    name: str, title: str, scores: np.ndarray, part: int, names: tuple[str, ...] = FREQUENCY_MODELS
+) -> Table:
+    rows = [(f"mode {k + 1}", *map(float, row)) for k, row in enumerate(scores[..., part])]
+    return Table(name, f"{title}, 15 poses trained, 20 told", ("", *names), tuple(rows))
+
+
+def _tables(
+    seven: np.ndarray, eight: np.ndarray, ten: np.ndarray, eleven: np.ndarray
+) -> tuple[Table, ...]:
+    title = "Figure 11: RMSE of residues {}, over the mode's size"
+    return (
+        _table("seed_000_figure_7_r2", "Figure 7: R² of frequencies", seven, 0),
+        _table("seed_000_figure_7_rmse", "Figure 7: RMSE of frequencies in Hz", seven, 1),
+        _figure_8_table(eight),
+        _table("seed_000_figure_10_r2", "Figure 10: R² of damping ratios", ten, 0, KERNELS),
+        _table("seed_000_figure_10_rmse", "Figure 10: RMSE of damping in %", ten, 1, KERNELS),
+        *(
+            _table(f"seed_000_figure_11_{name.replace(' ', '_')}", title.format(name), part, 1,
+                   KERNELS)
+            for name, part in zip(RESIDUES, eleven, strict=True)
+        ),
+    )  # fmt: skip
+
+
+def _figure_8_table(eight: np.ndarray) -> Table:
+    middle = np.median(eight, axis=1)  # over modes: (counts, models, 3)
+    columns = [f"{name} {what}" for name in FUSIONS for what in ("R²", "RMSE", "inside")]
+    rows = [(f"{n} poses", *map(float, row.ravel())) for n, row in zip(COUNTS, middle, strict=True)]
+    title = "Figure 8: R², RMSE in Hz and share inside the 95 % interval, medians over modes"
+    return Table("seed_000_figure_8", title, ("", *columns), tuple(rows))

@@ -1,0 +1,73 @@
+"""Seed 000's data: what the planner finds in the recordings of the shipped campaign (simulated)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from planner.campaign.cell import Cell
+from planner.campaign.config import load_campaign_config
+from planner.campaign.labels import label, observations
+from planner.campaign.log_conversion import from_mode
+from planner.campaign.state import Measurement
+from planner.dataset.measure import Source, measure
+from planner.demo import NAME, Pool, shipped
+from planner.frf.frf import Frf
+from planner.studies.report import Progress
+from planner.surrogate.modal_surrogate import ModalObservations
+
+TRAINED = 15
+DESIGNS = 200  # Latin hypercubes, of which the one with the largest least distance is taken
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """35 poses at x (35, d) in [0, 1], their labelled modes and their FRFs, and the simulation."""
+
+    poses: tuple[str, ...]
+    x: np.ndarray
+    modes: ModalObservations
+    frfs: tuple[Frf | None, ...]
+
+
+def load(progress: Progress) -> Recorded:
+    """Modal analysis of every recorded pose, labels by the simulation as in a campaign."""
+    source = shipped(NAME)
+    cell = Cell.load(
+        source / "robot" / "robot.toml", load_campaign_config(source / "campaign.toml")
+    )
+    pool = Pool.load(source / "recordings", cell.robot.joint_names)
+    found, frfs = [], []
+    for i, (pose, rows) in enumerate(pool.rows.items()):
+        progress(f"modal analysis of pose {pose}", 0.2 * i / len(pool.rows))
+        sources = tuple(Source(r.file, str(r.file), r.hit) for r in rows if r.file)
+        measured = measure(sources, cell.config.modes.band_hz)
+        modes = measured.modal.modes if measured.modal else ()
+        found.append(Measurement(pose, rows[0].joints_deg, (), tuple(from_mode(m) for m in modes)))
+        frfs.append(measured.frf)
+    seen = observations(cell, label(cell, tuple(found)))
+    x = seen.x[:, np.ptp(seen.x, axis=0) > 1e-6]
+    x = (x - x.min(axis=0)) / np.ptp(x, axis=0)
+    return Recorded(tuple(pool.rows), x, seen, tuple(frfs))
+
+
+def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Strategy A: 15 poses (in a random order, whose first N are B_N) and the 20 left over.
+
+    The poses nearest to a maximin Latin hypercube (section 2.2).
+    """
+    rng = np.random.default_rng(seed)
+    designs = [qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(DESIGNS)]
+    points = max(designs, key=_least_distance)
+    chosen: list[int] = []
+    for point in points:
+        distance = np.linalg.norm(x - point, axis=1)
+        distance[chosen] = np.inf
+        chosen.append(int(np.argmin(distance)))
+    train = rng.permutation(chosen)
+    return train, np.setdiff1d(np.arange(len(x)), train)
+
+
+def _least_distance(points: np.ndarray) -> float:
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    return float(apart[np.triu_indices(len(points), 1)].min())

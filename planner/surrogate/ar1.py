@@ -1,0 +1,130 @@
+"""AR1 of many outputs over a simulation that is known exactly at every pose.
+
+y_H(x) = ρ·y_L(x) + b + δ(x) (Kennedy & O'Hagan 2000; seed 000, section 2.3.1). The simulation is
+deterministic and costs milliseconds, so the low-fidelity level is evaluated, not modelled. An
+output without simulation is a plain GP: the same with no ρ·y_L.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.surrogate.gp import Posterior, Prior, fit
+from planner.surrogate.kernels import Kernel, parse
+from planner.surrogate.marginal import laplace
+from planner.surrogate.training_data import TrainingData, pad
+
+
+@dataclass(frozen=True)
+class OutputPrior:
+    """Weakly informative prior of one kind of output, in the output's own unit.
+
+    Medians of amplitude σ of δ and of the nugget τ, with log-sd `spread` each; length scales have
+    median `length`·√d, log-sd `length_spread`, in coordinates scaled to [0, 1]. `mean` applies
+    without simulation only.
+    """
+
+    bias_sd: float
+    slope_sd: float
+    amplitude: float
+    nugget: float
+    mean: float = 0.0
+    length: float = 0.8
+    spread: float = 1.0
+    length_spread: float = 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class AR1:
+    """Fitted outputs; `uses_low` (m,): which stand on the simulation.
+
+    Where the simulation has no value, it is taken as `centre` ± `unknown_sd` (m,).
+    """
+
+    posterior: Posterior
+    uses_low: np.ndarray
+    centre: np.ndarray
+    unknown_sd: np.ndarray
+
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there).
+
+        `outputs` (indices) asks for some of the columns only.
+        """
+        base, offset = self.split(low)
+        blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
+        if outputs is not None:
+            base, blind = base[:, outputs], blind[:, outputs]
+        mean, sd = self.posterior.predict(x, offset, outputs)
+        return mean + base, np.hypot(sd, blind)
+
+    def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What ρ = 1 predicts, and the centred value that ρ − 1 multiplies; (q, m) each."""
+        known = np.where(np.isfinite(low), low, self.centre[None, :])
+        base = np.where(self.uses_low[None, :], known, 0.0)
+        return base, np.where(self.uses_low[None, :], known - self.centre[None, :], 0.0)
+
+
+def fit_ar1(
+    data: TrainingData,
+    with_low: tuple[OutputPrior, ...],
+    without_low: tuple[OutputPrior, ...],
+    centre: np.ndarray,
+    samples: int = 256,
+    kept: int = 32,
+    kernel: str = "matern52",
+    thorough: bool = False,
+) -> AR1:
+    """Fit m outputs; per output its prior with and without simulation, and y_L's `centre` (m,).
+
+    `thorough` looks for each output's most probable hyperparameters first: tens of milliseconds
+    an output, which pays where there are many hyperparameters or many points.
+    """
+    uses_low = _uses_low(data, centre)
+    centre = np.where(uses_low, np.nan_to_num(centre), 0.0)
+    unknown_sd = _unknown_sd(data.low, without_low)
+    priors = [a if u else b for a, b, u in zip(with_low, without_low, uses_low, strict=True)]
+    blind = uses_low[None, :] & ~np.isfinite(data.low)
+    low = np.where(uses_low[None, :], np.where(blind, centre[None, :], data.low), 0.0)
+    sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
+    padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
+    prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1]))
+    start = laplace(kernel, padded, prior) if thorough else None
+    posterior = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start)
+    return AR1(posterior, uses_low, centre, unknown_sd)
+
+
+def _uses_low(data: TrainingData, centre: np.ndarray) -> np.ndarray:
+    """Which outputs (m,) stand on the simulation: those it has at most of the measured poses."""
+    measured, simulated = np.isfinite(data.y), np.isfinite(data.low)
+    most = 2 * np.sum(measured & simulated, axis=0) >= np.sum(measured, axis=0)
+    # With no measurement yet the simulation, where there is one, is all there is to stand on.
+    alone = simulated.any(axis=0) if len(data.x) else np.isfinite(centre)
+    return np.where(measured.any(axis=0), most, alone)
+
+
+def _unknown_sd(low: np.ndarray, priors: tuple[OutputPrior, ...]) -> np.ndarray:
+    """Sd (m,) of the simulation's value where it has none: its scatter over the poses seen."""
+    known = np.isfinite(low)
+    count = np.maximum(known.sum(axis=0), 1)
+    filled = np.where(known, low, 0.0)
+    mean = filled.sum(axis=0) / count
+    scatter = np.sqrt(np.sum(np.where(known, low - mean[None, :], 0.0) ** 2, axis=0) / count)
+    amplitude = np.array([p.amplitude for p in priors])
+    never_seen = np.hypot(amplitude, np.array([p.bias_sd for p in priors]))
+    return np.where(known.sum(axis=0) > 1, np.maximum(scatter, amplitude), never_seen)
+
+
+def _stack(priors: list[OutputPrior], uses_low: np.ndarray, kernel: Kernel) -> Prior:
+    theta = [
+        kernel.prior(p.amplitude, p.nugget, p.length, p.spread, p.length_spread) for p in priors
+    ]
+    return Prior(
+        mean=np.array([p.mean for p in priors]) * ~uses_low,
+        bias_sd=np.array([p.bias_sd for p in priors]),
+        slope_sd=np.array([p.slope_sd for p in priors]) * uses_low,
+        theta_mean=np.array([mean for mean, _ in theta]),
+        theta_sd=np.array([sd for _, sd in theta]),
+    )

@@ -1,0 +1,106 @@
+"""AR1 and a GP that ignores the simulation, output by output as the data believe in either.
+
+A simulation whose modes are in another order, or that lacks physics, makes AR1 several times worse
+than a GP. Each output therefore weighs the two by their evidence (see `mixture`).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
+from planner.surrogate.gp import Posterior, Prior
+from planner.surrogate.training_data import TrainingData
+
+BELIEF = 0.5  # in the simulation, before anything is measured
+SURE = 0.999  # weight from which the other model is not asked
+
+
+@dataclass(frozen=True, eq=False)
+class HedgedAR1:
+    """Of every output the likelier model, the other one, and the likelier one's weight (m,)."""
+
+    likelier: AR1
+    other: AR1
+    weight: np.ndarray
+    log_evidence: np.ndarray  # (m,) of the two together
+
+    @property
+    def posterior(self) -> Posterior:
+        """The likelier models' posterior."""
+        return self.likelier.posterior
+
+    @property
+    def uses_low(self) -> np.ndarray:
+        """Which outputs (m,) stand on the simulation."""
+        return self.likelier.uses_low
+
+    def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """See `AR1.split`; of the likelier models."""
+        return self.likelier.split(low)
+
+    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
+        mean, sd = self.likelier.predict(x, low)
+        unsure = np.flatnonzero(self.weight < SURE)
+        if not len(unsure):
+            return mean, sd
+        other, other_sd = self.other.predict(x, low, unsure)
+        w, apart = self.weight[unsure], other - mean[:, unsure]
+        variance = w * sd[:, unsure] ** 2 + (1 - w) * (other_sd**2 + w * apart**2)
+        mean[:, unsure] += (1 - w) * apart
+        sd[:, unsure] = np.sqrt(variance)
+        return mean, sd
+
+
+def fit_hedged(
+    data: TrainingData,
+    with_low: tuple[OutputPrior, ...],
+    without_low: tuple[OutputPrior, ...],
+    centre: np.ndarray,
+    samples: int = 256,
+    kept: int = 32,
+    judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
+    belief: float = BELIEF,
+) -> HedgedAR1:
+    """Fit m outputs; arguments as of `fit_ar1`.
+
+    `judged` are low-fidelity values (n, m) and priors by which the simulation is believed, where
+    those of `data` have seen the very measurements: what it said of each pose before. `belief` is
+    its probability before these data.
+    """
+    fused = fit_ar1(data, with_low, without_low, centre, samples, kept)
+    believed = fused
+    if judged is not None:
+        low, prior = judged
+        unseen = replace(data, low=np.where(np.isfinite(low), low, data.low))
+        believed = fit_ar1(unseen, prior, without_low, centre, samples, kept)
+    nothing = np.full(len(centre), np.nan)
+    ignored = replace(data, low=np.full_like(data.low, np.nan))
+    alone = fit_ar1(ignored, with_low, without_low, nothing, samples, kept)
+    gap = believed.posterior.log_evidence - alone.posterior.log_evidence
+    gap = np.where(fused.uses_low, gap + np.log(belief / (1 - belief)), np.inf)
+    # Without a measurement there is nothing to doubt the simulation by.
+    gap = np.where(fused.posterior.mask.any(axis=1), gap, np.inf)
+    trust = gap >= 0
+    weight = 1 / (1 + np.exp(-np.minimum(np.abs(gap), 700.0)))
+    evidence = np.logaddexp(believed.posterior.log_evidence, alone.posterior.log_evidence)
+    return HedgedAR1(_choose(trust, fused, alone), _choose(~trust, fused, alone), weight, evidence)
+
+
+def _choose(first: np.ndarray, a: AR1, b: AR1) -> AR1:
+    """Outputs of `a` where `first` (m,), of `b` elsewhere."""
+
+    def pick(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        return np.where(first.reshape(-1, *[1] * (u.ndim - 1)), u, v)
+
+    p, q = a.posterior, b.posterior
+    pairs = zip(vars(p.prior).values(), vars(q.prior).values(), strict=True)
+    prior = Prior(*(pick(u, v) for u, v in pairs))
+    names = ("low", "mask", "theta", "whiten", "weights", "log_evidence")
+    picked = {name: pick(getattr(p, name), getattr(q, name)) for name in names}
+    posterior = replace(p, prior=prior, remarks=p.remarks + q.remarks, **picked)
+    return AR1(
+        posterior, pick(a.uses_low, b.uses_low), pick(a.centre, b.centre),
+        pick(a.unknown_sd, b.unknown_sd),
+    )  # fmt: skip

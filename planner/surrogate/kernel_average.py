@@ -1,0 +1,67 @@
+"""AR1s (or GPs) that differ in their kernel, averaged by evidence, output by output.
+
+Damping of one robot is the same everywhere, of another a smooth function of the pose; seed 000
+(section 3.2) chose its kernel by hand.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
+from planner.surrogate.gp import Posterior
+from planner.surrogate.training_data import TrainingData
+
+SURE = 1e-3  # weight below which a kernel is not asked
+
+
+@dataclass(frozen=True, eq=False)
+class KernelAverage:
+    """Fits by kernel; weights (kernel, m), whose columns sum to one."""
+
+    kernels: tuple[str, ...]
+    models: tuple[AR1, ...]
+    weights: np.ndarray
+
+    @property
+    def likeliest(self) -> tuple[str, ...]:
+        """Each output's likeliest kernel."""
+        return tuple(self.kernels[i] for i in np.argmax(self.weights, axis=0).tolist())
+
+    @property
+    def posteriors(self) -> tuple[Posterior, ...]:
+        """One a kernel."""
+        return tuple(model.posterior for model in self.models)
+
+    @property
+    def log_evidence(self) -> np.ndarray:
+        """(m,) of all kernels together."""
+        each = np.array([m.posterior.log_evidence for m in self.models])
+        return np.logaddexp.reduce(each, axis=0) - np.log(len(self.models))
+
+    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
+        asked = np.flatnonzero(self.weights.max(axis=1) > SURE).tolist()
+        found = [self.models[i].predict(x, low) for i in asked]
+        w = self.weights[asked][:, None, :] / self.weights[asked].sum(axis=0)
+        means, sds = (np.array([f[i] for f in found]) for i in (0, 1))
+        mean = np.sum(w * means, axis=0)
+        return mean, np.sqrt(np.sum(w * (sds**2 + (means - mean) ** 2), axis=0))
+
+
+def fit_shapes(
+    data: TrainingData,
+    with_low: tuple[OutputPrior, ...],
+    without_low: tuple[OutputPrior, ...],
+    centre: np.ndarray,
+    kernels: tuple[str, ...],
+    samples: int = 64,
+    kept: int = 16,
+) -> KernelAverage:
+    """Fit m outputs with every kernel; the other arguments as of `fit_ar1`."""
+    models = tuple(
+        fit_ar1(data, with_low, without_low, centre, samples, kept, kernel) for kernel in kernels
+    )
+    evidence = np.array([m.posterior.log_evidence for m in models])
+    weights = np.exp(evidence - evidence.max(axis=0))
+    return KernelAverage(kernels, models, weights / weights.sum(axis=0))

@@ -1,0 +1,79 @@
+"""Leave-one-out: what each measurement would have been predicted as without it.
+
+For every hyperparameter sample the answer is in closed form (Sundararajan & Keerthi 2001): error
+α_i/(K⁻¹)_ii with variance 1/(K⁻¹)_ii, the measurement's own noise included. The samples, which
+have seen the measurement, are weighed by how little they needed it (importance sampling with
+truncated weights, Ionides 2008).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from planner.surrogate.gp import Posterior
+
+LEVELS = (0.5, 0.8, 0.9, 0.95)
+
+
+@dataclass(frozen=True, eq=False)
+class LeaveOneOut:
+    """Of n measurements and m outputs (n, m), NaN where there is none.
+
+    `error` is measured less predicted, `sd` what was expected of it, `rank` the share of the
+    predictive distribution below the measurement: uniform on [0, 1] if the model is calibrated.
+    """
+
+    error: np.ndarray
+    sd: np.ndarray
+    rank: np.ndarray
+
+    def coverage(self, levels: tuple[float, ...] = LEVELS) -> np.ndarray:
+        """Share of the measurements inside the central interval of each level."""
+        known = self.rank[np.isfinite(self.rank)]
+        if not len(known):
+            return np.full(len(levels), np.nan)
+        return np.array([np.mean(np.abs(known - 0.5) <= level / 2) for level in levels])
+
+    def worst(self, count: int = 3) -> np.ndarray:
+        """Indices of the measurements whose errors are largest for what was expected of them."""
+        size = np.where(np.isfinite(self.error), np.abs(self.error / self.sd), 0.0).max(axis=1)
+        return np.argsort(-size, kind="stable")[:count]
+
+
+def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
+    """Of the first `measurements` (n) rows that the posterior was fitted to."""
+    shape = (measurements, len(posterior.mask))
+    error, sd, rank = (np.full(shape, np.nan) for _ in range(3))
+    for j in range(shape[1]):
+        known = np.flatnonzero(posterior.mask[j][:measurements])
+        white = posterior.whiten[j]
+        precision = np.sum(white**2, axis=1)[:, known]  # (k, i): diagonal of K⁻¹
+        off, spread = posterior.weights[j][:, known] / precision, 1 / np.sqrt(precision)
+        needed = -norm.logpdf(off, scale=spread)
+        w = np.exp(needed - needed.max(axis=0))
+        w = np.minimum(w, np.sqrt(len(w)) * w.mean(axis=0))
+        w = w / w.sum(axis=0)
+        mean = np.sum(w * off, axis=0)
+        error[known, j] = mean
+        sd[known, j] = np.sqrt(np.sum(w * (spread**2 + (off - mean) ** 2), axis=0))
+        rank[known, j] = np.sum(w * norm.cdf(off / spread), axis=0)
+    return LeaveOneOut(error, sd, rank)
+
+
+def report(found: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, ...]) -> list[str]:
+    """Lines for the user: coverage, and the poses that surprise most."""
+    count = int(np.isfinite(found.rank).sum())
+    if count == 0:
+        return ["Nothing is measured yet that could be left out."]
+    pairs = zip(LEVELS, found.coverage(), strict=True)
+    shares = ", ".join(f"{100 * level:.0f} %: {100 * share:.0f} %" for level, share in pairs)
+    lines = [
+        f"Left out one by one, {count} values lie inside their intervals as follows: {shares}."
+    ]
+    for i in found.worst():
+        score = np.where(np.isfinite(found.error[i]), np.abs(found.error[i] / found.sd[i]), 0.0)
+        j = int(np.argmax(score))
+        if score[j] > 2:
+            lines.append(f"{poses[i]}: {outputs[j]} is {score[j]:.1f} sd off what the others say.")
+    return lines
