@@ -58,7 +58,7 @@ def test_a_changed_byte_is_found(data):
     byte = data.draw(st.integers(0, 255).filter(lambda b: b != log[at]))
     changed = log[:at] + bytes([byte]) + log[at + 1 :]
     last = log[:-1].rfind(b"\n") + 1
-    if at < last:
+    if at < last or byte == ord("\n"):  # a write that was cut short never leaves two lines
         with pytest.raises(JournalError, match="damaged"):
             parse(changed)
     else:
