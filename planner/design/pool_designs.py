@@ -4,7 +4,6 @@ import warnings
 from functools import lru_cache
 
 import numpy as np
-from scipy.stats import qmc
 
 from planner.design.space_filling import nearest
 
@@ -16,6 +15,8 @@ def random(x: np.ndarray, count: int, seed: int) -> np.ndarray:
 
 def sobol(x: np.ndarray, count: int, seed: int) -> np.ndarray:
     """The poses (indices) of x (n, d) nearest to a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+
     power = int(np.ceil(np.log2(count + 1)))
     sampler = qmc.Sobol(x.shape[1], scramble=True, rng=np.random.default_rng(seed))
     return nearest(x, sampler.random_base2(power), count)

@@ -3,7 +3,6 @@
 import warnings
 
 import numpy as np
-from scipy.stats import qmc
 
 
 def random(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray:
@@ -13,6 +12,8 @@ def random(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarra
 
 def sobol(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray:
     """The candidates nearest to the next points of a Sobol sequence, after those taken."""
+    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+
     power = int(np.ceil(np.log2(len(taken) + count + 1)))
     points = qmc.Sobol(x.shape[1], scramble=True, rng=np.random.default_rng(0)).random_base2(power)
     return nearest(x, points[len(taken) :], count)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
 
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
@@ -160,6 +159,8 @@ def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) ->
     """θ (k, P): the prior's median, then quasi-random between the bounds; or those given."""
     if not isinstance(starts, int):
         return p.near(np.log(np.atleast_2d(starts)))
+    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+
     lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
     sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
     unit = sampler.random_base2(max(1, int(np.ceil(np.log2(max(starts, 2))))))[: starts - 1]

@@ -8,7 +8,7 @@ frequencies and damping depend on the level.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
@@ -125,7 +125,7 @@ def _compare(a: Frf, b: Frf, band_hz: tuple[float, float]) -> tuple[float, float
     # E|ΔH|²/noise is 1 with sd 1 a line; the noise is itself estimated from few hits.
     spread = np.sqrt(2 / square.size) * 1.5
     beyond = max(0.0, float(np.sum(square - noise)) / float(np.sum(np.abs(ha * hb))))
-    return float(np.sqrt(beyond)), float(norm.sf((mean - 1) / spread))
+    return float(np.sqrt(beyond)), float(ndtr(-(mean - 1) / spread))
 
 
 def _level(

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import qmc
 
 from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
@@ -107,6 +106,8 @@ class Workspace:
         dimensions = int(self.varying.sum())
         points = np.tile(self.lower, (1 if dimensions == 0 else TRIES * n, 1))
         if dimensions:
+            from scipy.stats import qmc  # scipy.stats takes most of a second to import
+
             sampler = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
             exponent = int(np.ceil(np.log2(TRIES * n)))
             unit = sampler.random_base2(exponent)[: TRIES * n]
