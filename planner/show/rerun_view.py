@@ -12,6 +12,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
@@ -69,6 +70,7 @@ class RerunView:
                 rr.Boxes3D(
                     centers=[b.center_m for b in blocks],
                     sizes=[b.size_m for b in blocks],
+                    quaternions=[_quaternion(b.rpy_deg) for b in blocks],
                     labels=[b.name for b in blocks],
                     colors=COLOURS["obstacle"],
                 ),
@@ -235,6 +237,11 @@ class RerunView:
 def hit_sign(axis: str) -> float:
     """Sense of a signed axis."""
     return -1.0 if axis[0] == "-" else 1.0
+
+
+def _quaternion(rpy_deg: tuple[float, float, float]) -> np.ndarray:
+    """Quaternion (x, y, z, w) of roll, pitch and yaw about the world's axes."""
+    return Rotation.from_euler("xyz", rpy_deg, degrees=True).as_quat()
 
 
 def _eye(cell: Cell) -> rrb.EyeControls3D:

@@ -17,6 +17,10 @@ POSES_DEG = ((10.0, -80.0, 90.0, 5.0, 30.0, 20.0), (-35.0, -60.0, 70.0, -25.0, 6
 LINKS = ("base_link", *(f"link_{i}" for i in range(1, 7)))
 BARE = re.sub(r"<(visual|collision)>.*?</\1>", "", urdf())
 NO_VISUALS = re.sub(r"<visual>.*?</visual>", "", urdf())
+FENCE = (
+    '[[obstacle]]\nname = "fence"\ncenter_m = [2, 2, 0.5]\nsize_m = [0.1, 0.4, 1.0]\n'
+    "rpy_deg = [20, 30, 40]\n"
+)
 TRIANGLE = (
     "solid t\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
     "endfacet\nendsolid t\n"
@@ -26,6 +30,7 @@ TRIANGLE = (
 def record(folder, text):
     """The cell, and what is read back after proposals at POSES_DEG (measurements 0 and 1)."""
     robot_toml = make_arm(folder / "robot")
+    robot_toml.write_text(robot_toml.read_text() + FENCE)
     (folder / "robot" / "arm.urdf").write_text(text)
     (folder / "plan").mkdir()
     (folder / "plan" / "campaign.toml").write_text(campaign_text())
@@ -88,6 +93,14 @@ def test_what_lies_in_the_cell_lies_in_the_space_of_the_robot(bare):
         assert np.allclose(tool[:3, :3], turn, atol=1e-5)
     last = cell.robot.forward(np.deg2rad(POSES_DEG[-1]))[1]
     assert np.allclose(frames.shapes["/cell/proposed"]["Points3D:positions"], [last])
+
+
+def test_obstacles_are_turned_as_the_robot_avoids_them(bare):
+    _, frames = bare
+    fence = frames.shapes["/cell/obstacles"]
+    expected = pin.rpy.rpyToMatrix(*np.deg2rad([20.0, 30.0, 40.0]))
+    assert np.allclose(rotation(fence["Boxes3D:quaternions"][1]), expected, atol=1e-6)
+    assert np.allclose(fence["Boxes3D:centers"][1], [2.0, 2.0, 0.5])
 
 
 def test_collision_shapes_are_drawn_only_where_there_are_no_visual_ones(tmp_path):
