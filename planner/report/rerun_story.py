@@ -42,7 +42,7 @@ class Story:
         match event:
             case Proposed():
                 for proposal in event.proposals:
-                    view.proposal(number, proposal, model)
+                    view.proposal(number, proposal)
             case Imported():
                 self._imported(event, model, measured)
             case Skipped() | Withdrawn():

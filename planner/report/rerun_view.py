@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-import rerun.urdf as rru
 from matplotlib import colormaps
 from matplotlib.figure import Figure
+from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell
 from planner.campaign.events import Proposal
@@ -21,10 +21,16 @@ from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.report import frf_plots
 from planner.report.modal_plots import frequency_figure
+from planner.report.rerun_robot import WORLD, RobotDrawing
 from planner.report.rerun_stream import open_stream
 
 TIMELINE = "measurement"
-COLOURS = {"proposed": (255, 140, 0), "measured": (220, 30, 30), "hit": (30, 90, 255)}
+COLOURS = {
+    "proposed": (255, 140, 0),
+    "measured": (220, 30, 30),
+    "hit": (70, 140, 255),
+    "obstacle": (140, 150, 155),
+}
 LINES = 300  # frequency lines of the pictures
 
 
@@ -36,7 +42,7 @@ class RerunView:
         identity = f"{cell.robot.name}|{cell.config}"
         self._stream = open_stream(identity, cell.robot.name, _blueprint(cell), rrd, viewer)
         self._simulated = False
-        self._tree = self._robot()
+        self._drawing = self._robot()
         self._obstacles()
         if simulated:
             self.label_simulated()
@@ -47,18 +53,14 @@ class RerunView:
         text = "# SIMULATED RECORDINGS\nNothing in this campaign was measured on a real robot."
         self._stream.log("note", rr.TextDocument(text, media_type="text/markdown"), static=True)
 
-    def _robot(self) -> rru.UrdfTree | None:
-        """The robot as its URDF draws it; without drawings there are still the points."""
+    def _robot(self) -> RobotDrawing | None:
+        """The robot; where its URDF cannot be drawn there are still the points."""
         try:
-            tree = rru.UrdfTree.from_file_path(
-                self._cell.robot.urdf_path, entity_path_prefix="robot"
-            )
-            tree.log_urdf_to_recording(self._stream)
-        except Exception as error:  # the loader raises whatever a mesh makes it raise
+            return RobotDrawing(self._cell.robot, self._stream)
+        except Exception as error:  # the loader raises whatever a URDF makes it raise
             text = f"The robot cannot be drawn from its URDF: {error}"
             self._stream.log("log", rr.TextLog(text, level="WARN"), static=True)
             return None
-        return tree
 
     def _obstacles(self) -> None:
         blocks = self._cell.robot.config.obstacle
@@ -68,7 +70,9 @@ class RerunView:
                 rr.Boxes3D(
                     centers=[b.center_m for b in blocks],
                     sizes=[b.size_m for b in blocks],
+                    quaternions=[_quaternion(b.rpy_deg) for b in blocks],
                     labels=[b.name for b in blocks],
+                    colors=COLOURS["obstacle"],
                 ),
                 static=True,
             )
@@ -77,15 +81,10 @@ class RerunView:
         self._stream.set_time(TIMELINE, sequence=number)
 
     def _move(self, q: np.ndarray) -> None:
-        if self._tree is None:
-            return
-        for name, angle in zip(self._cell.robot.joint_names, q, strict=True):
-            joint = self._tree.get_joint_by_name(name)
-            if joint is not None:
-                transform = joint.compute_transform(float(angle), clamp=False)
-                self._stream.log(f"robot/joints/{name}", transform)
+        if self._drawing is not None:
+            self._drawing.move(q)
 
-    def proposal(self, number: int, proposal: Proposal, model: Model) -> None:
+    def proposal(self, number: int, proposal: Proposal) -> None:
         """The robot at a proposed pose, and what is expected there."""
         self._at(number)
         q = np.deg2rad(proposal.joints_deg)
@@ -132,6 +131,7 @@ class RerunView:
                 rr.Arrows3D(
                     origins=[position - v for v in vectors],
                     vectors=vectors,
+                    radii=0.008,
                     labels=axes,
                     colors=COLOURS["hit"],
                 ),
@@ -211,7 +211,8 @@ class RerunView:
         sd = 100 * np.sqrt(np.mean(relative**2, axis=1))
         # A fixed logarithmic scale, 0.1 % to 10 %, so that colours can be compared over time.
         shade = np.clip((np.log10(sd) + 1) / 2, 0, 1)
-        colours = (255 * colormaps["viridis"](shade)).astype(np.uint8)
+        # Without viridis' lowest quarter, which cannot be seen on a dark ground.
+        colours = (255 * colormaps["viridis"](0.25 + 0.75 * shade)).astype(np.uint8)
         points = rr.Points3D(self._cell.candidates.position_m, radii=0.008, colors=colours)
         self._stream.log("cell/workspace", points)
 
@@ -238,12 +239,36 @@ def hit_sign(axis: str) -> float:
     return -1.0 if axis[0] == "-" else 1.0
 
 
+def _quaternion(rpy_deg: tuple[float, float, float]) -> np.ndarray:
+    """Quaternion (x, y, z, w) of roll, pitch and yaw about the world's axes."""
+    return Rotation.from_euler("xyz", rpy_deg, degrees=True).as_quat()
+
+
+def _eye(cell: Cell) -> rrb.EyeControls3D:
+    """A look from the side and above at robot and workspace, whatever lies around them."""
+    shoulder, reach = cell.robot.shoulder_m, cell.robot.reach_m
+    away = np.mean(cell.candidates.position_m, axis=0) - shoulder
+    side = np.array([away[1], -away[0], 0.0]) + 0.6 * np.array([away[0], away[1], 0.0])
+    size = float(np.linalg.norm(side))
+    side = side / size if size > 1e-6 else np.array([0.0, -1.0, 0.0])
+    target = shoulder + 0.5 * away
+    return rrb.EyeControls3D(
+        position=target + reach * (1.3 * side + np.array([0.0, 0.0, 0.6])),
+        look_target=target,
+        eye_up=(0.0, 0.0, 1.0),
+    )
+
+
 def _blueprint(cell: Cell) -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
                 rrb.Spatial3DView(
-                    origin="/", contents=["/robot/**", "/cell/**"], name=cell.robot.name
+                    origin="/",
+                    contents=["/robot/**", "/cell/**"],
+                    name=cell.robot.name,
+                    spatial_information=rrb.SpatialInformation(target_frame=WORLD),
+                    eye_controls=_eye(cell),
                 ),
                 rrb.Vertical(
                     rrb.Tabs(

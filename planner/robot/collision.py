@@ -86,7 +86,7 @@ class Collisions:
         for _ in range(ALWAYS):
             q = rng.uniform(robot.lower_rad, robot.upper_rad)
             pin.computeCollisions(robot.model, kinematics, geometry, data, q, False)
-            always &= [r.isCollision() for r in data.collisionResults]
+            always &= np.array([r.isCollision() for r in data.collisionResults], dtype=bool)
         for pair in [p for p, a in zip(list(geometry.collisionPairs), always, strict=True) if a]:
             geometry.removeCollisionPair(pair)
 

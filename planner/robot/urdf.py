@@ -72,6 +72,13 @@ def mesh_folders(urdf: Path) -> list[str]:
     return [str(urdf.parent), str(urdf.parent.parent)]
 
 
+def find_mesh(urdf: Path, name: str) -> Path | None:
+    """The file of a mesh as a URDF names it (package://, relative, absolute); None if missing."""
+    file = _mesh_file(name)
+    places = [Path(folder) / file for folder in ["/", *mesh_folders(urdf)]]
+    return next((place for place in places if place.is_file()), None)
+
+
 def copy_meshes(urdf: Path, target: Path) -> None:
     """Copy the meshes that a URDF names to where the same URDF, at `target`, looks for them."""
     names = re.findall(r"<mesh\b[^>]*\bfilename\s*=\s*[\"']([^\"']+)", urdf.read_text("utf-8"))
@@ -191,9 +198,7 @@ def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
                     f"{numbers.tolist()}; give lengths above 0 m."
                 )
         for mesh in link.findall("collision/geometry/mesh"):
-            file = _mesh_file(mesh.get("filename", ""))
-            places = [Path(folder) / file for folder in ["/", *mesh_folders(urdf)]]
-            if not any(place.is_file() for place in places):
+            if find_mesh(urdf, mesh.get("filename", "")) is None:
                 raise InputError(
                     f"{urdf}: collision mesh {mesh.get('filename', '')} of link "
                     f"{link.get('name', '?')} cannot be found; put it beside the URDF or use a "

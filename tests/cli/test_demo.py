@@ -7,6 +7,7 @@ from rerun.chunk import RrdReader
 
 from outside import answer
 from planner.demo import shipped
+from rerun_frames import WORLD, Frames
 
 
 def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):
@@ -37,13 +38,17 @@ def check_against_truth(summary):
 
 def check_recording(path):
     """Opened with the SDK: entities, timeline and blueprint are there."""
-    contents = recording_contents(path)
+    contents, frames = recording_contents(path), Frames(path)
     wanted = ("/robot", "/cell/workspace", "/cell/measured", "/cell/proposed", "/frf/picture",
               "/campbell/picture", "/hits", "/learning", "/log", "/note", "/modes")  # fmt: skip
     for entity in wanted:
         assert any(e.startswith(entity) for e in contents["entities"]), entity
     assert contents["timelines"] == {"measurement"}
     assert contents["stores"] == {"recording", "blueprint"}
+    drawn = ("workspace", "measured", "proposed", "hits", "obstacles")
+    assert {f"/cell/{name}" for name in drawn} <= set(frames.shapes)
+    # Robot and cell are one space; the viewer shows nothing of another one.
+    assert {frames.root(frames.frame(entity)) for entity in frames.shapes} == {WORLD}
 
 
 def recording_contents(path):

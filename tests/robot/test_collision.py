@@ -1,5 +1,6 @@
 """What keeps a robot from a pose, in words: limits, links, obstacles, and what may touch."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -112,3 +113,12 @@ def test_free_agrees_with_violations_and_only_links_apart_can_touch(arm):
         for a, b in (c.split(" touches ") for c in contacts):
             assert b == "floor" or abs(names.index(a) - names.index(b)) > 1
     assert 0 < touched < 150
+
+
+def test_a_robot_without_collision_shapes_has_its_limits_only(arm):
+    text = re.sub(r"<(visual|collision)>.*?</\1>", "", (arm.parent / "arm.urdf").read_text())
+    (arm.parent / "arm.urdf").write_text(text)
+    found = collisions(arm)
+    assert found.free(LOW)
+    assert found.contacts(LOW) == ()
+    assert not found.free(LOW + np.deg2rad(5))

@@ -1,0 +1,105 @@
+"""The robot in a Rerun recording: the shapes of its URDF, and capsules where it has none."""
+
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.urdf as rru
+from rerun.chunk import Chunk
+
+from planner.robot.robot import Robot
+from planner.robot.skeleton import Body, bodies
+from planner.robot.urdf import find_mesh
+
+WORLD = "tf#/"  # Rerun's frame of the root entity, in which entities lie that name no frame
+GREY = (150, 150, 155)
+RADIUS = 0.025  # of a capsule, in units of the robot's reach
+NOT_SHAPES = ("rerun.controls", "CoordinateFrame", "InstancePoses3D", "Transform3D")
+
+
+class RobotDrawing:
+    """Draws the robot once, and moves it. Raises whatever Rerun's loader makes of the URDF.
+
+    What turns together (links on fixed joints) is one body. A body is drawn as its visual shapes;
+    without any as its collision shapes; without those as capsules from its joint to the next ones
+    and to the tcp.
+    """
+
+    def __init__(self, robot: Robot, stream: rr.RecordingStream):
+        self._robot, self._bodies, self._stream = robot, bodies(robot), stream
+        self._tree, chunks = _load(robot)
+        hidden = self._without_shapes(chunks)
+        rr.send_chunks([c for c in chunks if c.entity_path not in hidden], recording=stream)
+        # Links have frames of their own names, which nothing connects to the frames of entities.
+        root = self._frame(self._tree.root_link().name)
+        world = rr.Transform3D(translation=[0.0, 0.0, 0.0], parent_frame=WORLD, child_frame=root)
+        stream.log("robot/world", world, static=True)
+
+    def move(self, q: np.ndarray) -> None:
+        """Bring the robot to joint angles q (dof,) in rad, at the recording's current time."""
+        for name, angle in zip(self._robot.joint_names, q, strict=True):
+            joint = self._tree.get_joint_by_name(name)
+            if joint is not None:
+                transform = joint.compute_transform(float(angle), clamp=False)
+                self._stream.log(f"robot/joints/{name}", transform)
+
+    def _without_shapes(self, chunks: list[Chunk]) -> set[str]:
+        """Draw capsules for bodies without shapes; returns paths of shapes not to be shown."""
+        shown = {chunk.entity_path for chunk in chunks if _has_shape(chunk)}
+        hidden: set[str] = set()
+        for body in self._bodies:
+            links = body.links
+            visual = {p for link in links for p in self._tree.get_visual_geometry_paths(link)}
+            collision = {p for link in links for p in self._tree.get_collision_geometry_paths(link)}
+            if visual & shown:
+                hidden |= collision
+            elif not collision & shown:
+                self._capsules(body)
+        return hidden
+
+    def _frame(self, link: str) -> str:
+        """Rerun's name of a link's frame."""
+        return f"{self._tree.frame_prefix or ''}{link}"
+
+    def _capsules(self, body: Body) -> None:
+        path = f"robot/capsules/{body.link}"
+        self._stream.log(path, rr.CoordinateFrame(self._frame(body.link)), static=True)
+        capsules = rr.Capsules3D(
+            lengths=np.linalg.norm(body.ends_m, axis=1),
+            radii=RADIUS * self._robot.reach_m,
+            quaternions=[_turn_from_z(end) for end in body.ends_m],
+            colors=GREY,
+            fill_mode="solid",
+        )
+        self._stream.log(path, capsules, static=True)
+
+
+def _load(robot: Robot) -> tuple[rru.UrdfTree, list[Chunk]]:
+    """The tree, and what it would log; Rerun itself finds no mesh by package:// outside ROS."""
+    root = ElementTree.fromstring(robot.urdf_text)
+    for mesh in root.iter("mesh"):
+        file = find_mesh(robot.urdf_path, mesh.get("filename", ""))
+        if file is not None:
+            mesh.set("filename", str(file))
+    with tempfile.TemporaryDirectory() as folder:
+        urdf = Path(folder) / robot.urdf_path.name
+        urdf.write_bytes(ElementTree.tostring(root))
+        tree = rru.UrdfTree.from_file_path(urdf, entity_path_prefix="robot")
+        return tree, tree.stream().to_chunks()
+
+
+def _has_shape(chunk: Chunk) -> bool:
+    """Whether it draws anything: a mesh that cannot be read leaves an entity without a shape."""
+    names = chunk.to_record_batch().schema.names
+    return not all(name.startswith(NOT_SHAPES) for name in names)
+
+
+def _turn_from_z(direction: np.ndarray) -> np.ndarray:
+    """Quaternion (x, y, z, w) of the shortest turn from the z axis to a direction (3,)."""
+    length = float(np.linalg.norm(direction))
+    x, y, z = direction / length if length > 0 else (0.0, 0.0, 1.0)
+    half = np.array([-y, x, 0.0, 1.0 + z])
+    size = float(np.linalg.norm(half))
+    return half / size if size > 1e-9 else np.array([1.0, 0.0, 0.0, 0.0])
