@@ -12,7 +12,7 @@ from planner.frf.types import Frf
 from planner.identify.check import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
 from planner.identify.data import common_band, stack
 from planner.identify.feasible import Barrier
-from planner.identify.objective import Objective
+from planner.identify.objective import TOO_SOFT, Objective, stands
 from planner.identify.parameters import Parametrisation, Priors, parametrise
 from planner.identify.result import Identification, estimates, undetermined
 from planner.identify.solver import Minimum, inverse, minimise
@@ -25,6 +25,8 @@ SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
+STIFFER = float(np.log(1.5))  # by which the springs of a start grow until they carry the weight
+STIFFEST = 20  # such steps: a factor of 3,000
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
 
 
@@ -81,6 +83,16 @@ class _Problem:
     def inertial(self) -> bool:
         """Whether inertias are identified too."""
         return bool(self.parametrisation.nuisances)
+
+    def standing(self, theta: np.ndarray) -> np.ndarray:
+        """θ (P,) with all springs as much stiffer as it takes to carry the robot's weight."""
+        p = self.parametrisation
+        stiffer = STIFFER * np.array([x.kind == "stiffness" for x in p.parameters])
+        for steps in range(STIFFEST + 1):
+            tried = p.near(theta + steps * stiffer)
+            if stands(self.matrices, p.elasticity(tried).stiffness):
+                return theta if steps == 0 else tried
+        raise InputError(TOO_SOFT)
 
     def objective(
         self, share: float, lines: int, logarithmic: bool = False, inertia: bool = False
@@ -171,7 +183,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
     found: list[Minimum] = []
     misfits: list[float] = []
     for number, point in enumerate(points, 1):
-        x = _approach(problem, point, number)
+        x = _approach(problem, problem.standing(point), number)
         effort, stage = problem.effort, "FRFs in units of their noise"
         end, objective = _plain(problem, x, number, effort.lines, stage, effort.completions)
         found.append(end)
@@ -233,7 +245,8 @@ def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | No
     known |= dict(zip(warm.nuisances, warm.mean[len(warm.estimates) :], strict=True))
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
-    end, misfit = _refine(problem, np.array([*p.near(np.array(theta)), *phi]))
+    start = problem.standing(p.near(np.array(theta)))
+    end, misfit = _refine(problem, np.array([*start, *phi]))
     good = misfit < STILL_GOOD * max(warm.misfit, 1.0)
     return (end, misfit) if good or not problem.effort.doubtful else None
 

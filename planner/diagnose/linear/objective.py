@@ -12,6 +12,7 @@ from planner.identify.objective import (
     LOG_PRIOR,
     Quadratic,
     positive,
+    stands,
     weight_of,
 )
 from planner.identify.parameters import Parametrisation
@@ -153,12 +154,16 @@ class Misfit:
         return ByPose(np.sum(r**2, axis=1), gradient, normal)
 
     def possible(self, x: np.ndarray) -> bool:
-        """Whether masses are positive at x, and nothing is farther off than is looked for."""
+        """Whether a robot may be so at x, and nothing is farther off than is looked for.
+
+        Masses are positive, and the springs carry the weight.
+        """
         a, b = self.split
         if np.abs((x - self.mean) / self.sd).max() > FARTHEST:
             return False
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        return positive(mass)
+        springs = self.parametrisation.elasticity(x[:a])
+        return positive(mass) and stands(self.matrices, springs.stiffness)
 
     def __call__(self, x: np.ndarray) -> Weighed:
         """Data and prior together; ∞ where x cannot be."""
