@@ -61,9 +61,7 @@ class _Cells:
             config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(
-                root / config.robot, config, geometric_stiffness=stiffened
-            )
+            self._cells[key] = Cell.load(root / config.robot, config, geometric_stiffness=stiffened)
         return self._cells[key]
 
 

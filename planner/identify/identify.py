@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import qmc
@@ -18,7 +18,7 @@ from planner.identify.result import Identification, estimates, undetermined
 from planner.identify.solver import Minimum, inverse, minimise
 from planner.physics.gradient import Inertias
 from planner.physics.simulation import Simulation
-from planner.robot.elastic import Matrices
+from planner.robot.elastic import ElasticModel, Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
@@ -68,9 +68,15 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """All that stays the same from start to start; matrices do not depend on the springs."""
+    """All that stays the same from start to start.
+
+    Matrices depend on the springs only in that these carry the weight: they are those of
+    robot.toml's until a search has found better ones.
+    """
 
     frfs: tuple[Frf, ...]
+    q: np.ndarray
+    elastic: ElasticModel
     band_hz: tuple[float, float]
     matrices: Matrices
     inertias: Inertias
@@ -83,6 +89,15 @@ class _Problem:
     def inertial(self) -> bool:
         """Whether inertias are identified too."""
         return bool(self.parametrisation.nuisances)
+
+    def carried(self, x: np.ndarray) -> tuple["_Problem", np.ndarray]:
+        """The same where the springs at x = (θ, φ) carry the weight, and x, made to stand there."""
+        p = self.parametrisation
+        count = len(p.parameters)
+        elastic = self.elastic.carried_by(p.elasticity(x[:count]).stiffness)
+        inertias = p.inertias(elastic.body_jacobians(self.q))
+        there = replace(self, matrices=elastic.matrices(self.q), inertias=inertias)
+        return there, np.concatenate([there.standing(x[:count]), x[count:]])
 
     def standing(self, theta: np.ndarray) -> np.ndarray:
         """θ (P,) with all springs as much stiffer as it takes to carry the robot's weight."""
@@ -148,13 +163,13 @@ def identify(
     inertias = p.inertias(elastic.body_jacobians(q))
     barrier = Barrier.around(elastic.inertia, p)
     problem = _Problem(
-        tuple(frfs), band, elastic.matrices(q), inertias, p, progress, effort, barrier
+        tuple(frfs), q, elastic, band, elastic.matrices(q), inertias, p, progress, effort, barrier
     )
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
         x, misfits = _search(problem, _starting_points(p, starts, seed))
-        best = _refine(problem, x)
+        best = _refine(*problem.carried(x))
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
 
@@ -245,8 +260,7 @@ def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | No
     known |= dict(zip(warm.nuisances, warm.mean[len(warm.estimates) :], strict=True))
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
-    start = problem.standing(p.near(np.array(theta)))
-    end, misfit = _refine(problem, np.array([*start, *phi]))
+    end, misfit = _refine(*problem.carried(np.array([*p.near(np.array(theta)), *phi])))
     good = misfit < STILL_GOOD * max(warm.misfit, 1.0)
     return (end, misfit) if good or not problem.effort.doubtful else None
 

@@ -6,6 +6,7 @@ matrix does not depend on stiffness or damping (seed 004, section 2; seed 001, s
 is linear in the inertias of the bodies.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,8 +41,8 @@ class ElasticModel:
     """A robot with its elastic degrees of freedom. Raises InputError if there are none.
 
     `inertia_change` (bodies, 10) is added to the inertias (see `inertia`), so that M is linear in
-    it. The weight under which the robot sags stays that of its URDF, as its springs there stay
-    those of robot.toml: what identification changes of both moves a pose by next to nothing.
+    it: the weight under which the robot sags stays that of its URDF. Its springs there are those of
+    robot.toml unless others carry it (`carried_by`).
     """
 
     def __init__(self, robot: Robot, inertia_change: np.ndarray | None = None):
@@ -56,6 +57,7 @@ class ElasticModel:
         springs = [r.mass * (2 * np.pi * r.frequency_hz) ** 2 for r in small]
         dampers = [4 * np.pi * r.damping_ratio * r.mass * r.frequency_hz for r in small]
         self.stiffness = np.array([c.stiffness for c in blocks] + springs)
+        self._carrying = self.stiffness
         self.damping = np.array([c.damping for c in blocks] + dampers)
         self.loss_factor = np.array([c.loss_factor for c in blocks] + [0.0] * len(small))
         self._waves = tuple((self._own(w.joint), w) for w in robot.config.harmonic)
@@ -111,6 +113,12 @@ class ElasticModel:
         """
         return self._virtual.inertia
 
+    def carried_by(self, stiffness: np.ndarray) -> "ElasticModel":
+        """The same robot where springs of stiffness (e,) in N·m/rad carry its weight."""
+        other = copy.copy(self)
+        other._carrying = stiffness
+        return other
+
     def matrices(
         self, q: np.ndarray, hits: Sequence[str] = (), sensors: Sequence[str] = ()
     ) -> Matrices:
@@ -164,7 +172,7 @@ class ElasticModel:
         full = np.zeros(self._model.nq)
         full[self._virtual.rigid] = q
         if self.robot.config.geometric_stiffness:
-            self._sag(full, self.stiffness + self._with_angle(q), data)
+            self._sag(full, self._carrying + self._with_angle(q), data)
         return full
 
     def _with_angle(self, q: np.ndarray) -> np.ndarray:
@@ -176,7 +184,7 @@ class ElasticModel:
         return change
 
     def _sag(self, full: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> None:
-        """To where springs of the stated stiffness (e,) carry the weight: K δ = −g(q + δ)."""
+        """To where springs of this stiffness (e,) carry the weight: K δ = −g(q + δ)."""
         for _ in range(SAG_STEPS):
             weight = pin.computeGeneralizedGravity(self._weighed, data, full)
             full[self._elastic] = -weight[self._elastic] / stiffness

@@ -1,6 +1,7 @@
 """`next` with every acquisition, and on a robot that cannot be checked for collision."""
 
 import contextlib
+import hashlib
 import io
 import json
 from pathlib import Path
@@ -104,8 +105,6 @@ def written_earlier(cell: Path) -> Path:
 
 
 def _chained(check: str, body: bytes) -> tuple[bytes, str]:
-    import hashlib
-
     check = hashlib.sha256(check.encode() + body).hexdigest()[:16]
     return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
 

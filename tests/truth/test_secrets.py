@@ -117,10 +117,7 @@ def test_structural_damping_loses_as_much_in_a_cycle_at_every_frequency(path):
     mass, _, stiffness, hit, sensor = truth.matrices(Q)
     lossy = stiffness + 1j * eta * (stiffness - truth.gravity_stiffness(Q))  # the weight has none
     f = np.linspace(5, 60, 23)
-    exact = [
-        -(w**2) * sensor @ np.linalg.solve(lossy - w**2 * mass, hit.T)
-        for w in 2 * np.pi * f
-    ]
+    exact = [-(w**2) * sensor @ np.linalg.solve(lossy - w**2 * mass, hit.T) for w in 2 * np.pi * f]
     ours = structural_accelerance(truth, eta, Q, f)
     assert np.max(np.abs(ours - np.moveaxis(exact, 0, 2))) < 1e-9 * np.max(np.abs(exact))
     g, H = frfs(truth, Secret(Deviation(), loss_factor=eta), [once(Q, 1e3)],
