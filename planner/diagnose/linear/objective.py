@@ -17,7 +17,7 @@ from planner.identify.objective import (
 )
 from planner.identify.parameters import Parametrisation
 from planner.identify.solver import LONGEST
-from planner.physics.gradient import Inertias, response_gradient
+from planner.physics.gradient import Impedance, Inertias, response_gradient
 from planner.robot.elastic import Matrices
 
 STRIDE = 1.5  # sds by which an effect's own parameters may move in one step
@@ -120,8 +120,11 @@ class Misfit:
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
         setting = self.setting if rate is None else replace(self.setting, s=s)
         added = self.effect.impedance(setting, psi)
+        added = added if rate is None else (*added, _weight(self.matrices, s.shape[1]))
         inertias = self.inertias if self.inertial else None
         h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
+        if rate is not None:
+            by_weight, full = full[:, -1], full[:, :-1]
         springs, slope = len(p.held), full
         if not np.array_equal(p.spread, np.eye(springs)):
             theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
@@ -129,7 +132,7 @@ class Misfit:
         if rate is not None:
             # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
             e = p.size
-            down = 2 * full[:, :e].sum(axis=1) + full[:, e : 2 * e].sum(axis=1)
+            down = 2 * (full[:, :e].sum(axis=1) + by_weight) + full[:, e : 2 * e].sum(axis=1)
             along = -rate * down / s[:, None, None]
             slope = np.concatenate([slope, along[:, None]], axis=1)
         seen = self.effect.transfer(self.setting, psi)
@@ -191,3 +194,12 @@ class Misfit:
         least = 1e-9 * np.abs(measured) + 1e-300
         safe = np.where(np.abs(h) >= least, h, least)
         return weight * np.log(safe / measured), slope * (weight / safe)[:, None]
+
+
+def _weight(matrices: Matrices, lines: int) -> Impedance:
+    """Adds nothing to Z; its one derivative is that by the stiffness that goes with the pose."""
+    values, vectors = np.linalg.eigh(matrices.geometric)
+    ports = np.sqrt(np.abs(values))[..., None] * np.swapaxes(vectors, 1, 2)
+    shapes = np.eye(values.shape[1])[:, :, None] * np.eye(values.shape[1])[:, None]
+    signs = np.repeat(np.sign(values)[..., None], lines, axis=2)
+    return Impedance(ports, shapes, (), (tuple((j, signs[:, j]) for j in range(len(shapes))),))
