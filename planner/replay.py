@@ -55,12 +55,13 @@ class _Cells:
         self._cells: dict[bytes, Cell] = {}
 
     def of(self, configured: Configured) -> Cell:
-        key = msgspec.json.encode((configured.config, configured.robot))
+        stiffened = configured.geometric_stiffness
+        key = msgspec.json.encode((configured.config, configured.robot, stiffened))
         if key not in self._cells:
             config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(root / config.robot, config)
+            self._cells[key] = Cell.load(root / config.robot, config, geometric_stiffness=stiffened)
         return self._cells[key]
 
 
@@ -148,6 +149,6 @@ def _compare(logged: list, again: list, detail: str) -> tuple[str, str]:
     if [list(row) for row in logged] == [list(row) for row in again]:
         return "identical", detail
     a, b = np.array(logged, dtype=float), np.array(again, dtype=float)
-    if a.shape == b.shape and np.allclose(a, b, rtol=CLOSE, atol=CLOSE):
+    if a.shape == b.shape and np.allclose(a, b, rtol=CLOSE, atol=CLOSE, equal_nan=True):
         return "close", detail
     return "differs", detail

@@ -29,16 +29,30 @@ class Cell:
     workspace: Workspace
 
     @classmethod
-    def load(cls, robot_toml: Path, config: CampaignConfig, robot: Robot | None = None) -> "Cell":
+    def load(
+        cls,
+        robot_toml: Path,
+        config: CampaignConfig,
+        robot: Robot | None = None,
+        *,
+        geometric_stiffness: bool = True,
+    ) -> "Cell":
         """Load the robot and hold the workspace against it; InputError where they disagree.
 
-        `robot` is the one of robot_toml, where it was loaded already.
+        `robot` is the one of robot_toml, where it was loaded already. `geometric_stiffness` holds
+        where robot.toml does not say.
         """
         check_name(config.acquisition.name)
-        robot = robot or Robot.load(robot_toml)
+        robot = robot or Robot.load(robot_toml, geometric_stiffness)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
         return cls(config, robot, simulation, workspace)
+
+    @cached_property
+    def remarks(self) -> tuple[str, ...]:
+        """What the engineer has to know of every pose that is proposed, in sentences."""
+        unchecked = Collisions(self.robot).unchecked
+        return () if unchecked is None else (unchecked,)
 
     @cached_property
     def candidates(self) -> Candidates:

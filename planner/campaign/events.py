@@ -13,23 +13,27 @@ class Configured(Event, frozen=True, tag="configured"):
     """The campaign was started, or its campaign.toml or robot folder was changed by hand.
 
     `config` is campaign.toml; `robot` maps each file of the robot folder to its sha256.
+    `geometric_stiffness` is what holds where robot.toml does not say: campaigns whose log does
+    not say either began when gravity's own stiffness was left out, and go on like that.
     """
 
     config: dict
     robot: dict[str, str]
     planner: str
+    geometric_stiffness: bool = False
 
 
 class Proposal(msgspec.Struct, frozen=True):
     """A pose to measure: joint setpoint, tcp position, score of the acquisition, why.
 
-    `hits` are the tcp axes to hit along, `minutes` what getting there and hitting takes.
+    `score` is None where the acquisition, a space-filling design, gives none. `hits` are the tcp
+    axes to hit along, `minutes` what getting there and hitting takes.
     """
 
     pose: str
     joints_deg: tuple[float, ...]
     position_m: tuple[float, float, float]
-    score: float
+    score: float | None
     reason: str
     hits: tuple[str, ...] = ("x", "y", "z")
     minutes: float | None = None

@@ -34,7 +34,7 @@ def propose(
             pose=f"P{state.proposals_made + i + 1:03d}",
             joints_deg=tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])),
             position_m=_xyz(candidates.position_m[pick.index]),
-            score=float(pick.score),
+            score=float(pick.score) if np.isfinite(pick.score) else None,
             reason=_reason(model, pick.index, acquisition),
             hits=tuple("xyz"[axis] for axis in pick.axes),
             minutes=round(pick.minutes, 2) if np.isfinite(pick.minutes) else None,

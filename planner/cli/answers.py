@@ -24,6 +24,7 @@ def created(campaign: Campaign) -> dict[str, Any]:
         "joints": list(cell.robot.joint_names),
         "modes": cell.config.modes.count,
         "acquisition": cell.config.acquisition.name,
+        "remarks": list(cell.remarks),
     }
 
 
@@ -39,6 +40,7 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> dict[str, Any]
         "joint_names": list(campaign.cell.robot.joint_names),
         "forecast": _forecast(campaign.model),
         "repeat": _repeat(campaign.model),
+        "remarks": list(campaign.cell.remarks),
     }
 
 

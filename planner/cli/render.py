@@ -28,10 +28,11 @@ def _with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
 
 def created(answer: dict[str, Any]) -> RenderableType:
     """Text of `new`."""
+    remarks = "".join(f"{escape(remark)}\n" for remark in answer["remarks"])
     return (
         f"Campaign in {escape(answer['campaign'])}: robot {escape(answer['robot'])}, "
         f"{answer['modes']} modes, chosen by {answer['acquisition']}.\n"
-        f"Next: planner next {escape(answer['campaign'])}"
+        f"{remarks}Next: planner next {escape(answer['campaign'])}"
     )
 
 
@@ -55,6 +56,7 @@ def proposals(answer: dict[str, Any]) -> RenderableType:
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal['reason']}"
         parts += [angles, Text(place), expected]
     said = [answer["forecast"]["text"], (answer["repeat"] or {"text": ""})["text"]]
+    parts += [Text(remark, style="yellow") for remark in answer["remarks"]]
     return Group(*parts, Text(" ".join(filter(None, said))))
 
 

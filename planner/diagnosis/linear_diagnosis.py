@@ -13,8 +13,10 @@ from planner.diagnosis.linear.evidence import Weights, weigh
 from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle
 from planner.diagnosis.linear.search import Found, search
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.measured_frfs import common_band
+from planner.identification.objective import TOO_SOFT, stands
 from planner.progress import Tell, quietly
 
 TIED = 0.05  # probability that keeps a candidate in the set the data cannot tell apart
@@ -69,11 +71,14 @@ def diagnose(
     """Which effect explains FRFs at q (n, dof) in rad that the simulation does not.
 
     `effects` are looked at instead of the whole library; `bent` is as in `search`. Raises
-    InputError where nothing of the FRFs lies in robot.toml's band.
+    InputError where nothing of the FRFs lies in robot.toml's band, or where the robot would not
+    stand at q.
     """
     started = time.perf_counter()
     band = common_band(frfs, simulation.robot.config.band_hz)
     problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band)
+    if not stands(simulation.elastic.matrices(problem.q), simulation.elasticity.stiffness):
+        raise InputError(TOO_SOFT)
     tell("refitting the simulation", 0.0)
     refitted = settle(problem, fit(problem, Effect("")))
     all_ = library(simulation) if effects is None else effects

@@ -19,6 +19,7 @@ from planner.dynamics.vibration import SimulatedModes, normal_modes
 # are taken to cross; over more, to veer and keep their order. In longer steps veering looks like
 # crossing, and two robots that are nearly alike would be followed differently.
 STEP_RAD = 0.02
+LEAST_HZ = 1e-3  # stands for a mode that has no frequency: gravity is stronger than the springs
 FREQUENCY_STEP = 0.3  # of log frequency in one step: as unlikely as a shape unlike the one before
 
 Undamped = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
@@ -133,4 +134,5 @@ def undamped_modes(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of M and K (n, e, e): frequencies (n, e), mass-normalised shapes, and M again."""
     square, shapes = normal_modes(mass, stiffness)
-    return np.sqrt(np.maximum(square, 0.0)) / (2 * np.pi), shapes, mass
+    least = (2 * np.pi * LEAST_HZ) ** 2
+    return np.sqrt(np.maximum(square, least)) / (2 * np.pi), shapes, mass

@@ -53,8 +53,10 @@ class Simulation:
         for cached in ("stiffness", "damping"):
             other.__dict__.pop(cached, None)
         other.elasticity = elasticity
+        elastic = self.elastic
         if inertia_change is not None:
-            other.elastic = ElasticModel(self.robot, inertia_change)
+            elastic = ElasticModel(self.robot, inertia_change)
+        other.elastic = elastic.carried_by(elasticity.stiffness)
         return other
 
     @cached_property

@@ -1,8 +1,9 @@
 """Linear vibration of M ẍ + C ẋ + K x = Jᵀ f: modes and FRFs, batched over poses.
 
 Everything is exact for any viscous C: the state-space eigenproblem is solved in the coordinates
-of the undamped modes, real (overdamped) poles included (Géradin & Rixen 2015, chapter 3). With
-structural damping K is complex; FRFs then hold for positive frequencies, as they are measured.
+of the undamped modes, real (overdamped) poles included (Géradin & Rixen 2015, chapter 3). Where
+gravity is stronger than the springs (ω² < 0) a mode does not oscillate either. With structural
+damping K is complex; FRFs then hold for positive frequencies, as they are measured.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -107,7 +108,7 @@ def _proportional(
     """
     rate = np.diagonal(gamma, axis1=1, axis2=2).astype(complex)
     root = np.sqrt(rate**2 / 4 - square)
-    smallest = SPLIT * np.sqrt(square)
+    smallest = SPLIT * np.sqrt(np.abs(square))
     root = np.where(np.abs(root) < smallest, smallest, root)
     poles = np.concatenate([-rate / 2 + root, -rate / 2 - root], axis=1)
     norm = np.concatenate([2 * root, -2 * root], axis=1)
@@ -128,10 +129,10 @@ def _state_space(
     its eigenvectors are as well conditioned as they can be.
     """
     n, e = square.shape
-    omega = np.sqrt(square)
+    omega = np.sqrt(np.maximum(np.abs(square), np.finfo(float).tiny))
     state = np.zeros((n, 2 * e, 2 * e), dtype=float if loss is None else complex)
     state[:, :e, e:] = omega[:, :, None] * np.eye(e)
-    state[:, e:, :e] = -state[:, :e, e:]
+    state[:, e:, :e] = -np.sign(square)[:, :, None] * state[:, :e, e:]
     state[:, e:, e:] = -gamma
     if loss is not None:
         state[:, e:, :e] -= 1j * loss / omega[:, None, :]

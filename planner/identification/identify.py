@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,17 +13,19 @@ from planner.frf.frf import Frf
 from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, stack
-from planner.identification.objective import Objective
+from planner.identification.objective import TOO_SOFT, Objective, stands
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
 from planner.inference.least_squares import Minimum, inverse, minimise
-from planner.robot.elastic_model import Matrices
+from planner.robot.elastic_model import ElasticModel, Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
+STIFFER = float(np.log(1.5))  # by which the springs of a start grow until they carry the weight
+STIFFEST = 20  # such steps: a factor of 3,000
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
 
 
@@ -65,9 +67,15 @@ class Progress:
 
 @dataclass(frozen=True, eq=False)
 class _Problem:
-    """All that stays the same from start to start; matrices do not depend on the springs."""
+    """All that stays the same from start to start.
+
+    Matrices depend on the springs only in that these carry the weight: they are those of
+    robot.toml's until a search has found better ones.
+    """
 
     frfs: tuple[Frf, ...]
+    q: np.ndarray
+    elastic: ElasticModel
     band_hz: tuple[float, float]
     matrices: Matrices
     inertias: Inertias
@@ -80,6 +88,25 @@ class _Problem:
     def inertial(self) -> bool:
         """Whether inertias are identified too."""
         return bool(self.parametrisation.nuisances)
+
+    def carried(self, x: np.ndarray) -> tuple["_Problem", np.ndarray]:
+        """The same where the springs at x = (θ, φ) carry the weight, and x, made to stand there."""
+        p = self.parametrisation
+        count = len(p.parameters)
+        elastic = self.elastic.carried_by(p.elasticity(x[:count]).stiffness)
+        inertias = p.inertias(elastic.body_jacobians(self.q))
+        there = replace(self, matrices=elastic.matrices(self.q), inertias=inertias)
+        return there, np.concatenate([there.standing(x[:count]), x[count:]])
+
+    def standing(self, theta: np.ndarray) -> np.ndarray:
+        """θ (P,) with all springs as much stiffer as it takes to carry the robot's weight."""
+        p = self.parametrisation
+        stiffer = STIFFER * np.array([x.kind == "stiffness" for x in p.parameters])
+        for steps in range(STIFFEST + 1):
+            tried = p.near(theta + steps * stiffer)
+            if stands(self.matrices, p.elasticity(tried).stiffness):
+                return theta if steps == 0 else tried
+        raise InputError(TOO_SOFT)
 
     def objective(
         self, share: float, lines: int, logarithmic: bool = False, inertia: bool = False
@@ -135,13 +162,13 @@ def identify(
     inertias = p.inertias(elastic.body_jacobians(q))
     barrier = Barrier.around(elastic.inertia, p)
     problem = _Problem(
-        tuple(frfs), band, elastic.matrices(q), inertias, p, progress, effort, barrier
+        tuple(frfs), q, elastic, band, elastic.matrices(q), inertias, p, progress, effort, barrier
     )
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
         x, misfits = _search(problem, _starting_points(p, starts, seed))
-        best = _refine(problem, x)
+        best = _refine(*problem.carried(x))
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
 
@@ -172,7 +199,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
     found: list[Minimum] = []
     misfits: list[float] = []
     for number, point in enumerate(points, 1):
-        x = _approach(problem, point, number)
+        x = _approach(problem, problem.standing(point), number)
         effort, stage = problem.effort, "FRFs in units of their noise"
         end, objective = _plain(problem, x, number, effort.lines, stage, effort.completions)
         found.append(end)
@@ -234,7 +261,7 @@ def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | No
     known |= dict(zip(warm.nuisances, warm.mean[len(warm.estimates) :], strict=True))
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
-    end, misfit = _refine(problem, np.array([*p.near(np.array(theta)), *phi]))
+    end, misfit = _refine(*problem.carried(np.array([*p.near(np.array(theta)), *phi])))
     good = misfit < STILL_GOOD * max(warm.misfit, 1.0)
     return (end, misfit) if good or not problem.effort.doubtful else None
 

@@ -23,6 +23,10 @@ FARTHEST = 8.0  # sds of the prior beyond which nothing is looked for
 # Far from the truth the data err by bias, not noise, and neighbouring lines alike: the prior counts
 # for more. Without this, dampers that lock a joint where a spring should give are traps.
 LOG_PRIOR = 10.0
+TOO_SOFT = (
+    "The springs of robot.toml are far too soft to carry the robot's weight where it was measured; "
+    "correct their stiffness (N·m/rad), the masses or gravity."
+)
 LOG_DROP = 0.3  # relative noise above which a value has no logarithm worth fitting
 
 
@@ -89,6 +93,7 @@ class Objective:
         scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
         beyond = self._beyond(phi)
         possible = not self.free_inertia or positive(mass)
+        possible = possible and stands(self.matrices, p.elasticity(theta).stiffness)
         if not possible or not np.isfinite(beyond[0]) or np.abs(away).max() > FARTHEST:
             nothing = np.zeros(len(x))
             return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
@@ -146,9 +151,14 @@ def _normal_equations(residual: np.ndarray, slope: np.ndarray) -> tuple[np.ndarr
     return gradient, normal
 
 
-def positive(mass: np.ndarray) -> bool:
-    """Whether all of the mass matrices (n, e, e) are positive definite."""
+def stands(matrices: Matrices, stiffness: np.ndarray) -> bool:
+    """Whether springs of stiffness (e,) in N·m/rad carry the robot's weight at every pose."""
+    return positive(np.diag(stiffness) + matrices.geometric)
+
+
+def positive(matrix: np.ndarray) -> bool:
+    """Whether all of the symmetric matrices (n, e, e) are positive definite."""
     try:
-        return bool(np.isfinite(np.linalg.cholesky(mass)).all())
+        return bool(np.isfinite(np.linalg.cholesky(matrix)).all())
     except np.linalg.LinAlgError:
         return False

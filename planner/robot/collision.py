@@ -44,6 +44,16 @@ class Collisions:
                     f"link of {self.robot.urdf_path.name} nor an [[obstacle]]; correct it."
                 )
 
+    @property
+    def unchecked(self) -> str | None:
+        """A sentence where the URDF has no collision geometry, so that nothing is checked."""
+        if _link_geometry(self.robot).ngeoms:
+            return None
+        return (
+            f"Nothing is checked for collision, because {self.robot.urdf_path.name} has no "
+            f"collision geometry: look at each pose before the robot moves there."
+        )
+
     @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data]:
         robot = self.robot
@@ -80,6 +90,8 @@ class Collisions:
 
     def _drop_overlapping(self, geometry: pin.GeometryModel) -> None:
         """Remove pairs of links that touch at every one of a spread of poses."""
+        if not len(geometry.collisionPairs):
+            return
         rng = np.random.default_rng(0)
         robot, data, kinematics = self.robot, self._data(geometry), self.robot.model.createData()
         always = np.ones(len(geometry.collisionPairs), dtype=bool)

@@ -109,7 +109,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
     With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
-    own stiffness, of the size of weight times height, is added.
+    own stiffness, of the size of weight times height, is added: so it is unless robot.toml says
+    false (None is what it says where it says nothing; `load_config` puts a bool there).
     """
 
     name: str
@@ -118,7 +119,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor_frame: str
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
-    geometric_stiffness: bool = False
+    geometric_stiffness: bool | None = None
     compliance: tuple[Compliance, ...] = ()
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
@@ -128,9 +129,14 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     harmonic: tuple[Harmonic, ...] = ()
 
 
-def load_config(path: Path) -> RobotConfig:
-    """Read and check robot.toml; InputError with one sentence where it is wrong."""
+def load_config(path: Path, geometric_stiffness: bool = True) -> RobotConfig:
+    """Read and check robot.toml; InputError with one sentence where it is wrong.
+
+    `geometric_stiffness` holds where robot.toml does not say.
+    """
     config = load_toml(path, RobotConfig, "robot.toml")
+    if config.geometric_stiffness is None:
+        config = msgspec.structs.replace(config, geometric_stiffness=geometric_stiffness)
     _check(config, path)
     return _with_effects(config, path)
 

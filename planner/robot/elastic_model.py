@@ -6,6 +6,7 @@ matrix does not depend on stiffness or damping (seed 004, section 2; seed 001, s
 is linear in the inertias of the bodies.
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,7 +28,7 @@ class Matrices:
     `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
     s sensors; unless others were named, that is the tcp and the sensor. `geometric` (n, e, e) in
     N·m/rad is the stiffness that goes with the pose: gravity's own, harmonics of joint angles; 0
-    unless robot.toml asks for it.
+    where robot.toml leaves both out.
     """
 
     mass: np.ndarray
@@ -39,7 +40,9 @@ class Matrices:
 class ElasticModel:
     """A robot with its elastic degrees of freedom. Raises InputError if there are none.
 
-    `inertia_change` (bodies, 10) is added to the inertias (see `inertia`).
+    `inertia_change` (bodies, 10) is added to the inertias (see `inertia`), so that M is linear in
+    it: the weight under which the robot sags stays that of its URDF. Its springs there are those of
+    robot.toml unless others carry it (`carried_by`).
     """
 
     def __init__(self, robot: Robot, inertia_change: np.ndarray | None = None):
@@ -54,11 +57,13 @@ class ElasticModel:
         springs = [r.mass * (2 * np.pi * r.frequency_hz) ** 2 for r in small]
         dampers = [4 * np.pi * r.damping_ratio * r.mass * r.frequency_hz for r in small]
         self.stiffness = np.array([c.stiffness for c in blocks] + springs)
+        self._carrying = self.stiffness
         self.damping = np.array([c.damping for c in blocks] + dampers)
         self.loss_factor = np.array([c.loss_factor for c in blocks] + [0.0] * len(small))
         self._waves = tuple((self._own(w.joint), w) for w in robot.config.harmonic)
         self._virtual = virtual_model(robot, inertia_change)
-        self._model = self._virtual.model
+        weighed = self._virtual if inertia_change is None else virtual_model(robot)
+        self._model, self._weighed = self._virtual.model, weighed.model
         self._elastic = self._virtual.elastic
         self._grid = np.ix_(self._elastic, self._elastic)
         self._check_mass()
@@ -108,6 +113,12 @@ class ElasticModel:
         """
         return self._virtual.inertia
 
+    def carried_by(self, stiffness: np.ndarray) -> "ElasticModel":
+        """The same robot where springs of stiffness (e,) in N·m/rad carry its weight."""
+        other = copy.copy(self)
+        other._carrying = stiffness
+        return other
+
     def matrices(
         self, q: np.ndarray, hits: Sequence[str] = (), sensors: Sequence[str] = ()
     ) -> Matrices:
@@ -119,17 +130,15 @@ class ElasticModel:
         n, e, robot = len(q), self.size, self.robot
         ids = [[robot.frame_id("hit frame", name) for name in hits] or [robot.tcp_id]]
         ids += [[robot.frame_id("sensor frame", name) for name in sensors] or [robot.sensor_id]]
-        data = self._model.createData()  # one for each call, so that threads do not meet in it
+        # One for each call, so that threads do not meet in it.
+        data, weight = self._model.createData(), self._weighed.createData()
         mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
         out = [np.empty((n, len(group), 3, e)) for group in ids]
         for i, row in enumerate(q):
-            full = self._standing(row, data)
+            full = self._standing(row, weight)
             if robot.config.geometric_stiffness:
-                geometric[i] = self._gravity_stiffness(full, data)
-            for number, wave in self._waves:
-                angle = wave.order * row[robot.joint_names.index(wave.joint)]
-                change = wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
-                geometric[i, number, number] += change
+                geometric[i] = self._gravity_stiffness(full, weight)
+            geometric[i] += np.diag(self._with_angle(row))
             crba = pin.crba(self._model, data, full)
             upper = np.triu(crba)
             mass[i] = (upper + np.triu(crba, 1).T)[self._grid]
@@ -149,30 +158,39 @@ class ElasticModel:
         spatial inertias I of the bodies (`virtual.inertia_basis`), M = Σ Jᵀ I J.
         """
         q = np.atleast_2d(q)
-        data = self._model.createData()
+        data, weight = self._model.createData(), self._weighed.createData()
         out = np.empty((len(q), len(self.bodies), 6, self.size))
         for i, row in enumerate(q):
-            pin.computeJointJacobians(self._model, data, self._standing(row, data))
+            pin.computeJointJacobians(self._model, data, self._standing(row, weight))
             for b, joint in enumerate(self._virtual.carriers):
                 jacobian = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
                 out[i, b] = jacobian[:, self._elastic]
         return out
 
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
-        """Coordinates of the virtual model at q (dof,), sagged if robot.toml asks for it."""
+        """Coordinates of the virtual model at q (dof,), sagged unless robot.toml says otherwise."""
         full = np.zeros(self._model.nq)
         full[self._virtual.rigid] = q
-        return self._sagged(full, data) if self.robot.config.geometric_stiffness else full
-
-    def _sagged(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
-        """Where springs of the stated stiffness carry the weight: K δ = −g(q + δ)."""
-        for _ in range(SAG_STEPS):
-            weight = pin.computeGeneralizedGravity(self._model, data, full)
-            full[self._elastic] = -weight[self._elastic] / self.stiffness
+        if self.robot.config.geometric_stiffness:
+            self._sag(full, self._carrying + self._with_angle(q), data)
         return full
+
+    def _with_angle(self, q: np.ndarray) -> np.ndarray:
+        """What harmonics of the joint angles q (dof,) add to the stiffness (e,)."""
+        change = np.zeros(self.size)
+        for number, wave in self._waves:
+            angle = wave.order * q[self.robot.joint_names.index(wave.joint)]
+            change[number] += wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
+        return change
+
+    def _sag(self, full: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> None:
+        """To where springs of this stiffness (e,) carry the weight: K δ = −g(q + δ)."""
+        for _ in range(SAG_STEPS):
+            weight = pin.computeGeneralizedGravity(self._weighed, data, full)
+            full[self._elastic] = -weight[self._elastic] / stiffness
 
     def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Second derivative of the potential energy of the weight, (e, e)."""
-        gradient = pin.computeGeneralizedGravityDerivatives(self._model, data, full)
+        gradient = pin.computeGeneralizedGravityDerivatives(self._weighed, data, full)
         part = np.array(gradient)[self._grid]
         return (part + part.T) / 2

@@ -34,9 +34,12 @@ class Robot:
     joint_axes: tuple[np.ndarray, ...]  # unit vectors in the joints' own frames
 
     @classmethod
-    def load(cls, robot_toml: Path) -> "Robot":
-        """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy."""
-        config = load_config(robot_toml)
+    def load(cls, robot_toml: Path, geometric_stiffness: bool = True) -> "Robot":
+        """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy.
+
+        `geometric_stiffness` holds where robot.toml does not say.
+        """
+        config = load_config(robot_toml, geometric_stiffness)
         urdf = (robot_toml.parent / config.urdf).resolve()
         root = read_urdf(urdf, robot_toml)
         text = ElementTree.tostring(root, encoding="unicode")

@@ -97,6 +97,8 @@ class _Session:
 
     def run(self) -> SessionSummary:
         try:
+            for remark in self.campaign.cell.remarks:
+                self.console.print(Text(remark, style="yellow"))
             while not self.stop:
                 proposal = self._propose()
                 if proposal is not None:

@@ -1,7 +1,9 @@
 """The true robot: a MuJoCo model that deviates from the simulation in known ways.
 
 This engine is there to make recordings whose causes are known. It shares no code with the
-planner's own models: it reads URDF and robot.toml itself, and MuJoCo gives the mass matrix.
+planner's own models: it reads URDF and robot.toml itself, and MuJoCo gives mass matrix and weight.
+The robot vibrates about where it sags under gravity, whose own stiffness is part of K, unless
+robot.toml says geometric_stiffness = false.
 """
 
 import tomllib
@@ -16,6 +18,9 @@ from planner.errors import InputError
 from planner.truth.deviation import Deviation, Resonator, Spring
 from planner.truth.mjcf import Builder
 from planner.truth.propagate import driven
+
+SAG_STEPS = 30  # at most; each gains a digit or more where springs carry the weight at all
+TURN = 1e-4  # rad (or m), of the differences that give gravity's stiffness: exact to 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +39,7 @@ class Truth:
     _held: np.ndarray = field(repr=False)  # places of the robot's own joints in q
     _elastic: np.ndarray = field(repr=False)
     _own: dict[str, int] = field(repr=False)  # joint: its spring about its own axis
+    _weighs: bool = field(repr=False)  # whether gravity is part of the model
 
     def matrices(
         self, q: np.ndarray
@@ -41,7 +47,10 @@ class Truth:
         """M, C, K (e, e) and the Jacobians (3, e) of hit point and sensor, in their own frames."""
         import mujoco
 
-        model, data = self._posed(q)
+        stiffness = self._springs(q)
+        bent = self._sag(q, stiffness)
+        gravity = self._gravity(q, bent)
+        model, data = self._posed(q, bent)
         mujoco.mj_crb(model, data)
         full = _full_mass(model, data)
         grid = np.ix_(self._elastic, self._elastic)
@@ -51,12 +60,44 @@ class Truth:
             mujoco.mj_jacSite(model, data, jacobian, None, model.site(site).id)
             rotation = data.site(site).xmat.reshape(3, 3)
             jacobians.append((rotation.T @ jacobian)[:, self._elastic])
-        factor = self._factors(q)
-        damping = np.diag(factor * [s.damping for s in self.springs])
-        stiffness = np.diag(factor * [s.stiffness for s in self.springs])
+        damping = np.diag(self._factors(q) * [s.damping for s in self.springs])
+        return full[grid], damping, stiffness + gravity, jacobians[0], jacobians[1]
+
+    def gravity_stiffness(self, q: np.ndarray) -> np.ndarray:
+        """Gravity's part (e, e) of K: how the weight's torques change with the springs' angles."""
+        return self._gravity(q, self._sag(q, self._springs(q)))
+
+    def _springs(self, q: np.ndarray) -> np.ndarray:
+        """K (e, e) without gravity's part."""
+        stiffness = np.diag(self._factors(q) * [s.stiffness for s in self.springs])
         for loop in self.deviation.feedback:
             stiffness[self._own[loop.driven], self._own[loop.sensed]] += loop.gain
-        return full[grid], damping, stiffness, jacobians[0], jacobians[1]
+        return stiffness
+
+    def _gravity(self, q: np.ndarray, bent: np.ndarray) -> np.ndarray:
+        steps = TURN * np.eye(len(bent)) if self._weighs else ()
+        change = [self._weight(q, bent + s) - self._weight(q, bent - s) for s in steps]
+        part = np.array(change) / (2 * TURN) if change else np.zeros((len(bent), len(bent)))
+        return (part + part.T) / 2
+
+    def _sag(self, q: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+        """Angles (e,) at which the springs carry the weight."""
+        bent = np.zeros(len(self.springs))
+        for _ in range(SAG_STEPS if self._weighs else 0):
+            before, bent = bent, -np.linalg.solve(stiffness, self._weight(q, bent))
+            if np.max(np.abs(bent - before)) < 1e-13:
+                break
+        return bent
+
+    def _weight(self, q: np.ndarray, bent: np.ndarray) -> np.ndarray:
+        """Torques (e,) that hold the robot against gravity with its springs bent (e,)."""
+        import mujoco
+
+        model, data = self._posed(q, bent)
+        mujoco.mj_comVel(model, data)  # at rest: clears what a body would inherit
+        torque = np.zeros(model.nv)
+        mujoco.mj_rne(model, data, 0, torque)
+        return torque[self._elastic]
 
     def _factors(self, q: np.ndarray) -> np.ndarray:
         """What the stiffness of each spring (e,) is multiplied by at this pose."""
@@ -77,7 +118,7 @@ class Truth:
         """How a point of a link moves along a world direction (3,) with each spring (e,)."""
         import mujoco
 
-        model, data = self._posed(q)
+        model, data = self._posed(q, self._sag(q, self._springs(q)))
         body = model.body(link).id
         point = data.body(link).xpos + data.body(link).xmat.reshape(3, 3) @ position_m
         jacobian = np.zeros((3, model.nv))
@@ -89,12 +130,14 @@ class Truth:
         springs = tuple(replace(s, stiffness=factor * s.stiffness) for s in self.springs)
         return replace(self, springs=springs)
 
-    def _posed(self, q: np.ndarray) -> tuple:
+    def _posed(self, q: np.ndarray, bent: np.ndarray | float = 0.0) -> tuple:
+        """MuJoCo's model and data at joint angles q (dof,) with the springs bent (e,)."""
         import mujoco
 
         model, data = self._model, self._data
         data.qpos[:] = 0.0
         data.qpos[self._held] = q
+        data.qpos[self._elastic] = bent
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         return model, data
@@ -202,6 +245,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
     # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
     mujoco.set_mju_user_warning(lambda text: None)
     model = mujoco.MjModel.from_xml_string(builder.xml())
+    model.opt.gravity[:] = table.get("gravity", (0.0, 0.0, -9.81))
     held = [model.joint(name).dofadr[0] for name in builder.joint_names]
     elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(springs))]
     lower, upper = np.array(builder.limits).T
@@ -218,6 +262,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         np.array(held),
         np.array(elastic),
         own,
+        bool(table.get("geometric_stiffness", True)),
     )
 
 

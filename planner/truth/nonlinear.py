@@ -162,9 +162,15 @@ def structural(pose: Pose, loss_factor: float, step_s: float) -> np.ndarray:
 def structural_accelerance(
     truth: Truth, loss_factor: float, q: np.ndarray, frequency_hz: np.ndarray
 ) -> np.ndarray:
-    """Accelerance (3, 3, F) in m/s²/N: -ω² Σ φφᵀ / (ω_r² (1 + iη) - ω²)."""
+    """Accelerance (3, 3, F) in m/s²/N: -ω² Σ φφᵀ / (μ - ω²) of K (1 + iη) + G.
+
+    μ are the complex eigenvalues of that matrix and M, G is gravity's part, which has no loss.
+    """
     mass, _, stiffness, hit, sensor = truth.matrices(q)
-    squares, shapes = scipy.linalg.eigh((stiffness + stiffness.T) / 2, mass)
+    gravity = truth.gravity_stiffness(q)
+    springs = (stiffness + stiffness.T) / 2 - gravity
+    squares, shapes = scipy.linalg.eig(springs * (1 + 1j * loss_factor) + gravity, mass)[:2]
+    shapes = shapes / np.sqrt(np.einsum("ik,ij,jk->k", shapes, mass, shapes))
     w2 = (2 * np.pi * np.asarray(frequency_hz)) ** 2
-    shares = -w2 / (squares[:, None] * (1 + 1j * loss_factor) - w2)
+    shares = -w2 / (squares[:, None] - w2)
     return np.einsum("sk,hk,kf->shf", sensor @ shapes, hit @ shapes, shares)

@@ -32,9 +32,7 @@ class Scene:
 
     def stiffness(self, joint: str) -> float:
         """Of a joint about its own axis, in N·m/rad."""
-        matrix = self.truth.matrices(self.poses[0])[2]
-        own = self.truth.own(joint)
-        return float(own @ matrix @ own)
+        return float(self.truth.own(joint) @ [spring.stiffness for spring in self.truth.springs])
 
     def angle(self, joint: str) -> float:
         """A joint's largest elastic angle (rad) under a middling hit; median over some poses."""

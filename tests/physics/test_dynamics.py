@@ -48,6 +48,23 @@ def test_one_oscillator_in_closed_form():
     np.testing.assert_allclose(vibration.accelerance(solved, LINES)[0, 0, 0], exact, rtol=1e-10)
 
 
+@pytest.mark.parametrize("eta", [0.0, 0.05])
+@pytest.mark.parametrize("proportional", [False, True])
+def test_where_gravity_is_stronger_than_a_spring_one_mode_does_not_oscillate(proportional, eta):
+    mass, damping, stiffness, (hit, sensor) = random_system(2)
+    damping = 1e-3 * stiffness if proportional else damping
+    weight = np.linalg.eigvalsh(stiffness)[0] * 1.5 * np.eye(6)[np.argmin(np.diagonal(stiffness))]
+    toppling = stiffness * (1 + 1j * eta) if eta else stiffness
+    toppling = toppling - np.diag(weight)
+    solved = vibration.solve_poles(mass, damping, toppling, hit, sensor)
+    grows = solved.poles.real > 0.5 * np.abs(solved.poles)
+    assert np.sum(grows) == 1
+    assert np.sum(np.isfinite(vibration.oscillatory(solved, 6).frequency_hz)) == 5
+    ours = vibration.accelerance(solved, LINES)[0]
+    direct = vibration.direct_accelerance(mass[0], damping, toppling, hit[0], sensor[0], LINES)
+    assert np.abs(ours - direct).max() < 1e-9 * np.abs(direct).max()
+
+
 @settings(deadline=None, max_examples=30)
 @given(st.integers(0, 10_000))
 def test_reciprocity_at_one_point(seed):

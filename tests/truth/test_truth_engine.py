@@ -99,6 +99,23 @@ def test_agrees_with_the_planners_own_simulation(tmp_path, name, per_joint):
         assert np.max(np.abs(ours - theirs)) < 1e-7 * np.max(np.abs(ours))
 
 
+@pytest.mark.parametrize("tilt", [(0.0, 0.0, -9.81), (3.0, -2.0, -9.0)])
+def test_gravity_is_left_out_of_both_engines_where_robot_toml_says_so(tmp_path, tilt):
+    arm, f = KNOWN_ROBOTS["kr10"], np.linspace(4, 120, 60)
+    path, q = folder(tmp_path, "kr10", 2), arm.poses(1)[0]
+    text = path.read_text().replace("[0.0, 0.0, -9.81]", str(list(tilt)))
+    found = []
+    for said in ("", "geometric_stiffness = true\n", "geometric_stiffness = false\n"):
+        path.write_text(said + text)
+        truth, simulation = load_truth(path), Simulation(Robot.load(path))
+        ours, theirs = truth.accelerance(q, f), simulation.accelerance(q, f)[0]
+        assert np.max(np.abs(ours - theirs)) < 1e-7 * np.max(np.abs(ours))
+        assert np.any(truth.gravity_stiffness(q)) == ("false" not in said)
+        found.append(ours)
+    np.testing.assert_array_equal(found[0], found[1])
+    assert np.max(np.abs(found[2] - found[1])) > 1e-3 * np.max(np.abs(found[1]))
+
+
 def test_reciprocity_where_hammer_and_sensor_meet(tmp_path):
     path = folder(tmp_path, "kr210", 3)
     path.write_text(path.read_text().replace('sensor_frame = "sensor"', 'sensor_frame = "tcp"'))
@@ -110,6 +127,7 @@ def test_reciprocity_where_hammer_and_sensor_meet(tmp_path):
 
 def test_an_added_mass_enters_the_mass_matrix_where_it_sits(tmp_path):
     path, place = folder(tmp_path, "kr210", 2), KNOWN_ROBOTS["kr210"].tcp
+    path.write_text("geometric_stiffness = false\n" + path.read_text())  # the same posture
     q = KNOWN_ROBOTS["kr210"].poses(1)[0]
     plain = load_truth(path)
     loaded = load_truth(path, Deviation(added=(AddedMass("link_6", tuple(place), 12.0),)))

@@ -6,12 +6,13 @@ from functools import cached_property
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.dynamics.gradient import Inertias, response_gradient
+from planner.dynamics.gradient import Impedance, Inertias, response_gradient
 from planner.identification.measured_frfs import Measured
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
     positive,
+    stands,
     weight_of,
 )
 from planner.identification.parameters import Parametrisation
@@ -118,8 +119,12 @@ class Misfit:
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
         setting = self.setting if rate is None else replace(self.setting, s=s)
         added = self.effect.impedance(setting, psi)
+        added = added if rate is None else (*added, _weight(self.matrices, s.shape[1]))
         inertias = self.inertias if self.inertial else None
         h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
+        by_weight = full[:, -1]
+        if rate is not None:
+            full = full[:, :-1]
         springs, slope = len(p.held), full
         if not np.array_equal(p.spread, np.eye(springs)):
             theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
@@ -127,7 +132,7 @@ class Misfit:
         if rate is not None:
             # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
             e = p.size
-            down = 2 * full[:, :e].sum(axis=1) + full[:, e : 2 * e].sum(axis=1)
+            down = 2 * (full[:, :e].sum(axis=1) + by_weight) + full[:, e : 2 * e].sum(axis=1)
             along = -rate * down / s[:, None, None]
             slope = np.concatenate([slope, along[:, None]], axis=1)
         seen = self.effect.transfer(self.setting, psi)
@@ -152,12 +157,16 @@ class Misfit:
         return ByPose(np.sum(r**2, axis=1), gradient, normal)
 
     def possible(self, x: np.ndarray) -> bool:
-        """Whether masses are positive at x, and nothing is farther off than is looked for."""
+        """Whether a robot may be so at x, and nothing is farther off than is looked for.
+
+        Masses are positive, and the springs carry the weight.
+        """
         a, b = self.split
         if np.abs((x - self.mean) / self.sd).max() > FARTHEST:
             return False
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        return positive(mass)
+        springs = self.parametrisation.elasticity(x[:a])
+        return positive(mass) and stands(self.matrices, springs.stiffness)
 
     def __call__(self, x: np.ndarray) -> Weighed:
         """Data and prior together; ∞ where x cannot be."""
@@ -185,3 +194,12 @@ class Misfit:
         least = 1e-9 * np.abs(measured) + 1e-300
         safe = np.where(np.abs(h) >= least, h, least)
         return weight * np.log(safe / measured), slope * (weight / safe)[:, None]
+
+
+def _weight(matrices: Matrices, lines: int) -> Impedance:
+    """Adds nothing to Z; its one derivative is that by the stiffness that goes with the pose."""
+    values, vectors = np.linalg.eigh(matrices.geometric)
+    ports = np.sqrt(np.abs(values))[..., None] * np.swapaxes(vectors, 1, 2)
+    shapes = np.eye(values.shape[1])[:, :, None] * np.eye(values.shape[1])[:, None]
+    signs = np.repeat(np.sign(values)[..., None], lines, axis=2)
+    return Impedance(ports, shapes, (), (tuple((j, signs[:, j]) for j in range(len(shapes))),))

@@ -1,0 +1,134 @@
+"""`next` with every acquisition, and on a robot that cannot be checked for collision."""
+
+import contextlib
+import hashlib
+import io
+import json
+from pathlib import Path
+
+import pytest
+
+from plain_arm import make_plain_arm, plain_campaign
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import Configured, Proposed
+from planner.campaign.journal import encode_line, parse
+from planner.cli.run import run
+from planner.design.propose import ACQUISITIONS, DESIGNS
+
+UNCHECKED = "Nothing is checked for collision, because plain.urdf has no collision geometry"
+
+
+def call(*arguments: object) -> str:
+    """What a command that must succeed prints."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = run([str(a) for a in arguments])
+    assert code == 0, (arguments, err.getvalue())
+    return out.getvalue()
+
+
+def ask(*arguments: object) -> dict:
+    return json.loads(call(*arguments, "--json"))
+
+
+@pytest.fixture
+def robot(tmp_path) -> Path:
+    return make_plain_arm(tmp_path / "robot")
+
+
+def begun(folder: Path, robot: Path, acquisition: str = "integrated_variance") -> Path:
+    toml = plain_campaign(folder / "plan" / "campaign.toml", acquisition)
+    call("new", folder / "cell", "--robot", robot, "--campaign", toml)
+    return folder / "cell"
+
+
+def proposed_again(cell: Path, *options: object) -> list[dict]:
+    """Proposals that the next command reads from the log as the first one answered them."""
+    first = ask("next", cell, "--count", 2, *options)["proposals"]
+    assert ask("next", cell, "--count", 2, *options)["proposals"] == first
+    status = ask("status", cell)
+    assert [p["pose"] for p in status["open"]] == [p["pose"] for p in first]
+    assert status["log"]["torn_bytes"] == 0
+    assert [s["check"] for s in ask("replay", cell)["steps"]] == ["kept", "identical"]
+    return first
+
+
+@pytest.mark.parametrize("name", [*ACQUISITIONS, *DESIGNS])
+def test_every_acquisition_is_logged_so_that_it_reads_back(name, robot, tmp_path):
+    asked = proposed_again(begun(tmp_path / "asked", robot), "--acquisition", name)
+    stated = proposed_again(begun(tmp_path / "stated", robot, name))
+    assert asked == stated
+    for proposal in asked:
+        assert (proposal["score"] is None) == (name in DESIGNS)
+
+
+def test_a_log_in_which_a_score_became_null_opens(robot, tmp_path):
+    """Not a number is null in JSON: earlier versions wrote that and could not read it."""
+    cell = begun(tmp_path, robot)
+    proposals = ask("next", cell, "--acquisition", "sobol")["proposals"]
+    log = (cell / "log.jsonl").read_text()
+    assert '"score":null' in log
+    call("skip", cell, proposals[0]["pose"])
+    event = Campaign(cell).entries[1].event
+    assert isinstance(event, Proposed)
+    assert event.proposals[0].score is None
+
+
+def test_a_robot_without_collision_geometry_is_told_of_once(robot, tmp_path):
+    toml = plain_campaign(tmp_path / "plan" / "campaign.toml")
+    text = call("new", tmp_path / "cell", "--robot", robot, "--campaign", toml)
+    assert UNCHECKED in " ".join(text.split())
+    text = call("next", tmp_path / "cell", "--count", 3)
+    assert " ".join(text.split()).count(UNCHECKED) == 1
+    (remark,) = ask("next", tmp_path / "cell", "--count", 3)["remarks"]
+    assert remark.startswith(UNCHECKED)
+
+
+def test_a_robot_with_collision_geometry_is_not_told_of(robot, tmp_path):
+    urdf = robot.parent / "plain.urdf"
+    shape = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
+    urdf.write_text(urdf.read_text().replace("</inertial></link>", f"</inertial>{shape}", 1))
+    assert ask("next", begun(tmp_path, robot))["remarks"] == []
+
+
+def written_earlier(cell: Path) -> Path:
+    """The log as versions wrote it that left gravity's stiffness out: it does not mention it."""
+    path, check, lines = cell / "log.jsonl", "", []
+    for entry in parse(path.read_bytes()).entries:
+        line, _ = encode_line(check, entry)
+        body = line.split(b'"entry":', 1)[1].replace(b',"geometric_stiffness":true', b"")
+        assert body != line.split(b'"entry":', 1)[1]
+        line, check = _chained(check, body[:-2])
+        lines.append(line)
+    path.write_bytes(b"".join(lines))
+    return cell
+
+
+def _chained(check: str, body: bytes) -> tuple[bytes, str]:
+    check = hashlib.sha256(check.encode() + body).hexdigest()[:16]
+    return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
+
+
+def test_a_campaign_goes_on_with_the_gravity_that_it_began_with(robot, tmp_path):
+    left_out = make_plain_arm(tmp_path / "out", "geometric_stiffness = false")
+    without = ask("next", begun(tmp_path / "without", left_out))["proposals"]
+    fresh = begun(tmp_path / "fresh", robot)
+    with_it = ask("next", fresh)["proposals"]
+    assert with_it[0]["expected"] != without[0]["expected"]
+
+    earlier = written_earlier(begun(tmp_path / "earlier", robot))
+    assert ask("next", earlier)["proposals"] == without
+    toml = earlier / "campaign.toml"
+    toml.write_text(toml.read_text() + "[stop]\nmeasurements_max = 20\n")
+    assert ask("next", earlier)["proposals"][0]["expected"] == without[0]["expected"]
+    for cell in (fresh, earlier):
+        assert all(s["check"] in ("kept", "identical") for s in ask("replay", cell)["steps"])
+
+    stated = earlier / "robot" / "robot.toml"
+    stated.write_text("geometric_stiffness = true\n" + stated.read_text())
+    after = ask("next", earlier)["proposals"]
+    assert after[0]["joints_deg"] == with_it[0]["joints_deg"]
+    assert after[0]["expected"] == with_it[0]["expected"]
+    configured = [e.event for e in Campaign(earlier).entries if isinstance(e.event, Configured)]
+    assert [event.geometric_stiffness for event in configured] == [False] * 3
+    assert all(s["check"] in ("kept", "identical") for s in ask("replay", earlier)["steps"])

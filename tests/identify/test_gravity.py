@@ -1,0 +1,78 @@
+"""Identification of a robot so soft that gravity is stronger than some of the springs tried."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from plain_arm import make_plain_arm
+from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.identification.identify import identify
+from planner.identification.measured_frfs import stack
+from planner.identification.objective import Objective, stands
+from planner.identification.parameters import Priors, parametrise
+from planner.recording.records import Hit
+from planner.robot.robot import Robot
+from planner.truth.deviation import Deviation
+from planner.truth.hits import Hammer, simulate_hit
+from planner.truth.model import Truth, load_truth
+
+# Stretched upwards, where gravity softens most.
+Q = np.deg2rad([(0, -85, 5, 0), (30, -70, -10, 40), (-20, -80, 30, -60)])
+BAND_HZ = (1.0, 30.0)
+SOFTER = 250.0  # of the plain arm: carries its weight with little to spare
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory):
+    return make_plain_arm(tmp_path_factory.mktemp("soft"), softer=SOFTER)
+
+
+@pytest.fixture(scope="module")
+def frfs(arm):
+    truth = load_truth(arm, Deviation(seed=2, stiffness=0.1))
+    return [struck(truth, q) for q in Q]
+
+
+def struck(truth: Truth, q: np.ndarray) -> Frf:
+    """From hits whose records end before the decay, which a simulation has to complete."""
+    rate, rng = 256.0, np.random.default_rng(0)
+    hammer = Hammer(
+        duration_s=0.02, sampling_rate_hz=rate, record_s=4.0, pretrigger_s=0.1, noise=0.005
+    )
+    made = [simulate_hit(truth, q, axis, hammer, rng) for axis in ("+x", "+y", "+z") * 2]
+    hits = [
+        Hit(Path(str(i)), h.axis, rate, h.force_n, h.acceleration_m_s2) for i, h in enumerate(made)
+    ]
+    return estimate(tuple(hits), BAND_HZ)
+
+
+def test_random_starts_that_buckle_are_made_to_stand(arm, frfs):
+    simulation = Simulation(Robot.load(arm))
+    p = parametrise(simulation, Priors())
+    matrices = simulation.elastic.matrices(Q)
+    assert all(np.isfinite(frf.tail_s) for frf in frfs)
+    soft = p.mean - np.log(8) * np.array([x.kind == "stiffness" for x in p.parameters])
+    starts = np.exp([p.mean, soft, soft + 0.3, soft - 0.3])
+    assert [stands(matrices, p.elasticity(np.log(s)).stiffness) for s in starts] == [1, 0, 0, 0]
+    measured, inertias = (
+        stack(frfs, BAND_HZ, 40, 0.0),
+        p.inertias(simulation.elastic.body_jacobians(Q)),
+    )
+    objective = Objective(measured, matrices, inertias, p, logarithmic=False, free_inertia=False)
+    assert [objective(np.log(s)).value < np.inf for s in starts] == [1, 0, 0, 0]
+    found = identify(frfs, Q, simulation, band_hz=BAND_HZ, starts=starts)
+    alone = identify(frfs, Q, simulation, band_hz=BAND_HZ, starts=starts[1:2])
+    drawn = identify(frfs, Q, simulation, band_hz=BAND_HZ, starts=6, seed=3)
+    for each in (found, alone, drawn):
+        assert each.fit.frac > 0.99
+        assert stands(matrices, each.simulation.elasticity.stiffness)
+
+
+def test_springs_that_could_never_carry_the_robot_are_said(tmp_path, frfs):
+    simulation = Simulation(Robot.load(make_plain_arm(tmp_path, softer=1e7)))
+    with pytest.raises(InputError, match="far too soft to carry the robot's weight"):
+        identify(frfs, Q, simulation, band_hz=BAND_HZ, starts=1)
