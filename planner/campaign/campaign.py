@@ -291,7 +291,10 @@ class Campaign:
         old = tuple(self.source_of(hit) for hit in known.accepted) if known else ()
         hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
-        modes = from_modal(measured.modal)
+        modes = new_modes = from_modal(measured.modal)
+        if old:  # among earlier hits, wrong ones would not stand out
+            alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
+            new_modes = from_modal(alone.modal)
         event = Imported(
             pose=pose,
             joints_deg=joints_deg,
@@ -299,7 +302,7 @@ class Campaign:
             modes=modes,
             remarks=measured.remarks,
             amplitude=from_homogeneity(measured.homogeneity),
-            question=question(before, state, pose, joints_deg, modes),
+            question=question(before, state, pose, joints_deg, new_modes),
         )
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]

@@ -57,7 +57,7 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
 
     Raises InputError where they are not known or contradict each other.
     """
-    known = state.measurements.get(delivery.pose)
+    known = state.measurements.get(delivery.pose) or state.held.get(delivery.pose)
     if delivery.joints_deg is None:
         stated = known or state.proposals.get(delivery.pose)
         if stated is None:
@@ -89,7 +89,7 @@ def keep_files(
     fresh: dict[str, Kept] = {}
     already, left_out = [], []
     for source in delivery.sources:
-        digest, suffix = store.store_recording(directory, source.path)
+        digest = store.sha256(store.read_bytes(source.path))
         if owner.get(digest, delivery.pose) != delivery.pose:
             raise InputError(
                 f"{source.path} was imported before as a recording of pose {owner[digest]}; "
@@ -98,10 +98,10 @@ def keep_files(
         if digest in owner or digest in fresh:
             already.append(source.name)
         elif reason := _reason_against(delivery.pose, digest, source.path in named, state):
-            hit = HitRecord(source.name, digest, suffix, source.hit, source.repeat, False, reason)
+            hit = HitRecord(source.name, digest, "", source.hit, source.repeat, False, reason)
             left_out.append(hit)
         else:
-            fresh[digest] = (source, digest, suffix)
+            fresh[digest] = (source, *store.store_recording(directory, source.path))
     return KeptFiles(tuple(fresh.values()), tuple(already), tuple(left_out))
 
 

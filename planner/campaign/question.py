@@ -88,9 +88,9 @@ def question(
     joints_deg: tuple[float, ...],
     modes: tuple[MeasuredMode, ...],
 ) -> Question | None:
-    """What to ask the engineer before the hits of a pose are believed; None: nothing.
+    """What to ask the engineer before new hits of a pose are believed; None: nothing.
 
-    `model` and `state` are those before the import.
+    `modes` are those of the new hits alone; `model` and `state` are those before the import.
     """
     known = state.measurements.get(pose)
     answered = known is not None and known.question is not None
