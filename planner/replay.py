@@ -137,6 +137,7 @@ def _check_import(
     if accepted != [hit.accepted for hit in event.hits]:
         return "differs", f"{event.pose}: other hits are refused than before", measured
     detail = f"{event.pose}: {sum(accepted)} hits, {len(modes)} modes"
+    detail += ", held until confirmed" if event.question else ""
     check, detail = _compare(_numbers(event.modes), _numbers(modes), detail)
     return check, detail, measured
 

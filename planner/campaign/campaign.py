@@ -19,27 +19,34 @@ from planner.campaign.deliveries import Delivery, sort_paths
 from planner.campaign.events import (
     AnyEvent,
     Configured,
+    Confirmed,
     Entry,
     HitRecord,
     Imported,
     Proposal,
     Proposed,
+    Refused,
     Skipped,
     Starred,
     Undone,
     Withdrawn,
 )
 from planner.campaign.importing import (
+    REFUSED,
     ImportReport,
     displacement,
     keep_files,
     measure_files,
+    not_used,
     place,
+    refusals,
+    taken_after_all,
 )
 from planner.campaign.journal import Journal
 from planner.campaign.log_conversion import from_homogeneity, from_modal
 from planner.campaign.model import Model, build
 from planner.campaign.proposals import propose
+from planner.campaign.question import question
 from planner.campaign.state import CampaignState, Measurement, fold, last_act
 from planner.dataset.measure import Source, frf_of
 from planner.errors import InputError
@@ -94,11 +101,7 @@ class Campaign:
         key = msgspec.json.encode(configured).decode()
         if key not in self._cells:
             config = config_from_builtins(configured.config)
-            self._cells[key] = Cell.load(
-                self.directory / config.robot,
-                config,
-                geometric_stiffness=configured.geometric_stiffness,
-            )
+            self._cells[key] = Cell.load(self.directory / config.robot, config)
         return self._cells[key]
 
     @property
@@ -123,7 +126,7 @@ class Campaign:
         known = {
             hit.sha256
             for e in self.entries
-            if isinstance(e.event, Imported)
+            if isinstance(e.event, Imported | Refused)
             for hit in e.event.hits
         }
         kept = (self.directory / store.RECORDINGS).glob("[0-9a-f]*")
@@ -133,8 +136,7 @@ class Campaign:
         """What campaign.toml and the robot folder say now (the log follows with the next act)."""
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
-        begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        return Configured(_as_logged(config), hashes, __version__, begun.geometric_stiffness)
+        return Configured(_as_logged(config), hashes, __version__)
 
     # -- acts ----------------------------------------------------------------------------------
 
@@ -161,6 +163,8 @@ class Campaign:
     ) -> tuple[ImportReport, ...]:
         """Import hits, one report per pose, in recording order.
 
+        Files that the engineer refused are imported only where `paths` names them themselves.
+        Hits far from what the model is sure of are held until `confirm`, `move` or `refuse_held`.
         Raises InputError, before anything is stored, if it is not clear what or where they are.
         """
         with self._acting():
@@ -168,15 +172,52 @@ class Campaign:
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(paths, self.cell.robot.joint_names, pose, default)
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
+            named = frozenset(path for path in paths if path.is_file())
             reports = []
             for delivery, joints_deg in placed:
                 if progress:
                     progress(delivery.pose)
-                reports.append(self._import_pose(delivery, joints_deg))
+                reports.append(self._import_pose(delivery, joints_deg, named))
             return tuple(reports)
 
+    def refuse(self, pose: str, paths: tuple[Path, ...]) -> None:
+        """Refuse files that wait at a pose: they are kept, and not imported unless named."""
+        with self._acting():
+            if paths:
+                self._append(Refused(pose, refusals(self.directory, paths)))
+
+    def confirm(self, pose: str) -> None:
+        """The held hits of a pose are from there indeed: the model uses them."""
+        with self._acting():
+            self._held(pose)
+            self._append(Confirmed(pose))
+
+    def move(self, pose: str, other: str) -> ImportReport:
+        """The held hits of a pose are from another one: import them there."""
+        with self._acting():
+            entry, event = self._held(pose)
+            sources = tuple(self.source_of(hit) for hit in event.hits)
+            delivery = Delivery(other, None, sources)
+            joints_deg = place(self.cell, self.state, delivery)
+            if other in self.state.held:
+                raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
+            self._append(Undone(entry.seq))
+            return self._import_pose(delivery, joints_deg, frozenset())
+
+    def refuse_held(self, pose: str, reason: str = REFUSED) -> None:
+        """The held hits of a pose are set aside, as if they had been refused when they came."""
+        with self._acting():
+            entry, event = self._held(pose)
+            # In this order: stopped in between, the hits are asked for again.
+            self._append(Undone(entry.seq))
+            refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
+            hits = (msgspec.structs.replace(h, reason=h.reason or reason) for h in refused)
+            self._append(Refused(pose, tuple(hits)))
+
     def withdraw(self, pose: str, reason: str = "") -> None:
-        """Set a measured pose aside; its recordings stay."""
+        """Set a measured pose aside, or held hits; the recordings stay."""
+        if pose in self.state.held:
+            return self.refuse_held(pose, reason or REFUSED)
         with self._acting():
             measurement = self.state.measurements.get(pose)
             if measurement is None or measurement.withdrawn:
@@ -198,7 +239,7 @@ class Campaign:
             self._append(Starred(pose))
 
     def undo(self, decisions_only: bool = False) -> Entry:
-        """Take back the last act (proposal, import, withdrawal, skip, star)."""
+        """Take back the last act (proposal, import, answer, refusal, withdrawal, skip, star)."""
         with self._acting():
             entry = last_act(self.entries, decisions_only)
             if entry is None:
@@ -223,43 +264,69 @@ class Campaign:
             store.keep_robot_files(self.directory, configured.robot)
             self._append(configured)
 
-    def _import_pose(self, delivery: Delivery, joints_deg: tuple[float, ...]) -> ImportReport:
-        before, state = self.model, self.state
-        known = state.measurements.get(delivery.pose)
-        fresh, already = keep_files(self.directory, delivery, state)
-        if not fresh:
-            return ImportReport(delivery.pose, (), (), already, known, None, before, before, 0.0)
+    def _held(self, pose: str) -> tuple[Entry, Imported]:
+        """The import that is held at a pose; InputError if none is."""
+        if pose not in self.state.held:
+            raise InputError(f"No hits of pose {pose} wait for an answer; see planner status.")
+        found = [
+            (e, e.event)
+            for e in self.entries
+            if isinstance(e.event, Imported) and e.event.pose == pose and e.event.question
+        ]
+        return found[-1]
+
+    def _import_pose(
+        self, delivery: Delivery, joints_deg: tuple[float, ...], named: frozenset[Path]
+    ) -> ImportReport:
+        before, state, pose = self.model, self.state, delivery.pose
+        known = state.measurements.get(pose)
+        kept = keep_files(self.directory, delivery, state, named)
+        if not kept.fresh:
+            held = state.held.get(pose)
+            return ImportReport(
+                pose, (), (), kept.already, held or known, None, before, before, 0.0,
+                left_out=kept.left_out, question=held.question if held else None,
+            )  # fmt: skip
         started = time.perf_counter()
         old = tuple(self.source_of(hit) for hit in known.accepted) if known else ()
-        hits, measured = measure_files(self.directory, old, fresh, self.cell.config.modes)
+        hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
+        joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
+        modes = new_modes = from_modal(measured.modal)
+        if old:  # among earlier hits, wrong ones would not stand out
+            alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
+            new_modes = from_modal(alone.modal)
         event = Imported(
-            pose=delivery.pose,
-            joints_deg=known.joints_deg if known else joints_deg,
+            pose=pose,
+            joints_deg=joints_deg,
             hits=hits,
-            modes=from_modal(measured.modal),
+            modes=modes,
             remarks=measured.remarks,
             amplitude=from_homogeneity(measured.homogeneity),
+            question=question(before, state, pose, joints_deg, new_modes),
         )
         self._append(event)
+        measurement = (self.state.held if event.question else self.state.measurements)[pose]
         if measured.frf is not None:
-            accepted = self.state.measurements[delivery.pose].accepted
-            self._frfs[_frf_key(accepted, self.cell.config.modes)] = measured.frf
+            self._frfs[_frf_key(measurement.accepted, self.cell.config.modes)] = measured.frf
         model = self.model
         return ImportReport(
-            pose=delivery.pose,
-            accepted=tuple(hit for hit in hits if hit.accepted),
-            refused=tuple(hit for hit in hits if not hit.accepted),
-            already=already,
-            measurement=self.state.measurements[delivery.pose],
+            pose=pose,
+            accepted=tuple(hit for hit in hits if hit.accepted and not event.question),
+            refused=not_used(hits, event.question),
+            already=kept.already,
+            measurement=measurement,
             measured=measured,
             model_before=before,
             model=model,
             refit_seconds=time.perf_counter() - started,
             remarks=(
                 *measured.remarks,
-                *displacement(state, delivery, joints_deg),
+                *taken_after_all(state, kept.fresh),
+                *displacement(state, delivery, stood),
                 *model.remarks,
             ),
+            left_out=kept.left_out,
+            question=event.question,
         )
 
     def source_of(self, hit: HitRecord) -> Source:
@@ -308,5 +375,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(_as_logged(config), hashes, __version__, geometric_stiffness=True)
+    event = Configured(_as_logged(config), hashes, __version__)
     return encode_line("", Entry(1, now, event))[0]

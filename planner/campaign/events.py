@@ -100,8 +100,25 @@ class Amplitude(msgspec.Struct, frozen=True):
     homogeneous: bool
 
 
+class Question(msgspec.Struct, frozen=True):
+    """What the engineer is asked of hits that lie far from what the model is sure of.
+
+    The `mode` that is furthest off is so by `off_sd` standard deviations; `fits` names the pose
+    whose modes these are instead, if there is one.
+    """
+
+    text: str
+    mode: int
+    off_sd: float
+    off_percent: float
+    fits: str = ""
+
+
 class Imported(Event, frozen=True, tag="imported"):
-    """Hits at one pose were imported; `modes` are those of all its accepted hits so far."""
+    """Hits at one pose were imported; `modes` are those of all its accepted hits so far.
+
+    With a `question` they are held: not used until a Confirmed follows.
+    """
 
     pose: str
     joints_deg: tuple[float, ...]
@@ -109,6 +126,20 @@ class Imported(Event, frozen=True, tag="imported"):
     modes: tuple[MeasuredMode, ...]
     remarks: tuple[str, ...] = ()
     amplitude: Amplitude | None = None  # null: all hits of one strength
+    question: Question | None = None
+
+
+class Confirmed(Event, frozen=True, tag="confirmed"):
+    """The engineer said that held hits are from the pose that they are said to be from."""
+
+    pose: str
+
+
+class Refused(Event, frozen=True, tag="refused"):
+    """The engineer refused hits that waited at a pose; they are kept, and not offered again."""
+
+    pose: str
+    hits: tuple[HitRecord, ...]
 
 
 class Withdrawn(Event, frozen=True, tag="withdrawn"):
@@ -141,7 +172,9 @@ class Undone(Event, frozen=True, tag="undone"):
     act: int
 
 
-AnyEvent = Configured | Proposed | Imported | Withdrawn | Skipped | Starred | Undone
+AnyEvent = (
+    Configured | Proposed | Imported | Confirmed | Refused | Withdrawn | Skipped | Starred | Undone
+)
 
 
 class Entry(msgspec.Struct, frozen=True):

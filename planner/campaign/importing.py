@@ -4,25 +4,39 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 
 from planner.campaign import store
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
-from planner.campaign.events import HitRecord
+from planner.campaign.events import HitRecord, Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose, Source, measure
 from planner.errors import InputError
 
 SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
+REFUSED = "refused by the engineer"
 
 Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
 
 
+@dataclass(frozen=True)
+class KeptFiles:
+    """Files of one delivery: new ones, names of those imported before, and those left out."""
+
+    fresh: tuple[Kept, ...]
+    already: tuple[str, ...]
+    left_out: tuple[HitRecord, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class ImportReport:
-    """What one import did to one pose: files, modes, and the model before and after."""
+    """What one import did to one pose: files, modes, and the model before and after.
+
+    With a `question` the measurement is held, and its hits are not among the accepted ones.
+    """
 
     pose: str
     accepted: tuple[HitRecord, ...]
@@ -34,6 +48,8 @@ class ImportReport:
     model: Model
     refit_seconds: float
     remarks: tuple[str, ...] = ()
+    left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
+    question: Question | None = None
 
 
 def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, ...]:
@@ -41,7 +57,7 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
 
     Raises InputError where they are not known or contradict each other.
     """
-    known = state.measurements.get(delivery.pose)
+    known = state.measurements.get(delivery.pose) or state.held.get(delivery.pose)
     if delivery.joints_deg is None:
         stated = known or state.proposals.get(delivery.pose)
         if stated is None:
@@ -62,17 +78,18 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
 
 
 def keep_files(
-    directory: Path, delivery: Delivery, state: CampaignState
-) -> tuple[tuple[Kept, ...], tuple[str, ...]]:
+    directory: Path, delivery: Delivery, state: CampaignState, named: frozenset[Path]
+) -> KeptFiles:
     """Keep the raw files; those imported before at this pose are only named.
 
+    A file that the engineer refused is new only where it is itself among the `named` paths.
     Raises InputError for a recording that belongs to another pose already.
     """
-    owner = {h.sha256: m.pose for m in state.measurements.values() for h in m.hits}
+    owner = {h.sha256: m.pose for m in state.recorded for h in m.hits}
     fresh: dict[str, Kept] = {}
-    already = []
+    already, left_out = [], []
     for source in delivery.sources:
-        digest, suffix = store.store_recording(directory, source.path)
+        digest = store.sha256(store.read_bytes(source.path))
         if owner.get(digest, delivery.pose) != delivery.pose:
             raise InputError(
                 f"{source.path} was imported before as a recording of pose {owner[digest]}; "
@@ -80,9 +97,51 @@ def keep_files(
             )
         if digest in owner or digest in fresh:
             already.append(source.name)
+        elif reason := _reason_against(delivery.pose, digest, source.path in named, state):
+            hit = HitRecord(source.name, digest, "", source.hit, source.repeat, False, reason)
+            left_out.append(hit)
         else:
-            fresh[digest] = (source, digest, suffix)
-    return tuple(fresh.values()), tuple(already)
+            fresh[digest] = (source, *store.store_recording(directory, source.path))
+    return KeptFiles(tuple(fresh.values()), tuple(already), tuple(left_out))
+
+
+def _reason_against(pose: str, digest: str, named: bool, state: CampaignState) -> str:
+    """Why a new file is not imported; empty: it is."""
+    if pose in state.held:
+        return f"hits of {pose} wait for an answer: {_asked_of(state.held[pose])}"
+    if digest in state.refused and not named:
+        return f"{REFUSED} before; to import it all the same, name the file itself"
+    return ""
+
+
+def _asked_of(held: Measurement) -> str:
+    return held.question.text if held.question else ""
+
+
+def refusals(directory: Path, paths: tuple[Path, ...]) -> tuple[HitRecord, ...]:
+    """The engineer's refusal of each of these files, which are kept like any other."""
+    kept = [(path, *store.store_recording(directory, path)) for path in paths]
+    return tuple(
+        HitRecord(str(path), digest, suffix, accepted=False, reason=REFUSED)
+        for path, digest, suffix in kept
+    )
+
+
+def not_used(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRecord, ...]:
+    """Those of new hits that the model does not use: refused ones, or all while it is `asked`."""
+    if asked is None:
+        return tuple(hit for hit in hits if not hit.accepted)
+    return tuple(replace(h, accepted=False, reason=h.reason or asked.text) for h in hits)
+
+
+def taken_after_all(state: CampaignState, fresh: tuple[Kept, ...]) -> tuple[str, ...]:
+    """A remark on each file that the engineer had refused and then named."""
+    return tuple(
+        f"{source.name} was {REFUSED} at {state.refused[digest][0]} before; it is imported now "
+        f"because it was named."
+        for source, digest, _ in fresh
+        if digest in state.refused
+    )
 
 
 def measure_files(

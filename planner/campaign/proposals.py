@@ -48,6 +48,7 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     x = cell.candidates.features
     taken = [m.joints_deg for m in state.measurements.values()]
     at = np.deg2rad(taken[-1]) if taken else None
+    taken += [m.joints_deg for m in state.held.values()]
     shares = None
     if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
         shares = axis_shares(model.low.simulate(cell.candidates.q).residue)

@@ -7,19 +7,22 @@ from planner.campaign.events import (
     Amplitude,
     AnyEvent,
     Configured,
+    Confirmed,
     Entry,
     HitRecord,
     Imported,
     MeasuredMode,
     Proposal,
     Proposed,
+    Question,
+    Refused,
     Skipped,
     Starred,
     Undone,
     Withdrawn,
 )
 
-ACTS = (Proposed, Imported, Withdrawn, Skipped, Starred)
+ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, Starred)
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class Measurement:
     amplitude: Amplitude | None = None
     withdrawn: bool = False
     time: str = ""
+    question: Question | None = None  # open while it is held, else answered
 
     @property
     def accepted(self) -> tuple[HitRecord, ...]:
@@ -56,6 +60,8 @@ class CampaignState:
     proposed_by: str = ""  # acquisition that made the open proposals
     stale: bool = True  # the model changed since the open proposals were made
     measurements: dict[str, Measurement] = field(default_factory=dict)
+    held: dict[str, Measurement] = field(default_factory=dict)  # until their question is answered
+    refused: dict[str, tuple[str, HitRecord]] = field(default_factory=dict)  # by sha256: pose, hit
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
@@ -68,6 +74,11 @@ class CampaignState:
         """Measurements that the model uses, in the order of their first import."""
         return tuple(m for m in self.measurements.values() if m.modes and not m.withdrawn)
 
+    @property
+    def recorded(self) -> tuple[Measurement, ...]:
+        """All that was imported, used or not, and what is held."""
+        return (*self.measurements.values(), *self.held.values())
+
 
 def fold(entries: Iterable[Entry]) -> CampaignState:
     """The state after the given entries (seq 1, 2, …)."""
@@ -79,7 +90,8 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
             made = state.proposals_made + len(entry.event.proposals)
             state = replace(state, proposals_made=made)
         if isinstance(entry.event, Undone):
-            state = replace(state, stale=True, model_version=entry.seq)
+            if _counts(entries[entry.event.act - 1].event):
+                state = replace(state, stale=True, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
         state = replace(state, events=entry.seq)
@@ -93,6 +105,12 @@ def last_act(entries: Iterable[Entry], decisions_only: bool = False) -> Entry | 
     kinds = tuple(kind for kind in ACTS if not (decisions_only and kind is Proposed))
     acts = [e for e in entries if isinstance(e.event, kinds) and e.seq not in undone]
     return acts[-1] if acts else None
+
+
+def _counts(event: AnyEvent) -> bool:
+    """Whether taking an act back changes the model or the proposals."""
+    held = isinstance(event, Imported) and event.question is not None
+    return not (held or isinstance(event, Starred | Refused))
 
 
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
@@ -109,7 +127,14 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
                 stale=False,
             )
         case Imported():
-            return _imported(changed, event, entry)
+            return _imported(state, changed, event, entry)
+        case Confirmed():
+            held = {pose: m for pose, m in state.held.items() if pose != event.pose}
+            measurements = {**state.measurements, event.pose: state.held[event.pose]}
+            return replace(changed, measurements=measurements, held=held)
+        case Refused():
+            hits = {hit.sha256: (event.pose, hit) for hit in event.hits}
+            return replace(state, refused={**state.refused, **hits})
         case Withdrawn():
             measurement = replace(state.measurements[event.pose], withdrawn=True)
             return replace(changed, measurements={**state.measurements, event.pose: measurement})
@@ -123,7 +148,9 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
     return state
 
 
-def _imported(state: CampaignState, event: Imported, entry: Entry) -> CampaignState:
+def _imported(
+    state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
+) -> CampaignState:
     before = state.measurements.get(event.pose)
     measurement = Measurement(
         pose=event.pose,
@@ -133,8 +160,15 @@ def _imported(state: CampaignState, event: Imported, entry: Entry) -> CampaignSt
         remarks=event.remarks,
         amplitude=event.amplitude,
         time=before.time if before else entry.time,
+        question=event.question or (before.question if before else None),
     )
     left = state.open
     if measurement.modes:
         left = tuple(pose for pose in state.open if pose != event.pose)
-    return replace(state, open=left, measurements={**state.measurements, event.pose: measurement})
+    came = {hit.sha256 for hit in event.hits}
+    refused = {digest: hit for digest, hit in state.refused.items() if digest not in came}
+    if event.question is not None:
+        held = {**state.held, event.pose: measurement}
+        return replace(state, open=left, refused=refused, held=held)
+    measurements = {**state.measurements, event.pose: measurement}
+    return replace(changed, open=left, refused=refused, measurements=measurements)

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Entry, HitRecord, Proposal
+from planner.campaign.events import Entry, HitRecord, Proposal, Question
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.errors import InputError
@@ -82,7 +82,8 @@ def _imported(report: ImportReport) -> dict[str, Any]:
     return {
         "pose": report.pose,
         "accepted": [hit.file for hit in report.accepted],
-        "refused": [{"file": hit.file, "reason": hit.reason} for hit in report.refused],
+        "refused": refused((*report.refused, *report.left_out)),
+        "question": _question(report.question, report.pose),
         "already_imported": list(report.already),
         "modes": _labelled_modes(report),
         "refit_seconds": report.refit_seconds,
@@ -94,6 +95,10 @@ def _imported(report: ImportReport) -> dict[str, Any]:
         else None,
         "simulated": bool(report.measurement and report.measurement.simulated),
     }
+
+
+def _question(question: Question | None, pose: str) -> dict[str, Any] | None:
+    return None if question is None else {"pose": pose, **msgspec.to_builtins(question)}
 
 
 def _labelled_modes(report: ImportReport) -> list[dict[str, Any]]:
@@ -125,6 +130,15 @@ def _labelled_modes(report: ImportReport) -> list[dict[str, Any]]:
     return answer
 
 
+def what_to_say(directory: Path, pose: str, asked: str) -> str:
+    """What is asked of held hits, and the commands that answer it, in one line."""
+    return (
+        f"{asked} They are held, not used. If it is: planner confirm {directory} {pose}; if it is "
+        f"at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
+        f"{directory} {pose}."
+    )
+
+
 def status(campaign: Campaign) -> dict[str, Any]:
     """Answer of `status`."""
     state, model = campaign.state, campaign.model
@@ -132,15 +146,19 @@ def status(campaign: Campaign) -> dict[str, Any]:
     sd = model.frequency_sd_percent
     refused = [
         {"pose": m.pose, "file": h.file, "reason": h.reason}
-        for m in state.measurements.values()
+        for m in state.recorded
         for h in m.hits
         if not h.accepted
-    ]
+    ] + [{"pose": p, "file": h.file, "reason": h.reason} for p, h in state.refused.values()]
     return {
         "campaign": str(campaign.directory),
         "robot": campaign.cell.robot.name,
-        "simulated": any(m.simulated for m in state.measurements.values()),
+        "simulated": any(m.simulated for m in state.recorded),
         "measurements": [_measurement(m, state.starred) for m in state.measurements.values()],
+        "held": [
+            _measurement(m, state.starred) | {"question": _question(m.question, m.pose)}
+            for m in state.held.values()
+        ],
         "open": [msgspec.to_builtins(state.proposals[pose]) for pose in state.open],
         "skipped": [{"pose": p, "reason": r} for p, r in state.skipped.items()],
         "refused": refused,
@@ -235,7 +253,7 @@ def replayed(
     from planner.report.rerun_story import Story
 
     steps, model = [], None
-    simulated = any(m.simulated for m in campaign.state.measurements.values())
+    simulated = any(m.simulated for m in campaign.state.recorded)
     with Story(campaign.cell, rrd, viewer, simulated) as story:
         for step in replay(campaign, until, acquisition):
             progress(f"{step.entry.seq} of {len(campaign.entries)} {step.detail}")

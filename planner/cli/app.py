@@ -86,10 +86,40 @@ def import_(
 
     with reporting("importing", quiet=as_json) as progress:
         reports = Campaign(directory).import_paths(tuple(paths), pose, progress)
-    refused = [hit for report in reports for hit in report.refused]
-    for hit in refused:
-        warn(f"Refused {hit.file}: {hit.reason}")
-    return respond(answers.imported(reports), as_json, render.imported, 3 if refused else 0)
+    answer, code = answers.imported(reports), 0
+    for report in answer["poses"]:
+        asked = report["question"]
+        for hit in report["refused"]:
+            if asked is None or hit["reason"] != asked["text"]:
+                warn(f"Refused {hit['file']}: {hit['reason']}")
+        if asked is not None:
+            warn(answers.what_to_say(directory, asked["pose"], asked["text"]))
+        code = 3 if asked or report["refused"] else code
+    return respond(answer, as_json, render.imported, code)
+
+
+@app.command()
+def confirm(
+    directory: Directory,
+    pose: PoseArgument,
+    at: Annotated[
+        str | None, typer.Option("--at", metavar="POSE", help="Where they are from instead.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Use the held hits of a pose: they are from there indeed, or from another pose."""
+    from planner.campaign.campaign import Campaign
+    from planner.cli import answers, render
+
+    campaign = Campaign(directory)
+    if at is None:
+        campaign.confirm(pose)
+        answer = {"confirmed": pose, "frequency_sd_percent": campaign.model.frequency_sd_percent}
+        return respond(answer, as_json, render.confirmed)
+    answer = answers.imported((campaign.move(pose, at),))
+    if answer["question"]:
+        warn(answers.what_to_say(directory, at, answer["question"]["text"]))
+    return respond(answer, as_json, render.imported, 3 if answer["refused"] else 0)
 
 
 @app.command()
@@ -188,7 +218,10 @@ def watch(
         viewer=viewer,
         explain=explain,
     )
-    return respond(answers.session(summary), as_json, render.session)
+    for pose, text in summary.questions.items():
+        warn(answers.what_to_say(directory, pose, text))
+    code = 3 if summary.questions else 0
+    return respond(answers.session(summary), as_json, render.session, code)
 
 
 @app.command()

@@ -31,7 +31,7 @@ def left_out(campaign: Campaign, pictures: Pictures) -> dict[str, Any]:
         return {**answer, "plots": [], "rrd": None}
     from planner.report.leave_one_out_plots import left_out_figure
 
-    simulated = any(m.simulated for m in campaign.state.measurements.values())
+    simulated = any(m.simulated for m in campaign.state.recorded)
     mark = "SIMULATED recordings · " if simulated else ""
     figure = left_out_figure(found, poses, f"{mark}Each measured pose, predicted without it")
     return {**answer, **pictures.write({"leave_one_out": figure}, campaign.directory.name)}

@@ -78,6 +78,8 @@ def imported(answer: dict[str, Any]) -> RenderableType:
                 _with_sd(100 * mode["damping_ratio"], 100 * mode["damping_sd"]),
             )
         parts.append(made)
+        if pose["question"]:
+            parts.append(Text(f"  {pose['question']['text']}", style="bold red"))
         parts += [Text(f"  {remark}", style="yellow") for remark in pose["remarks"]]
         before, after = pose["frequency_sd_percent_before"], pose["frequency_sd_percent"]
         change = ", ".join(f"{b:.1f} → {a:.1f} %" for b, a in zip(before, after, strict=True))
@@ -116,11 +118,21 @@ def status(answer: dict[str, Any]) -> RenderableType:
             f"stopped before they were imported: import them again."
         )
     lines += answer["remarks"] + answer["leave_one_out"]["text"]
+    lines += [
+        f"Held, not used: {h['question']['text']} Answer with planner confirm, or withdraw."
+        for h in answer["held"]
+    ]
     lines += [f"refused {r['file']}: {r['reason']}" for r in answer["refused"]]
     if answer["plots"]:
         lines.append("\n  ".join(["Pictures:", *answer["plots"]]))
     parts: list[RenderableType] = [measured, Text("\n".join(lines))]
     return Group(*parts, SIMULATED) if answer["simulated"] else Group(*parts)
+
+
+def confirmed(answer: dict[str, Any]) -> RenderableType:
+    """Text of `confirm`."""
+    sd = ", ".join(f"{v:.1f} %" for v in answer["frequency_sd_percent"])
+    return f"The hits of pose {escape(answer['confirmed'])} are used; sd of frequencies: {sd}."
 
 
 def undone(answer: dict[str, Any]) -> RenderableType:

@@ -47,7 +47,7 @@ def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
     if acquisition not in NESTED:
         check_name(acquisition)
     cell = campaign.cell
-    used = [m for m in campaign.state.measurements.values() if not m.withdrawn and m.modes]
+    used = campaign.state.used
     if len(used) < LEAST:
         return None
     table = cell.config.modes

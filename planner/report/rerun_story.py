@@ -5,7 +5,17 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.cell import Cell
-from planner.campaign.events import Entry, Imported, Proposed, Skipped, Starred, Undone, Withdrawn
+from planner.campaign.events import (
+    Confirmed,
+    Entry,
+    Imported,
+    Proposed,
+    Refused,
+    Skipped,
+    Starred,
+    Undone,
+    Withdrawn,
+)
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
@@ -45,6 +55,11 @@ class Story:
                     view.proposal(number, proposal)
             case Imported():
                 self._imported(event, model, measured)
+            case Confirmed():
+                self._measurement(event.pose, model, None, f"Confirmed {event.pose}")
+            case Refused():
+                for hit in event.hits:
+                    view.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
             case Skipped() | Withdrawn():
                 reason = f": {event.reason}" if event.reason else ""
                 view.text(number, f"{type(event).__name__} {event.pose}{reason}", "WARN")
@@ -54,13 +69,12 @@ class Story:
                 view.text(number, f"Took back entry {event.act} of the log", "WARN")
             case _:
                 view.text(number, f"Configured {model.cell.robot.name}", "INFO")
-        if not isinstance(event, Proposed | Starred):
+        if not isinstance(event, Proposed | Refused | Starred):
             view.learning(number, _learning(model))
 
     def _imported(self, event: Imported, model: Model, measured: MeasuredPose | None) -> None:
         assert self._view is not None
         number = len(model.labelled)
-        pose = next((p for p in model.labelled if p.pose == event.pose), None)
         found = ", ".join(f"{m.frequency_hz:.2f} Hz" for m in event.modes if m.likely)
         text = f"Imported {event.pose}: {found or 'no usable modes'}"
         if any(hit.simulated for hit in event.hits):
@@ -68,6 +82,17 @@ class Story:
         for hit in event.hits:
             if not hit.accepted:
                 self._view.text(number, f"Refused {hit.file}: {hit.reason}", "WARN")
+        if event.question is not None:
+            self._view.text(number, f"Held back: {event.question.text}", "WARN")
+        else:
+            self._measurement(event.pose, model, measured, text)
+
+    def _measurement(
+        self, name: str, model: Model, measured: MeasuredPose | None, text: str
+    ) -> None:
+        assert self._view is not None
+        number = len(model.labelled)
+        pose = next((p for p in model.labelled if p.pose == name), None)
         if pose is None:
             self._view.text(number, text, "WARN")
         else:

@@ -6,7 +6,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.events import Proposal
+from planner.campaign.events import Proposal, Question
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 
@@ -80,6 +80,16 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
         parts.append(Text(SIMULATED, style="bold magenta"))
     title = f"Pose {report.pose}: {len(report.accepted)} hits in, {len(report.refused)} refused"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
+
+
+def question_panel(question: Question, pose: str, other: str) -> RenderableType:
+    """What is asked of held hits, and the keys; `other` is the open pose they may be from."""
+    keys = f"[a] yes, use them at {pose}  [r] refuse, hit again  "
+    keys += f"[o] no, they are from {other}  " if other else ""
+    text = Text(question.text, style="bold red")
+    more = Text("They are kept, and not used until you answer.")
+    parts = Group(text, more, Text(f"{keys}[u] undo  [q] quit", style="dim"))
+    return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
 
 
 def uncertainty_line(model: Model) -> Text:

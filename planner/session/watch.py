@@ -36,6 +36,7 @@ class SessionSummary:
     stopped: str
     frequency_sd_percent: tuple[float, ...]
     seconds: float
+    questions: dict[str, str]  # not answered, by pose: the hits they speak of are held
 
 
 def watch(
@@ -85,7 +86,7 @@ class _Session:
         self.explaining = explaining
         self.started = time.monotonic()
         self.deadline = None if limit_s is None else self.started + limit_s
-        self.aside: set[str] = set()  # refused by the engineer, by content
+        self.aside: set[str] = set()  # by content: could not be imported without the engineer
         self.measured: list[str] = []
         self.history: list[float] = []
         self.stop = ""
@@ -97,11 +98,11 @@ class _Session:
 
     def run(self) -> SessionSummary:
         try:
-            for remark in self.campaign.cell.remarks:
-                self.console.print(Text(remark, style="yellow"))
             while not self.stop:
-                proposal = self._propose()
-                if proposal is not None:
+                held = () if self.auto else tuple(self.campaign.state.held)
+                if held:
+                    self._ask(held[0])
+                elif (proposal := self._propose()) is not None:
                     self._at_pose(proposal)
             self._tell()
             if self.stop != "quit":
@@ -118,7 +119,58 @@ class _Session:
             self.stop,
             tuple(self.campaign.model.frequency_sd_percent.tolist()),
             time.monotonic() - self.started,
+            {p: m.question.text for p, m in self.campaign.state.held.items() if m.question},
         )
+
+    def _ask(self, pose: str) -> None:
+        """Wait until the engineer has said of held hits where they are from."""
+        question = self.campaign.state.held[pose].question
+        assert question is not None
+        other = question.fits if question.fits in self.campaign.state.open else ""
+        self.console.print(session_text.question_panel(question, pose, other))
+        while not self.stop:
+            try:
+                if self._answer(self.keys.get(POLL_S), pose, other):
+                    self._tell()
+                    return
+            except PlannerError as error:
+                self.console.print(Text(str(error), style="red"))
+                return
+            if self.deadline is not None and time.monotonic() > self.deadline:
+                self.stop = "time limit"
+
+    def _answer(self, key: str | None, pose: str, other: str) -> bool:
+        """Act on a key while a question is open; True when it is answered."""
+        match key:
+            case "a" | "\n" | "\r":
+                with self.console.status("refitting"):
+                    self.campaign.confirm(pose)
+                    self._note()
+                self.console.print(Text(f"The hits of {pose} are used."))
+                self._measured(pose)
+            case "r":
+                self.campaign.refuse_held(pose)
+                self._note()
+                self.console.print(Text(f"The hits of {pose} are set aside; hit again."))
+            case "o" if other:
+                with self.console.status("importing and refitting"):
+                    report = self.campaign.move(pose, other)
+                self._note([report])
+                self._after(report)
+            case "u":
+                self._undo()
+            case "q":
+                self.stop = "quit"
+                return False
+            case _:
+                return False
+        return True
+
+    def _undo(self) -> None:
+        entry = self.campaign.undo(decisions_only=True)
+        self._note()
+        kind = type(entry.event).__name__.lower()
+        self.console.print(Text(f"Took back entry {entry.seq} ({kind})."))
 
     def _propose(self) -> Proposal | None:
         try:
@@ -179,8 +231,10 @@ class _Session:
                 self.stop = "time limit"
 
     def _done(self) -> set[str]:
-        measurements = self.campaign.state.measurements.values()
-        return self.aside | {hit.sha256 for m in measurements for hit in m.hits}
+        state = self.campaign.state
+        return (
+            self.aside | state.refused.keys() | {h.sha256 for m in state.recorded for h in m.hits}
+        )
 
     def _arrived(self, whole: list[Path], waiting: list[tuple[Path, str]]) -> None:
         if len(whole) != self.shown_count:
@@ -200,7 +254,8 @@ class _Session:
                 case "a" | "\n" | "\r":
                     return self._import(proposal, whole)
                 case "r":
-                    self.aside |= {self.inbox.digest(path) for path in whole}
+                    self.campaign.refuse(proposal.pose, tuple(whole))
+                    self._note()
                     self.console.print(Text(f"{len(whole)} hits set aside; hit again."))
                 case "s":
                     self.campaign.star(proposal.pose)
@@ -210,9 +265,7 @@ class _Session:
                     self.console.print(Text(f"{proposal.pose} will not be offered again."))
                     return True
                 case "u":
-                    entry = self.campaign.undo(decisions_only=True)
-                    kind = type(entry.event).__name__.lower()
-                    self.console.print(Text(f"Took back entry {entry.seq} ({kind})."))
+                    self._undo()
                     return True
                 case "n":
                     self.campaign.skip(proposal.pose, "another was asked for")
@@ -243,19 +296,34 @@ class _Session:
             return False
         self._note(reports)
         for report in reports:
-            if report.accepted or report.refused:
+            self.aside |= {hit.sha256 for hit in report.left_out}
+            if report.question is not None:
+                self._held_back(report)
+            elif report.accepted or report.refused:
                 self._after(report)
         done = any(report.measurement and report.measurement.modes for report in reports)
         if not done:
             self._tell()
         return done
 
+    def _held_back(self, report: ImportReport) -> None:
+        """Without anybody to ask, say so; else the question comes next."""
+        if self.auto and report.measured is not None and report.question is not None:
+            self.console.print(Text(f"Held back, not used: {report.question.text}", style="red"))
+
     def _after(self, report: ImportReport) -> None:
-        state, stop = self.campaign.state, self.campaign.cell.config.stop
+        if report.question is not None:  # at the pose it was moved to it does not fit either
+            return
         simulated = bool(report.measurement and report.measurement.simulated)
         self.console.print(session_text.import_panel(report, simulated))
-        self.measured.append(report.pose)
-        overall = float(np.sqrt(np.mean(report.model.frequency_sd_percent**2)))
+        self._measured(report.pose)
+
+    def _measured(self, pose: str) -> None:
+        """Say how far the campaign is after one more pose."""
+        state, model = self.campaign.state, self.campaign.model
+        stop = self.campaign.cell.config.stop
+        self.measured.append(pose)
+        overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
         self.history.append(overall)
         per_pose = (time.monotonic() - self.started) / len(self.measured)
         self.console.print(
@@ -265,7 +333,7 @@ class _Session:
         )
         if self.explaining is not None and len(state.used) >= LEAST:
             self.explaining.ask()
-        if not self.announced and report.model.done:
+        if not self.announced and model.done:
             self.announced = True
             self.console.print(Text("The target of campaign.toml is reached.", style="bold green"))
             self.stop = "target reached" if self.auto else ""

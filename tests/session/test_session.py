@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from rerun.chunk import RrdReader
 from rich.console import Console
 
@@ -119,7 +120,7 @@ def test_resume_ignores_what_was_imported_and_waits_for_torn_files(cell):
     assert list(again.state.measurements) == ["P001"]
 
 
-def test_refused_hits_are_not_imported_nor_offered_again(cell):
+def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
     campaign, truth, tmp_path = cell
     deliver(truth, tmp_path, campaign.next()[0], 0)
     console = screen()
@@ -128,6 +129,74 @@ def test_refused_hits_are_not_imported_nor_offered_again(cell):
     watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
           quiet_s=0.05, limit_s=30)  # fmt: skip
     assert campaign.state.measurements == {}
+    again = Campaign(campaign.directory)
+    assert len(again.state.refused) == 9
+    summary = watch(again, tmp_path / "inbox", console=screen(), keys=Script(screen(), []),
+                    auto=True, hits_per_pose=9, quiet_s=0.05, limit_s=2)  # fmt: skip
+    assert summary.measured == ()
+    assert again.state.measurements == {}
+    # Taken back, they wait again, at the same pose.
+    console = screen()
+    script = Script(console, [(wait("[q] quit"), "u"), (wait("9 of 9"), "a"),
+                              (wait("P001: 9 hits in"), "q")])  # fmt: skip
+    watch(again, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
+          quiet_s=0.05, limit_s=30)  # fmt: skip
+    assert list(again.state.measurements) == ["P001"]
+    assert again.state.refused == {}
+
+
+@pytest.fixture
+def four(cell):
+    """The cell after four poses, and a proposal at which the hits of another pose arrive."""
+    campaign, truth, tmp_path = cell
+    for number in range(4):
+        pose = campaign.next()[0]
+        folder = record(truth, tmp_path / f"made{number}", pose.pose, pose.joints_deg, number)
+        (report,) = campaign.import_paths((folder,))
+        assert report.question is None
+    stated, true = campaign.next(2)
+    made = replace(true, pose=stated.pose)
+    deliver(truth, tmp_path, made, 9)
+    return campaign, tmp_path, stated.pose, true.pose
+
+
+def test_without_anybody_to_ask_hits_of_another_pose_are_held(four):
+    campaign, tmp_path, stated, true = four
+    console = screen()
+    summary = watch(campaign, tmp_path / "inbox", console=console, keys=Script(screen(), []),
+                    auto=True, hits_per_pose=9, quiet_s=0.05, limit_s=4)  # fmt: skip
+    asked = campaign.state.held[stated].question
+    assert asked is not None
+    assert asked.fits == true
+    assert summary.questions == {stated: asked.text}
+    assert summary.measured == ()
+    text = " ".join(console.export_text().split())
+    assert f"Held back, not used: {asked.text}" in text
+    assert f"go to pose {true}" in text
+    assert len(campaign.state.used) == 4
+
+
+@pytest.mark.parametrize(
+    ("key", "said", "used", "refused"),
+    [("a", "are used", "stated", 0), ("r", "set aside", None, 9), ("o", "9 hits in", "true", 0)],
+)
+def test_the_question_survives_the_session_and_is_answered_by_a_key(four, key, said, used, refused):
+    campaign, tmp_path, stated, true = four
+    console, inbox = screen(), tmp_path / "inbox"
+    script = Script(console, [(wait("9 of 9"), "a"), (wait("Is the robot at"), "q")])
+    first = watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
+                  limit_s=30)  # fmt: skip
+    assert list(first.questions) == [stated]
+    assert len(campaign.state.used) == 4
+    again, console = Campaign(campaign.directory), screen()
+    script = Script(console, [(wait("Is the robot at"), key), (wait(said), "q")])
+    second = watch(again, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
+                   limit_s=30)  # fmt: skip
+    assert second.questions == {}
+    names = {"stated": [stated], "true": [true], None: []}[used]
+    assert [m.pose for m in again.state.used][4:] == names
+    assert len(again.state.refused) == refused
+    assert not again.state.held
 
 
 def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):

@@ -1,0 +1,217 @@
+"""Refused hits, and hits of another pose than stated: in the log, asked about, not used."""
+
+import csv
+import json
+import shutil
+
+import msgspec
+import numpy as np
+import pytest
+
+from outside import planner
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import MeasuredMode, Proposed
+from planner.campaign.question import compare
+from planner.campaign.state import fold
+from planner.cli import answers
+from planner.demo import NAME, Pool, shipped
+from planner.errors import InputError
+from planner.recording.folder import TABLE
+from planner.replay import replay
+
+MEASURED = ("A11", "A33", "A57", "A17")
+WRONG, CLAIMED = "A25", "A42"
+
+
+@pytest.fixture(scope="module")
+def pool():
+    return Pool.load(shipped(NAME) / "recordings", tuple(f"joint_{i}" for i in range(1, 7)))
+
+
+@pytest.fixture(scope="module")
+def four(tmp_path_factory, pool):
+    """A campaign of four poses."""
+    source = shipped(NAME)
+    folder = tmp_path_factory.mktemp("four") / "campaign"
+    campaign = Campaign.new(folder, source / "robot" / "robot.toml", source / "campaign.toml")
+    for pose in MEASURED:
+        (report,) = campaign.import_paths((pool.folder,), pose)
+        assert report.question is None
+    return folder
+
+
+@pytest.fixture
+def campaign(four, tmp_path):
+    shutil.copytree(four, tmp_path / "campaign")
+    return Campaign(tmp_path / "campaign")
+
+
+def claim(folder, pool, pose=WRONG, at=CLAIMED, name="X1"):
+    """A recordings folder whose table says that the hits of `pose` were made at `at`."""
+    (folder / "data").mkdir(parents=True)
+    with open(folder / TABLE, "w", newline="") as file:
+        table = csv.writer(file)
+        joints = [f"joint_{i}_deg" for i in range(1, 7)]
+        table.writerow(["pose", *joints, "hit", "repeat", "file"])
+        for row in pool.rows[pose]:
+            shutil.copy(row.file, folder / "data")
+            angles = pool.rows[at][0].joints_deg
+            table.writerow([name, *angles, row.hit, row.repeat, f"data/{row.file.name}"])
+    return folder
+
+
+def test_hits_of_another_pose_are_held_until_confirmed(campaign, pool, tmp_path):
+    before = campaign.model.frequency_sd_percent
+    (report,) = campaign.import_paths((claim(tmp_path / "wrong", pool),))
+    asked = report.question
+    assert asked is not None
+    assert asked.off_sd > 20
+    assert abs(asked.off_percent) > 2
+    assert "Is the robot at X1?" in asked.text
+    assert asked.fits == ""
+    assert report.accepted == ()
+    assert {hit.reason for hit in report.refused} == {asked.text}
+    # After a crash all is known from the log, and nothing of it is used.
+    again = Campaign(campaign.directory)
+    assert list(again.state.measurements) == list(MEASURED)
+    assert again.state.held["X1"].question == asked
+    assert not again.orphans()
+    np.testing.assert_array_equal(again.model.frequency_sd_percent, before)
+    (held,) = answers.status(again)["held"]
+    assert held["question"]["text"] == asked.text
+    (once_more,) = again.import_paths((tmp_path / "wrong",))
+    assert once_more.question == asked
+    assert len(once_more.already) == 12
+    again.confirm("X1")
+    assert "X1" in [m.pose for m in again.state.used]
+    assert not again.state.held
+    assert all(step.check in ("identical", "kept") for step in replay(again))
+    again.undo()
+    assert again.state.held["X1"].question == asked
+    again.undo()
+    assert not again.state.held
+    (fresh,) = again.import_paths((tmp_path / "wrong",))
+    assert fresh.question is not None
+
+
+def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path):
+    """The robot still stands where an open proposal says: the question names it."""
+    proposals = campaign.next(3)
+    hits = {p.pose: _nearest(campaign, pool, p) for p in proposals}
+    stated, true = proposals[0].pose, proposals[1].pose
+    joints = {p.pose: p.joints_deg for p in proposals}
+    _put(campaign, {true: pool.rows[hits[true]][0].joints_deg})
+    folder = claim(tmp_path / "wrong", pool, hits[true], hits[stated], stated)
+    (report,) = campaign.import_paths((folder,))
+    assert report.question is not None
+    assert report.question.fits == true
+    assert stated not in campaign.state.open
+    with pytest.raises(InputError, match="No joint angles"):
+        campaign.move(stated, "nowhere")
+    assert stated in campaign.state.held
+    moved = campaign.move(stated, true)
+    assert moved.question is None
+    assert len(moved.accepted) == 12
+    assert not campaign.state.held
+    assert true in campaign.state.measurements
+    assert joints[stated] == campaign.state.proposals[stated].joints_deg
+
+
+def _nearest(campaign, pool, proposal):
+    return pool.nearest(campaign.cell, proposal, list(MEASURED))
+
+
+def _put(campaign, joints):
+    """Let open proposals be exactly where recorded poses are."""
+    (last,) = [e for e in campaign.entries[-1:] if isinstance(e.event, Proposed)]
+    changed = tuple(
+        msgspec.structs.replace(p, joints_deg=tuple(joints.get(p.pose, p.joints_deg)))
+        for p in last.event.proposals
+    )
+    with campaign._acting():
+        campaign._append(msgspec.structs.replace(last.event, proposals=changed))
+
+
+def test_more_hits_at_a_measured_pose_are_looked_at_alone(campaign, pool, tmp_path):
+    extra = tmp_path / "extra.uff"
+    shutil.copy(pool.rows["A21"][0].file, extra)
+    (report,) = campaign.import_paths((extra,), "A57")
+    assert report.question is not None
+    assert [h.file for h in report.refused] == [str(extra)]
+    assert len(campaign.state.measurements["A57"].hits) == 12
+    assert campaign.state.used == fold(campaign.entries[:5]).used
+
+
+def test_held_hits_set_aside_are_refused_ones_and_further_ones_wait(campaign, pool, tmp_path):
+    folder = claim(tmp_path / "wrong", pool)
+    campaign.import_paths((folder,))
+    other = tmp_path / "other.uff"
+    shutil.copy(pool.rows[CLAIMED][0].file, other)
+    (report,) = campaign.import_paths((other,), "X1")
+    assert "wait for an answer" in report.left_out[0].reason
+    campaign.withdraw("X1")
+    again = Campaign(campaign.directory)
+    assert not again.state.held
+    assert len(again.state.refused) == 12
+    assert all(hit.reason == "refused by the engineer" for _, hit in again.state.refused.values())
+    (report,) = again.import_paths((folder,))
+    assert report.accepted == ()
+    assert len(report.left_out) == 12
+    assert not again.orphans()
+
+
+def test_refused_files_stay_out_unless_they_are_named(campaign, pool):
+    files = tuple(row.file for row in pool.rows["A46"])
+    version = campaign.state.model_version
+    campaign.refuse("A46", files[:3])
+    again = Campaign(campaign.directory)
+    listed = [r for r in answers.status(again)["refused"] if r["pose"] == "A46"]
+    assert [r["file"] for r in listed] == [str(path) for path in files[:3]]
+    assert {r["reason"] for r in listed} == {"refused by the engineer"}
+    assert again.state.model_version == version
+    (report,) = again.import_paths((pool.folder,), "A46")
+    assert len(report.accepted) == 9
+    assert [hit.file for hit in report.left_out] == [str(path) for path in files[:3]]
+    (report,) = again.import_paths((files[0],), "A46")
+    assert len(report.accepted) == 1
+    assert any("refused by the engineer at A46 before" in text for text in report.remarks)
+    assert len(again.state.refused) == 2
+    assert all(step.check in ("identical", "kept") for step in replay(again))
+    for _ in range(3):
+        again.undo()
+    assert not again.state.refused
+    assert list(again.state.measurements) == list(MEASURED)
+
+
+def test_the_commands_say_it_and_answer_it(campaign, pool, tmp_path):
+    folder = claim(tmp_path / "wrong", pool)
+    done = planner("import", campaign.directory, folder, "--json", check=False)
+    assert done.returncode == 3
+    answer = json.loads(done.stdout)
+    assert answer["accepted"] == []
+    assert answer["question"]["pose"] == "X1"
+    assert {entry["reason"] for entry in answer["refused"]} == {answer["question"]["text"]}
+    assert answer["question"]["text"] in done.stderr
+    assert f"planner confirm {campaign.directory} X1" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert planner("confirm", campaign.directory, "A11", check=False).returncode == 2
+    assert "are used" in planner("confirm", campaign.directory, "X1").stdout
+    assert "X1" in [m.pose for m in Campaign(campaign.directory).state.used]
+
+
+def mode(hertz):
+    return MeasuredMode(hertz, 0.001 * hertz, 0.03, 0.001, (), ())
+
+
+def test_a_mode_that_was_not_found_is_none_that_is_off():
+    expected, sd = np.array([10.0, 12.0, 18.0, 28.0]), np.array([0.01, 0.01, 0.02, 0.03])
+    found = compare(expected, sd, (mode(10.0), mode(18.0), mode(28.0), mode(53.0)))
+    np.testing.assert_array_equal(found.far, [False, True, False, False])
+    assert not found.contradicts(True)
+    one = compare(expected, sd, tuple(map(mode, (10.0, 12.6, 18.0, 28.0))))
+    assert one.contradicts(True)
+    assert not one.contradicts(False)
+    two = compare(expected, sd, tuple(map(mode, (10.5, 12.6, 18.0, 28.0))))
+    assert two.contradicts(False)
+    slight = compare(expected, sd, tuple(map(mode, (10.15, 12.2, 18.3, 28.4))))
+    assert not slight.contradicts(True)
