@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_acquire import X, conditioned_variance, over, with_parameters
 
 from planner.acquire import reduction as module
 from planner.acquire.axes import axis_shares, best_axes
@@ -27,8 +26,9 @@ from planner.identify.parameters import Priors, parametrise
 from planner.identify.uncertainty import log_frequency_slope
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from robots import BAND_HZ, JOINTS_DEG, make_arm
-from test_fusion import observed, simulated
+from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
+from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.surrogates import observed, simulated
 
 
 @pytest.fixture(scope="module")

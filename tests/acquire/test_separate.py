@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.acquire.separate import most_telling, separation
 from planner.diagnose.diagnose import Problem
 from planner.diagnose.effects import library
@@ -14,6 +13,7 @@ from planner.diagnose.linear.predict import misfit_at
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 LINES = np.linspace(6.0, 60.0, 96)
 SD = 2e-4

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from known_robots import KR210
 from planner.acquire.separate_laws import accelerance, forces_n, law_separation
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
@@ -25,6 +24,7 @@ from planner.diagnose.screens.levels import base
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 RATE_HZ, SAMPLES, PORT = 400.0, 1024, 2
 STIFFENING, DAHL, DEAD_ZONE = LAWS

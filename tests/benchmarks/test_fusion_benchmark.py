@@ -14,7 +14,7 @@ import pytest
 
 from planner.acquire.propose import propose
 from planner.fusion.surrogate import ModalObservations, fit_surrogate
-from test_fusion import observed, simulated
+from tests.support.surrogates import observed, simulated
 
 X = np.random.default_rng(9).random((1000, 2))
 
@@ -73,7 +73,7 @@ def test_time_of_160_outputs():
 def test_times_of_a_start(tmp_path):
     code = (
         "import time; a = time.perf_counter()\n"
-        "from test_fusion import observed, simulated\n"
+        "from tests.support.surrogates import observed, simulated\n"
         "from planner.fusion.surrogate import fit_surrogate\n"
         "b = time.perf_counter()\n"
         "x = observed(9, 1).x; fit_surrogate(observed(5, 0)).predict(x, simulated(x))\n"

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import scipy.io
 
-from outside import HAMMER, make_cell, record
 from planner.cli.run import run
 from planner.truth.hits import simulate_hit
-from robots import JOINTS_DEG
+from tests.support.outside import HAMMER, make_cell, record
+from tests.support.robots import JOINTS_DEG
 
 MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
 

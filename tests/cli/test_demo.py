@@ -5,8 +5,8 @@ import json
 import numpy as np
 from rerun.chunk import RrdReader
 
-from outside import answer
 from planner.demo import shipped
+from tests.support.outside import answer
 
 
 def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR10
 from planner.diagnose.data.visits import Recorded
 from planner.diagnose.screens import artefacts
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot
-from synthetic_hits import RATE_HZ, recorded
+from tests.support.known_robots import KR10
+from tests.support.synthetic_hits import RATE_HZ, recorded
 
 
 def late(hit: Hit, delay_s: float) -> Hit:

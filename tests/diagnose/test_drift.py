@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.diagnose.linear.visited import problem_of
 from planner.diagnose.screens import drift
 from planner.diagnose.screens.drift import screen
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from synthetic_hits import recorded
+from tests.support.known_robots import KR210
+from tests.support.synthetic_hits import recorded
 
 
 @pytest.fixture(scope="module")

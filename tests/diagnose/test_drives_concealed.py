@@ -10,7 +10,7 @@ import pytest
 
 from planner.truth.arms import ARMS
 from planner.truth.cases import make_case
-from screened_cases import judge, table
+from tests.support.screened_cases import judge, table
 
 SEEDS, FIRST = int(os.environ.get("STUDY_SEEDS", "12")), int(os.environ.get("STUDY_FIRST", "501"))
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from known_robots import kr210_folder
 from planner.diagnose.effects import library
 from planner.diagnose.linear.fit import Grade, Problem
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
+from tests.support.known_robots import kr210_folder
 
 EFFECTS = (
     "joint_stiffness joint_2", "transverse_compliance joint_3", "base_compliance base",

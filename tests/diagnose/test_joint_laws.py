@@ -7,7 +7,7 @@ from planner.diagnose.laws.equivalent import System, receptances
 from planner.diagnose.laws.timedomain import seen, spectra, strokes, torques
 from planner.diagnose.laws.torques import LAWS
 from planner.physics.simulation import Elasticity
-from struck import VISITS, struck_robot
+from tests.support.struck import VISITS, struck_robot
 
 STIFFENING, DAHL, DEAD_ZONE = LAWS
 AMPLITUDES = np.array([1e-3, 0.1, 0.5, 2.0, 20.0])

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.diagnose import judge as module
 from planner.diagnose.diagnose import diagnose
 from planner.diagnose.effects import library
@@ -13,6 +12,7 @@ from planner.diagnose.judge import WORSE, judge
 from planner.frf.types import Frf
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 LINES = np.linspace(6.0, 60.0, 96)
 

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from known_robots import KR210
 from planner.diagnose.data.visits import Recorded
 from planner.diagnose.effects.chain import SensorChain
 from planner.diagnose.effects.drift import Drift
@@ -22,7 +21,8 @@ from planner.diagnose.screens import screen as screens
 from planner.diagnose.screens.window import screen_window
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from synthetic_hits import RATE_HZ, recorded
+from tests.support.known_robots import KR210
+from tests.support.synthetic_hits import RATE_HZ, recorded
 
 POSES = 5
 

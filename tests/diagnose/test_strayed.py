@@ -5,12 +5,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from known_robots import KR210
 from planner.diagnose.linear.fit import PRIORS
 from planner.diagnose.screens.strayed import strayed
 from planner.identify.parameters import parametrise
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 
 def named(tmp_path, away_sds: dict[str, float], per_value: float = 0.9) -> list[str]:

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from known_robots import kr10_folder
 from planner.identify.feasible import Barrier, pseudo_inertia
 from planner.identify.parameters import Priors, parametrise
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
+from tests.support.known_robots import kr10_folder
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from planner.modes.amplitude import homogeneity
 from planner.modes.estimate import estimate_modes
 from planner.recording.levels import by_level, peak_n
 from planner.recording.types import Hit
-from simulated_hits import POLES, make_hit
+from tests.support.simulated_hits import POLES, make_hit
 
 BAND = (4.0, 60.0)
 LEVELS_N = (100.0, 400.0, 1600.0)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modal_systems import System, as_frf, exact_frf, noisy, random_system
 from planner.errors import RefusedError
 from planner.modes.compare import mac
 from planner.modes.estimate import estimate_modes, identification
+from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
 
 LINES = np.arange(2.0, 80.0, 0.2)
 BAND = (4.0, 60.0)

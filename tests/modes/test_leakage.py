@@ -9,7 +9,7 @@ from planner.frf.estimate import estimate
 from planner.frf.modal import pole
 from planner.modes.estimate import estimate_modes
 from planner.recording.types import Hit
-from simulated_hits import make_hit
+from tests.support.simulated_hits import make_hit
 
 BAND = (4.0, 60.0)
 FREQUENCY_HZ = np.array([9.0, 14.0, 31.0, 47.0])

@@ -9,7 +9,7 @@ from planner.frf import modal
 from planner.physics import dynamics
 from planner.physics.simulation import Simulation
 from planner.robot.robot import Robot
-from robots import make_arm
+from tests.support.robots import make_arm
 
 LINES = np.linspace(2, 90, 60)
 

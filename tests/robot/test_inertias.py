@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KNOWN_ROBOTS
 from planner.robot.elastic import ElasticModel
 from planner.robot.inertias import urdf_with_inertias
 from planner.robot.robot import Robot
+from tests.support.known_robots import KNOWN_ROBOTS
 
 
 @pytest.mark.parametrize("name", list(KNOWN_ROBOTS))

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from known_robots import KNOWN_ROBOTS
 from planner.robot.collision import Collisions
 from planner.robot.inverse import solve
 from planner.robot.robot import Robot
-from robots import make_arm
+from tests.support.known_robots import KNOWN_ROBOTS
+from tests.support.robots import make_arm
 
 TARGETS = 60
 

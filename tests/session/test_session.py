@@ -11,12 +11,12 @@ import pytest
 from rerun.chunk import RrdReader
 from rich.console import Console
 
-from outside import make_cell, record
 from planner import itself
 from planner.campaign.campaign import Campaign
 from planner.session.explaining import Explaining
 from planner.session.watch import watch
 from planner.show.story import Story
+from tests.support.outside import make_cell, record
 
 WANTED = (
     "joint_a1",

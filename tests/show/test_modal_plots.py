@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.text import Text
 
-from modal_systems import exact_frf, noisy, random_system
 from planner.frf.types import Frf
 from planner.modes.compare import mac
 from planner.modes.estimate import estimate_modes, identification
 from planner.show.marks import spread, with_sd
 from planner.show.modal_plots import frequency_figure, mac_figure, modal_figures
 from planner.show.plots import save
+from tests.support.modal_systems import exact_frf, noisy, random_system
 
 BAND = (4.0, 60.0)
 USABLE = (5.0, 62.0)

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition_cases import CELLS, campaign, make
 from planner.acquire.designs import NESTED
 from planner.campaign.config import CostTable
+from tests.support.acquisition_cases import CELLS, campaign, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition_cases import CELLS, OF_FRFS, Case, campaign, make
 from planner.acquire.designs import NESTED
 from planner.campaign.cell import Cell
 from planner.campaign.config import GoalTable
+from tests.support.acquisition_cases import CELLS, OF_FRFS, Case, campaign, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 SEEDS, FIRST = int(os.environ.get("STUDY_SEEDS", "4")), int(os.environ.get("STUDY_FIRST", "201"))

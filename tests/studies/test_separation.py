@@ -22,7 +22,7 @@ from planner.acquire.separate import odds_after, separation
 from planner.diagnose.linear.fit import carried_on
 from planner.side_by_side import side_by_side
 from planner.truth.effects import NONLINEAR
-from separation_cases import KINDS, Campaign, OfEffects, begun
+from tests.support.separation_cases import KINDS, Campaign, OfEffects, begun
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 SEEDS = int(os.environ.get("STUDY_SEEDS", "20"))

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition_cases import LINES, MODES, ROBOTS, Case
 from planner.acquire.separate import most_telling
 from planner.acquire.separate_laws import most_telling_forces, undecided
 from planner.campaign.cell import Cell
@@ -36,6 +35,7 @@ from planner.truth.model import load_truth
 from planner.truth.scene import Drawn, Scene
 from planner.truth.secret import Secret, hit_poses
 from planner.truth.secret import Visit as Planned
+from tests.support.acquisition_cases import LINES, MODES, ROBOTS, Case
 
 KINDS = ("transverse_compliance", "link_flexibility", "added_mass")
 START = 4

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import KR210
 from planner.diagnose.data.columns import Column, column
 from planner.diagnose.laws.equivalent import System
 from planner.physics.simulation import Simulation
 from planner.recording.types import Hit
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 VISITS = [0, 0, 0, 1, 1, 1]
 
