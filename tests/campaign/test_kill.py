@@ -14,7 +14,7 @@ import pytest
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Imported, Proposed
 from planner.replay import replay
-from tests.support.outside import make_cell, planner
+from tests.support.outside import make_cell, planner, with_tests
 
 MEASUREMENTS = 5
 
@@ -82,13 +82,13 @@ def check_survivor(root: Path) -> None:
 def kill_sessions(root: Path, kills: int, seed: int) -> int:
     """Start, kill after a random time, check; again until so many kills have struck."""
     rng = random.Random(seed)
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
     struck = generation = 0
     cell_root = root
     while struck < kills:
         process = subprocess.Popen(
             [sys.executable, "-c", SESSION, str(cell_root), str(MEASUREMENTS)],
-            stdout=subprocess.PIPE, text=True, start_new_session=True, env=env,
+            stdout=subprocess.PIPE, text=True, start_new_session=True,
+            env=with_tests(),
         )  # fmt: skip
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"

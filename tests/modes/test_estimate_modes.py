@@ -149,6 +149,7 @@ def test_probability_is_high_for_modes_with_support():
     h, variance = noisy(exact_frf(system, LINES), 0.02, rng)
     found = identification(as_frf(LINES, h, variance), BAND)
     assert found is not None
+    assert len(found.modes) == 4
     assert all(mode.probability > 0.9 for mode in found.modes)
     assert all(mode.support > 0.8 for mode in found.modes)
     assert found.diagram.sets[-1].order == found.order == 40

@@ -263,4 +263,5 @@ def test_when_it_says_done_it_is(runs):
         f"{late:.0f} measurements after it became true (median); "
         f"RMSE within its 95 % bound in {100 * inside / max(steps, 1):.0f} % of {steps} forecasts"
     )
+    assert fired > 0
     assert right >= 0.95 * fired

@@ -20,6 +20,11 @@ PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
 
 
+def with_tests() -> dict[str, str]:
+    """The environment of a Python that is to import what these tests import."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
+
+
 def planner(
     *arguments: object, check: bool = True, limit_s: float = 240
 ) -> subprocess.CompletedProcess[str]:
