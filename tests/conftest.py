@@ -1,4 +1,4 @@
-"""What every test shares: one BLAS thread, real recordings where they are present."""
+"""What every test shares: one BLAS thread, real recordings where they are present, --table."""
 
 import os
 
@@ -9,6 +9,7 @@ from pathlib import Path  # noqa: E402
 
 import pytest  # noqa: E402
 
+pytest_plugins = ["tests.support.proof_table"]
 SHARED_DATA = Path(__file__).parents[2] / "shared" / "data"
 
 

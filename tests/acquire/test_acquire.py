@@ -3,58 +3,19 @@
 import numpy as np
 import pytest
 
-from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.integrated_variance import integrated_variance
 from planner.design.propose import ACQUISITIONS, DESIGNS, propose
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import fit_surrogate
-from test_fusion import observed, simulated
+from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.surrogates import observed, simulated
 
-X = np.random.default_rng(4).random((120, 2))
 NAMES = [*ACQUISITIONS, *DESIGNS]
 
 
 @pytest.fixture(scope="module")
 def surrogate():
     return fit_surrogate(observed(5, 0))
-
-
-def over(surrogate, x, workspace):
-    """Outputs over the first poses of x (n, 2), and all of them as poses."""
-    poses = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
-    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:workspace])), poses
-
-
-def with_parameters(surrogate, x, p=6, seed=1):
-    """The same with p open parameters of a made-up simulation."""
-    rng = np.random.default_rng(seed)
-    plain = Poses.plain(x, surrogate.frequency_inputs(simulated(x)))
-    slope = 0.3 * np.sin(x @ rng.normal(size=(2, 4 * p)) * 3).reshape(len(x), 4, p)
-    j = rng.normal(size=(len(x), 3, 2, p)) * (1 + x[:, :1, None, None])
-    information = np.swapaxes(j, 2, 3) @ j
-    poses = Poses(plain.x, plain.low, slope, information)
-    covariance = np.cov(rng.normal(size=(p, 3 * p))) * 0.01
-    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:20]), None, covariance), poses
-
-
-def conditioned_variance(outputs, k, c, low_c):
-    """Mean variance over the workspace once c is measured, by adding a row to the GP itself."""
-    post, total = outputs.posterior, []
-    known = np.flatnonzero(post.mask[k])
-    x = np.vstack([post.x[known], c[None]])
-    low = np.append(post.low[k][known], low_c)
-    for s in range(len(post.theta[k])):
-        whiten = post.whiten[k][s][np.ix_(known, known)]
-        noisy = np.linalg.inv(whiten.T @ whiten)  # covariance of what was measured, with noise
-        cross = post._prior(k, post.x[known], low[:-1], c[None], low[-1:])[s]
-        own = post._prior(k, c[None], low[-1:], c[None], low[-1:])[s] + outputs.noise[k]
-        grown = np.block([[noisy, cross], [cross.T, own]])
-        xu, lu = outputs.workspace.poses.x, outputs.workspace.poses.low[:, k]
-        at = post._prior(k, x, low, xu, lu)[s]
-        there = post._prior(k, xu, lu, xu, lu)[s]
-        reduced = np.sum(at * np.linalg.solve(grown, at), axis=0)
-        total.append(np.mean(np.diag(there) - reduced))
-    return float(np.mean(total))
 
 
 def test_integrated_variance_is_that_of_an_actual_refit(surrogate):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from test_acquire import X, conditioned_variance, over, with_parameters
 
 from planner.design import variance_reduction as module
 from planner.design.cost import Cost, shortest_tour
@@ -27,8 +26,9 @@ from planner.identification.frequency_uncertainty import log_frequency_slope
 from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import fit_surrogate
-from robots import BAND_HZ, JOINTS_DEG, make_arm
-from test_fusion import observed, simulated
+from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
+from tests.support.scored_poses import X, conditioned_variance, over, with_parameters
+from tests.support.surrogates import observed, simulated
 
 
 @pytest.fixture(scope="module")

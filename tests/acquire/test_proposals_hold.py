@@ -6,14 +6,14 @@
 import numpy as np
 import pytest
 
-from known_robots import IRB6640, KR10, KR210
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.truth.inverse import joint_angles, tool_rotation
 from planner.truth.model import load_truth
-from robots import JOINTS_DEG, make_arm
+from tests.support.known_robots import IRB6640, KR10, KR210
+from tests.support.robots import JOINTS_DEG, make_arm
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1500)]
 PROPOSALS, TARGETS, POINTS = 2500, 250, 60

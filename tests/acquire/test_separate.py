@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.design.discrimination import most_telling, separation
 from planner.diagnosis.effects import library
 from planner.diagnosis.linear.fit import FINE, Fit, carried_on, fit, settle
@@ -14,6 +13,7 @@ from planner.diagnosis.linear_diagnosis import Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 LINES = np.linspace(6.0, 60.0, 96)
 SD = 2e-4

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from known_robots import KR210
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
 from planner.cli.render_diagnosis import _next
@@ -25,6 +24,7 @@ from planner.diagnosis.screens.force_levels import base
 from planner.dynamics.simulation import Simulation
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 RATE_HZ, SAMPLES, PORT = 400.0, 1024, 2
 STIFFENING, DAHL, DEAD_ZONE = LAWS

@@ -17,6 +17,7 @@ from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.variance_reduction import reduction
 from planner.surrogate.gp import Posterior, Prior
 from planner.surrogate.kernels import matern52
+from tests import support
 
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 HAS_PEERS = "PEERS_PYTHON" in os.environ or importlib.util.find_spec("emukit") is not None
@@ -69,7 +70,7 @@ def test_beside_emukit(tmp_path: Path):
         tmp_path / "job.npz", x=post.x, y=y, variance=1.0, lengths=LENGTHS, noise=NOISE,
         candidates=poses.x, points=seen.workspace.poses.x,
     )  # fmt: skip
-    script = Path(__file__).with_name("acquisition_peers.py")
+    script = Path(support.__file__).with_name("acquisition_peers.py")
     environment = {**os.environ, "PYTHONPATH": "", "OMP_NUM_THREADS": "1"}
     subprocess.run(
         [PYTHON, script, tmp_path / "job.npz", tmp_path / "answer.npz"],

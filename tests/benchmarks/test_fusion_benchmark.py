@@ -4,7 +4,6 @@
 several times the times aimed at, so that a busy machine does not fail them.
 """
 
-import os
 import subprocess
 import sys
 import time
@@ -14,7 +13,8 @@ import pytest
 
 from planner.design.propose import propose
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
-from test_fusion import observed, simulated
+from tests.support.outside import with_tests
+from tests.support.surrogates import observed, simulated
 
 X = np.random.default_rng(9).random((1000, 2))
 
@@ -73,17 +73,13 @@ def test_time_of_160_outputs():
 def test_times_of_a_start(tmp_path):
     code = (
         "import time; a = time.perf_counter()\n"
-        "from test_fusion import observed, simulated\n"
+        "from tests.support.surrogates import observed, simulated\n"
         "from planner.surrogate.modal_surrogate import fit_surrogate\n"
         "b = time.perf_counter()\n"
         "x = observed(9, 1).x; fit_surrogate(observed(5, 0)).predict(x, simulated(x))\n"
         "print(b - a, time.perf_counter() - b)"
     )
-    environment = {
-        **os.environ,
-        "XDG_CACHE_HOME": str(tmp_path),
-        "PYTHONPATH": os.pathsep.join(p for p in sys.path if p),
-    }
+    environment = {**with_tests(), "XDG_CACHE_HOME": str(tmp_path)}
     for what, bound in (("nothing cached", 6.0), ("cached", 3.0)):
         done = subprocess.run(
             [sys.executable, "-c", code],

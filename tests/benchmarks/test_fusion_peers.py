@@ -19,13 +19,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fusion_peers
-from fusion_problems import PROBLEMS, Design, design
 from planner.studies.models.fidelity_levels import Samples
 from planner.studies.models.fused import fit_fused, fit_low
 from planner.studies.models.recursive_ar1 import fit_recursive
 from planner.surrogate.predictive import Predictive
-from robot_problems import ROBOT_PROBLEMS
+from tests.support import fusion_peers
+from tests.support.fusion_problems import PROBLEMS, Design, design
+from tests.support.robot_problems import ROBOT_PROBLEMS
 
 COUNTS = (3, 5, 8, 11, 15)
 SEEDS = int(os.environ.get("FUSION_SEEDS", "20"))

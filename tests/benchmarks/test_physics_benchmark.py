@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from known_robots import KR10
-from measured_frfs import birk_bounds, birk_folder, measured_frfs
 from planner.dynamics.gradient import Inertias, laplace, response, response_gradient
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.identification.identify import identify
@@ -14,7 +12,9 @@ from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
 from planner.truth.model import load_truth
-from test_speed import seconds
+from tests.support.known_robots import KR10
+from tests.support.measured_frfs import birk_bounds, birk_folder, measured_frfs
+from tests.support.timing import seconds
 
 pytestmark = pytest.mark.slow
 

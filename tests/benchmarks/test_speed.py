@@ -1,8 +1,5 @@
 """How long a person waits, with a peer in the same run: pytest -m slow tests/benchmarks -s"""
 
-import statistics
-import time
-
 import numpy as np
 import pytest
 
@@ -17,20 +14,10 @@ from planner.surrogate.modal_surrogate import fit_surrogate
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import load_truth
-from test_fusion import observed, simulated
+from tests.support.surrogates import observed, simulated
+from tests.support.timing import seconds
 
 pytestmark = pytest.mark.slow
-
-
-def seconds(action, repeats=7):
-    """Median after one warm-up."""
-    action()
-    taken = []
-    for _ in range(repeats):
-        started = time.perf_counter()
-        action()
-        taken.append(time.perf_counter() - started)
-    return statistics.median(taken)
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +45,10 @@ def test_files_to_modes(cell):
     folder = shipped("kr240_plane") / "recordings"
     rows = Pool.load(folder, cell.robot.joint_names).rows["A34"]
     sources = tuple(Source(r.file, r.file.name, r.hit) for r in rows)
-    print(f"\n12 hits from files to modes: {seconds(lambda: measure(sources, (4.0, 60.0))):.2f} s")
+    found = []
+    spent = seconds(lambda: found.append(measure(sources, (4.0, 60.0)).modal))
+    print(f"\n12 hits from files to modes: {spent:.2f} s")
+    assert all(modal is not None and len(modal.modes) >= 4 for modal in found)
 
 
 def test_files_to_labelled_modes(cell, tmp_path):
@@ -108,3 +98,4 @@ def test_refit_against_scikit_learn():
         f"\nrefit and prediction at 500 points: {ours:.2f} s for 80 outputs, scikit-learn with 5 "
         f"restarts {theirs:.2f} s for 4, ratio per output {theirs / 4 / (ours / 80):.0f}"
     )
+    assert ours / 80 < theirs / 4

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pyuff
 
-from outside import make_cell
 from planner.campaign.campaign import Campaign
+from tests.support.outside import make_cell
 
 LINES = np.arange(4.0, 130.0, 0.25)
 

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from outside import make_cell, planner
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Imported, Proposed
 from planner.replay import replay
+from tests.support.outside import make_cell, planner, with_tests
 
 MEASUREMENTS = 5
 
@@ -22,9 +22,7 @@ MEASUREMENTS = 5
 SESSION = """
 import contextlib, io, json, os, sys
 from pathlib import Path
-for place in sys.argv[3].split(os.pathsep):
-    sys.path.insert(0, place)
-from outside import make_cell, record
+from tests.support.outside import make_cell, record
 from planner.cli.run import run
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth
@@ -84,13 +82,13 @@ def check_survivor(root: Path) -> None:
 def kill_sessions(root: Path, kills: int, seed: int) -> int:
     """Start, kill after a random time, check; again until so many kills have struck."""
     rng = random.Random(seed)
-    places = os.pathsep.join(p for p in sys.path if p.rstrip("/").endswith(("tests", "cli")))
     struck = generation = 0
     cell_root = root
     while struck < kills:
         process = subprocess.Popen(
-            [sys.executable, "-c", SESSION, str(cell_root), str(MEASUREMENTS), places],
+            [sys.executable, "-c", SESSION, str(cell_root), str(MEASUREMENTS)],
             stdout=subprocess.PIPE, text=True, start_new_session=True,
+            env=with_tests(),
         )  # fmt: skip
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"

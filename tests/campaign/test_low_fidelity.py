@@ -14,8 +14,8 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Resonator
 from planner.truth.hits import Hammer
 from planner.truth.model import load_truth
-from robots import BAND_HZ, JOINTS_DEG, make_arm
-from true_modes import hits_at
+from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
+from tests.support.true_modes import hits_at
 
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=2.0)
 COUNT = 4

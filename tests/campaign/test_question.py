@@ -8,7 +8,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from outside import planner
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import MeasuredMode, Proposed
 from planner.campaign.question import compare
@@ -18,6 +17,7 @@ from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.replay import replay
+from tests.support.outside import planner
 
 MEASURED = ("A11", "A33", "A57", "A17")
 WRONG, CLAIMED = "A25", "A42"

@@ -5,9 +5,9 @@ import json
 import numpy as np
 from rerun.chunk import RrdReader
 
-from outside import answer
 from planner.demo import shipped
-from rerun_frames import WORLD, Frames
+from tests.support.outside import answer
+from tests.support.rerun_frames import WORLD, Frames
 
 
 def test_demo_reaches_two_percent_and_writes_a_recording(tmp_path):
@@ -79,6 +79,7 @@ def check_replay(tmp_path, summary):
 def check_otherwise(replayed, summary):
     """What another acquisition would have proposed at each step, and saved."""
     proposed = [step for step in replayed["steps"] if step["event"] == "proposed"]
+    assert proposed
     assert all(len(step["instead"]) == 1 for step in proposed)
     assert all(not step["instead"] for step in replayed["steps"] if step["event"] == "imported")
     runs = replayed["otherwise"]["runs"]

@@ -7,8 +7,6 @@ import tomllib
 import numpy as np
 import pytest
 
-from outside import HAMMER, planner
-from outside import answer as planner_json
 from planner.dataset.recorded import read_recorded
 from planner.dynamics.simulation import Simulation
 from planner.identification.agreement import fit_similarity
@@ -16,7 +14,9 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses
 from planner.truth.model import load_truth
-from robots import BAND_HZ, JOINTS_DEG, make_arm
+from tests.support.outside import HAMMER, planner
+from tests.support.outside import answer as planner_json
+from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 
 POSES = 5
 

@@ -5,10 +5,10 @@ import shutil
 import numpy as np
 import pytest
 
-from outside import answer as planner_json
-from outside import planner
 from planner.demo import shipped
-from robots import make_arm
+from tests.support.outside import answer as planner_json
+from tests.support.outside import planner
+from tests.support.robots import make_arm
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from outside import make_cell, record
 from planner.cli.run import run
+from tests.support.outside import make_cell, record
 
 NAMES = ["stabilisation", "frf", "coherence", "mac"]
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from plain_arm import make_plain_arm, plain_campaign
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Configured, Proposed
 from planner.campaign.journal import encode_line, parse
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS
+from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 UNCHECKED = "Nothing is checked for collision, because plain.urdf has no collision geometry"
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from outside import answer, make_cell, planner, record
 from planner.truth.model import load_truth
-from robots import JOINTS_DEG
+from tests.support.outside import answer, make_cell, planner, record
+from tests.support.robots import JOINTS_DEG
 
 MEASUREMENTS = 8
 

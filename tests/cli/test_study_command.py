@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from outside import answer, planner
+from tests.support.outside import answer, planner
 
 
 @pytest.mark.parametrize("arguments", [("seed-9",), ("seed-002", "--out", "{file}")])

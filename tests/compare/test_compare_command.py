@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from outside import PLANNER, planner
 from planner.campaign.model import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
@@ -20,7 +19,8 @@ from planner.compare.resume import recorded
 from planner.compare.run import run
 from planner.compare.tasks import Task
 from planner.robot.robot import Robot
-from pools import make_pool
+from tests.support.outside import PLANNER, planner
+from tests.support.pools import make_pool
 
 POSES, STRATEGIES = 12, "maximin_lhs,random,default"
 SMALL = ("--repeats", "2", "--initial", "2", "--budget", "4", "--simulation", "frozen")

@@ -11,11 +11,11 @@ import os
 import numpy as np
 import pytest
 
-from outside import planner
 from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import load_truth
+from tests.support.outside import planner
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(7200)]
 POSES, BUDGET, SEED = 100, 15, 201

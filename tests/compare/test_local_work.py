@@ -2,8 +2,8 @@
 
 import os
 
-import items
 from planner.compare.processes import Failure, each
+from tests.support import items
 
 
 def test_every_item_is_done_by_other_processes():

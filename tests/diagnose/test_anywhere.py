@@ -2,13 +2,13 @@
 
 import pytest
 
-from concealed import hidden
-from known_robots import IRB6640
 from planner.diagnosis.effects import library
 from planner.diagnosis.linear.fit import Problem
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear_diagnosis import diagnose
 from planner.truth.deviation import AddedMass, Resonator, Spring
+from tests.support.concealed import hidden
+from tests.support.known_robots import IRB6640
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TILTS = Spring("base", X, 2.4e6, 1.2e3), Spring("base", Y, 1.6e6, 8e2)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from concealed import hidden
-from known_robots import IRB6640, KR210
 from planner.diagnosis.linear_diagnosis import diagnose
 from planner.truth.deviation import Spring
+from tests.support.concealed import hidden
+from tests.support.known_robots import IRB6640, KR210
 
 pytestmark = pytest.mark.slow
 

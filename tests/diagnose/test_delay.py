@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR10
 from planner.dataset.visits import Recorded
 from planner.diagnosis.screens import artefacts
 from planner.dynamics.simulation import Simulation
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from synthetic_hits import RATE_HZ, recorded
+from tests.support.known_robots import KR10
+from tests.support.synthetic_hits import RATE_HZ, recorded
 
 
 def late(hit: Hit, delay_s: float) -> Hit:

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.screens import drift
 from planner.diagnosis.screens.drift import screen
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
-from synthetic_hits import recorded
+from tests.support.known_robots import KR210
+from tests.support.synthetic_hits import recorded
 
 
 @pytest.fixture(scope="module")

@@ -7,12 +7,12 @@ of the pin means in metres is taken from two other recordings.
 import numpy as np
 import pytest
 
-from beam import first_hz
 from planner.diagnosis.effects.effect import Quantity
 from planner.diagnosis.frequencies import Change, explain
 from planner.modal.ringdown import ringdown
 from planner.recording.read import read
-from test_dropbear import FIRST_MODE, dwells
+from tests.support.beam import first_hz
+from tests.support.dropbear import FIRST_MODE, dwells
 
 pytestmark = pytest.mark.slow
 

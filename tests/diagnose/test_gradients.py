@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from known_robots import kr210_folder
 from planner.diagnosis.effects import library
 from planner.diagnosis.linear.fit import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
+from tests.support.known_robots import kr210_folder
 
 EFFECTS = (
     "joint_stiffness joint_2", "transverse_compliance joint_3", "base_compliance base",

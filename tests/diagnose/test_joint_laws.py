@@ -7,7 +7,7 @@ from planner.diagnosis.laws.equivalent_stiffness import System, receptances
 from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
 from planner.diagnosis.laws.torque_laws import LAWS
 from planner.dynamics.simulation import Elasticity
-from struck import VISITS, struck_robot
+from tests.support.struck import VISITS, struck_robot
 
 STIFFENING, DAHL, DEAD_ZONE = LAWS
 AMPLITUDES = np.array([1e-3, 0.1, 0.5, 2.0, 20.0])

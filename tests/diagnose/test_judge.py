@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.diagnosis import held_out_check as module
 from planner.diagnosis.effects import library
 from planner.diagnosis.held_out_check import WORSE, judge
@@ -13,6 +12,7 @@ from planner.diagnosis.linear_diagnosis import diagnose
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 LINES = np.linspace(6.0, 60.0, 96)
 

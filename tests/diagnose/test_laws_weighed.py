@@ -2,8 +2,8 @@
 
 import pytest
 
-import separation_cases
 from planner.truth.effects import NONLINEAR
+from tests.support import separation_cases
 
 KINDS = tuple(NONLINEAR)
 

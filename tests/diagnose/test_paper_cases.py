@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KR10
-from measured_frfs import birk_folder, measured_frfs
 from planner.dataset.visits import Recorded, Visit
 from planner.diagnosis.linear.predict import predicted
 from planner.diagnosis.linear_diagnosis import diagnose
@@ -26,6 +24,8 @@ from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene, across, triple
 from planner.truth.secret import Secret, hit_poses
 from planner.truth.secret import Visit as Planned
+from tests.support.known_robots import KR10
+from tests.support.measured_frfs import birk_folder, measured_frfs
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 

@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from known_robots import KR210
 from planner.dataset.visits import Recorded
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect, Quantity
@@ -22,7 +21,8 @@ from planner.diagnosis.screens import screen as screens
 from planner.diagnosis.screens.exponential_window import screen_window
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
-from synthetic_hits import RATE_HZ, recorded
+from tests.support.known_robots import KR210
+from tests.support.synthetic_hits import RATE_HZ, recorded
 
 POSES = 5
 

@@ -7,7 +7,7 @@ import pytest
 
 from planner.truth.arms import ARMS
 from planner.truth.cases import make_case
-from screened_cases import OWN, judge, table
+from tests.support.screened_cases import OWN, judge, table
 
 LINEAR = ("transverse_compliance", "base_compliance", "added_mass", "local_resonator")
 CASES = [(kind, 101 + i) for i, kind in enumerate((*OWN, "null", "null", *LINEAR))]

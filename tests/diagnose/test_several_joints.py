@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KR10
 from planner.dataset.visits import Recorded, Visit
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.law_beside_linear import leaves_room
@@ -26,7 +25,8 @@ from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret, hit_poses
 from planner.truth.secret import Visit as Planned
-from struck import VISITS, struck_robot
+from tests.support.known_robots import KR10
+from tests.support.struck import VISITS, struck_robot
 
 STIFFENING, DAHL, DEAD_ZONE = LAWS
 

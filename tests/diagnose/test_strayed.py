@@ -5,12 +5,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from known_robots import KR210
 from planner.diagnosis.linear.fit import PRIORS
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 
 def named(tmp_path, away_sds: dict[str, float], per_value: float = 0.9) -> list[str]:

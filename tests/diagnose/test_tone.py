@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR210
 from planner.dataset.visits import Recorded
 from planner.diagnosis.screens.tone import screen_tone
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
-from synthetic_hits import RATE_HZ, recorded
+from tests.support.known_robots import KR210
+from tests.support.synthetic_hits import RATE_HZ, recorded
 
 TONE_HZ, SIZE = 17.3, 0.3  # of the weakest hit's rms response
 

@@ -7,7 +7,7 @@ from planner.errors import RefusedError
 from planner.frf.estimator import estimate, from_records
 from planner.modal.estimate_modes import estimate_modes
 from planner.recording.records import FrfRecord
-from simulated_hits import RATE_HZ, exact_accelerance, make_hit
+from tests.support.simulated_hits import RATE_HZ, exact_accelerance, make_hit
 
 BAND = (4.0, 60.0)
 

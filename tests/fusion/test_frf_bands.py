@@ -6,7 +6,7 @@ import pytest
 from planner.frf import synthesis
 from planner.surrogate.frf_bands import ModalPrediction, frf_band, frf_moments
 from planner.surrogate.modal_surrogate import fit_surrogate
-from test_fusion import observed, simulated
+from tests.support.surrogates import observed, simulated
 
 LINES = np.linspace(4, 50, 60)
 

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.dynamics.vibration import SimulatedModes
 from planner.surrogate import gp
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.kernels import KERNELS
-from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
+from planner.surrogate.modal_surrogate import fit_surrogate
 from planner.surrogate.training_data import TrainingData
+from tests.support.surrogates import observed, simulated, true_hz
 
 PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.3, amplitude=0.1, nugget=0.01)
 
@@ -126,30 +126,6 @@ def test_padding_changes_nothing_and_growth_compiles_nothing():
     b = fit(masked).predict(small.x, small.low)
     np.testing.assert_allclose(a[0], b[0], atol=1e-6)
     np.testing.assert_allclose(a[1], b[1], rtol=1e-4)
-
-
-def simulated(x, k=4):
-    f = np.stack(
-        [(8 + 9 * i) * (1 + 0.2 * x[:, 0] * (-1) ** i + 0.1 * x[:, 1]) for i in range(k)], 1
-    )
-    return SimulatedModes(f, np.full(f.shape, 0.02), np.full((*f.shape, 3, 3), -1e-6j))
-
-
-def observed(n, seed, scale=1.12):
-    rng = np.random.default_rng(seed)
-    x = rng.random((n, 2))
-    low = simulated(x)
-    truth = true_hz(x, scale)
-    f = truth * (1 + 1e-3 * rng.standard_normal(truth.shape))
-    zeta = 0.03 * np.exp(0.1 * rng.standard_normal(f.shape))
-    return ModalObservations(
-        x, f, 1e-3 * f, zeta, 0.05 * zeta, 1.3 * low.residue, np.full((n, 4, 3, 3), 1e-8), low
-    )
-
-
-def true_hz(x, scale):
-    bend = 1 + 0.03 * np.sin(4 * x[:, :1] + 2 * x[:, 1:2])
-    return simulated(x).frequency_hz * scale * bend
 
 
 def test_intervals_hold_at_few_points():

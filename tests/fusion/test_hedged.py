@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from fusion_problems import arm_hz
 from planner.surrogate.ar1 import fit_ar1
 from planner.surrogate.hedged import fit_hedged
 from planner.surrogate.modal_surrogate import FREQUENCY, FREQUENCY_ALONE
 from planner.surrogate.training_data import TrainingData
+from tests.support.fusion_problems import arm_hz
 
 GRID = np.random.default_rng(5).random((200, 3))
 COUNTS, SEEDS = (3, 5, 8, 15), range(8)

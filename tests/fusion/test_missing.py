@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from planner.surrogate.modal_surrogate import fit_surrogate
-from test_fusion import observed, simulated, true_hz
+from tests.support.surrogates import observed, simulated, true_hz
 
 X = np.random.default_rng(4).random((20, 2))
 

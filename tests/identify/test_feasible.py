@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from known_robots import kr10_folder
 from planner.dynamics.simulation import Simulation
 from planner.identification.feasible_inertias import Barrier, pseudo_inertia
 from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
+from tests.support.known_robots import kr10_folder
 
 
 @pytest.fixture(scope="module")

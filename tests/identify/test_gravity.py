@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plain_arm import make_plain_arm
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.estimator import estimate
@@ -19,6 +18,7 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.model import Truth, load_truth
+from tests.support.plain_arm import make_plain_arm
 
 # Stretched upwards, where gravity softens most.
 Q = np.deg2rad([(0, -85, 5, 0), (30, -70, -10, 40), (-20, -80, 30, -60)])

@@ -8,8 +8,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from known_robots import KR10
-from measured_frfs import measured_frfs
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.agreement import fit_similarity
@@ -17,6 +15,8 @@ from planner.identification.held_out import identify_judged, set_aside
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth
+from tests.support.known_robots import KR10
+from tests.support.measured_frfs import measured_frfs
 
 
 @given(st.integers(1, 30), st.integers(0, 5))

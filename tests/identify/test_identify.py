@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KR10
-from measured_frfs import measured_frfs
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.estimator import estimate
@@ -23,6 +21,8 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.model import Truth, load_truth
+from tests.support.known_robots import KR10
+from tests.support.measured_frfs import measured_frfs
 
 LINES = np.linspace(5.0, 150.0, 96)
 POSES = KR10.poses(4, seed=2)

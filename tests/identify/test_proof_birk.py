@@ -8,8 +8,6 @@ which one does not even hold the truth. Masses are those of the R1100-2 with a s
 import numpy as np
 import pytest
 
-from known_robots import KR10
-from measured_frfs import birk_bounds, birk_folder, measured_frfs
 from planner.dynamics.simulation import Simulation
 from planner.identification.agreement import fit_similarity
 from planner.identification.identify import identify
@@ -17,6 +15,8 @@ from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth
+from tests.support.known_robots import KR10
+from tests.support.measured_frfs import birk_bounds, birk_folder, measured_frfs
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from measured_frfs import measured_frfs
 from planner.dataset.recorded import read_recorded
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
@@ -21,6 +20,7 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses
 from planner.truth.model import load_truth
+from tests.support.measured_frfs import measured_frfs
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 

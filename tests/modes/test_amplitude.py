@@ -10,7 +10,7 @@ from planner.modal.estimate_modes import estimate_modes
 from planner.modal.homogeneity import homogeneity
 from planner.recording.force_levels import by_level, peak_n
 from planner.recording.records import Hit
-from simulated_hits import POLES, make_hit
+from tests.support.simulated_hits import POLES, make_hit
 
 BAND = (4.0, 60.0)
 LEVELS_N = (100.0, 400.0, 1600.0)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modal_systems import System, as_frf, exact_frf, noisy, random_system
 from planner.errors import RefusedError
 from planner.modal.estimate_modes import estimate_modes, identification
 from planner.modal.mac import mac
+from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
 
 LINES = np.arange(2.0, 80.0, 0.2)
 BAND = (4.0, 60.0)
@@ -149,6 +149,7 @@ def test_probability_is_high_for_modes_with_support():
     h, variance = noisy(exact_frf(system, LINES), 0.02, rng)
     found = identification(as_frf(LINES, h, variance), BAND)
     assert found is not None
+    assert len(found.modes) == 4
     assert all(mode.probability > 0.9 for mode in found.modes)
     assert all(mode.support > 0.8 for mode in found.modes)
     assert found.diagram.sets[-1].order == found.order == 40

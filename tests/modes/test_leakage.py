@@ -9,7 +9,7 @@ from planner.frf.estimator import estimate
 from planner.frf.synthesis import pole
 from planner.modal.estimate_modes import estimate_modes
 from planner.recording.records import Hit
-from simulated_hits import make_hit
+from tests.support.simulated_hits import make_hit
 
 BAND = (4.0, 60.0)
 FREQUENCY_HZ = np.array([9.0, 14.0, 31.0, 47.0])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from modal_systems import System, random_system
 from planner.frf.estimator import estimate
 from planner.modal.estimate_modes import estimate_modes
-from simulated_hits import make_hit
+from tests.support.modal_systems import System, random_system
+from tests.support.simulated_hits import make_hit
 
 BAND = (4.0, 60.0)
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from modal_systems import System, exact_frf, noisy, random_system
 from planner.modal.plscf import plscf
 from planner.modal.residues import rank_one
 from planner.modal.stabilisation import diagram, stable
+from tests.support.modal_systems import System, exact_frf, noisy, random_system
 
 LINES = np.arange(3.0, 70.0, 0.15)
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from modal_systems import exact_frf, random_system
 from planner.frf.synthesis import accelerance
 from planner.modal.fit_data import Data
 from planner.modal.refine import refine, shared_error
@@ -18,6 +17,7 @@ from planner.modal.residues import (
     realign,
     synthesize,
 )
+from tests.support.modal_systems import exact_frf, random_system
 
 LINES = np.arange(4.0, 60.0, 0.2)
 

@@ -9,7 +9,7 @@ from planner.dynamics import vibration
 from planner.dynamics.simulation import Simulation
 from planner.frf import synthesis
 from planner.robot.robot import Robot
-from robots import make_arm
+from tests.support.robots import make_arm
 
 LINES = np.linspace(2, 90, 60)
 

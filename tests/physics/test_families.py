@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KR10
-from pendulums import pendulum_urdf
 from planner.dynamics import vibration
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Spring
 from planner.truth.model import load_truth
+from tests.support.known_robots import KR10
+from tests.support.pendulums import pendulum_urdf
 
 LINES = np.linspace(5, 150, 50)
 MASS, RADIUS, MOMENT, STIFFNESS = 3.0, 0.4, 0.05, 60.0

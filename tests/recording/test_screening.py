@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.recording.screening import screen, screen_repeats
-from simulated_hits import make_hit
+from tests.support.simulated_hits import make_hit
 
 BAND = (4.0, 60.0)
 

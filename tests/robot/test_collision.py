@@ -8,7 +8,7 @@ import pytest
 
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
-from robots import LIMITS_DEG, make_arm
+from tests.support.robots import LIMITS_DEG, make_arm
 
 FREE = np.deg2rad([0, -60, 60, 0, 20, 0])
 LOW = np.deg2rad([0, 45, 40, 0, 0, 0])  # links in the floor

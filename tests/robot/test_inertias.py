@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from known_robots import KNOWN_ROBOTS
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
+from tests.support.known_robots import KNOWN_ROBOTS
 
 
 @pytest.mark.parametrize("name", list(KNOWN_ROBOTS))

@@ -15,7 +15,7 @@ from planner.robot.elastic_model import ElasticModel
 from planner.robot.inverse_kinematics import solve
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from robots import JOINTS_DEG, LIMITS_DEG, make_arm
+from tests.support.robots import JOINTS_DEG, LIMITS_DEG, make_arm
 
 
 @pytest.fixture(scope="module")

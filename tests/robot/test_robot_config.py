@@ -7,7 +7,7 @@ import pytest
 from planner.errors import InputError
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
-from robots import make_arm
+from tests.support.robots import make_arm
 
 LIMIT = '<limit lower="0.5" upper="0.5" velocity="1" effort="0"/>'
 NO_RANGE = f"""<robot name="one"><link name="base"/><link name="tool"/><link name="accelerometer"/>

@@ -6,9 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from known_robots import KR10
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR10
 
 
 @pytest.fixture

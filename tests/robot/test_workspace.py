@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from known_robots import KR10, KR210
 from planner.campaign.config import WorkspaceTable
 from planner.errors import InputError, NoPoseLeftError
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from robots import JOINTS_DEG, make_arm
+from tests.support.known_robots import KR10, KR210
+from tests.support.robots import JOINTS_DEG, make_arm
 
 DOWN = (0.0, 0.0, -1.0)
 

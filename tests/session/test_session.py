@@ -12,12 +12,12 @@ from msgspec.structs import replace
 from rerun.chunk import RrdReader
 from rich.console import Console
 
-from outside import make_cell, record
 from planner import program
 from planner.campaign.campaign import Campaign
 from planner.report.rerun_story import Story
 from planner.session.diagnosis_process import Explaining
 from planner.session.watch import watch
+from tests.support.outside import make_cell, record
 
 WANTED = (
     "joint_a1",

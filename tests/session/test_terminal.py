@@ -7,7 +7,7 @@ import subprocess
 import termios
 import time
 
-from outside import PLANNER, answer, make_cell
+from tests.support.outside import PLANNER, answer, make_cell
 
 
 def read_until(handle: int, text: str, seconds: float = 60.0) -> str:

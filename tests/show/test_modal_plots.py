@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.text import Text
 
-from modal_systems import exact_frf, noisy, random_system
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes, identification
 from planner.modal.mac import mac
 from planner.report.frf_plots import save
 from planner.report.modal_plots import frequency_figure, mac_figure, modal_figures
 from planner.report.plot_marks import spread, with_sd
+from tests.support.modal_systems import exact_frf, noisy, random_system
 
 BAND = (4.0, 60.0)
 USABLE = (5.0, 62.0)

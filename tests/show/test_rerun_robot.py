@@ -10,8 +10,8 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.campaign.events import Proposal
 from planner.report.rerun_view import RerunView
-from rerun_frames import WORLD, Frames, rotation
-from robots import campaign_text, make_arm, urdf
+from tests.support.rerun_frames import WORLD, Frames, rotation
+from tests.support.robots import campaign_text, make_arm, urdf
 
 POSES_DEG = ((10.0, -80.0, 90.0, 5.0, 30.0, 20.0), (-35.0, -60.0, 70.0, -25.0, 65.0, -15.0))
 LINKS = ("base_link", *(f"link_{i}" for i in range(1, 7)))

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition_cases import CELLS, campaign, make
 from planner.campaign.config import CostTable
 from planner.design.pool_designs import NESTED
+from tests.support.acquisition_cases import CELLS, campaign, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")
@@ -263,4 +263,5 @@ def test_when_it_says_done_it_is(runs):
         f"{late:.0f} measurements after it became true (median); "
         f"RMSE within its 95 % bound in {100 * inside / max(steps, 1):.0f} % of {steps} forecasts"
     )
+    assert fired > 0
     assert right >= 0.95 * fired

@@ -10,12 +10,12 @@ import os
 import numpy as np
 import pytest
 
-from fidelity_cells import MODES, UNUSED, band_of, cell_of, hit, soft, truth_of
-from known_robots import IRB6640, KR10, KR210
 from planner.campaign.events import Proposal
 from planner.campaign.model import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
+from tests.support.fidelity_cells import MODES, UNUSED, band_of, cell_of, hit, soft, truth_of
+from tests.support.known_robots import IRB6640, KR10, KR210
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(6000)]
 SEEDS = int(os.environ.get("SEEDS", "3"))

@@ -9,10 +9,10 @@ import os
 import numpy as np
 import pytest
 
-from fidelity_cells import CELLS, MeasuredCell
 from planner.campaign.cell import Cell
 from planner.campaign.model import build
 from planner.campaign.state import CampaignState
+from tests.support.fidelity_cells import CELLS, MeasuredCell
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(6000)]
 STARTS = int(os.environ.get("STARTS", "5"))

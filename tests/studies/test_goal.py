@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition_cases import CELLS, OF_FRFS, Case, campaign, make
 from planner.campaign.cell import Cell
 from planner.campaign.config import GoalTable
 from planner.design.pool_designs import NESTED
+from tests.support.acquisition_cases import CELLS, OF_FRFS, Case, campaign, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 SEEDS, FIRST = int(os.environ.get("STUDY_SEEDS", "4")), int(os.environ.get("STUDY_FIRST", "201"))
@@ -63,3 +63,5 @@ def test_the_path_is_known_better(tmp_path):
         text = "  ".join(f"{m:.2f} ({w:.2f})" for m, w in zip(median, worst, strict=True))
         print(f"  {strategy:20s} median (9 of 10)  {text}")
     assert all(np.isfinite(rows).all() for rows in errors.values())
+    # Naming the path has not been shown to beat the others; that it is known well, it must be.
+    assert np.median(errors["goal"], axis=0)[-1] <= 0.3

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from modal_systems import System, as_frf, exact_frf, noisy, random_system
 from planner.errors import RefusedError
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import Mode
-from test_peer_ema import peer_poles
+from tests.support.ema_peer import peer_poles
+from tests.support.modal_systems import System, as_frf, exact_frf, noisy, random_system
 
 pytestmark = pytest.mark.slow
 BAND = (4.0, 60.0)

@@ -17,7 +17,7 @@ from planner.modal.tracking import Guide, Tracks, track
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.model import load_truth
-from random_ways import (
+from tests.support.random_ways import (
     CAMPAIGN,
     SOFT_FLOOR,
     Way,
@@ -31,7 +31,7 @@ from random_ways import (
     right_renamed,
     scattered_modes,
 )
-from true_modes import Measured, measure_all
+from tests.support.true_modes import Measured, measure_all
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3600)]
 COUNT, ABOVE, POSES = 4, 2, 60

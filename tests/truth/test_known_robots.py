@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from known_robots import KNOWN_ROBOTS
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.truth.model import load_truth
+from tests.support.known_robots import KNOWN_ROBOTS
 
 PER_ROBOT = 40
 

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from known_robots import KR10
 from planner.errors import InputError
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
@@ -16,6 +15,7 @@ from planner.truth.laws import Backlash, Contact, Friction, Hardening, Law
 from planner.truth.model import Truth, load_truth
 from planner.truth.nonlinear import Port, Pose, respond
 from planner.truth.secret import Secret, frfs, once
+from tests.support.known_robots import KR10
 
 STEP, N = 1 / 6400, 3200
 Q = KR10.poses(1)[0]

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from known_robots import KR10, KR210
 from planner.truth.deviation import Deviation, Feedback, Harmonic, Resonator, Scaled, Spring
 from planner.truth.hits import Hammer
 from planner.truth.laws import Contact
 from planner.truth.model import Truth, load_truth
 from planner.truth.nonlinear import Port, structural_accelerance
 from planner.truth.secret import Artefact, Drift, Secret, Tone, Visit, frfs, hit_poses, once
+from tests.support.known_robots import KR10, KR210
 
 Q = KR210.poses(1)[0]
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=2.56)

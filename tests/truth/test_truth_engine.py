@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from known_robots import KNOWN_ROBOTS, KR10
-from pendulums import pendulum_urdf
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
@@ -16,6 +14,8 @@ from planner.robot.workspace import Workspace
 from planner.truth import inverse
 from planner.truth.deviation import AddedMass, Deviation, Spring
 from planner.truth.model import load_truth
+from tests.support.known_robots import KNOWN_ROBOTS, KR10
+from tests.support.pendulums import pendulum_urdf
 
 MASS, RADIUS, MOMENT, STIFFNESS, DAMPING = 3.0, 0.4, 0.05, 2.0e4, 12.0
 INERTIA = MOMENT + MASS * RADIUS**2

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import KnownRobot
 from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
@@ -15,6 +14,7 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.model import load_truth
+from tests.support.known_robots import KnownRobot
 
 RATE_1_S = 1.5  # exponential window: decays are over when the record ends
 

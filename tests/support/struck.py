@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import KR210
 from planner.dataset.level_columns import Column, column
 from planner.diagnosis.laws.equivalent_stiffness import System
 from planner.dynamics.simulation import Simulation
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
 
 VISITS = [0, 0, 0, 1, 1, 1]
 

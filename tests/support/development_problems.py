@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fusion_problems import Problem
-from robot_problems import robot_problem
+from tests.support.fusion_problems import Problem
+from tests.support.robot_problems import robot_problem
 
 
 def _camel(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fusion_problems import Problem
-from known_robots import KNOWN_ROBOTS
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import load_truth
+from tests.support.fusion_problems import Problem
+from tests.support.known_robots import KNOWN_ROBOTS
 
 MOVED = (1, 2, 4)
 

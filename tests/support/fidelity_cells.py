@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import IRB6640, KR10, KR210, KnownRobot
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins, load_campaign_config
 from planner.campaign.log_conversion import from_modal
@@ -22,7 +21,8 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
 from planner.truth.hits import Hammer
 from planner.truth.model import Truth, load_truth
-from true_modes import hits_at
+from tests.support.known_robots import IRB6640, KR10, KR210, KnownRobot
+from tests.support.true_modes import hits_at
 
 POOL, UNUSED, MODES = 30, 60, 4
 HAMMER = Hammer(peak_n=300, duration_s=0.004, sampling_rate_hz=640, record_s=2.4)

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import IRB6640, KR10, KR210
 from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
@@ -19,6 +18,7 @@ from planner.frf.metrics import global_frac
 from planner.modal.modes import Mode
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import Truth, load_truth
+from tests.support.known_robots import IRB6640, KR10, KR210
 
 ROBOTS = {"KR10": KR10, "IRB 6640": IRB6640, "KR210": KR210}
 # Robot and what its simulation lacks: the floor's tilts, or transverse tilts of the joints too.

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import KR10
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.dynamics.mode_families import Families
@@ -15,7 +14,8 @@ from planner.modal.modes import Mode
 from planner.modal.tracking import Tracks
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.model import Truth, load_truth
-from true_modes import Measured, undamped
+from tests.support.known_robots import KR10
+from tests.support.true_modes import Measured, undamped
 
 CAMPAIGN = Path(__file__).parents[2] / "campaigns" / "kr240_plane"
 SOFT_FLOOR = (

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from known_robots import KR10
 from planner.frf.frf import Frf
 from planner.truth.model import Truth
+from tests.support.known_robots import KR10
 
 DEGREE = 180 / np.pi  # per degree to per radian
 # Birk et al. 2025, Table 7 and Table 2: N·m/°, N·m/(°/s).

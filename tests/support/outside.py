@@ -1,5 +1,7 @@
-"""Driving the program from outside, as the contract says: commands, files and JSON only."""
+"""Driving the program from outside: commands, files and JSON only."""
 
+import contextlib
+import io
 import json
 import os
 import subprocess
@@ -8,13 +10,19 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.cli.run import run
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import Truth, load_truth
-from robots import campaign_text, make_arm
+from tests.support.robots import campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")
 HAMMER = Hammer(peak_n=60.0, duration_s=0.004, record_s=2.0, sampling_rate_hz=640.0)
+
+
+def with_tests() -> dict[str, str]:
+    """The environment of a Python that is to import what these tests import."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(p for p in sys.path if p)}
 
 
 def planner(
@@ -32,6 +40,21 @@ def planner(
 def answer(*arguments: object) -> dict:
     """The JSON answer of a command that must succeed."""
     return json.loads(planner(*arguments, "--json").stdout)
+
+
+def call(*arguments: object) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command in this process, which starts no other."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = run([str(a) for a in arguments])
+    return code, out.getvalue(), err.getvalue()
+
+
+def told(*arguments: object) -> dict:
+    """The JSON answer of a command that must succeed, in this process."""
+    code, out, err = call(*arguments, "--json")
+    assert code == 0, f"{arguments}: {code}\n{err}"
+    return json.loads(out)
 
 
 def make_cell(root: Path) -> tuple[Path, Path, Truth]:

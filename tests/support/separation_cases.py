@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition_cases import LINES, MODES, ROBOTS, Case
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
@@ -36,6 +35,7 @@ from planner.truth.model import load_truth
 from planner.truth.scene import Drawn, Scene
 from planner.truth.secret import Secret, hit_poses
 from planner.truth.secret import Visit as Planned
+from tests.support.acquisition_cases import LINES, MODES, ROBOTS, Case
 
 KINDS = ("transverse_compliance", "link_flexibility", "added_mass")
 START = 4

@@ -1,0 +1,60 @@
+"""A campaign by its commands alone, with a measurement set aside and taken back again."""
+
+import numpy as np
+import pytest
+
+from tests.support.outside import call, make_cell, record, told
+from tests.support.robots import JOINTS_DEG
+
+ASKED = np.array(JOINTS_DEG).T * 0.5 + np.mean(JOINTS_DEG, axis=1) * 0.5  # (2, 6) in degrees
+
+
+def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    cell, table = tmp_path / "cell", tmp_path / "predict.csv"
+    joints = ",".join(f"joint_a{i}_deg" for i in range(1, 7))
+    rows = [f"H{i},{','.join(map(str, q))}" for i, q in enumerate(ASKED, 1)]
+    table.write_text("\n".join([f"pose,{joints}", *rows]) + "\n")
+
+    def predicted() -> np.ndarray:
+        """Frequency and sd (pose, mode, 2) in Hz."""
+        poses = told("predict", cell, table)["poses"]
+        assert [p["pose"] for p in poses] == ["H1", "H2"]
+        return np.array([[[m["frequency_hz"], m["sd_hz"]] for m in p["modes"]] for p in poses])
+
+    def measured() -> list[tuple[str, bool]]:
+        """Poses in the order of their measurement, and whether they are set aside."""
+        return [(m["pose"], m["withdrawn"]) for m in told("status", cell)["measurements"]]
+
+    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    assert measured() == []
+    after, names = [predicted()], []
+    for number in range(3):
+        (proposal,) = told("next", cell)["proposals"]
+        names.append(proposal["pose"])
+        folder = record(truth, tmp_path / f"export{number}", names[-1], proposal["joints_deg"])
+        report = told("import", cell, folder)
+        assert (report["pose"], len(report["accepted"])) == (names[-1], 9)
+        after.append(predicted())
+    assert measured() == [(name, False) for name in names]
+    true = np.array([truth.modes(np.deg2rad(q), 4)[0] for q in ASKED])
+    off = [np.sqrt(np.mean((p[..., 0] / true - 1) ** 2)) for p in (after[0], after[-1])]
+    assert off[1] < min(0.01, off[0] / 2)
+    assert (after[-1][..., 1] < after[0][..., 1]).all()
+
+    told("withdraw", cell, names[-1])
+    assert measured() == [(names[0], False), (names[1], False), (names[2], True)]
+    np.testing.assert_allclose(predicted(), after[2], rtol=1e-9)
+    code, _, err = call("withdraw", cell, names[-1])
+    assert (code, names[-1] in err) == (2, True)
+    told("undo", cell)
+    assert measured() == [(name, False) for name in names]
+    np.testing.assert_allclose(predicted(), after[3], rtol=1e-9)
+
+    replayed = told("replay", cell)
+    assert replayed["reproduced"]
+    assert [s["event"] for s in replayed["steps"]].count("imported") == 3
+    assert {"withdrawn", "undone"} <= {s["event"] for s in replayed["steps"]}
+    two = told("replay", cell, "--until", 5)
+    assert [s["event"] for s in two["steps"]].count("imported") == 2
+    assert two["frequency_sd_percent"] != pytest.approx(replayed["frequency_sd_percent"])
