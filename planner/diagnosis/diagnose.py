@@ -11,7 +11,8 @@ from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import beside_another, diagnose
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.verdict import ARTEFACTS, Together, linear_effects_apply, together
+from planner.diagnosis.thresholds import ARTEFACTS
+from planner.diagnosis.verdict import Together, linear_effects_apply, together
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, within
 

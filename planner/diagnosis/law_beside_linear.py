@@ -12,24 +12,28 @@ from pathlib import Path
 
 from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.search import ENOUGH
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.diagnosis.screens import force_levels
+from planner.diagnosis.thresholds import (
+    AT_NOISE,
+    LAW_BETTER,
+    LAW_CRUDE,
+    LAWS_OF_JOINTS,
+    PAYS,
+    UNKNOWN,
+)
 from planner.diagnosis.write_explained import write_explained
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, quietly
 from planner.robot.robot import Robot
 
-PAYS = 1.5  # factor by which a linear effect has to lower the misfit of averaged FRFs
-CRUDE = 3.0  # χ² per value from which a law leaves room for something beside it
 # What a joint's own law looks like on average: but not as closely as what is really there.
 OWN = "joint_stiffness", "angle_dependent_stiffness"
-BETTER = 1.5  # factor by which the linear effect then has to lower it
 
 
 def of_levels(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """What the force levels tell: laws of joints, or that nothing known explains them."""
-    return tuple(f for f in findings if f.effect in (*force_levels.LAWS, "unknown"))
+    return tuple(f for f in findings if f.effect in (*LAWS_OF_JOINTS, UNKNOWN))
 
 
 def leaves_room(findings: Sequence[Finding]) -> bool:
@@ -37,8 +41,8 @@ def leaves_room(findings: Sequence[Finding]) -> bool:
 
     Laws of several joints are not fitted closely enough to tell.
     """
-    laws = [f for f in findings if f.effect in force_levels.LAWS]
-    return len(laws) == 1 and laws[0].misfit > CRUDE
+    laws = [f for f in findings if f.effect in LAWS_OF_JOINTS]
+    return len(laws) == 1 and laws[0].misfit > LAW_CRUDE
 
 
 def beside(
@@ -66,8 +70,8 @@ def beside(
         robot = found.problem.simulation.robot
         path = write_explained(Path(folder), robot, found, linear)
         again = force_levels.screen(recorded, Simulation(Robot.load(path)), single=True, tell=tell)
-    law = next((f for f in again if f.effect in force_levels.LAWS), None)
-    if law is None or law.misfit * BETTER > min(f.misfit for f in before):
+    law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)
+    if law is None or law.misfit * LAW_BETTER > min(f.misfit for f in before):
         return None
     kept = [f for f in findings if f not in before and f.effect != "joint_stiffness"]
     # Springs make up for what averages tell wrongly of the linear effect.
@@ -106,7 +110,7 @@ def _numbers(candidate: Candidate) -> tuple[int, int]:
 
 
 def _at_the_noise(candidate: Candidate) -> bool:
-    return candidate.fit is not None and candidate.fit.per_value <= ENOUGH
+    return candidate.fit is not None and candidate.fit.per_value <= AT_NOISE
 
 
 def _physical(candidate: Candidate) -> bool:

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnosis.effects.effect import NOTHING, Effect, Setting, Transfer
+from planner.diagnosis.effects.effect import Effect, Setting, Transfer
+from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors
-
-SECOND = 0.2  # how much less likely one more effect is than one, before any data
 
 
 @dataclass(frozen=True)
@@ -25,7 +24,7 @@ class Both(Effect):
     def prior(self) -> float:
         """As if effects came independently of each other."""
         shares = np.array([m.prior for m in self.members])
-        return float(shares.prod() * (SECOND / NOTHING) ** (len(shares) - 1))
+        return float(shares.prod() * (SECOND_EFFECT / NOTHING) ** (len(shares) - 1))
 
     @classmethod
     def of(cls, *effects: Effect) -> "Both":
@@ -104,7 +103,7 @@ class Family(Both):
     @property
     def prior(self) -> float:
         """As one more effect than one."""
-        return SECOND
+        return SECOND_EFFECT
 
 
 def families(effects: Sequence[Effect]) -> list[Effect]:

@@ -8,18 +8,28 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
 from planner.diagnosis.linear.objective import ByPose, Misfit, Weighed, own_names
+from planner.diagnosis.thresholds import (
+    COM_SD_M,
+    DAMPING_FACTOR,
+    INERTIA_SD,
+    MASS_SD,
+    STIFFNESS_FACTOR,
+)
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.identify import QUICK, STAGES, Effort, identify
 from planner.identification.measured_frfs import Measured, stack
 from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
+from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
 from planner.robot.elastic_model import Matrices
 
-# Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
-PRIORS = Priors(stiffness_factor=1.17, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
+PRIORS = Priors(
+    stiffness_factor=STIFFNESS_FACTOR, damping_factor=DAMPING_FACTOR,
+    mass=MASS_SD, inertia=INERTIA_SD, com_m=COM_SD_M,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -122,12 +132,10 @@ class Fit:
         return self.data.normal.sum(axis=0) / temper + np.diag(1 / self.misfit.sd**2)
 
     def log_evidence(self, temper: float) -> float:
-        """Laplace: −χ²/2T − prior/2 − ½ ln |posterior precision · prior covariance|."""
+        """Log evidence by Laplace's method, χ² counting 1/temper."""
         sd = self.misfit.sd
         away = (self.x - self.misfit.mean) / sd
-        volume = np.linalg.slogdet(self.precision(temper) * np.outer(sd, sd))[1]
-        chi2 = float(self.data.chi2.sum())
-        return -chi2 / (2 * temper) - float(away @ away) / 2 - volume / 2
+        return laplace(float(self.data.chi2.sum()), away, self.precision(temper), sd, temper)
 
     def held_out(self, temper: float) -> np.ndarray:
         """(n,) χ² of each pose when it is left out: one Newton step on what the others tell."""
