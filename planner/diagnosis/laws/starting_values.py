@@ -40,9 +40,12 @@ def starts(found: Equivalent, system: System, port: int, x: np.ndarray, own: int
                     moved[own] += float(np.log(np.clip(1 - k * there / scale, 0.3, 3.0)))
                     share = k / scale if law.signed else np.log(k / scale)
                     nu = np.array([[share], [np.log(GRID[i])]])
-                    sign, at = 0 if law.signed else 1, np.array([port])
-                    log_middle = np.array([np.log(middle)])
-                    out.append(JointLaw(law, sign, at, np.array([scale]), log_middle, moved, nu))
+                    out.append(
+                        JointLaw(
+                            law, 0 if law.signed else 1, np.array([port]), np.array([scale]),
+                            np.log([middle]), moved, nu,
+                        )
+                    )  # fmt: skip
     return out
 
 
