@@ -5,10 +5,8 @@ the simulation lacks spoils the fit of any law to the hits. Each is therefore as
 the other has told.
 """
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
@@ -22,10 +20,8 @@ from planner.diagnosis.thresholds import (
     PAYS,
     UNKNOWN,
 )
-from planner.diagnosis.write_explained import write_explained
-from planner.dynamics.simulation import Simulation
+from planner.diagnosis.write_explained import explained_simulation
 from planner.progress import Tell, quietly
-from planner.robot.robot import Robot
 
 # What a joint's own law looks like on average: but not as closely as what is really there.
 OWN = "joint_stiffness", "angle_dependent_stiffness"
@@ -66,10 +62,8 @@ def beside(
     pays = found.refitted.per_value > PAYS * linear.fit.per_value
     if not pays and found.verdict != "explained":
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        robot = found.problem.simulation.robot
-        path = write_explained(Path(folder), robot, found, linear)
-        again = force_levels.screen(recorded, Simulation(Robot.load(path)), single=True, tell=tell)
+    explained = explained_simulation(found, linear)
+    again = force_levels.screen(recorded, explained, single=True, tell=tell)
     law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)
     if law is None or law.misfit * LAW_BETTER > min(f.misfit for f in before):
         return None

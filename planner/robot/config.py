@@ -128,18 +128,31 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     harmonic: tuple[Harmonic, ...] = ()
 
 
+LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
+
+
+def without_effects(config: RobotConfig) -> RobotConfig:
+    """The config as its file has it: the lists without what effects add."""
+    own = {
+        name: getattr(config, name)[:-count]
+        for name in LISTS
+        if (count := sum(len(getattr(e, name)) for e in config.effects))
+    }
+    return msgspec.structs.replace(config, **own)
+
+
 def load_config(path: Path) -> RobotConfig:
     """Read and check robot.toml; InputError with one sentence where it is wrong."""
     config = load_toml(path, RobotConfig, "robot.toml")
     _check(config, path)
-    return _with_effects(config, path)
+    return with_effects(config, path)
 
 
-def _with_effects(config: RobotConfig, path: Path) -> RobotConfig:
-    lists = ("compliance", "payload", "resonator", "harmonic")
+def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
+    """The config as its file has it, with what its effects add; InputError where that is wrong."""
     added = {
         name: (*getattr(config, name), *(x for e in config.effects for x in getattr(e, name)))
-        for name in lists
+        for name in LISTS
     }
     whole = msgspec.structs.replace(config, **added)
     _check_compliances(whole, path)
