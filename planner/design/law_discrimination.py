@@ -13,7 +13,7 @@ import numpy as np
 from planner.design.discrimination import Telling, expected_log_odds
 from planner.design.frequency_posterior import AXES
 from planner.diagnosis.laws.equivalent_stiffness import Receptances, receptances, system_of, waves
-from planner.diagnosis.laws.joint_law import JointLaw, LawMisfit, Laws
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit, Laws
 from planner.diagnosis.laws.level_data import own_parameter
 from planner.diagnosis.laws.starting_values import faded
 from planner.diagnosis.linear.predict import misfit_at
@@ -94,7 +94,7 @@ def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray
 
 
 def accelerance(
-    found: Receptances, law: JointLaw, hit_force: np.ndarray, share: np.ndarray
+    found: Receptances, law: LawAtJoints, hit_force: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
     """FRFs (L, 3, 3, F) in m/s²/N of a system with a law at one of its joints.
 
@@ -117,13 +117,13 @@ def accelerance(
 
 
 def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> np.ndarray:
-    """What differences of FRFs (3, 3, F) weigh, as in `leveldata`."""
+    """What differences of FRFs (3, 3, F) weigh, as in `laws.level_data`."""
     error = (LAW_MODEL_ERROR * np.abs(h - hardest)) ** 2 + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2
     return np.sqrt(2 / (temper * (quiet + error)))
 
 
 def _told(
-    laws: Laws, law: JointLaw, row: np.ndarray, force_n: np.ndarray
+    laws: Laws, law: LawAtJoints, row: np.ndarray, force_n: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """FRFs (L, 3, 3, F) of a law at a pose, and slopes (L, 3, 3, 3, F) by ν and its own spring."""
     hit = laws.hit
@@ -142,7 +142,7 @@ def _told(
     return h, np.stack([(one - h) / STEP for one in near], axis=1)
 
 
-def _own(laws: Laws, law: JointLaw) -> int:
+def _own(laws: Laws, law: LawAtJoints) -> int:
     return own_parameter(laws.plain, int(system_of(laws.plain).blocks[law.ports[0]]))
 
 

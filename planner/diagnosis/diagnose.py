@@ -6,7 +6,7 @@ from planner.dataset.recorded import Recorded
 from planner.dataset.visits import Recorded as Visits
 from planner.dataset.windowed import corrected
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.held_out_check import Judged, judge
+from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import beside_another, diagnose
 from planner.diagnosis.revoked_artefacts import taken_back
@@ -22,7 +22,7 @@ class Explained:
     """`recorded` as it was used, without artefacts; what explains it, judged; all candidates."""
 
     recorded: Recorded
-    judged: Judged
+    judged: JudgedDiagnosis
     whole: Together
 
 

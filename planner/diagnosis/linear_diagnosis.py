@@ -44,7 +44,7 @@ class Diagnosis:
     verdict: str
     candidates: tuple[Candidate, ...]
     refitted: Fit
-    best: Fit  # of the candidates that are no more than fits
+    best: Fit  # of the likeliest candidate that is a fit, so not "unknown"
     temper: float
     seconds: float
     problem: Problem
@@ -104,7 +104,7 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
 
 
 def beside_another(found: Diagnosis) -> Diagnosis:
-    """The same where something has been found already: every effect is one more then."""
+    """The diagnosis beside an artefact: each effect is a second one then, and less likely."""
 
     def weight(c: Candidate) -> float:
         return c.probability * (1.0 if c.places == (("none", None),) else SECOND_EFFECT)

@@ -8,13 +8,13 @@ import msgspec
 import numpy as np
 import tomlkit
 
-from planner.diagnosis.effects.effect import Effect as LibraryEffect
+from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
-from planner.robot.config import Effect, without_effects
+from planner.robot.config import EffectTable, without_effects
 from planner.robot.robot import Robot
 from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
@@ -35,7 +35,7 @@ class _Changes:
 def explained_simulation(diagnosis: Diagnosis, accepted: Candidate) -> Simulation:
     """The refitted simulation with the accepted effects, as `write_explained` would write it."""
     changes = _changes(diagnosis, accepted)
-    effects = [msgspec.convert(entry, Effect) for entry in changes.effects]
+    effects = [msgspec.convert(entry, EffectTable) for entry in changes.effects]
     nominal = diagnosis.problem.simulation
     return nominal.with_effects(changes.springs, effects, changes.bodies, changes.inertia_change)
 
@@ -76,9 +76,7 @@ def _changes(diagnosis: Diagnosis, accepted: Candidate) -> _Changes:
     return _Changes(springs, effects, found.misfit.setting.simulation.elastic.bodies, change)
 
 
-def _entry(
-    diagnosis: Diagnosis, accepted: Candidate, found: Fit, effect: LibraryEffect
-) -> dict[str, Any]:
+def _entry(diagnosis: Diagnosis, accepted: Candidate, found: Fit, effect: Effect) -> dict[str, Any]:
     """An [[effects]] block of robot.toml."""
     values = found.parameters(diagnosis.temper, effect)
     told = {

@@ -17,7 +17,7 @@ from planner.dynamics.vibration import (
     receptance,
     solve_poles,
 )
-from planner.robot.config import Effect, without_effects
+from planner.robot.config import EffectTable, without_effects
 from planner.robot.elastic_model import ElasticModel, Matrices
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
@@ -63,7 +63,7 @@ class Simulation:
     def with_effects(
         self,
         springs: Sequence[Mapping[str, float]],
-        effects: Sequence[Effect],
+        effects: Sequence[EffectTable],
         bodies: tuple[str, ...],
         inertia_change: np.ndarray,
     ) -> "Simulation":

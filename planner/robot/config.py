@@ -65,7 +65,7 @@ class Harmonic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sine: float
 
 
-class Told(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ParameterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A parameter of an effect, as the diagnosis found it."""
 
     value: float
@@ -73,7 +73,7 @@ class Told(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit: str
 
 
-class Effect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class EffectTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Physics that the diagnosis found missing, and what it adds to the simulation.
 
     `payload` may have a negative mass here, where a stated one was too large.
@@ -82,7 +82,7 @@ class Effect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     effect: str
     at: str
     probability: float = 1.0
-    parameters: dict[str, Told] = {}
+    parameters: dict[str, ParameterTable] = {}
     compliance: tuple[Compliance, ...] = ()
     payload: tuple[Payload, ...] = ()
     resonator: tuple[Resonator, ...] = ()
@@ -123,7 +123,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     collision: CollisionTable = CollisionTable()
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[EffectTable, ...] = ()
     resonator: tuple[Resonator, ...] = ()
     harmonic: tuple[Harmonic, ...] = ()
 

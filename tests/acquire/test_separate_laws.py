@@ -17,7 +17,7 @@ from planner.dataset.visits import Recorded, Visit
 from planner.design.law_discrimination import accelerance, forces_n, law_separation
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import receptances, system_of
-from planner.diagnosis.laws.joint_law import JointLaw, LawMisfit, Laws
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit, Laws
 from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
 from planner.diagnosis.laws.torque_laws import LAWS
 from planner.diagnosis.linear.drift_fit import problem_of
@@ -61,7 +61,7 @@ def laws_of(cell, *numbers):
         nu = np.array([[share if law.signed else np.log(share)], [0.0]])
         own, middle = np.array([scale]), np.array([np.log(angle)])
         sign = 0 if law.signed else 1
-        one = JointLaw(law, sign, np.array([PORT]), own, middle, plain.x, nu)
+        one = LawAtJoints(law, sign, np.array([PORT]), own, middle, plain.x, nu)
         made.append(LawMisfit(one).sloped(None, np.eye(d) * 400.0))
     even = (1 / len(made),) * len(made)
     problem = problem_of(recorded, simulation)

@@ -70,7 +70,7 @@ class Both(Effect):
         return tuple(i for m, own in self._split(psi) for i in m.impedance(setting, own))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer | None:
-        """The product, the last effect nearest to the recorder."""
+        """Product of the effects' transfer functions, the last one's nearest to the recorder."""
         left, slopes = None, []
         for member, own in self._split(psi):
             now = member.transfer(setting, own)
@@ -85,12 +85,12 @@ class Both(Effect):
         return None if left is None else Transfer(left, np.concatenate(slopes, axis=1))
 
     def rate(self, psi: np.ndarray) -> float | None:
-        """That of the one that has one."""
+        """Rate of the exponential window, where one of the effects is one."""
         rates = [m.rate(own) for m, own in self._split(psi)]
         return next((r for r in rates if r is not None), None)
 
     def starts(self) -> np.ndarray:
-        """The first's middle with the last's starts."""
+        """The last effect's starts, all others at their priors' means."""
         last = self.members[-1].starts()
         middle = [q.mean for m in self.members[:-1] for q in m.quantities]
         return np.hstack([np.tile(middle, (len(last), 1)), last])
@@ -98,11 +98,11 @@ class Both(Effect):
 
 @dataclass(frozen=True)
 class Family(Both):
-    """One kind of effect at all its places: one cause, as that robot.toml leaves out bearings."""
+    """One kind of effect at all its places, by one cause: say, robot.toml lacks all bearings."""
 
     @property
     def prior(self) -> float:
-        """As one more effect than one."""
+        """That of a second effect: one cause gives at all these places."""
         return SECOND_EFFECT
 
 
@@ -116,7 +116,7 @@ def families(effects: Sequence[Effect]) -> list[Effect]:
 
 
 def together(a: Effect, b: Effect) -> Both | None:
-    """Both, where that is possible: not twice the same, no impedance beside a window."""
+    """Both effects at once; None for the same effect at one place, or for two windows."""
     same = any((x.name, x.at) == (y.name, y.at) for x in a.parts() for y in b.parts())
     both = Both.of(a, b)
     own = [p for p in both.members if p.quantities or p.name == "polarity"]

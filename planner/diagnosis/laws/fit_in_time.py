@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from planner.diagnosis.laws.equivalent_stiffness import System, receptances, system_of
-from planner.diagnosis.laws.joint_law import JointLaw, LawMisfit
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
 from planner.diagnosis.laws.level_data import (
     LevelData,
     LinearSlopes,
@@ -45,16 +45,16 @@ class LawProblem:
     hits: Strokes
     linear: LinearSlopes | None = None
 
-    def start(self, law: JointLaw, rule: Damping) -> Iterate[LawMisfit]:
+    def start(self, law: LawAtJoints, rule: Damping) -> Iterate[LawMisfit]:
         """A fit where nothing is evaluated yet."""
         return begin(law.coordinates, LawMisfit(law), rule, law.limits(self.plain))
 
 
-def misfits(problem: LawProblem, laws: Sequence[JointLaw]) -> list[LawMisfit]:
+def misfits(problem: LawProblem, laws: Sequence[LawAtJoints]) -> list[LawMisfit]:
     """The objective of each law; with gradient and matrix where `problem.linear` is given.
 
-    Laws at one joint are integrated together by compiled code, on two cores. On the hits of 12
-    poses it takes a tenth of the time a law that the general integrator does.
+    Laws at one joint are integrated many at a time by compiled code, which is much faster than the
+    integrator of several joints, and with derivatives by differences as cheap as the angles.
     """
     if problem.linear is None or any(len(law.ports) > 1 for law in laws):
         return [_misfit_of_several(problem, law) for law in laws]
@@ -93,7 +93,7 @@ def advance(
 
 
 def descended(
-    problem: LawProblem, law: JointLaw, rounds: int, gain: float, rule: Damping
+    problem: LawProblem, law: LawAtJoints, rounds: int, gain: float, rule: Damping
 ) -> LawMisfit:
     """Where `rounds` steps lead, each of which lowers the value; the last one by less than `gain`.
 
@@ -123,7 +123,7 @@ def _stepped(problem: LawProblem, fit: Iterate[LawMisfit]) -> Iterate[LawMisfit]
             return fit
 
 
-def _misfit_of_several(problem: LawProblem, law: JointLaw) -> LawMisfit:
+def _misfit_of_several(problem: LawProblem, law: LawAtJoints) -> LawMisfit:
     data, system = problem.data, system_of(problem.plain, law.x)
     joints = joints_of(system, problem.hits, data.fastest_hz)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -152,7 +152,7 @@ def _sloped(problem: LawProblem, at: LawMisfit) -> LawMisfit:
     return _with_normal(problem, at, linear, slopes)
 
 
-def _misfits_of_one(problem: LawProblem, laws: Sequence[JointLaw]) -> list[LawMisfit]:
+def _misfits_of_one(problem: LawProblem, laws: Sequence[LawAtJoints]) -> list[LawMisfit]:
     """Laws at one joint each, all integrated together."""
     linear = problem.linear
     assert linear is not None
@@ -167,7 +167,7 @@ def _misfits_of_one(problem: LawProblem, laws: Sequence[JointLaw]) -> list[LawMi
 
 
 def one_joint_frfs(
-    problem: LawProblem, laws: Sequence[JointLaw]
+    problem: LawProblem, laws: Sequence[LawAtJoints]
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """FRFs (c, 3, F) of all columns, and derivatives (3, c, 3, F) by ν and the own ln stiffness."""
     data, hits = problem.data, problem.hits
@@ -215,7 +215,7 @@ def frfs(
 
 
 def _weighed(
-    problem: LawProblem, law: JointLaw, h: np.ndarray, stiffer: np.ndarray | None = None
+    problem: LawProblem, law: LawAtJoints, h: np.ndarray, stiffer: np.ndarray | None = None
 ) -> LawMisfit:
     """χ² and the objective of FRFs (c, 3, F)."""
     data = problem.data

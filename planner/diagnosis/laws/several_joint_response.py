@@ -1,6 +1,6 @@
 """Hits on a simulation with several nonlinear joints at once, integrated in time.
 
-As in `timedomain`, the linear part is propagated exactly pole by pole, for torques that are linear
+As with one joint, the linear part is propagated exactly pole by pole, for torques that are linear
 between steps; each step solves for the angles of all the joints by Newton's method.
 """
 

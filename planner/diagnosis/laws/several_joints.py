@@ -8,7 +8,7 @@ import numpy as np
 from planner.dataset.visits import Recorded
 from planner.diagnosis.laws.equivalent_stiffness import system_of
 from planner.diagnosis.laws.fit_in_time import LawProblem, descended, misfits
-from planner.diagnosis.laws.joint_law import JointLaw, LawMisfit
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
 from planner.diagnosis.laws.level_data import LAID, LevelData, level_data, own_parameter
 from planner.diagnosis.laws.level_refits import Refit, begin
 from planner.diagnosis.laws.one_joint_response import strokes
@@ -30,7 +30,7 @@ def problem_of_levels(recorded: Recorded, plain: Fit) -> LawProblem:
     return LawProblem(level_data(recorded, plain), plain, hits)
 
 
-def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> JointLaw:
+def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> LawAtJoints:
     """Where the refits of force levels say that the law lies."""
     system = system_of(plain)
     scale = system.elasticity.stiffness[system.blocks]
@@ -40,7 +40,7 @@ def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> Joint
     for j, block in enumerate(system.blocks):
         own = own_parameter(plain, int(block))
         x[own], *nu[:, j] = begin(refits, law, sign, float(scale[j]), j, float(middle[j]))
-    return JointLaw(law, sign, np.arange(len(scale)), scale, middle, x, nu)
+    return LawAtJoints(law, sign, np.arange(len(scale)), scale, middle, x, nu)
 
 
 def softened(data: LevelData, share: float) -> LevelData:
@@ -50,7 +50,7 @@ def softened(data: LevelData, share: float) -> LevelData:
     return replace(data, weight=np.where(data.weight > 0, 1 / error, 0.0))
 
 
-def settled(problem: LawProblem, law: JointLaw, softness: Sequence[float]) -> LawMisfit:
+def settled(problem: LawProblem, law: LawAtJoints, softness: Sequence[float]) -> LawMisfit:
     """Where the descent ends, errors being taken as softened by one share after the other."""
     at = LawMisfit(law)
     for share in softness:
@@ -61,7 +61,7 @@ def settled(problem: LawProblem, law: JointLaw, softness: Sequence[float]) -> La
     return at
 
 
-def straightened(plain: Fit, at: LawMisfit, joint: int) -> JointLaw:
+def straightened(plain: Fit, at: LawMisfit, joint: int) -> LawAtJoints:
     """With a spring in the stead of one joint's law, as stiff as that was in the mean."""
     law = at.law
     assert at.stiffer is not None
@@ -73,7 +73,7 @@ def straightened(plain: Fit, at: LawMisfit, joint: int) -> JointLaw:
     return replace(law, x=x, nu=nu)
 
 
-def differences(problem: LawProblem, law: JointLaw) -> tuple[float, float, float]:
+def differences(problem: LawProblem, law: LawAtJoints) -> tuple[float, float, float]:
     """Of the weaker hits' differences to the strongest: χ² with and without the law, and values."""
     data = problem.data
     found = misfits(problem, [law])[0]

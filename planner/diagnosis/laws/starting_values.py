@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System
-from planner.diagnosis.laws.joint_law import JointLaw
+from planner.diagnosis.laws.law_at_joints import LawAtJoints
 from planner.diagnosis.laws.torque_laws import LAWS, Law
 
 DECAY = np.linspace(0.0, 1.5, 6)  # ln of how far the swing has faded while it still counts
@@ -21,7 +21,9 @@ def faded(law: Law, swing: np.ndarray, a: float) -> np.ndarray:
     return each @ (weight / weight.sum())
 
 
-def starts(found: Equivalent, system: System, port: int, x: np.ndarray, own: int) -> list[JointLaw]:
+def starts(
+    found: Equivalent, system: System, port: int, x: np.ndarray, own: int
+) -> list[LawAtJoints]:
     """Every law (and sign of k): the best of a grid of a, and its neighbours."""
     scale = float(system.elasticity.stiffness[system.blocks[port]])
     middle = float(np.median(found.swing[:, 1, port]))
@@ -41,7 +43,7 @@ def starts(found: Equivalent, system: System, port: int, x: np.ndarray, own: int
                     share = k / scale if law.signed else np.log(k / scale)
                     nu = np.array([[share], [np.log(GRID[i])]])
                     out.append(
-                        JointLaw(
+                        LawAtJoints(
                             law, 0 if law.signed else 1, np.array([port]), np.array([scale]),
                             np.log([middle]), moved, nu,
                         )

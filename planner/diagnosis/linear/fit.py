@@ -7,7 +7,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.diagnosis.linear.objective import ByPose, Misfit, Weighed, own_names
+from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, own_names
 from planner.diagnosis.thresholds import (
     COM_SD_M,
     DAMPING_FACTOR,
@@ -225,7 +225,7 @@ def _approach(problem: Problem, effect: Effect) -> np.ndarray:
 
 def _best(
     misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS
-) -> Minimum[Weighed]:
+) -> Minimum[MisfitAtPoint]:
     """Where the best of the starts leads."""
     if len(starts) > KEPT:
         held = replace(misfit, inertial=False)
@@ -265,12 +265,12 @@ def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
 
 
 def _minimise(
-    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: Weighed | None = None
-) -> Minimum[Weighed]:
+    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: MisfitAtPoint | None = None
+) -> Minimum[MisfitAtPoint]:
     return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at)
 
 
-def _at(misfit: Misfit, found: Minimum[Weighed]) -> Fit:
+def _at(misfit: Misfit, found: Minimum[MisfitAtPoint]) -> Fit:
     return Fit(misfit.effect, misfit, found.x, found.at.data or misfit.by_pose(found.x))
 
 

@@ -11,7 +11,7 @@ from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System, equivalent, system_of
 from planner.diagnosis.laws.fit_in_time import BATCH_DAMPING, LawProblem, advance
-from planner.diagnosis.laws.joint_law import LawMisfit, Laws
+from planner.diagnosis.laws.law_at_joints import LawMisfit, Laws
 from planner.diagnosis.laws.level_data import (
     LevelData,
     equivalent_slopes,

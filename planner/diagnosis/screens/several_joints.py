@@ -13,7 +13,7 @@ from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import own_springs
 from planner.diagnosis.laws.fit_in_time import LawProblem
-from planner.diagnosis.laws.joint_law import JointLaw, LawMisfit
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
 from planner.diagnosis.laws.level_refits import Refit, base, refits
 from planner.diagnosis.laws.several_joints import (
     beginning,
@@ -105,7 +105,7 @@ def _ordered(some: Sequence[SharedLaw]) -> list[SharedLaw]:
 
 
 def _settled(
-    told: LawProblem, judged: LawProblem, softness: Sequence[float], begun: JointLaw
+    told: LawProblem, judged: LawProblem, softness: Sequence[float], begun: LawAtJoints
 ) -> SharedLaw:
     """Fitted to what is told, judged elsewhere."""
     fit = settled(told, begun, softness)

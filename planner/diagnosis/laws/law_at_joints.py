@@ -20,7 +20,7 @@ LONGEST = 0.7  # of a step: in the logarithms of the law, in sds of the linear p
 
 
 @dataclass(frozen=True, eq=False)
-class JointLaw:
+class LawAtJoints:
     """A law at m joints, at linear parameters x (D,) and ν (2, m): stiffness share and ln angle.
 
     k is the share times the joints' stiffness `scale` (m,) in N·m/rad, ln a is `middle` (m,) + ν.
@@ -75,7 +75,7 @@ class JointLaw:
         """(D + 2 m,): x, then the shares, then the angles."""
         return np.concatenate([self.x, self.nu.ravel()])
 
-    def at(self, coordinates: np.ndarray) -> "JointLaw":
+    def at(self, coordinates: np.ndarray) -> "LawAtJoints":
         """The same at other coordinates (D + 2 m,)."""
         d = len(self.x)
         return replace(self, x=coordinates[:d], nu=coordinates[d:].reshape(self.nu.shape))
@@ -115,7 +115,7 @@ class LawMisfit:
     they were not asked for.
     """
 
-    law: JointLaw
+    law: LawAtJoints
     chi2: float = np.inf
     value: float = np.inf
     residual: np.ndarray | None = None
