@@ -78,9 +78,10 @@ def beside(
 
 
 def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | None:
-    """The fewest linear effects with the fewest numbers: more of them imitate what bends.
+    """The candidate with the fewest effects, then numbers, among those that fit nearly as well.
 
-    Of alike ones the likeliest.
+    More effects and numbers imitate what the nonlinear joint does to averaged FRFs. Among equally
+    simple ones it is the likeliest.
     """
     lines = found.refitted.misfit.counts.sum()
     settled = [
@@ -96,7 +97,7 @@ def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | No
 
 
 def _numbers(candidate: Candidate) -> tuple[int, int]:
-    """Of effects, and of numbers that they may choose."""
+    """How many effects a candidate has, and how many free parameters those add."""
     assert candidate.fit is not None
     simulation = candidate.fit.misfit.setting.simulation
     chosen = (len(e.quantities) + len(e.springs(simulation)) for e in candidate.effects)

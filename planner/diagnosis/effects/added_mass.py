@@ -49,7 +49,7 @@ class AddedMass(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["AddedMass", ...]:
-        """On every link."""
+        """One effect for each link."""
         masses = [b[0] for b in simulation.elastic.inertia]
         mass, size = ADDED_MASS_SD * float(np.mean(masses)), ADDED_PLACE_SD * link_size(simulation)
         found = []

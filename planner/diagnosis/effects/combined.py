@@ -28,14 +28,14 @@ class Both(Effect):
 
     @classmethod
     def of(cls, *effects: Effect) -> "Both":
-        """Effects at their places."""
+        """The effects together; those that are several already are taken apart."""
         members = tuple(part for e in effects for part in e.parts())
         quantities = tuple(q for m in members for q in m.quantities)
         return cls(" and ".join(m.at for m in members), quantities, members)
 
     @property
     def artefact(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether all are."""
+        """Whether all members are artefacts."""
         return all(m.artefact for m in self.members)
 
     def parts(self) -> tuple[Effect, ...]:
@@ -62,11 +62,11 @@ class Both(Effect):
         return priors
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
-        """Of all."""
+        """Names of all members' springs."""
         return tuple(name for m in self.members for name in m.springs(simulation))
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
-        """All; each depends on its own parameters only."""
+        """What all members add; each depends on its own parameters only."""
         return tuple(i for m, own in self._split(psi) for i in m.impedance(setting, own))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer | None:

@@ -36,7 +36,7 @@ class ExtraCompliance(Effect):
     gives: tuple[Give, ...] = ()
 
     def structure(self, simulation: Simulation) -> Simulation:
-        """With one more [[compliance]] block each."""
+        """The simulation with one more [[compliance]] block for each spring."""
         return with_blocks(simulation, self.blocks(damping_time(simulation)))
 
     def blocks(self, time: float) -> tuple[Compliance, ...]:

@@ -40,7 +40,7 @@ class JointStiffness(Effect):
         return [b for b in there if not self.only_own or abs(np.array(b.axis) @ axis) > 0.9]
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
-        """Stiffnesses of the joint."""
+        """Names of the joint's stiffnesses."""
         return tuple(f"stiffness of {b.tie or place_name(b)}" for b in self._blocks(simulation))
 
     def priors(self, simulation: Simulation, priors: Priors) -> Priors:

@@ -29,7 +29,7 @@ class LocalResonator(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["LocalResonator", ...]:
-        """On every link."""
+        """One effect for each link."""
         mass = RESONATOR_MASS * float(np.mean([b[0] for b in simulation.elastic.inertia]))
         size, (low, high) = ADDED_PLACE_SD * link_size(simulation), simulation.robot.config.band_hz
         found = []

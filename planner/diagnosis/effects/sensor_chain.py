@@ -50,7 +50,7 @@ class SensorChain(Effect):
         return float(np.exp(psi[0])) if self.windowed else None
 
     def matrix(self, psi: np.ndarray) -> np.ndarray:
-        """A (3, 3)."""
+        """The sensor's matrix A (3, 3) at ψ."""
         return np.eye(3) + psi[-9:].reshape(3, 3)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:

@@ -18,7 +18,7 @@ class SensorRotation(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["SensorRotation", ...]:
-        """The one sensor."""
+        """The effect at the only sensor."""
         sd = float(np.deg2rad(SENSOR_ROTATION_SD_DEG))
         return (cls("sensor", tuple(Quantity(f"angle_{a}", "rad", 0.0, sd) for a in "xyz")),)
 

@@ -136,7 +136,7 @@ def _misfit_of_several(problem: LawProblem, law: LawAtJoints) -> LawMisfit:
 
 
 def _sloped(problem: LawProblem, at: LawMisfit) -> LawMisfit:
-    """With gradient and matrix too.
+    """The objective with its gradient and Gauss-Newton matrix.
 
     Those by the law and by the joints' own springs follow the swings in time; those by all other
     parameters take the joints as springs that are stiffer by what each hit makes of them.
@@ -232,7 +232,7 @@ def _weighed(
 def _with_normal(
     problem: LawProblem, at: LawMisfit, linear: LinearSlopes, slopes: np.ndarray
 ) -> LawMisfit:
-    """With gradient and Gauss-Newton matrix.
+    """The objective with its gradient and Gauss-Newton matrix.
 
     `slopes` (3 m, c, 3, F) are derivatives of FRFs by ν and by the joints' own springs, which are
     told by them alone.

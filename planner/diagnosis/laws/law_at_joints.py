@@ -38,7 +38,7 @@ class LawAtJoints:
 
     @property
     def effect(self) -> str:
-        """As the effect is called."""
+        """Name of the effect, such as "friction"."""
         return self.kind.effect
 
     @property

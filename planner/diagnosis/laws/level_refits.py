@@ -50,7 +50,7 @@ def base(recorded: Recorded, nominal: Simulation) -> Fit:
 
 
 def refits(recorded: Recorded, nominal: Simulation) -> tuple[Refit, ...]:
-    """Of every force level, weakest first."""
+    """The linear fit to the hits of each force level, weakest level first."""
     out = []
     for level in range(len(recorded.level_n)):
         of_level = [

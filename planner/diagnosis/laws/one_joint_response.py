@@ -74,7 +74,7 @@ class Seen:
 
 
 def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
-    """Of every hit, at the port with this number."""
+    """The port's poles and its angles without a torque, for every hit; `port` is its number."""
     n = len(system.mass)
     e = len(system.elasticity.stiffness)
     block = int(system.blocks[port])

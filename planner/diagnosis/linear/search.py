@@ -115,7 +115,7 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
 
 
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
-    """The best to the end, the others, and the first of them if need be, less closely."""
+    """The best rough fits (with `first`, the first one too), the best of them on all lines."""
     few = _and_best(rough, LAST) if first else best_of(rough, LAST)
     return _settled(problem, best_of(_settled(problem, few, CLOSE, STEPS), POINTED))
 
@@ -127,12 +127,12 @@ def _settled(
 
 
 def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
-    """The first, and the best so many."""
+    """The first fit, and the `most` best ones."""
     return list({id(f): f for f in (*rough[:1], *best_of(rough, most))}.values())
 
 
 def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """With masses and resonators of the best at other places, where it misses the noise."""
+    """Adds fits whose masses and resonators stand elsewhere, where the best misses the noise."""
     best = min(found.finalists, key=lambda f: f.per_value)
     if best.per_value <= AT_NOISE:
         return found
@@ -141,13 +141,13 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 
 def _rigid(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """With the best's resonators as masses that do not swing."""
+    """Adds fits in which the best's resonators are replaced by masses that do not swing."""
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
     return Found((*found.finalists, *_settled(problem, rigid(problem, best, effects))), found.left)
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
-    """With one more effect after the other, as long as each pays and the noise is not reached."""
+    """Adds one effect after the other while each lowers the misfit and noise is not reached."""
     single = min(f.per_value for f in found.finalists if len(f.effect.parts()) == 1)
     best, before = min(found.finalists, key=lambda f: f.per_value), single
     while AT_NOISE < best.per_value < 1 + (before - 1) / PAYS:
@@ -163,7 +163,7 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
 
 
 def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
-    """With what is promising beside one effect that explains nearly everything.
+    """Adds pairs of one effect that explains nearly everything and each other effect.
 
     Noise that is overstated hides a small second effect from `AT_NOISE`, not from the evidence.
     """
@@ -177,9 +177,9 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
 
 
 def _lessened(problem: Problem, found: Found) -> Found:
-    """With what is left of the best when an effect is dropped again, fitted from there.
+    """Adds the best explanations without one of their effects each, fitted from where they are.
 
-    It may have led the fit out of a wrong minimum, and then explain nothing itself.
+    An effect may have led the fit out of a wrong minimum and then explain nothing itself.
     """
     there = [f for f in found.finalists if f.effect.at]
     less: list[tuple[Fit, Effect]] = []
@@ -194,7 +194,7 @@ def _lessened(problem: Problem, found: Found) -> Found:
 
 
 def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """With each spring called far off that the best moved far from where it is stated."""
+    """Adds pairs of the best with the stiffness of each joint whose springs it moved far."""
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
     if not best.effect.at or best.per_value > AT_NOISE:
         return found
