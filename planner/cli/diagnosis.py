@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from planner.dataset.visits import Recorded as Visits
     from planner.diagnosis.diagnose import Explained
     from planner.diagnosis.finding import Finding
-    from planner.diagnosis.linear.predict import Agreement
+    from planner.diagnosis.linear.predict import ThreefoldSimilarity
     from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
     from planner.robot.robot import Robot
 
@@ -193,7 +193,7 @@ def _established(finding: "Finding", probability: float) -> dict[str, Any]:
     }
 
 
-def _agreement(of: "Agreement | None") -> dict[str, Any]:
+def _agreement(of: "ThreefoldSimilarity | None") -> dict[str, Any]:
     names = ("nominal", "refitted", "explained")
     if of is None:
         return {name: {"frac": None, "frobenius": None} for name in names}

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from planner.dataset.recorded import Recorded
     from planner.dynamics.simulation import Simulation
     from planner.identification.agreement import Similarity
-    from planner.identification.held_out import Judged
+    from planner.identification.held_out import JudgedIdentification
     from planner.identification.identify import Progress
     from planner.identification.result import Identification
     from planner.report.plot_files import Pictures
@@ -111,7 +111,11 @@ def identify(
 
 
 def _write(
-    answer: dict[str, Any], out: Path, robot: "Robot", recorded: "Recorded", judged: "Judged"
+    answer: dict[str, Any],
+    out: Path,
+    robot: "Robot",
+    recorded: "Recorded",
+    judged: "JudgedIdentification",
 ) -> None:
     """Write the identified robot, read it again, and say how well that one agrees."""
     from planner.dynamics.simulation import Simulation
@@ -130,7 +134,7 @@ def _write(
 def _drawn(
     pictures: "Pictures",
     recorded: "Recorded",
-    judged: "Judged",
+    judged: "JudgedIdentification",
     nominal: "Simulation",
     band_hz: tuple[float, float],
 ) -> dict[str, Any]:
@@ -156,7 +160,7 @@ def _told(progress: Callable[[str], None]) -> "Callable[[Progress], None]":
     return tell
 
 
-def _answer(robot: "Robot", recorded: "Recorded", judged: "Judged") -> dict[str, Any]:
+def _answer(robot: "Robot", recorded: "Recorded", judged: "JudgedIdentification") -> dict[str, Any]:
     final = judged.final
     aside = [recorded.poses[i] for i in judged.held_out]
     remarks = [*recorded.remarks, *final.remarks]

@@ -10,7 +10,7 @@ from planner.dataset.visits import Recorded as Visits
 from planner.design.discrimination import Telling, most_telling
 from planner.design.law_discrimination import most_telling_forces, undecided
 from planner.diagnosis.diagnose import Explained
-from planner.diagnosis.laws.one_joint import Laws
+from planner.diagnosis.laws.law_at_joints import Laws
 
 
 def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:

@@ -13,11 +13,11 @@ import numpy as np
 from planner.design.discrimination import Telling, expected_log_odds
 from planner.design.frequency_posterior import AXES
 from planner.diagnosis.laws.equivalent_stiffness import Receptances, receptances, system_of, waves
-from planner.diagnosis.laws.level_data import DIFFERENCE_ERROR, MODEL_ERROR, own_parameter
-from planner.diagnosis.laws.one_joint import Candidate, Laws, covariance
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit, Laws
+from planner.diagnosis.laws.level_data import own_parameter
 from planner.diagnosis.laws.starting_values import faded
 from planner.diagnosis.linear.predict import misfit_at
-from planner.diagnosis.linear_diagnosis import TIED
+from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR, TIED
 
 LOOKED_AT = 60  # poses: each takes tens of milliseconds
 APART = 2.0  # between two forces, so that hits of each are told from those of the other
@@ -83,7 +83,7 @@ def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray
     floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
     quiet = floor * (laws.hit.peak_n / force_n) ** 2
     for place, row in enumerate(q):
-        told = [_told(laws, c, row, force_n) for c in laws.candidates]
+        told = [_told(laws, c.law, row, force_n) for c in laws.candidates]
         for level in range(len(force_n) - 1):
             now = [(h[level] - h[-1], slope[level] - slope[-1]) for h, slope in told]
             scales = [
@@ -94,59 +94,60 @@ def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray
 
 
 def accelerance(
-    found: Receptances, candidate: Candidate, hit_force: np.ndarray, share: np.ndarray
+    found: Receptances, law: LawAtJoints, hit_force: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
     """FRFs (L, 3, 3, F) in m/s²/N of a system with a law at one of its joints.
 
     `hit_force` (F,) in N·s is the spectrum of a hit, `share` (L,) how many times as hard it is.
     """
-    own = found.port_port[:, candidate.port]
-    driven = found.port_hit[:, candidate.port].T  # (3, F)
+    port = int(law.ports[0])
+    own = found.port_port[:, port]
+    driven = found.port_hit[:, port].T  # (3, F)
     course = hit_force[:, None] * waves(found.s)
     stiffer = np.zeros((len(share), AXES), dtype=complex)
     for _ in range(ROUNDS):
         angle = driven / (1 + stiffer[..., None] * own)  # (L, 3, F) per N
         swing = share[:, None] * np.max(np.abs((angle @ course).real), axis=2)
-        slow = faded(candidate.law, np.maximum(swing, STILL), candidate.a)
-        stiffer = 0.5 * (stiffer + candidate.k * slow)
+        slow = faded(law.kind, np.maximum(swing, STILL), float(law.a[0]))
+        stiffer = 0.5 * (stiffer + law.k[0] * slow)
     angle = driven / (1 + stiffer[..., None] * own)
-    through = np.moveaxis(found.sensor_port[:, :, candidate.port], 0, 1)  # (3, F)
+    through = np.moveaxis(found.sensor_port[:, :, port], 0, 1)  # (3, F)
     torque = (stiffer[..., None] * angle)[:, None]  # (L, 1, 3, F)
     return found.s**2 * (np.moveaxis(found.sensor_hit, 0, 2) - through[:, None, :] * torque)
 
 
 def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> np.ndarray:
-    """What differences of FRFs (3, 3, F) weigh, as in `leveldata`."""
-    error = (MODEL_ERROR * np.abs(h - hardest)) ** 2 + (DIFFERENCE_ERROR * np.abs(h)) ** 2
+    """What differences of FRFs (3, 3, F) weigh, as in `laws.level_data`."""
+    error = (LAW_MODEL_ERROR * np.abs(h - hardest)) ** 2 + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2
     return np.sqrt(2 / (temper * (quiet + error)))
 
 
 def _told(
-    laws: Laws, candidate: Candidate, row: np.ndarray, force_n: np.ndarray
+    laws: Laws, law: LawAtJoints, row: np.ndarray, force_n: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """FRFs (L, 3, 3, F) of a law at a pose, and slopes (L, 3, 3, 3, F) by ν and its own spring."""
     hit = laws.hit
     misfit = misfit_at(laws.problem, laws.plain.effect, row[None], hit.frequency_hz, hit.rate_1_s)
     there, s = replace(laws.plain, misfit=misfit), misfit.setting.s[0]
-    stiffer = candidate.x.copy()
-    stiffer[_own(laws, candidate)] += STEP
-    here, moved = (receptances(system_of(there, x), 0, s) for x in (candidate.x, stiffer))
+    stiffer = law.x.copy()
+    stiffer[_own(laws, law)] += STEP
+    here, moved = (receptances(system_of(there, x), 0, s) for x in (law.x, stiffer))
     share = force_n / hit.peak_n
-    h = accelerance(here, candidate, hit.force, share)
+    h = accelerance(here, law, hit.force, share)
     near = [
-        accelerance(here, replace(candidate, nu=candidate.nu + step), hit.force, share)
+        accelerance(here, replace(law, nu=law.nu + step[:, None]), hit.force, share)
         for step in STEP * np.eye(2)
     ]
-    near.append(accelerance(moved, candidate, hit.force, share))
+    near.append(accelerance(moved, law, hit.force, share))
     return h, np.stack([(one - h) / STEP for one in near], axis=1)
 
 
-def _own(laws: Laws, candidate: Candidate) -> int:
-    return own_parameter(laws.plain, int(system_of(laws.plain).blocks[candidate.port]))
+def _own(laws: Laws, law: LawAtJoints) -> int:
+    return own_parameter(laws.plain, int(system_of(laws.plain).blocks[law.ports[0]]))
 
 
-def _precision(laws: Laws, candidate: Candidate) -> np.ndarray:
+def _precision(laws: Laws, candidate: LawMisfit) -> np.ndarray:
     """(3, 3) of ν and the own spring's logarithm, all else averaged out."""
-    full = covariance(candidate, laws.temper)
-    at = np.array([len(full) - 2, len(full) - 1, _own(laws, candidate)])
+    full = candidate.covariance(laws.temper)
+    at = np.array([len(full) - 2, len(full) - 1, _own(laws, candidate.law)])
     return np.linalg.inv(full[np.ix_(at, at)])

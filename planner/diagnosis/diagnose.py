@@ -6,12 +6,13 @@ from planner.dataset.recorded import Recorded
 from planner.dataset.visits import Recorded as Visits
 from planner.dataset.windowed import corrected
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.held_out_check import Judged, judge
+from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import beside_another, diagnose
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.verdict import ARTEFACTS, Together, linear_effects_apply, together
+from planner.diagnosis.thresholds import ARTEFACTS
+from planner.diagnosis.verdict import Together, linear_effects_apply, together
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, within
 
@@ -21,7 +22,7 @@ class Explained:
     """`recorded` as it was used, without artefacts; what explains it, judged; all candidates."""
 
     recorded: Recorded
-    judged: Judged
+    judged: JudgedDiagnosis
     whole: Together
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from planner.diagnosis.laws.one_joint import Laws
+    from planner.diagnosis.laws.law_at_joints import Laws
 
 
 @dataclass(frozen=True)

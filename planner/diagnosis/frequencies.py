@@ -13,9 +13,8 @@ from itertools import combinations
 import numpy as np
 from scipy.optimize import least_squares
 
-from planner.diagnosis.effects.combined import SECOND
-from planner.diagnosis.effects.effect import NOTHING, Quantity
-from planner.diagnosis.linear.evidence import TOLERATED, UNKNOWN_PARAMETERS
+from planner.diagnosis.effects.effect import Quantity
+from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT, TOLERATED, UNKNOWN_PARAMETERS
 
 Model = Callable[[Mapping[str, float]], np.ndarray]  # values by name to frequencies (n, m) in Hz
 STARTS = (-1.0, 0.0, 1.0)  # of a change's own value, in sds of its prior
@@ -97,7 +96,7 @@ def explain(
 
 def _log_prior(changes: tuple[Change, ...]) -> float:
     """As of effects in FRFs: nothing is as likely as all single ones, a second one less."""
-    return -len(changes) * np.log(NOTHING) + max(len(changes) - 1, 0) * np.log(SECOND)
+    return -len(changes) * np.log(NOTHING) + max(len(changes) - 1, 0) * np.log(SECOND_EFFECT)
 
 
 @dataclass(frozen=True, eq=False)

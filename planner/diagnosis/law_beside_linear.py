@@ -5,31 +5,31 @@ the simulation lacks spoils the fit of any law to the hits. Each is therefore as
 the other has told.
 """
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.search import ENOUGH
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.diagnosis.screens import force_levels
-from planner.diagnosis.write_explained import write_explained
-from planner.dynamics.simulation import Simulation
+from planner.diagnosis.thresholds import (
+    AT_NOISE,
+    LAW_BETTER,
+    LAW_CRUDE,
+    LAWS_OF_JOINTS,
+    PAYS,
+    UNKNOWN,
+)
+from planner.diagnosis.write_explained import explained_simulation
 from planner.progress import Tell, quietly
-from planner.robot.robot import Robot
 
-PAYS = 1.5  # factor by which a linear effect has to lower the misfit of averaged FRFs
-CRUDE = 3.0  # χ² per value from which a law leaves room for something beside it
 # What a joint's own law looks like on average: but not as closely as what is really there.
 OWN = "joint_stiffness", "angle_dependent_stiffness"
-BETTER = 1.5  # factor by which the linear effect then has to lower it
 
 
 def of_levels(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """What the force levels tell: laws of joints, or that nothing known explains them."""
-    return tuple(f for f in findings if f.effect in (*force_levels.LAWS, "unknown"))
+    return tuple(f for f in findings if f.effect in (*LAWS_OF_JOINTS, UNKNOWN))
 
 
 def leaves_room(findings: Sequence[Finding]) -> bool:
@@ -37,8 +37,8 @@ def leaves_room(findings: Sequence[Finding]) -> bool:
 
     Laws of several joints are not fitted closely enough to tell.
     """
-    laws = [f for f in findings if f.effect in force_levels.LAWS]
-    return len(laws) == 1 and laws[0].misfit > CRUDE
+    laws = [f for f in findings if f.effect in LAWS_OF_JOINTS]
+    return len(laws) == 1 and laws[0].misfit > LAW_CRUDE
 
 
 def beside(
@@ -62,12 +62,10 @@ def beside(
     pays = found.refitted.per_value > PAYS * linear.fit.per_value
     if not pays and found.verdict != "explained":
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        robot = found.problem.simulation.robot
-        path = write_explained(Path(folder), robot, found, linear)
-        again = force_levels.screen(recorded, Simulation(Robot.load(path)), single=True, tell=tell)
-    law = next((f for f in again if f.effect in force_levels.LAWS), None)
-    if law is None or law.misfit * BETTER > min(f.misfit for f in before):
+    explained = explained_simulation(found, linear)
+    again = force_levels.screen(recorded, explained, single=True, tell=tell)
+    law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)
+    if law is None or law.misfit * LAW_BETTER > min(f.misfit for f in before):
         return None
     kept = [f for f in findings if f not in before and f.effect != "joint_stiffness"]
     # Springs make up for what averages tell wrongly of the linear effect.
@@ -80,9 +78,10 @@ def beside(
 
 
 def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | None:
-    """The fewest linear effects with the fewest numbers: more of them imitate what bends.
+    """The candidate with the fewest effects, then numbers, among those that fit nearly as well.
 
-    Of alike ones the likeliest.
+    More effects and numbers imitate what the nonlinear joint does to averaged FRFs. Among equally
+    simple ones it is the likeliest.
     """
     lines = found.refitted.misfit.counts.sum()
     settled = [
@@ -98,7 +97,7 @@ def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | No
 
 
 def _numbers(candidate: Candidate) -> tuple[int, int]:
-    """Of effects, and of numbers that they may choose."""
+    """How many effects a candidate has, and how many free parameters those add."""
     assert candidate.fit is not None
     simulation = candidate.fit.misfit.setting.simulation
     chosen = (len(e.quantities) + len(e.springs(simulation)) for e in candidate.effects)
@@ -106,7 +105,7 @@ def _numbers(candidate: Candidate) -> tuple[int, int]:
 
 
 def _at_the_noise(candidate: Candidate) -> bool:
-    return candidate.fit is not None and candidate.fit.per_value <= ENOUGH
+    return candidate.fit is not None and candidate.fit.per_value <= AT_NOISE
 
 
 def _physical(candidate: Candidate) -> bool:

@@ -7,19 +7,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.diagnosis.effects import library
-from planner.diagnosis.effects.combined import SECOND
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.evidence import Weights, weigh
 from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle
 from planner.diagnosis.linear.search import Found, search
+from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.measured_frfs import common_band
 from planner.identification.objective import TOO_SOFT, stands
 from planner.progress import Tell, quietly
-
-TIED = 0.05  # probability that keeps a candidate in the set the data cannot tell apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +46,7 @@ class Diagnosis:
     verdict: str
     candidates: tuple[Candidate, ...]
     refitted: Fit
-    best: Fit  # of the candidates that are no more than fits
+    best: Fit  # of the likeliest candidate that is a fit, so not "unknown"
     temper: float
     seconds: float
     problem: Problem
@@ -111,10 +109,10 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
 
 
 def beside_another(found: Diagnosis) -> Diagnosis:
-    """The same where something has been found already: every effect is one more then."""
+    """The diagnosis beside an artefact: each effect is a second one then, and less likely."""
 
     def weight(c: Candidate) -> float:
-        return c.probability * (1.0 if c.places == (("none", None),) else SECOND)
+        return c.probability * (1.0 if c.places == (("none", None),) else SECOND_EFFECT)
 
     total = sum(map(weight, found.candidates))
     again = [replace(c, probability=weight(c) / total) for c in found.candidates]

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.linear.fit import FINE, Fit, Problem
+from planner.diagnosis.thresholds import RESIDUAL_CLEARLY, RESIDUAL_SHARE
 
 BANDS = 12
-CLEARLY = 2.0  # mean square residual, 1 at the noise
-SHARE = 0.25  # of the largest, that makes a band, pose or direction one of those that differ
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,4 +62,4 @@ def _mean(values: np.ndarray) -> float:
 
 
 def _stands_out(values: np.ndarray) -> np.ndarray:
-    return (values > CLEARLY) & (values > SHARE * values.max())
+    return (values > RESIDUAL_CLEARLY) & (values > RESIDUAL_SHARE * values.max())

@@ -12,9 +12,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
-
-LEAST = 0.9  # probability of the opposite artefact
-LEFT = 0.05  # of the correction, that at most is left of it
+from planner.diagnosis.thresholds import REVOKED_LEFT, REVOKING
 
 
 def taken_back(
@@ -42,11 +40,11 @@ def _undone(finding: Finding, found: Diagnosis) -> bool:
     part = next((e for e in first.effects if (e.name, e.at) == place), None)
     if part is None or first.fit is None or len(first.effects) < 2:
         return False
-    if sum(c.probability for c in found.candidates if place in c.places) < LEAST:
+    if sum(c.probability for c in found.candidates if place in c.places) < REVOKING:
         return False
     again = first.fit.parameters(found.temper, part)
     there, back = _size(finding.parameters), _size(again)
-    return there is not None and back is not None and abs(there + back) < LEFT * abs(there)
+    return there is not None and back is not None and abs(there + back) < REVOKED_LEFT * abs(there)
 
 
 def _size(parameters: dict[str, tuple[float, float, str]]) -> float | None:

@@ -12,15 +12,9 @@ import numpy as np
 
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
+from planner.diagnosis.thresholds import ARTEFACTS, SCREEN_PRIOR, SUREST, SUREST_SCREEN, UNKNOWN
+from planner.inference.evidence import probability as posterior
 
-ARTEFACTS = ("sensor_rotation", "channel_delay", "exponential_window", "sensor_gain", "polarity",
-             "swapped_axes")  # fmt: skip
-UNKNOWN = "unknown"
-PRIOR = 0.05  # of any one screen's effect before its data
-SUREST = 0.98  # screens approximate: none is surer than they were right on concealed cases
-# What is said first is never said surer than it was right: in 392 of the 433 concealed cases (seeds
-# 11001 to 16001) in which it was said with 90 % or more, before the latest had taught anything.
-HONEST = 0.92
 Place = tuple[str, str | None]
 
 
@@ -49,8 +43,7 @@ def linear_effects_apply(findings: Sequence[Finding]) -> bool:
 
 def probability(finding: Finding) -> float:
     """Of what a screen found, from its evidence."""
-    odds = finding.log_evidence + np.log(PRIOR / (1 - PRIOR))
-    return float(min(SUREST, finding.sure, 1 / (1 + np.exp(-np.clip(odds, -700.0, 700.0)))))
+    return min(SUREST_SCREEN, finding.sure, posterior(finding.log_evidence, SCREEN_PRIOR))
 
 
 def _ways(findings: Sequence[Finding]) -> tuple[tuple[tuple[Place, ...], float], ...]:
@@ -95,9 +88,9 @@ def together(
 
 
 def _honest(ranked: list[Ranked]) -> list[Ranked]:
-    """Most probable first, HONEST at most; the rest goes to "unknown", or from it to the next."""
+    """Most probable first, SUREST at most; the rest goes to "unknown", or from it to the next."""
     first = max(ranked, key=lambda r: r.probability)
-    rest = max(first.probability - HONEST, 0.0)
+    rest = max(first.probability - SUREST, 0.0)
     others = [r for r in ranked if r is not first]
     unknown = next((r for r in others if r.places == ((UNKNOWN, None),)), None)
     heir = unknown or max(others, key=lambda r: r.probability)

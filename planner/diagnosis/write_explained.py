@@ -1,20 +1,43 @@
-"""The explained robot as a folder: robot.toml with [[effects]], and its URDF."""
+"""The explained robot: as a simulation, or as a folder with robot.toml and its URDF."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import tomlkit
 
+from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
+from planner.robot.config import EffectTable, without_effects
 from planner.robot.robot import Robot
 from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
 
-DIGITS = 6
+DIGITS = 6  # significant ones in robot.toml: more than any diagnosis knows
+
+
+@dataclass(frozen=True, eq=False)
+class _Changes:
+    """What an explanation changes: springs of [[compliance]], new [[effects]], inertias."""
+
+    springs: tuple[dict[str, float], ...]
+    effects: tuple[dict[str, Any], ...]
+    bodies: tuple[str, ...]
+    inertia_change: np.ndarray  # (bodies, 10)
+
+
+def explained_simulation(diagnosis: Diagnosis, accepted: Candidate) -> Simulation:
+    """The refitted simulation with the accepted effects, as `write_explained` would write it."""
+    changes = _changes(diagnosis, accepted)
+    effects = [msgspec.convert(entry, EffectTable) for entry in changes.effects]
+    nominal = diagnosis.problem.simulation
+    return nominal.with_effects(changes.springs, effects, changes.bodies, changes.inertia_change)
 
 
 def write_explained(folder: Path, robot: Robot, diagnosis: Diagnosis, accepted: Candidate) -> Path:
@@ -23,53 +46,65 @@ def write_explained(folder: Path, robot: Robot, diagnosis: Diagnosis, accepted: 
     Springs and inertias are the refitted ones; each accepted effect is an [[effects]] block.
     Raises InputError where the files cannot be written; earlier ones of the same names go.
     """
-    found = accepted.fit
-    assert found is not None  # "unknown" is never accepted
     path = folder.absolute() / "robot.toml"
     if path == robot.path.absolute():
         raise InputError(f"--out {folder} holds the robot that was given; name another folder.")
-    urdf = folder / robot.urdf_path.name
-    bodies, change = _inertia_change(found, robot)
+    urdf, changes = folder / robot.urdf_path.name, _changes(diagnosis, accepted)
+    text, _ = urdf_with_inertias(robot, changes.bodies, changes.inertia_change)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        urdf.write_text(urdf_with_inertias(robot, bodies, change)[0], encoding="utf-8")
+        urdf.write_text(text, encoding="utf-8")
         copy_meshes(robot.urdf_path, urdf)
-        path.write_text(_toml(robot, diagnosis, accepted, found, urdf.name), encoding="utf-8")
+        path.write_text(_toml(robot, changes, urdf.name), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{folder} cannot be written ({error.strerror}); name another.") from None
     return path
 
 
-def _inertia_change(found: Fit, robot: Robot) -> tuple[tuple[str, ...], np.ndarray]:
+def _changes(diagnosis: Diagnosis, accepted: Candidate) -> _Changes:
+    found = accepted.fit
+    assert found is not None  # "unknown" is never accepted
     a, b = found.misfit.split
+    elasticity = found.misfit.parametrisation.elasticity(found.x[:a])
+    count = len(without_effects(diagnosis.problem.simulation.robot.config).compliance)
+    springs = tuple(
+        {kind: _round(float(getattr(elasticity, kind)[i])) for kind in KINDS} for i in range(count)
+    )
+    there = accepted.effects if accepted.effects[0].at else ()
+    effects = tuple(_entry(diagnosis, accepted, found, effect) for effect in there)
     change = found.misfit.parametrisation.inertia_change(found.x[a:b])
-    return found.misfit.setting.simulation.elastic.bodies, change
+    return _Changes(springs, effects, found.misfit.setting.simulation.elastic.bodies, change)
 
 
-def _toml(robot: Robot, diagnosis: Diagnosis, accepted: Candidate, found: Fit, urdf: str) -> str:
+def _entry(diagnosis: Diagnosis, accepted: Candidate, found: Fit, effect: Effect) -> dict[str, Any]:
+    """An [[effects]] block of robot.toml."""
+    values = found.parameters(diagnosis.temper, effect)
+    told = {
+        _key(n): {"value": _round(v), "sd": _round(sd), "unit": unit}
+        for n, (v, sd, unit) in values.items()
+    }
+    elements = effect.elements(found.misfit.setting.simulation, values)
+    lists = {
+        name: [{k: _rounded(v) for k, v in block.items()} for block in blocks]
+        for name, blocks in elements.items()
+    }
+    probability = _round(accepted.probability)
+    whole = {"effect": effect.name, "at": effect.at, "probability": probability}
+    return {**whole, "parameters": told, **lists}
+
+
+def _toml(robot: Robot, changes: _Changes, urdf: str) -> str:
     document = tomlkit.parse(robot.path.read_text(encoding="utf-8"))
     document["urdf"] = urdf
-    springs = found.misfit.parametrisation.elasticity(found.x[: found.misfit.split[0]])
     listed: Any = document["compliance"]
-    for number, block in enumerate(listed):
-        for kind in KINDS:
-            value = _round(float(getattr(springs, kind)[number]))
+    for block, values in zip(listed, changes.springs, strict=True):
+        for kind, value in values.items():
             if value or kind in block:
                 block[kind] = value
     effects: Any = document.get("effects", tomlkit.aot())
-    for effect in accepted.effects if accepted.effects[0].at else ():
-        values = found.parameters(diagnosis.temper, effect)
+    for values in changes.effects:
         entry = tomlkit.table()
-        entry |= {"effect": effect.name, "at": effect.at}
-        entry["probability"] = _round(accepted.probability)
-        told = {
-            _key(n): {"value": _round(v), "sd": _round(sd), "unit": unit}
-            for n, (v, sd, unit) in values.items()
-        }
-        entry["parameters"] = told
-        elements = effect.elements(found.misfit.setting.simulation, values)
-        for name, blocks in elements.items():
-            entry[name] = [{k: _rounded(v) for k, v in block.items()} for block in blocks]
+        entry |= values
         effects.append(entry)
     if len(effects):
         document["effects"] = effects

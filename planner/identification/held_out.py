@@ -19,7 +19,7 @@ FEWEST = 3  # poses of which one can be spared
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class JudgedIdentification:
     """Final identification on all poses, and what `trial`, which lacked some, made of these.
 
     `held_out` holds their indices; where there are none, trial and similarities are None.
@@ -71,7 +71,7 @@ def identify_judged(
     priors: Priors | None = None,
     held_out: int | None = None,
     **options: Any,
-) -> Judged:
+) -> JudgedIdentification:
     """Identify without the held-out poses, judge there, then refine on all poses.
 
     Arguments as `identify`, whose other options are passed on; `held_out` is how many.
@@ -84,4 +84,4 @@ def identify_judged(
         there = [frfs[i] for i in aside], q[list(aside)], band
         judged = fit_similarity(simulation, *there), fit_similarity(warm.simulation, *there)
     final = identify(frfs, q, simulation, priors, warm=warm, **options)
-    return Judged(final, warm, before, aside, *judged)
+    return JudgedIdentification(final, warm, before, aside, *judged)

@@ -1,13 +1,37 @@
-"""Levenberg-Marquardt on an objective that gives its own Gauss-Newton matrix."""
+"""Damped least squares (Levenberg-Marquardt): the one solver behind every fit.
+
+The caller gives the objective with its gradient and Gauss-Newton matrix. `propose` and `accept`
+take one step at a time, so that several fits can be advanced round by round and their points
+evaluated together; `minimise` is the loop for a single fit.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import scipy.linalg
 
 LONGEST = 1.5  # no parameter moves farther in one step: a factor of 4.5 for a logarithm
+
+
+class GaussNewton(Protocol):
+    """An objective at a point; ∞ as its value where the point cannot be."""
+
+    @property
+    def value(self) -> float:
+        """−ln of the posterior density but for a constant, or χ²/2."""
+        ...
+
+    @property
+    def gradient(self) -> np.ndarray:
+        """(P,) of the value."""
+        ...
+
+    @property
+    def normal(self) -> np.ndarray:
+        """(P, P) Gauss-Newton matrix of the value: JᵀWJ, the prior's precision included."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +44,119 @@ class Quadratic:
     chi2: float
 
 
-Q = TypeVar("Q", bound=Quadratic)
+Q = TypeVar("Q", bound=GaussNewton)
+
+
+@dataclass(frozen=True)
+class Damping:
+    """How the damping follows what the steps gain; it is relative to the matrix's diagonal.
+
+    After Nielsen (1999) unless `lighter` and `heavier` give the factors after a step that gained
+    and after one that did not. It never falls below `least`; beyond `most` the fit is stuck.
+    """
+
+    first: float = 1e-2
+    least: float = 1e-9
+    most: float = 1e12
+    lighter: float | None = None
+    heavier: float = 2.0
+
+    def eased(self, damping: float, share: float) -> float:
+        """The damping after a step that gained `share` of what the quadratic model expected."""
+        factor = self.lighter
+        if factor is None:
+            factor = max(1 / 5, 1 - (2 * share - 1) ** 3)
+        return max(self.least, damping * factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """How far one step goes, and the box that it stays in; (P,) each, or one for all entries.
+
+    A step that would exceed `longest` is shortened as a whole, with `entrywise` entry by entry.
+    """
+
+    longest: float | np.ndarray = LONGEST
+    lower: float | np.ndarray = -np.inf
+    upper: float | np.ndarray = np.inf
+    entrywise: bool = False
+
+    def within(self, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Where a step from x leads."""
+        if self.entrywise:
+            step = np.clip(step, -1.0 * self.longest, self.longest)
+        else:
+            step = step * min(1.0, 1 / max(float(np.max(np.abs(step) / self.longest)), 1e-300))
+        return np.clip(x + step, self.lower, self.upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Iterate(Generic[Q]):
+    """A fit between two steps: where it is, the objective there, and what the next step takes.
+
+    `gained` is by how much the last step lowered the value, 0 where it was not taken.
+    """
+
+    x: np.ndarray
+    at: Q
+    damping: float
+    rule: Damping
+    limits: Limits
+    heavier: float
+    gained: float = 0.0
+
+    @property
+    def stuck(self) -> bool:
+        """Whether no step, however short, has gained anything."""
+        return self.damping > self.rule.most
+
+    def restarted(self, at: Q, rule: Damping) -> "Iterate[Q]":
+        """The same point with a new objective, as after a change of the data or of the rule."""
+        return begin(self.x, at, rule, self.limits)
+
+
+def begin(
+    x: np.ndarray, at: Q, rule: Damping | None = None, limits: Limits | None = None
+) -> Iterate[Q]:
+    """The fit at x (P,), where the objective is `at`."""
+    rule = rule or Damping()
+    return Iterate(x, at, rule.first, rule, limits or Limits(), rule.heavier)
+
+
+def propose(state: Iterate[Q]) -> np.ndarray:
+    """The point (P,) that the damped Gauss-Newton step leads to."""
+    # In units in which the diagonal is 1: parameters of any size are solved for as well.
+    scale = np.diagonal(state.at.normal)
+    unit = 1 / np.sqrt(np.where(scale > 0, scale, 1.0))
+    damped = state.at.normal * np.outer(unit, unit) + state.damping * np.eye(len(unit))
+    downhill = -unit * state.at.gradient
+    try:
+        factor = scipy.linalg.cho_factor(damped, check_finite=False)
+        step = unit * scipy.linalg.cho_solve(factor, downhill, check_finite=False)
+    except np.linalg.LinAlgError:  # rounding has left a direction without curvature
+        step = unit * np.linalg.lstsq(damped, downhill, rcond=None)[0]
+    return state.limits.within(state.x, step)
+
+
+def expected(state: Iterate[Q], x: np.ndarray) -> float:
+    """By how much the quadratic model says that the value is lower at x (P,)."""
+    step = x - state.x
+    return -float(state.at.gradient @ step + step @ state.at.normal @ step / 2)
+
+
+def accept(state: Iterate[Q], x: np.ndarray, at: Q | None) -> Iterate[Q]:
+    """The fit once the objective at the proposed x (P,) is known: moved there if that is better.
+
+    `at` is None, or its value not finite, where x cannot be; the next step is shorter then.
+    """
+    rule = state.rule
+    gained = state.at.value - at.value if at is not None and np.isfinite(at.value) else -np.inf
+    if at is not None and gained > 0:
+        share = gained / max(expected(state, x), 1e-300) if rule.lighter is None else 1.0
+        eased = rule.eased(state.damping, share)
+        return replace(state, x=x, at=at, damping=eased, heavier=rule.heavier, gained=gained)
+    heavier = state.heavier * (2.0 if rule.lighter is None else 1.0)
+    return replace(state, damping=state.damping * state.heavier, heavier=heavier, gained=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +169,49 @@ class Minimum(Generic[Q]):
     converged: bool
 
 
+def minimise(
+    objective: Callable[[np.ndarray], Q | None],
+    start: np.ndarray,
+    tolerance: float,
+    most: int,
+    progress: Callable[[int, float], None] | None = None,
+    longest: float | np.ndarray = LONGEST,
+    at: Q | None = None,
+    rule: Damping | None = None,
+    settled: Callable[[Iterate[Q], np.ndarray, Q], bool] | None = None,
+) -> Minimum[Q]:
+    """Least value from `start`, until a step would gain less than `tolerance` of it.
+
+    Args:
+        objective: the objective at x (P,); None, or a value that is not finite, where x cannot be.
+        start: x (P,) to begin at, where the objective is finite.
+        tolerance: share of the value that a step must be expected to gain.
+        most: steps at most, those included that gained nothing.
+        progress: is told each step's number and the value before it.
+        longest: by how much an entry may move in one step, one for all or (P,).
+        at: the objective at `start`, where that is known.
+        rule: of the damping, Nielsen's unless given.
+        settled: a further rule to stop by: told the fit before a step, the proposed x and the
+            objective there.
+    """
+    here = at if at is not None else objective(start)
+    assert here is not None, "the objective is not defined where the fit begins"
+    state = begin(start, here, rule, Limits(longest))
+    for iteration in range(1, most + 1):
+        if progress:
+            progress(iteration, state.at.value)
+        x = propose(state)
+        if expected(state, x) <= tolerance * state.at.value:
+            return Minimum(state.x, state.at, iteration, True)
+        trial, before = objective(x), state
+        state = accept(state, x, trial)
+        if trial is not None and settled is not None and settled(before, x, trial):
+            return Minimum(state.x, state.at, iteration, True)
+        if state.stuck:
+            return Minimum(state.x, state.at, iteration, False)
+    return Minimum(state.x, state.at, most, False)
+
+
 def inverse(precision: np.ndarray) -> np.ndarray:
     """Covariance (p, p) of a precision that is positive, but for rounding: so is the answer.
 
@@ -42,46 +221,3 @@ def inverse(precision: np.ndarray) -> np.ndarray:
     values, vectors = scipy.linalg.eigh(precision * np.outer(unit, unit))
     values = np.maximum(values, np.finfo(float).eps * len(unit) * values[-1])
     return np.outer(unit, unit) * ((vectors / values) @ vectors.T)
-
-
-def minimise(
-    objective: Callable[[np.ndarray], Q],
-    start: np.ndarray,
-    tolerance: float,
-    most: int,
-    progress: Callable[[int, float], None] | None = None,
-    longest: float | np.ndarray = LONGEST,
-    at: Q | None = None,
-) -> Minimum[Q]:
-    """Least value from `start`, until a step would gain less than `tolerance` of it.
-
-    `at` is the objective there, where that is known.
-
-    Damping follows Nielsen 1999; each step is shortened so that no entry moves by over
-    `longest` (that of each, or one for all).
-    """
-    x, at = start, at or objective(start)
-    damping, grow = 1e-2, 2.0
-    for iteration in range(1, most + 1):
-        if progress:
-            progress(iteration, at.value)
-        scale = np.diagonal(at.normal)
-        # In units in which the diagonal is 1: parameters of any size are solved for as well.
-        unit = 1 / np.sqrt(scale)
-        damped = at.normal * np.outer(unit, unit) + damping * np.eye(len(unit))
-        factor = scipy.linalg.cho_factor(damped, overwrite_a=True, check_finite=False)
-        step = -unit * scipy.linalg.cho_solve(factor, unit * at.gradient, check_finite=False)
-        step *= min(1.0, 1 / max(float(np.max(np.abs(step) / longest)), 1e-300))
-        expected = -(at.gradient @ step + step @ at.normal @ step / 2)
-        if expected <= tolerance * at.value:
-            return Minimum(x, at, iteration, True)
-        trial = objective(x + step)
-        gain = (at.value - trial.value) / expected if np.isfinite(trial.value) else -1.0
-        if gain > 0:
-            x, at = x + step, trial
-            damping, grow = max(damping * max(1 / 5, 1 - (2 * gain - 1) ** 3), 1e-9), 2.0
-        else:
-            damping, grow = damping * grow, grow * 2
-            if damping > 1e12:
-                return Minimum(x, at, iteration, False)
-    return Minimum(x, at, most, False)

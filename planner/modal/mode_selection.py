@@ -19,7 +19,7 @@ FLOOR = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PoleFit:
     """Refined poles, the variance that weighted them, and the excess of χ² per line."""
 
     refined: Refined
@@ -31,7 +31,7 @@ class Fit:
         return float(np.interp(frequency_hz, lines_hz, self.excess))
 
 
-def fit(data: Data, start: np.ndarray) -> Fit:
+def fit(data: Data, start: np.ndarray) -> PoleFit:
     """Fit from starting poles (m,), leaving out and adding modes until neither helps."""
     current = _refine(data, start, None)
     current = _prune(data, current)
@@ -48,7 +48,7 @@ def fit(data: Data, start: np.ndarray) -> Fit:
     return _unsplit(data, current)
 
 
-def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
+def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:
     """Refined fit; an unknown variance is taken from the error itself."""
     power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = data.variance
@@ -67,7 +67,7 @@ def _refine(data: Data, poles: np.ndarray, before: Fit | None) -> Fit:
             variance = _scatter(data, refined, power)
     assert refined is not None
     error = _error(data, refined)
-    return Fit(refined, variance, excess(data, error, variance, refined.degrees))
+    return PoleFit(refined, variance, excess(data, error, variance, refined.degrees))
 
 
 def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
@@ -126,7 +126,7 @@ def excess(data: Data, error: np.ndarray, variance: np.ndarray, degrees: int) ->
     return data.correlated * np.maximum(1.0, local)
 
 
-def _prune(data: Data, current: Fit) -> Fit:
+def _prune(data: Data, current: PoleFit) -> PoleFit:
     """Leave out modes that the data do not carry, the weakest of each neighbourhood first."""
     while current.refined.poles.size > 1:
         weak = weakness(data, current)
@@ -143,7 +143,7 @@ def _prune(data: Data, current: Fit) -> Fit:
     return current
 
 
-def _unsplit(data: Data, current: Fit) -> Fit:
+def _unsplit(data: Data, current: PoleFit) -> PoleFit:
     """One pole for twins of one shape: hit directions that disagree split a mode in two.
 
     Between two hits a mode moves a little (warmth, amplitude, a clamp that settles); its second
@@ -158,7 +158,7 @@ def _unsplit(data: Data, current: Fit) -> Fit:
     return current
 
 
-def _twins(data: Data, current: Fit) -> tuple[int, int] | None:
+def _twins(data: Data, current: PoleFit) -> tuple[int, int] | None:
     if data.response.shape[0] < 2:
         return None
     refined = current.refined
@@ -173,7 +173,7 @@ def _twins(data: Data, current: Fit) -> tuple[int, int] | None:
     return None
 
 
-def weakness(data: Data, current: Fit) -> np.ndarray:
+def weakness(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) above 1 where a mode is not established: no fall of χ², blurred, or too damped."""
     refined = current.refined
     m = refined.poles.size
@@ -186,13 +186,13 @@ def weakness(data: Data, current: Fit) -> np.ndarray:
     return np.max([found, blurred, damped], axis=0)
 
 
-def scales(data: Data, current: Fit) -> np.ndarray:
+def scales(data: Data, current: PoleFit) -> np.ndarray:
     """(m,) factor on the covariance of each mode, from the error around it."""
     frequency = np.abs(current.refined.poles) / (2 * np.pi)
     return np.array([current.scale_at(f, data.frequency_hz) for f in frequency])
 
 
-def _worth(data: Data, before: Fit, after: Fit) -> bool:
+def _worth(data: Data, before: PoleFit, after: PoleFit) -> bool:
     weight = 2 / before.variance
     rise = np.sum(weight * np.abs(_error(data, before.refined)) ** 2)
     rise -= np.sum(weight * np.abs(_error(data, after.refined)) ** 2)
@@ -203,7 +203,7 @@ def _worth(data: Data, before: Fit, after: Fit) -> bool:
     return bool(rise > data.threshold * scale)
 
 
-def _missing(data: Data, current: Fit, tried: list[complex]) -> complex | None:
+def _missing(data: Data, current: PoleFit, tried: list[complex]) -> complex | None:
     """Pole of the atom that would lower χ² most, if by more than chance can (None: nowhere)."""
     weight = (2 / current.variance / current.excess).reshape(data.entries, -1)
     error = weight * _error(data, current.refined).reshape(data.entries, -1)

@@ -9,7 +9,7 @@ that overlap, or modes outside the band that the out-of-band terms do not descri
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.mode_selection import Fit, scales
+from planner.modal.mode_selection import PoleFit, scales
 from planner.modal.refine import Refined, refine
 
 CUT = 0.12  # of the band's span, taken away above, then below
@@ -17,7 +17,7 @@ LEAST_LINES = 32
 MAX_ITERATIONS = 8  # the start is next to the answer
 
 
-def inflation(data: Data, fitted: Fit, shared: np.ndarray) -> np.ndarray:
+def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
     """(m,) factors ≥ 1 on the covariance of each mode for what noise does not explain.
 
     For poles in the s-plane (accelerance). `shared` (2m, 2m) is the covariance of the poles from
@@ -47,7 +47,7 @@ def _parts(data: Data) -> list[slice]:
     return [p for p in parts if p.stop - p.start >= LEAST_LINES]
 
 
-def _fit(data: Data, fitted: Fit, part: slice) -> Refined:
+def _fit(data: Data, fitted: PoleFit, part: slice) -> Refined:
     return refine(
         data.lines.part(part),
         data.response[..., part],

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.mode_selection import Fit, fit, model, scales, strongest, weakness
+from planner.modal.mode_selection import PoleFit, fit, model, scales, strongest, weakness
 from planner.modal.model_check import inflation
 from planner.modal.plscf import PoleSet, plscf
 from planner.modal.refine import Refined, shared_error
@@ -38,7 +38,7 @@ class Identification:
     modes: tuple[Identified, ...]
     data: Data
     diagram: Diagram
-    fit: Fit
+    fit: PoleFit
     fit_error: float  # ‖H − fit‖/‖H‖
     order: int
 
@@ -74,7 +74,7 @@ def ladder(top: int) -> tuple[int, ...]:
     return tuple(sorted(orders | {top}))
 
 
-def _modes(data: Data, fitted: Fit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+def _modes(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
     refined = fitted.refined
     m = refined.poles.size
     scale = scales(data, fitted)

@@ -12,22 +12,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.descend import descend
+from planner.inference.least_squares import Damping, Iterate, minimise
 from planner.modal.residues import Lines, Residues, basis, basis_slope, unpack
 
 MAX_ITERATIONS = 30
+# Few lines around a resonance are fitted nearly quadratically: the damping may vanish at once.
+DAMPING = Damping(first=1e-3, least=0.0, most=1e8, lighter=0.1, heavier=10.0)
+STILL = 1e-3  # standard deviations by which the poles move in a step that is the last
+NO_GAIN = 1e-9  # of χ²: what a step gains by rounding alone
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """The problem at one set of poles: χ², step equations and what they rest on."""
+class ReducedFit:
+    """The problem at one set of poles, residues at their best: χ², its slope and curvature."""
 
     chi2: float
     coefficients: np.ndarray  # (entries, columns)
-    gradient: np.ndarray  # (2m,)
-    hessian: np.ndarray  # (2m, 2m)
+    gradient: np.ndarray  # (2m,) of χ²/2
+    normal: np.ndarray  # (2m, 2m) JᵀWJ
     inverse: np.ndarray  # (entries, columns, columns) of the linear normal matrix
     sensitivity: np.ndarray  # (entries, columns, 2m): change of coefficients with the poles
+
+    @property
+    def value(self) -> float:
+        """χ²/2, which is minimised."""
+        return self.chi2 / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +51,7 @@ class Refined:
     residue_variance: np.ndarray  # (outputs, inputs, 2, m) of real and imaginary parts
     significance: np.ndarray  # (m,) rise of χ² if the mode were left out, poles of others held
     converged: bool
-    point: Point
+    point: ReducedFit
 
 
 def refine(
@@ -64,14 +73,30 @@ def refine(
     weight = 2 / variance.reshape(-1, count)
     poles = np.asarray(poles, complex)
 
-    def evaluate(parts: np.ndarray) -> Point:
+    def evaluate(parts: np.ndarray) -> ReducedFit:
         return _evaluate(lines, data, weight, _complex(parts), residual_terms)
 
+    def objective(parts: np.ndarray) -> ReducedFit | None:
+        return evaluate(parts) if allowed(_complex(parts)) else None
+
     start = np.concatenate([poles.real, poles.imag])
-    parts, point, converged = descend(
-        evaluate, start, lambda parts: allowed(_complex(parts)), max_iterations
-    )
-    return _finish(lines, _complex(parts), point, (outputs, inputs), count, converged)
+    found = minimise(
+        objective, start, 0.0, max_iterations,
+        longest=np.inf, at=evaluate(start), rule=DAMPING, settled=_settled,
+    )  # fmt: skip
+    shape = outputs, inputs
+    return _finish(lines, _complex(found.x), found.at, shape, count, found.converged)
+
+
+def _settled(before: Iterate[ReducedFit], parts: np.ndarray, point: ReducedFit) -> bool:
+    """Whether a step changed nothing: far below a standard deviation, rounding may make it worse.
+
+    A short step tells nothing as long as damping keeps it short.
+    """
+    sds = np.abs(parts - before.x) * np.sqrt(np.maximum(np.diag(before.at.normal), 0.0))
+    gain = abs(before.at.chi2 - point.chi2)
+    small = np.max(sds) < STILL or gain < NO_GAIN * before.at.chi2
+    return bool(small and before.damping < DAMPING.first)
 
 
 def shared_error(
@@ -110,7 +135,7 @@ def _complex(parts: np.ndarray) -> np.ndarray:
 
 def _evaluate(
     lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
-) -> Point:
+) -> ReducedFit:
     m = poles.size
     linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
     p = linear.shape[0]
@@ -128,15 +153,15 @@ def _evaluate(
     turn = slope_turn(coefficients / norm[:p], m) * norm[p:, None]
     mixed = gram[:, :p, p:] @ turn
     sensitivity = -inverse @ mixed
-    gradient = np.einsum("eka,ek->a", turn, cross[:, p:])
-    gradient -= np.einsum("eka,ek->a", mixed, coefficients)
+    gradient = np.einsum("eka,ek->a", mixed, coefficients)
+    gradient -= np.einsum("eka,ek->a", turn, cross[:, p:])
     jtj = turn.transpose(0, 2, 1) @ gram[:, p:, p:] @ turn
-    hessian = np.sum(jtj + mixed.transpose(0, 2, 1) @ sensitivity, axis=0)
-    return Point(
+    normal = np.sum(jtj + mixed.transpose(0, 2, 1) @ sensitivity, axis=0)
+    return ReducedFit(
         max(chi2, 0.0),
         coefficients / norm[:p],
         gradient,
-        hessian,
+        normal,
         inverse / norm[:p, None] / norm[:p],
         sensitivity / norm[:p, None],
     )
@@ -174,14 +199,14 @@ def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
 def _finish(
     lines: Lines,
     poles: np.ndarray,
-    point: Point,
+    point: ReducedFit,
     shape: tuple[int, int],
     count: int,
     converged: bool,
 ) -> Refined:
     m = poles.size
     entries, p = point.coefficients.shape
-    covariance = np.linalg.pinv(point.hessian, hermitian=True)
+    covariance = np.linalg.pinv(point.normal, hermitian=True)
     spread = np.einsum("eka,ab,ekb->ek", point.sensitivity, covariance, point.sensitivity)
     variance = np.einsum("ekk->ek", point.inverse) + spread
     residues = unpack(point.coefficients.reshape(*shape, p), m)
@@ -198,7 +223,7 @@ def _finish(
     )
 
 
-def _significance(point: Point, m: int) -> np.ndarray:
+def _significance(point: ReducedFit, m: int) -> np.ndarray:
     """Wald statistic of each mode's residues: 2 · entries degrees of freedom without a mode."""
     index = np.stack([np.arange(m), m + np.arange(m)], axis=1)
     value = point.coefficients[:, index]

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from planner.diagnosis.thresholds import ARTEFACTS, LAWS_OF_JOINTS
 from planner.frf import metrics
 
 BINS = 10
 Z90 = 1.645
-NONLINEAR = ("nonlinear_stiffness", "friction", "backlash")
-ARTEFACTS = ("sensor_rotation", "sensor_gain", "polarity", "channel_delay", "exponential_window")
+
 Place = tuple[str, str | None]
 
 
@@ -145,7 +145,7 @@ def summary(scored: Sequence[Scored]) -> dict[str, Any]:
         return {"right": good, "of": len(chosen), "share": good / len(chosen) if chosen else None}
 
     groups = {g: [s for s in scored if s.group == g] for g in sorted({s.group for s in scored})}
-    linear = [s for s in groups.get("single", []) if s.true[0][0] not in (*NONLINEAR, "drift")]
+    linear = [s for s in groups.get("single", []) if s.true[0][0] not in (*LAWS_OF_JOINTS, "drift")]
     physics = [
         s for s in groups.get("artefact", [])
         if any(name not in (*ARTEFACTS, "unknown", "none") for name, _ in s.said)

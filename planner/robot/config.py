@@ -65,7 +65,7 @@ class Harmonic(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sine: float
 
 
-class Told(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ParameterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A parameter of an effect, as the diagnosis found it."""
 
     value: float
@@ -73,7 +73,7 @@ class Told(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     unit: str
 
 
-class Effect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class EffectTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Physics that the diagnosis found missing, and what it adds to the simulation.
 
     `payload` may have a negative mass here, where a stated one was too large.
@@ -82,7 +82,7 @@ class Effect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     effect: str
     at: str
     probability: float = 1.0
-    parameters: dict[str, Told] = {}
+    parameters: dict[str, ParameterTable] = {}
     compliance: tuple[Compliance, ...] = ()
     payload: tuple[Payload, ...] = ()
     resonator: tuple[Resonator, ...] = ()
@@ -124,9 +124,22 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     collision: CollisionTable = CollisionTable()
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[EffectTable, ...] = ()
     resonator: tuple[Resonator, ...] = ()
     harmonic: tuple[Harmonic, ...] = ()
+
+
+LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
+
+
+def without_effects(config: RobotConfig) -> RobotConfig:
+    """The config as its file has it: the lists without what effects add."""
+    own = {
+        name: getattr(config, name)[:-count]
+        for name in LISTS
+        if (count := sum(len(getattr(e, name)) for e in config.effects))
+    }
+    return msgspec.structs.replace(config, **own)
 
 
 def load_config(path: Path, geometric_stiffness: bool = True) -> RobotConfig:
@@ -138,14 +151,14 @@ def load_config(path: Path, geometric_stiffness: bool = True) -> RobotConfig:
     if config.geometric_stiffness is None:
         config = msgspec.structs.replace(config, geometric_stiffness=geometric_stiffness)
     _check(config, path)
-    return _with_effects(config, path)
+    return with_effects(config, path)
 
 
-def _with_effects(config: RobotConfig, path: Path) -> RobotConfig:
-    lists = ("compliance", "payload", "resonator", "harmonic")
+def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
+    """The config as its file has it, with what its effects add; InputError where that is wrong."""
     added = {
         name: (*getattr(config, name), *(x for e in config.effects for x in getattr(e, name)))
-        for name in lists
+        for name in LISTS
     }
     whole = msgspec.structs.replace(config, **added)
     _check_compliances(whole, path)

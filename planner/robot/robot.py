@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.config import RobotConfig, load_config
-from planner.robot.urdf import build_model, joint_axes, read_urdf
+from planner.robot.config import RobotConfig, load_config, with_effects
+from planner.robot.urdf import build_model, joint_axes, parse_urdf, read_urdf
 
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 # A link and the joint that carries it may share a name; the link is meant.
@@ -41,7 +41,20 @@ class Robot:
         """
         config = load_config(robot_toml, geometric_stiffness)
         urdf = (robot_toml.parent / config.urdf).resolve()
-        root = read_urdf(urdf, robot_toml)
+        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml))
+
+    def described(self, config: RobotConfig, urdf_text: str) -> "Robot":
+        """The robot that its two files describe with this config and text in their stead.
+
+        `config` is as the file has it: its lists are without what its effects add.
+        """
+        root = parse_urdf(urdf_text, self.urdf_path)
+        return self._built(with_effects(config, self.path), self.path, self.urdf_path, root)
+
+    @classmethod
+    def _built(
+        cls, config: RobotConfig, robot_toml: Path, urdf: Path, root: ElementTree.Element
+    ) -> "Robot":
         text = ElementTree.tostring(root, encoding="unicode")
         model = build_model(text, urdf)
         axes = joint_axes(root, tuple(model.names)[1:])

@@ -21,7 +21,7 @@ FIXED, TURNING = ("fixed",), ("revolute", "continuous")
 def read_urdf(urdf: Path, robot_toml: Path) -> ElementTree.Element:
     """The checked XML; continuous joints are given limits of ±180°. Raises InputError."""
     try:
-        root = ElementTree.fromstring(urdf.read_bytes())
+        text = urdf.read_bytes()
     except FileNotFoundError:
         raise InputError(
             f"{robot_toml}: its URDF {urdf} does not exist; correct the entry urdf."
@@ -31,6 +31,13 @@ def read_urdf(urdf: Path, robot_toml: Path) -> ElementTree.Element:
             f"{robot_toml}: its URDF {urdf} cannot be read ({error.strerror}); correct the entry "
             f"urdf."
         ) from None
+    return parse_urdf(text, urdf)
+
+
+def parse_urdf(text: bytes | str, urdf: Path) -> ElementTree.Element:
+    """The same of a URDF's text; errors name the file `urdf`."""
+    try:
+        root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
     if root.tag != "robot":

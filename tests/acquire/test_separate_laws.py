@@ -16,7 +16,7 @@ from planner.dataset.visits import Recorded, Visit
 from planner.design.law_discrimination import accelerance, forces_n, law_separation
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import receptances, system_of
-from planner.diagnosis.laws.one_joint import Candidate, Laws
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit, Laws
 from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
 from planner.diagnosis.laws.torque_laws import LAWS
 from planner.diagnosis.linear.drift_fit import problem_of
@@ -58,9 +58,11 @@ def laws_of(cell, *numbers):
     d = len(plain.x) + 2
     made = []
     for law, share, angle in numbers:
-        nu = np.array([share if law.signed else np.log(share), np.log(angle)])
-        candidate = Candidate(law, PORT, scale, np.log(angle), plain.x, nu)
-        made.append(replace(candidate, normal=np.eye(d) * 200.0))
+        nu = np.array([[share if law.signed else np.log(share)], [0.0]])
+        own, middle = np.array([scale]), np.array([np.log(angle)])
+        sign = 0 if law.signed else 1
+        one = LawAtJoints(law, sign, np.array([PORT]), own, middle, plain.x, nu)
+        made.append(LawMisfit(one).sloped(None, np.eye(d) * 400.0))
     even = (1 / len(made),) * len(made)
     problem = problem_of(recorded, simulation)
     return Laws(problem, plain, tuple(made), even, 1.0, recorded.columns[0][0])
@@ -78,7 +80,7 @@ def in_time(cell, law, force_n):
     s = 2j * np.pi * np.linspace(6, 45, 40) + 4.0
     view = seen(system, PORT, hits, 500.0)
     one = np.ones(3)
-    torque = torques([(law.law, slice(0, 3))], law.k * one, law.a * one, 0 * one, view)
+    torque = torques([(law.kind, slice(0, 3))], law.k * one, law.a * one, 0 * one, view)
     ratio = spectra(torque, hits, s) / spectra(hits.force.T, hits, s)
     found = receptances(system, 0, s)
     linear = np.moveaxis(found.sensor_hit, 0, 2)
@@ -91,14 +93,14 @@ def in_time(cell, law, force_n):
 )
 def test_what_a_law_does_follows_that_in_time(cell, law, share):
     laws = laws_of(cell, (law, share, SWING))
-    candidate = laws.candidates[0]
+    candidate = laws.candidates[0].law
     system, sizes, errors = system_of(laws.plain), [], []
     for force in (30.0, 300.0, 3000.0):
         h, struck_column, s = in_time(cell, candidate, force)
         spectrum = np.interp(s.imag / (2 * np.pi), struck_column.frequency_hz, struck_column.force)
         found = receptances(system, 0, s)
         ours = accelerance(found, candidate, spectrum, np.ones(1))[0]
-        linear = accelerance(found, replace(candidate, scale=0.0), spectrum, np.ones(1))[0]
+        linear = accelerance(found, replace(candidate, scale=np.zeros(1)), spectrum, np.ones(1))[0]
         sizes.append(np.linalg.norm(h - linear))
         errors.append(np.linalg.norm(ours - h))
     print(law.effect, share, "size", np.round(sizes, 3), "error", np.round(errors, 3))
@@ -110,7 +112,7 @@ def test_what_a_law_does_follows_that_in_time(cell, law, share):
 def test_swings_do_not_depend_on_how_wide_the_band_is(cell):
     """Of a hit that excites nothing above 50 Hz, told over twice and four times the band."""
     system, peak = system_of(cell[2]), 1.3e-4
-    candidate = laws_of(cell, (STIFFENING, 0.6, peak)).candidates[0]
+    candidate = laws_of(cell, (STIFFENING, 0.6, peak)).candidates[0].law
     told = []
     for end in (50.0, 100.0, 200.0):
         s = 2j * np.pi * np.arange(5.0, end, 0.4) + 4.0
@@ -126,7 +128,7 @@ def test_forces_that_tell_laws_apart_in_time_are_those_proposed(cell):
     force = np.append(np.geomspace(1.0, 10000.0, 7), 3e5)
     gain = law_separation(laws, laws.problem.q[:1], force)[0]
     floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
-    every = [[in_time(cell, law, peak)[0] for law in laws.candidates] for peak in force]
+    every = [[in_time(cell, one.law, peak)[0] for one in laws.candidates] for peak in force]
     apart = np.empty(gain.shape)
     for level, (one, other) in enumerate(every[:-1]):
         change, rival = one - every[-1][0], other - every[-1][1]
@@ -140,7 +142,7 @@ def test_forces_that_tell_laws_apart_in_time_are_those_proposed(cell):
 
 
 def test_a_hit_that_leaves_the_joint_still_tells_nothing(cell):
-    candidate = laws_of(cell, (DAHL, 0.5, SWING)).candidates[0]
+    candidate = laws_of(cell, (DAHL, 0.5, SWING)).candidates[0].law
     found = receptances(system_of(cell[2]), 0, 2j * np.pi * np.linspace(6, 45, 40))
     still = replace(found, port_hit=np.zeros_like(found.port_hit))
     h = accelerance(still, candidate, np.ones(40, complex), np.ones(1))[0]

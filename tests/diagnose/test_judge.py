@@ -7,8 +7,9 @@ import pytest
 
 from planner.diagnosis import held_out_check as module
 from planner.diagnosis.effects import library
-from planner.diagnosis.held_out_check import WORSE, judge
+from planner.diagnosis.held_out_check import judge
 from planner.diagnosis.linear_diagnosis import diagnose
+from planner.diagnosis.thresholds import HELD_OUT_WORSE
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
@@ -36,7 +37,7 @@ def test_what_predicts_as_well_is_kept(found):
     judged = judge(found)
     assert judged.diagnosis is found
     assert judged.held_out is not None
-    assert judged.held_out.explained.frac > judged.held_out.refitted.frac - WORSE
+    assert judged.held_out.explained.frac > judged.held_out.refitted.frac - HELD_OUT_WORSE
 
 
 def test_what_predicts_worse_is_given_up(found, monkeypatch):

@@ -6,14 +6,14 @@ from typing import Any, cast
 import pytest
 
 from planner.diagnosis.effects.added_mass import AddedMass
-from planner.diagnosis.effects.combined import SECOND
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.sensor_channel import ChannelDelay
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.law_beside_linear import leaves_room
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis, beside_another
 from planner.diagnosis.revoked_artefacts import taken_back
-from planner.diagnosis.verdict import HONEST, linear_effects_apply, together
+from planner.diagnosis.thresholds import SECOND_EFFECT, SUREST
+from planner.diagnosis.verdict import linear_effects_apply, together
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ def test_nothing_is_surer_than_it_was_right_on_concealed_cases(sure):
     others = [place for place in (NONE, BASE, UNKNOWN) if place != sure]
     found = combined((), (sure, 1.0), *((place, 0.0) for place in others)).candidates
     assert found[0].places == (sure,)
-    assert found[0].probability == HONEST
-    assert found[1].probability == pytest.approx(1 - HONEST)
+    assert found[0].probability == SUREST
+    assert found[1].probability == pytest.approx(1 - SUREST)
     assert (found[1].places == (UNKNOWN,)) == (sure != UNKNOWN)
 
 
@@ -135,7 +135,7 @@ def test_beside_something_found_an_effect_is_one_more(none, verdict):
     assert after.best == max(shares, key=lambda f: shares[f])
     assert sum(shares.values()) == pytest.approx(1.0)
     odds = (0.95 - none) / none
-    assert shares[fits["joint_2"]] / shares[fits[""]] == pytest.approx(SECOND * odds)
+    assert shares[fits["joint_2"]] / shares[fits[""]] == pytest.approx(SECOND_EFFECT * odds)
 
 
 DELAY = Finding("channel_delay", "sensor", 500.0, {"delay": (2.1e-3, 3e-4, "s")})

@@ -9,13 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.diagnosis.effects.effect import Effect, Quantity
-from planner.diagnosis.linear.evidence import shared_noise, temper, weigh
+from planner.diagnosis.linear.evidence import weigh
+from planner.diagnosis.thresholds import ALIKE, NOISE_OVERSTATED
+from planner.inference.evidence import shared_noise, temper
 
 
 @given(st.floats(0.5, 1e6), st.floats(1.0, 10.0))
 def test_temper_grows_with_the_misfit(misfit, shared):
-    assert temper(misfit, shared) >= min(misfit, 1.0) * shared
-    assert temper(1.1 * misfit, shared) >= temper(misfit, shared)
+    now = temper(misfit, ALIKE, shared=shared, least=NOISE_OVERSTATED)
+    assert now >= min(misfit, 1.0) * shared
+    assert temper(1.1 * misfit, ALIKE, shared=shared, least=NOISE_OVERSTATED) >= now
 
 
 @given(st.floats(0.05, 2.0), st.floats(0.1, 5.0))

@@ -7,12 +7,10 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting
 from planner.diagnosis.effects.places import joint_of, links
+from planner.diagnosis.thresholds import ADDED_MASS_SD, ADDED_PLACE_SD
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.robot.virtual_joints import inertia_basis
-
-SHARE = 0.25  # prior sd, of the mean mass of the links
-REACH = 0.35  # prior sd of the place, of the longest link
 
 
 def link_size(simulation: Simulation) -> float:
@@ -51,9 +49,9 @@ class AddedMass(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["AddedMass", ...]:
-        """On every link."""
+        """One effect for each link."""
         masses = [b[0] for b in simulation.elastic.inertia]
-        mass, size = SHARE * float(np.mean(masses)), REACH * link_size(simulation)
+        mass, size = ADDED_MASS_SD * float(np.mean(masses)), ADDED_PLACE_SD * link_size(simulation)
         found = []
         for place, joint in links(simulation):
             if joint not in simulation.elastic.bodies:

@@ -7,10 +7,10 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting
 from planner.diagnosis.effects.places import joint_of, joints, own_axis
+from planner.diagnosis.thresholds import ANGLE_DEPENDENCE_SD
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 
-SD = 0.3  # of the stiffness
 ORDERS = (1, 2)  # a turn: out of balance, or like the teeth of two halves
 
 
@@ -30,7 +30,9 @@ class AngleDependentStiffness(Effect):
             number = _block(simulation, joint)
             if number is not None:
                 k = float(simulation.elasticity.stiffness[number])
-                waves = [Quantity(w, "N·m/rad", 0.0, SD * k) for w in ("cosine", "sine")]
+                waves = [
+                    Quantity(w, "N·m/rad", 0.0, ANGLE_DEPENDENCE_SD * k) for w in ("cosine", "sine")
+                ]
                 quantities = (*waves, Quantity("damping_share", "1", 1.0, 0.5))
                 found += [cls(place, quantities, order) for order in ORDERS]
         return tuple(found)

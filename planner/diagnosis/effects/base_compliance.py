@@ -7,10 +7,9 @@ import numpy as np
 from planner.diagnosis.effects.added_mass import link_size
 from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, told, triple
 from planner.diagnosis.effects.places import missing_axes
+from planner.diagnosis.thresholds import BASE_STIFFNESS
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import BASE
-
-REACH = (0.3, 30.0)  # times the largest stiffness of the robot's joints
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class BaseCompliance(ExtraCompliance):
         tilts = [a for a in axes if abs(a[2]) < 0.5]
         if not tilts:
             return ()
-        low, high = (r * _largest(simulation) for r in REACH)
+        low, high = (r * _largest(simulation) for r in BASE_STIFFNESS)
         two = tuple(Give(triple(a), low, high) for a in tilts)
         found = [cls("base", (), BASE, two)]
         if len(axes) == 3:

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnosis.effects.effect import NOTHING, Effect, Setting, Transfer
+from planner.diagnosis.effects.effect import Effect, Setting, Transfer
+from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors
-
-SECOND = 0.2  # how much less likely one more effect is than one, before any data
 
 
 @dataclass(frozen=True)
@@ -25,18 +24,18 @@ class Both(Effect):
     def prior(self) -> float:
         """As if effects came independently of each other."""
         shares = np.array([m.prior for m in self.members])
-        return float(shares.prod() * (SECOND / NOTHING) ** (len(shares) - 1))
+        return float(shares.prod() * (SECOND_EFFECT / NOTHING) ** (len(shares) - 1))
 
     @classmethod
     def of(cls, *effects: Effect) -> "Both":
-        """Effects at their places."""
+        """The effects together; those that are several already are taken apart."""
         members = tuple(part for e in effects for part in e.parts())
         quantities = tuple(q for m in members for q in m.quantities)
         return cls(" and ".join(m.at for m in members), quantities, members)
 
     @property
     def artefact(self) -> bool:  # pyright: ignore[reportIncompatibleVariableOverride]
-        """Whether all are."""
+        """Whether all members are artefacts."""
         return all(m.artefact for m in self.members)
 
     def parts(self) -> tuple[Effect, ...]:
@@ -63,15 +62,15 @@ class Both(Effect):
         return priors
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
-        """Of all."""
+        """Names of all members' springs."""
         return tuple(name for m in self.members for name in m.springs(simulation))
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
-        """All; each depends on its own parameters only."""
+        """What all members add; each depends on its own parameters only."""
         return tuple(i for m, own in self._split(psi) for i in m.impedance(setting, own))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer | None:
-        """The product, the last effect nearest to the recorder."""
+        """Product of the effects' transfer functions, the last one's nearest to the recorder."""
         left, slopes = None, []
         for member, own in self._split(psi):
             now = member.transfer(setting, own)
@@ -86,12 +85,12 @@ class Both(Effect):
         return None if left is None else Transfer(left, np.concatenate(slopes, axis=1))
 
     def rate(self, psi: np.ndarray) -> float | None:
-        """That of the one that has one."""
+        """Rate of the exponential window, where one of the effects is one."""
         rates = [m.rate(own) for m, own in self._split(psi)]
         return next((r for r in rates if r is not None), None)
 
     def starts(self) -> np.ndarray:
-        """The first's middle with the last's starts."""
+        """The last effect's starts, all others at their priors' means."""
         last = self.members[-1].starts()
         middle = [q.mean for m in self.members[:-1] for q in m.quantities]
         return np.hstack([np.tile(middle, (len(last), 1)), last])
@@ -99,12 +98,12 @@ class Both(Effect):
 
 @dataclass(frozen=True)
 class Family(Both):
-    """One kind of effect at all its places: one cause, as that robot.toml leaves out bearings."""
+    """One kind of effect at all its places, by one cause: say, robot.toml lacks all bearings."""
 
     @property
     def prior(self) -> float:
-        """As one more effect than one."""
-        return SECOND
+        """That of a second effect: one cause gives at all these places."""
+        return SECOND_EFFECT
 
 
 def families(effects: Sequence[Effect]) -> list[Effect]:
@@ -117,7 +116,7 @@ def families(effects: Sequence[Effect]) -> list[Effect]:
 
 
 def together(a: Effect, b: Effect) -> Both | None:
-    """Both, where that is possible: not twice the same, no impedance beside a window."""
+    """Both effects at once; None for the same effect at one place, or for two windows."""
     same = any((x.name, x.at) == (y.name, y.at) for x in a.parts() for y in b.parts())
     both = Both.of(a, b)
     own = [p for p in both.members if p.quantities or p.name == "polarity"]

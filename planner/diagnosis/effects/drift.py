@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
-
-SD = 0.2  # of ψ at the end
-BEND_SD = 3.0  # of κ in (1 − e^(−κ·order)) / (1 − e^(−κ)): 0 is linear, large is a warming up
+from planner.diagnosis.thresholds import DRIFT_LOG_SD
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ class Drift(Effect):
     def starts(self) -> np.ndarray:
         """See `Effect.starts`."""
         if self.kind == "gradual":
-            return np.array([[0.5 * SD, 0.0], [-0.5 * SD, 0.0]])
+            return np.array([[0.5 * DRIFT_LOG_SD, 0.0], [-0.5 * DRIFT_LOG_SD, 0.0]])
         return np.array([[q.mean for q in self.quantities]])
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:

@@ -5,11 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from planner.diagnosis.thresholds import NOTHING
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors
-
-NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong
 
 
 @dataclass(frozen=True)

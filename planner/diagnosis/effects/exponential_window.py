@@ -17,11 +17,11 @@ class ExponentialWindow(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["ExponentialWindow", ...]:
-        """Of the sensor's channels."""
+        """The effect at the sensor, whose channels share one window."""
         return (cls("sensor", (Quantity("rate", "1/s", float(np.log(1.5)), 1.0, True),)),)
 
     def rate(self, psi: np.ndarray) -> float:
-        """e^ψ."""
+        """The window's decay rate e^ψ in 1/s."""
         return float(np.exp(psi[0]))
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:

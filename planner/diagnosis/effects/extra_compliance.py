@@ -7,11 +7,10 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.places import damping_time, with_blocks
+from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors, place_name
 from planner.robot.config import Compliance
-
-DAMPING_FACTOR = 8.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ class ExtraCompliance(Effect):
     gives: tuple[Give, ...] = ()
 
     def structure(self, simulation: Simulation) -> Simulation:
-        """With one more [[compliance]] block each."""
+        """The simulation with one more [[compliance]] block for each spring."""
         return with_blocks(simulation, self.blocks(damping_time(simulation)))
 
     def blocks(self, time: float) -> tuple[Compliance, ...]:
@@ -57,7 +56,10 @@ class ExtraCompliance(Effect):
             bounds[f"stiffness of {place}"] = (give.lower, give.upper)
             low, high = give.lower * time, give.upper * time
             if place not in undamped:
-                bounds[f"damping of {place}"] = (low / DAMPING_FACTOR, high * DAMPING_FACTOR)
+                bounds[f"damping of {place}"] = (
+                    low / FURTHER_DAMPING_FACTOR,
+                    high * FURTHER_DAMPING_FACTOR,
+                )
         return replace(priors, bounds=bounds)
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:

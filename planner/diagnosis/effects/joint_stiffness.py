@@ -6,11 +6,10 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.places import joint_of, joints, own_axis
+from planner.diagnosis.thresholds import FAR_SPRING_FACTOR
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors, place_name
 from planner.robot.config import Compliance
-
-FAR = 8.0  # either way
 
 
 @dataclass(frozen=True)
@@ -41,17 +40,17 @@ class JointStiffness(Effect):
         return [b for b in there if not self.only_own or abs(np.array(b.axis) @ axis) > 0.9]
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
-        """Stiffnesses of the joint."""
+        """Names of the joint's stiffnesses."""
         return tuple(f"stiffness of {b.tie or place_name(b)}" for b in self._blocks(simulation))
 
     def priors(self, simulation: Simulation, priors: Priors) -> Priors:
-        """Log-uniform within a factor FAR; what is loose or stiff is damped otherwise too."""
+        """Log-uniform within FAR_SPRING_FACTOR; what is loose or stiff is damped otherwise too."""
         bounds = dict(priors.bounds)
         for block in self._blocks(simulation):
             for kind, value in (("stiffness", block.stiffness), ("damping", block.damping)):
                 if value > 0:
                     name = f"{kind} of {block.tie or place_name(block)}"
-                    bounds[name] = (value / FAR, value * FAR)
+                    bounds[name] = (value / FAR_SPRING_FACTOR, value * FAR_SPRING_FACTOR)
         return replace(priors, bounds=bounds)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:

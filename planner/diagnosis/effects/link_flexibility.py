@@ -8,15 +8,12 @@ import scipy.linalg
 from planner.diagnosis.effects.effect import Quantity, Setting
 from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, across, told, triple
 from planner.diagnosis.effects.places import joint_of, links, own_axis
+from planner.diagnosis.thresholds import HALVES_APART_SD, LINK_STIFFNESS
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.robot.virtual_joints import OUTER, halves_moved, inertia_basis
 
-REACH = (0.1, 10.0)  # times the stiffness of the joint that moves the link, about its own axis
 SHORTEST = 0.1  # of the longest link: what is shorter is a block
-# Prior sd of where the halves' centres are, of their distance: where a link's mass is, its inertia
-# does not tell. Of its second moment a block has 3/4 between its halves, heavy ends nearly all.
-APART = 0.12
 
 
 @dataclass(frozen=True)
@@ -44,10 +41,10 @@ class LinkFlexibility(ExtraCompliance):
             length = float(np.linalg.norm(along))
             if length < SHORTEST * longest:
                 continue
-            low, high = (r * _own(simulation, joint_of(simulation, place)) for r in REACH)
+            low, high = (r * _own(simulation, joint_of(simulation, place)) for r in LINK_STIFFNESS)
             axes = [*across(along / length), along / length]
             gives = tuple(Give(triple(a), low, high) for a in axes)
-            sd = APART * halves_moved(robot, link)[0]
+            sd = HALVES_APART_SD * halves_moved(robot, link)[0]
             own = tuple(Quantity(f"apart_{a}", "m", 0.0, sd) for a in "xyz") if sd > 0 else ()
             found += [cls(place, own, link, g) for g in (gives[:2], gives[2:], gives)]
         return tuple(found)

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnosis.effects.added_mass import REACH, link_size
+from planner.diagnosis.effects.added_mass import link_size
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting
 from planner.diagnosis.effects.places import joint_of, links
+from planner.diagnosis.thresholds import ADDED_PLACE_SD, RESONATOR_MASS
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 
-SHARE = 0.05  # of the mean mass of the links
 FREQUENCIES = 6  # starts over the band
 # (3, 3, 3): what turns with a link at w moves what lies at e_v by ACROSS[v] w = w × e_v
 ACROSS = np.array([np.cross(np.eye(3), e).T for e in np.eye(3)])
@@ -29,9 +29,9 @@ class LocalResonator(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["LocalResonator", ...]:
-        """On every link."""
-        mass = SHARE * float(np.mean([b[0] for b in simulation.elastic.inertia]))
-        size, (low, high) = REACH * link_size(simulation), simulation.robot.config.band_hz
+        """One effect for each link."""
+        mass = RESONATOR_MASS * float(np.mean([b[0] for b in simulation.elastic.inertia]))
+        size, (low, high) = ADDED_PLACE_SD * link_size(simulation), simulation.robot.config.band_hz
         found = []
         for place, joint in links(simulation):
             if joint not in simulation.elastic.bodies:

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
+from planner.diagnosis.thresholds import DELAY_SD_S, SENSOR_MATRIX_SD
 
-MATRIX_SD = 1.0  # of each entry around those of the identity
-DELAY_SD_S = 5e-3
 RATE_1_S = 1.0, 2.0  # median and log sd of a window's rate
 
 
@@ -35,7 +34,7 @@ class SensorChain(Effect):
         """From several starts of A (3, 3), and of the delay where A changes nothing."""
         rate = [Quantity("rate", "1/s", float(np.log(RATE_1_S[0])), RATE_1_S[1], True)]
         delay = Quantity("delay", "s", 0.0, DELAY_SD_S)
-        entries = [Quantity(f"a_{i}{j}", "1", 0.0, MATRIX_SD) for i in "xyz" for j in "xyz"]
+        entries = [Quantity(f"a_{i}{j}", "1", 0.0, SENSOR_MATRIX_SD) for i in "xyz" for j in "xyz"]
         quantities = (*(rate if windowed else []), delay, *entries)
         first = [q.mean for q in quantities[:-9]]
         begin = [(*first, *(float(v) for v in (a - np.eye(3)).flat)) for a in starts]
@@ -51,7 +50,7 @@ class SensorChain(Effect):
         return float(np.exp(psi[0])) if self.windowed else None
 
     def matrix(self, psi: np.ndarray) -> np.ndarray:
-        """A (3, 3)."""
+        """The sensor's matrix A (3, 3) at ψ."""
         return np.eye(3) + psi[-9:].reshape(3, 3)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:

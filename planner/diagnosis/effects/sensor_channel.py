@@ -19,7 +19,7 @@ class SensorGain(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["SensorGain", ...]:
-        """On every channel."""
+        """One effect for each channel."""
         gain = Quantity("gain", "1", 0.0, 0.5, True)
         return tuple(cls(f"sensor_{a}", (gain,)) for a in AXES)
 
@@ -46,7 +46,7 @@ class Polarity(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["Polarity", ...]:
-        """On every channel."""
+        """One effect for each channel."""
         return tuple(cls(f"sensor_{a}") for a in AXES)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
@@ -69,7 +69,7 @@ class ChannelDelay(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["ChannelDelay", ...]:
-        """Of the sensor."""
+        """The effect at the sensor, whose channels share one delay."""
         return (cls("sensor", (Quantity("delay", "s", 0.0, 2e-3),)),)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
+from planner.diagnosis.thresholds import SENSOR_ROTATION_SD_DEG
 from planner.dynamics.simulation import Simulation
-
-SD_DEG = 20.0
 
 
 @dataclass(frozen=True)
@@ -19,8 +18,8 @@ class SensorRotation(Effect):
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["SensorRotation", ...]:
-        """The one sensor."""
-        sd = float(np.deg2rad(SD_DEG))
+        """The effect at the only sensor."""
+        sd = float(np.deg2rad(SENSOR_ROTATION_SD_DEG))
         return (cls("sensor", tuple(Quantity(f"angle_{a}", "rad", 0.0, sd) for a in "xyz")),)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:

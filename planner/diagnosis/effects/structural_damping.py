@@ -25,7 +25,7 @@ class StructuralDamping(Effect):
         return () if known else (cls("joints"),)
 
     def structure(self, simulation: Simulation) -> Simulation:
-        """With loss factors instead of dampers."""
+        """The simulation with loss factors in the place of its dampers."""
         robot: Robot = simulation.robot
         middle = 2 * np.pi * float(np.sqrt(np.prod(robot.config.band_hz)))
         blocks = tuple(
@@ -38,7 +38,7 @@ class StructuralDamping(Effect):
         return Simulation(replace(robot, config=config))
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
-        """Loss factors."""
+        """Names of the loss factors."""
         return tuple(
             f"loss_factor of {b.tie or place_name(b)}" for b in simulation.robot.config.compliance
         )

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, across, told, triple
 from planner.diagnosis.effects.places import joints, missing_axes, own_axis, stiffest
+from planner.diagnosis.thresholds import ACROSS_STIFFNESS
 from planner.dynamics.simulation import Simulation
-
-REACH = (0.2, 20.0)  # times the joint's own stiffness
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class TransverseCompliance(ExtraCompliance):
         for place, joint in joints(simulation):
             axes = missing_axes(simulation, joint, across(own_axis(simulation, joint)))
             if len(axes):
-                low, high = (float(r * stiffest(simulation, joint)) for r in REACH)
+                low, high = (float(r * stiffest(simulation, joint)) for r in ACROSS_STIFFNESS)
                 found.append(cls(place, (), joint, tuple(Give(triple(a), low, high) for a in axes)))
         return tuple(found)
 

@@ -173,7 +173,11 @@ def _delta(
     weight: np.ndarray,
     scale: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Δ (J,), precision (J,) and χ² (J,) of each joint: Gauss-Newton from several starts."""
+    """Δ (J,), precision (J,) and χ² (J,) of each joint: Gauss-Newton from several starts.
+
+    Each Δ is one complex number, whose step is a quotient of two sums: all joints and starts go
+    side by side as arrays, which a fit with a matrix at each (`inference.least_squares`) would not.
+    """
     s2 = (full.s[lines] ** 2)[:, None, None]
     path = -s2 * full.sensor_port[lines] * full.port_hit[lines][:, None, :, axis]
     path = np.moveaxis(path, 0, 1)[:, :, :, None]  # (3, F, J, 1)

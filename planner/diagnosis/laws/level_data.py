@@ -1,6 +1,6 @@
 """What laws of a joint are fitted to: strongest hits, and differences of weaker ones to them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,22 +9,20 @@ from planner.dataset.visits import Recorded
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
 from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
 from planner.dynamics.gradient import Impedance, response_gradient
 
 LINES = 64
 LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
-MODEL_ERROR = 0.01  # of an FRF, and of a difference
-DIFFERENCE_ERROR = 0.003  # of the FRFs between which the difference is taken
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
-    """c columns of n visits on common lines s (F,): FRFs (c, 3, F), `best` (c,) the strongest one.
+class LevelData:
+    """c columns of n visits on common lines s (F,): FRFs h (c, 3, F), `best` (c,) the strongest.
 
     `weight` (c, 3, F) is 1/E|error|² of what is compared: a strongest column itself, the
-    difference to it of a weaker one. `slope` (b, D, 3, F) are derivatives of what is compared by
-    the linear parameters, for the columns `rows` (b,), at first the strongest only; `normal`
-    (D, D) is what they alone tell.
+    difference to it of a weaker one. `force` (c, F) in N·s are the spectra of `hits`, poles above
+    `fastest_hz` are taken to follow at once.
     """
 
     s: np.ndarray
@@ -32,16 +30,47 @@ class Data:
     weight: np.ndarray
     best: np.ndarray
     level: np.ndarray  # (c,)
-    rows: np.ndarray
     hits: Strokes
-    force: np.ndarray  # (c, F) in N·s
-    slope: np.ndarray
-    normal: np.ndarray
+    force: np.ndarray
     fastest_hz: float
 
+    @property
+    def weaker(self) -> np.ndarray:
+        """(c, 1, 1) bool: columns of which the difference to the strongest is compared."""
+        return (self.best != np.arange(len(self.h)))[:, None, None]
 
-def data_of(recorded: Recorded, plain: Fit) -> Data:
-    """Columns of all visits, and what the linear simulation says of the strongest."""
+    def compared(self, h: np.ndarray) -> np.ndarray:
+        """Strongest columns as they are, weaker ones as differences to them; h (..., c, 3, F)."""
+        return np.where(self.weaker, h - h[..., self.best, :, :], h)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearSlopes:
+    """Derivatives by the D linear parameters of what is compared, in units of its errors.
+
+    `scaled` (D, N) are real and imaginary parts for the columns `rows` (b,), 0 for all others;
+    `gram` (D, D) is their product with themselves.
+    """
+
+    rows: np.ndarray
+    scaled: np.ndarray
+    gram: np.ndarray
+
+    @classmethod
+    def of(cls, data: LevelData, slope: np.ndarray, rows: np.ndarray) -> "LinearSlopes":
+        """From derivatives (b, D, 3, F) of the columns `rows` (b,)."""
+        weighted = slope * np.sqrt(data.weight[rows])[:, None]
+        scaled = real_rows(np.swapaxes(weighted, 0, 1))
+        return cls(rows, scaled, scaled @ scaled.T)
+
+
+def real_rows(values: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts (k, N) of complex values (k, ...)."""
+    return np.ascontiguousarray(values).reshape(len(values), -1).view(float)
+
+
+def level_data(recorded: Recorded, plain: Fit) -> LevelData:
+    """Columns of all visits on lines of their own."""
     columns: list[Column] = []
     visits: list[int] = []
     for number, group in enumerate(recorded.columns_at(LAID)):
@@ -60,35 +89,28 @@ def data_of(recorded: Recorded, plain: Fit) -> Data:
         weaker[:, None, None],
         variance
         + variance[best]
-        + (MODEL_ERROR * change) ** 2
-        + (DIFFERENCE_ERROR * np.abs(h)) ** 2,
-        variance + (MODEL_ERROR * np.abs(h)) ** 2,
+        + (LAW_MODEL_ERROR * change) ** 2
+        + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2,
+        variance + (LAW_MODEL_ERROR * np.abs(h)) ** 2,
     )
     weight = np.where(np.isfinite(error), 1 / error, 0.0)
-    rows = np.flatnonzero(~weaker)
     hits = strokes(visits, columns)
-    slope = np.empty((len(rows), len(plain.x), 3, len(s)), dtype=complex)
-    full = _slopes(plain, s, plain.x)
-    slope[:] = full[hits.visit[rows], :, :, hits.axis[rows]]
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
-    fastest = FASTEST * float(frequency[-1])
-    normal = _normal(slope, weight[rows])
-    return Data(s, h, weight, best, level, rows, hits, force, slope, normal, fastest)
+    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]))
 
 
-def _normal(slope: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Σ Re slope* weight slope, (D, D)."""
-    d = slope.shape[1]
-    normal = np.zeros((d, d))
-    for row, w in zip(slope, weight, strict=True):
-        scaled = np.ascontiguousarray((row * np.sqrt(w)).reshape(d, -1)).view(float)
-        normal += scaled @ scaled.T
-    return normal
+def strongest_slopes(data: LevelData, plain: Fit) -> LinearSlopes:
+    """What the linear simulation says of the strongest columns, where it fits best."""
+    rows = np.flatnonzero(~data.weaker[:, 0, 0])
+    slope = _slopes(plain, data.s, plain.x)[data.hits.visit[rows], :, :, data.hits.axis[rows]]
+    return LinearSlopes.of(data, slope, rows)
 
 
-def relinearised(data: Data, plain: Fit, found: Equivalent, port: int, x: np.ndarray) -> Data:
-    """The same data with derivatives at x, of the differences too.
+def equivalent_slopes(
+    data: LevelData, plain: Fit, found: Equivalent, port: int, x: np.ndarray
+) -> LinearSlopes:
+    """Derivatives at x, of the differences too, with the stiffness that each column tells.
 
     Every column has the stiffness that the joint has for it: that of the linear fit at the highest
     level, and Δ more at the others. How far a joint swings depends on inertias and springs:
@@ -108,25 +130,15 @@ def relinearised(data: Data, plain: Fit, found: Equivalent, port: int, x: np.nda
         moved = _slopes(plain, data.s, x, blocks, stiffer[:, None])
         for c in np.flatnonzero((axis == a) & (data.level == level)):
             slope[c] = moved[visit[c], :, :, a] - plainly[visit[c], :, :, a]
-    for c in np.flatnonzero(data.best == np.arange(len(data.h))):
+    for c in np.flatnonzero(~data.weaker[:, 0, 0]):
         slope[c] = plainly[visit[c], :, :, axis[c]]
-    rows = np.arange(len(data.h))
-    return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
+    return LinearSlopes.of(data, slope, np.arange(len(data.h)))
 
 
-def compared(data: Data, h: np.ndarray) -> np.ndarray:
-    """Strongest columns as they are, weaker ones as differences to them; h (c, 3, F)."""
-    weaker = (data.best != np.arange(len(h)))[:, None, None]
-    return np.where(weaker, h - h[data.best], h)
-
-
-def linearised(
-    data: Data, plain: Fit, x: np.ndarray, blocks: np.ndarray, stiffer: np.ndarray
-) -> Data:
-    """The same data with derivatives at x of every column, whose springs `blocks` are stiffer.
-
-    `stiffer` (c, m) in N·m/rad.
-    """
+def stiffened_slopes(
+    data: LevelData, plain: Fit, x: np.ndarray, blocks: np.ndarray, stiffer: np.ndarray
+) -> LinearSlopes:
+    """Derivatives at x of every column, whose springs `blocks` are `stiffer` (c, m) N·m/rad."""
     visit, axis = data.hits.visit, data.hits.axis
     n = int(visit.max()) + 1
     slope = np.zeros((len(data.h), len(plain.x), 3, len(data.s)), dtype=complex)
@@ -136,10 +148,8 @@ def linearised(
         there = np.zeros((n, len(blocks)))
         there[visit[here]] = stiffer[here]
         slope[here] = _slopes(plain, data.s, x, blocks, there)[visit[here], :, :, a]
-    weaker = data.best != np.arange(len(data.h))
-    slope = np.where(weaker[:, None, None, None], slope - slope[data.best], slope)
-    rows = np.arange(len(data.h))
-    return replace(data, rows=rows, slope=slope, normal=_normal(slope, data.weight))
+    slope = np.swapaxes(data.compared(np.swapaxes(slope, 0, 1)), 0, 1)
+    return LinearSlopes.of(data, slope, np.arange(len(data.h)))
 
 
 def _slopes(

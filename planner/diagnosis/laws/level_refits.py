@@ -13,11 +13,11 @@ from scipy import optimize
 from planner.dataset.visits import Recorded
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.laws.equivalent_stiffness import receptances, swing, system_of
-from planner.diagnosis.laws.one_joint import LOG_ANGLE_SD, LOG_SHARE, LOG_SHARE_SD
 from planner.diagnosis.laws.starting_values import faded
-from planner.diagnosis.laws.torque_laws import Law
+from planner.diagnosis.laws.torque_laws import LEAST_SHARE, Law
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import FINE, GLANCE, Fit
+from planner.diagnosis.thresholds import LAW_ANGLE_LOG_SD, LAW_LOG_SHARE, LAW_LOG_SHARE_SD
 from planner.dynamics.simulation import Simulation
 from planner.inference.least_squares import minimise
 
@@ -25,7 +25,7 @@ LOG_STEPS = 20
 SPRING_SD = 0.05  # of ln stiffness that a refit gives a joint that is not linear
 LINEAR_SD = 1.0  # of ln stiffness of a joint without its law
 LINEAR, SHARES, ANGLES = (0.6, 1.0, 1.5), (0.1, 0.5, 1.5), (0.05, 0.2, 0.6, 1.5)  # of the grid
-LEAST_SHARE, MOST_SHARE, MOST_LACKING = 1e-3, 20.0, 0.9
+MOST_SHARE, MOST_LACKING = 20.0, 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def base(recorded: Recorded, nominal: Simulation) -> Fit:
 
 
 def refits(recorded: Recorded, nominal: Simulation) -> tuple[Refit, ...]:
-    """Of every force level, weakest first."""
+    """The linear fit to the hits of each force level, weakest level first."""
     out = []
     for level in range(len(recorded.level_n)):
         of_level = [
@@ -80,11 +80,13 @@ def begin(
     swings = [np.median(level.swing[:, joint]) for level in seen]
     most = np.log(MOST_LACKING if law.effect == "backlash" or sign < 0 else MOST_SHARE)
 
+    sd = [LINEAR_SD, LAW_LOG_SHARE_SD, LAW_ANGLE_LOG_SD]
+
     def residual(v: np.ndarray) -> np.ndarray:
         linear, k, a = np.exp(v[0]), sign * scale * np.exp(v[1]), float(np.exp(middle + v[2]))
         each = [linear + k * faded(law, swing, a).real for swing in swings]
         off = (told - np.log(np.maximum(each, 1e-3 * linear))) / SPRING_SD
-        prior = (v - [np.log(scale), LOG_SHARE, 0.0]) / [LINEAR_SD, LOG_SHARE_SD, LOG_ANGLE_SD]
+        prior = (v - [np.log(scale), LAW_LOG_SHARE, 0.0]) / sd
         return np.concatenate([off, prior])
 
     low = [np.log(scale) - 3, np.log(LEAST_SHARE), -6.0]

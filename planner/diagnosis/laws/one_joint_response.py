@@ -74,7 +74,7 @@ class Seen:
 
 
 def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
-    """Of every hit, at the port with this number."""
+    """The port's poles and its angles without a torque, for every hit; `port` is its number."""
     n = len(system.mass)
     e = len(system.elasticity.stiffness)
     block = int(system.blocks[port])
@@ -106,6 +106,21 @@ def seen(system: System, port: int, hits: Strokes, fastest_hz: float) -> Seen:
     drive = own * (newer + older / grow)
     gives = np.sum(own * newer, axis=1).real + static
     return Seen(grow[v].T.copy(), drive[v].T.copy(), gives[v], free)
+
+
+def side_by_side_views(ports: Sequence[Seen]) -> Seen:
+    """Several ports as one with the columns of all, poles filled up to as many as any has."""
+    most = max(len(p.grow) for p in ports)
+
+    def padded(values: np.ndarray) -> np.ndarray:
+        return np.pad(values, ((0, most - len(values)), (0, 0)))
+
+    return Seen(
+        np.concatenate([padded(p.grow) for p in ports], axis=1),
+        np.concatenate([padded(p.drive) for p in ports], axis=1),
+        np.concatenate([p.gives for p in ports]),
+        np.concatenate([p.free for p in ports], axis=1),
+    )
 
 
 def free_angles(

@@ -1,6 +1,6 @@
 """Hits on a simulation with several nonlinear joints at once, integrated in time.
 
-As in `timedomain`, the linear part is propagated exactly pole by pole, for torques that are linear
+As with one joint, the linear part is propagated exactly pole by pole, for torques that are linear
 between steps; each step solves for the angles of all the joints by Newton's method.
 """
 
@@ -46,7 +46,7 @@ class Joints:
 
 
 def joints_of(system: System, hits: Strokes, fastest_hz: float) -> Joints:
-    """Of every hit, at all ports of the system."""
+    """The joints' poles and angles without torques, for every hit, at all ports of the system."""
     n, m = len(system.mass), len(system.blocks)
     e = 2 * len(system.elasticity.stiffness)  # overdamped poles come singly
     drive, felt = np.zeros((n, e, m), dtype=complex), np.zeros((n, m, e), dtype=complex)
@@ -83,7 +83,7 @@ def joints_of(system: System, hits: Strokes, fastest_hz: float) -> Joints:
 
 
 def _grown(grow: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Grow z, (c, 2 p, d)."""
+    """The modal states z (c, 2 p, d) one step later, without torques."""
     p = grow.shape[1]
     real, imaginary = z[:, :p], z[:, p:]
     return np.concatenate(
@@ -143,7 +143,7 @@ class Course:
 def course(
     law: Law, k: np.ndarray, a: np.ndarray, joints: Joints, hits: Strokes, s: np.ndarray
 ) -> Course:
-    """What every hit makes of the joints."""
+    """Torques' spectra and added stiffness, for every hit."""
     angle, torque = np.empty(joints.free.shape), np.empty(joints.free.shape)
     for i, at in enumerate(instants(law, k, a, joints)):
         angle[i], torque[i] = at.now, at.torque

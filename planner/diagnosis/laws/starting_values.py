@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System
-from planner.diagnosis.laws.one_joint import Candidate
+from planner.diagnosis.laws.law_at_joints import LawAtJoints
 from planner.diagnosis.laws.torque_laws import LAWS, Law
 
 DECAY = np.linspace(0.0, 1.5, 6)  # ln of how far the swing has faded while it still counts
@@ -23,8 +23,8 @@ def faded(law: Law, swing: np.ndarray, a: float) -> np.ndarray:
 
 def starts(
     found: Equivalent, system: System, port: int, x: np.ndarray, own: int
-) -> list[Candidate]:
-    """Candidates of every law (and sign of k): the best of a grid of a, and its neighbours."""
+) -> list[LawAtJoints]:
+    """Every law (and sign of k): the best of a grid of a, and its neighbours."""
     scale = float(system.elasticity.stiffness[system.blocks[port]])
     middle = float(np.median(found.swing[:, 1, port]))
     out = []
@@ -40,11 +40,14 @@ def starts(
                 if sign * k > 0:
                     moved = x.copy()
                     moved[own] += float(np.log(np.clip(1 - k * there / scale, 0.3, 3.0)))
-                    share = k / scale
-                    nu = np.array(
-                        [share if law.signed else np.log(share), np.log(GRID[i] * middle)]
-                    )
-                    out.append(Candidate(law, port, scale, float(np.log(middle)), moved, nu))
+                    share = k / scale if law.signed else np.log(k / scale)
+                    nu = np.array([[share], [np.log(GRID[i])]])
+                    out.append(
+                        LawAtJoints(
+                            law, 0 if law.signed else 1, np.array([port]), np.array([scale]),
+                            np.log([middle]), moved, nu,
+                        )
+                    )  # fmt: skip
     return out
 
 

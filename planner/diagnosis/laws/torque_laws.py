@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+LEAST_SHARE = 1e-3  # of k in the joint's linear stiffness where its logarithm is fitted
 PHASES = 2 * np.pi * (np.arange(64) + 0.5) / 64
 
 Torque = tuple[Any, Any, Any]  # torque, its slope, new state
@@ -37,6 +38,13 @@ class Law:
     def remembers(self) -> bool:
         """Whether the torque depends on how the joint came to its angle; then it is k times z."""
         return self.effect == "friction"
+
+    def share_bounds(self, sign: int) -> tuple[float, float]:
+        """Least and greatest share of k in the joint's stiffness; logarithms where `sign` is ±1."""
+        if not sign:
+            return self.least_share, self.most_share
+        most = self.most_share if sign > 0 else -self.least_share
+        return float(np.log(LEAST_SHARE)), float(np.log(most))
 
     def slow(self, amplitude: np.ndarray, a: float) -> np.ndarray:
         """Equivalent stiffness per unit of k, same shape as `amplitude`; the loss is imaginary."""

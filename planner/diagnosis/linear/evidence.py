@@ -7,43 +7,26 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.thresholds import (
+    ALIKE,
+    NOISE_OVERSTATED,
+    SLIGHT_GAIN,
+    TOLERATED,
+    UNKNOWN_PARAMETERS,
+)
+from planner.inference.evidence import bootstrapped, shared_noise, temper
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
-ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
-TOLERATED = 1.2  # misfit that nuisances leave where the physics is right
-LEAST = 0.3  # no noise is overstated by more
 BOOTSTRAPS = 400
-# Share of χ² that some background gains as well: up to it a gain counts nothing, from 2 × it whole.
-SLIGHT = 0.01
-UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each
-
-
-def temper(misfit: float, shared: float = 1.0) -> float:
-    """T by which χ² is divided: misfit · `shared` at the noise and below, where it was overstated.
-
-    Above, it grows with the share that is not noise.
-    """
-    excess = max(0.0, 1 - 1 / max(misfit, 1e-9))
-    return max(misfit, LEAST) * (shared + ALIKE * excess)
-
-
-def shared_noise(spacing_hz: float, rate_1_s: float) -> float:
-    """Lines over which an exponential window smears the noise: Σ |correlation|² over all lags.
-
-    Noise under e^(−σt) is correlated as 1 / (1 + iΔω/2σ) over Δω.
-    """
-    if rate_1_s <= 0:
-        return 1.0
-    a = 2 * np.pi * spacing_hz / (2 * rate_1_s)
-    return float(np.pi / a / np.tanh(np.pi / a))
 
 
 def temper_of(fits: Sequence[Fit]) -> float:
     """T for fits on the same lines, from the best of them."""
     measured = fits[0].misfit.measured
     spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
-    rate = float(np.median(measured.s.real[:, 0]))
-    return temper(min(f.per_value for f in fits), shared_noise(spacing, rate))
+    shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
+    misfit = min(f.per_value for f in fits)
+    return temper(misfit, ALIKE, shared=shared, least=NOISE_OVERSTATED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +41,7 @@ class Weights:
 def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights:
     """Tempered evidence, averaged over which poses might have been taken; the first fit is "none".
 
-    The average is a Bayesian bootstrap over poses, as in pseudo-BMA+ (Yao et al. 2018, section
-    3.4), of the poses' own misfits: what rests on one pose alone gets no certainty from it.
+    `prior` are the weights of the fits before any data, in their order.
     """
     t = temper_of(fits)
     own = np.array([f.data.chi2 for f in fits])
@@ -70,14 +52,8 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     charge = UNKNOWN_PARAMETERS / 2 * np.log(max(count / t, 2.0))
     # Springs that a fit has bent to imitate what is not known cost that fit, not the unknown.
     unknown = -TOLERATED * count / (2 * t) - charge + max(_volume(f, t) for f in fits)
-    n = chi2.shape[1]
-    shares = np.random.default_rng(seed).dirichlet(np.ones(n), BOOTSTRAPS) * n
-    scores = -((shares - 1) @ (chi2 - chi2[int(np.argmax(evidence))]).T) / (2 * t)
-    total = np.append(scores + evidence, np.full((BOOTSTRAPS, 1), unknown), axis=1)
-    total -= total.max(axis=1, keepdims=True)
-    weights = np.exp(total)
-    weights /= weights.sum(axis=1, keepdims=True)
-    return Weights(weights.mean(axis=0), t, evidence)
+    shares = bootstrapped(chi2, evidence, t, unknown, BOOTSTRAPS, seed)
+    return Weights(shares, t, evidence)
 
 
 def _without_slight(fits: Sequence[Fit], chi2: np.ndarray) -> np.ndarray:
@@ -90,7 +66,7 @@ def _without_slight(fits: Sequence[Fit], chi2: np.ndarray) -> np.ndarray:
     for i, f in enumerate(fits):
         gain = 1 - chi2[i].sum() / chi2[0].sum()
         if gain > 0 and any(part.quantities for part in f.effect.parts()):
-            out[i] += min(1.0, max(2 * SLIGHT / gain - 1, 0.0)) * (chi2[0] - chi2[i])
+            out[i] += min(1.0, max(2 * SLIGHT_GAIN / gain - 1, 0.0)) * (chi2[0] - chi2[i])
     return out
 
 

@@ -7,19 +7,29 @@ from functools import lru_cache, partial
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.diagnosis.linear.objective import ByPose, Misfit, Weighed, own_names
+from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, own_names
+from planner.diagnosis.thresholds import (
+    COM_SD_M,
+    DAMPING_FACTOR,
+    INERTIA_SD,
+    MASS_SD,
+    STIFFNESS_FACTOR,
+)
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.identify import QUICK, STAGES, Effort, identify
 from planner.identification.measured_frfs import Measured, stack
 from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
+from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
 from planner.robot.elastic_model import Matrices
 
-# Stated stiffness and damping scatter by this factor (1 sd) without anything being wrong.
-PRIORS = Priors(stiffness_factor=1.17, damping_factor=1.6, mass=0.05, inertia=0.05, com_m=0.01)
+PRIORS = Priors(
+    stiffness_factor=STIFFNESS_FACTOR, damping_factor=DAMPING_FACTOR,
+    mass=MASS_SD, inertia=INERTIA_SD, com_m=COM_SD_M,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -122,12 +132,10 @@ class Fit:
         return self.data.normal.sum(axis=0) / temper + np.diag(1 / self.misfit.sd**2)
 
     def log_evidence(self, temper: float) -> float:
-        """Laplace: −χ²/2T − prior/2 − ½ ln |posterior precision · prior covariance|."""
+        """Log evidence by Laplace's method, χ² counting 1/temper."""
         sd = self.misfit.sd
         away = (self.x - self.misfit.mean) / sd
-        volume = np.linalg.slogdet(self.precision(temper) * np.outer(sd, sd))[1]
-        chi2 = float(self.data.chi2.sum())
-        return -chi2 / (2 * temper) - float(away @ away) / 2 - volume / 2
+        return laplace(float(self.data.chi2.sum()), away, self.precision(temper), sd, temper)
 
     def held_out(self, temper: float) -> np.ndarray:
         """(n,) χ² of each pose when it is left out: one Newton step on what the others tell."""
@@ -217,7 +225,7 @@ def _approach(problem: Problem, effect: Effect) -> np.ndarray:
 
 def _best(
     misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_STEPS
-) -> Minimum[Weighed]:
+) -> Minimum[MisfitAtPoint]:
     """Where the best of the starts leads."""
     if len(starts) > KEPT:
         held = replace(misfit, inertial=False)
@@ -257,12 +265,12 @@ def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
 
 
 def _minimise(
-    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: Weighed | None = None
-) -> Minimum[Weighed]:
+    misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: MisfitAtPoint | None = None
+) -> Minimum[MisfitAtPoint]:
     return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at)
 
 
-def _at(misfit: Misfit, found: Minimum[Weighed]) -> Fit:
+def _at(misfit: Misfit, found: Minimum[MisfitAtPoint]) -> Fit:
     return Fit(misfit.effect, misfit, found.x, found.at.data or misfit.by_pose(found.x))
 
 

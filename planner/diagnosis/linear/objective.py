@@ -32,7 +32,7 @@ class ByPose:
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed(Quadratic):
+class MisfitAtPoint(Quadratic):
     """Data and prior at a point, and what the data of each pose say; None where x cannot be."""
 
     data: ByPose | None
@@ -47,8 +47,8 @@ def own_names(effect: Effect) -> list[str]:
 class Misfit:
     """χ²/2 of data and prior over x: springs θ (P), inertial nuisances φ (R), the effect's ψ (p).
 
-    With `logarithmic` the data are the logarithms of the FRFs, as in `identify.objective`. Unless
-    `inertial`, φ stays where it is.
+    With `logarithmic` the data are the logarithms of the FRFs, as in `identification.objective`.
+    Unless `inertial`, φ stays where it is.
     """
 
     measured: Measured
@@ -168,17 +168,17 @@ class Misfit:
         springs = self.parametrisation.elasticity(x[:a])
         return positive(mass) and stands(self.matrices, springs.stiffness)
 
-    def __call__(self, x: np.ndarray) -> Weighed:
+    def __call__(self, x: np.ndarray) -> MisfitAtPoint:
         """Data and prior together; ∞ where x cannot be."""
         away, scale = (x - self.mean) / self.sd, 1 / self.sd
         if not self.possible(x):
             nothing = np.zeros(len(x))
-            return Weighed(np.inf, nothing, np.diag(nothing), np.inf, None)
+            return MisfitAtPoint(np.inf, nothing, np.diag(nothing), np.inf, None)
         data = self.by_pose(x)
         if self.logarithmic:
             away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
         chi2 = float(data.chi2.sum())
-        return Weighed(
+        return MisfitAtPoint(
             (chi2 + float(away @ away)) / 2,
             data.gradient.sum(axis=0) + np.where(self.free, scale * away, 0.0),
             data.normal.sum(axis=0) + np.diag(scale**2),

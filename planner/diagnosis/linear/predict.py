@@ -71,7 +71,7 @@ def similarity(problem: Problem, found: Fit | None) -> Similarity:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class ThreefoldSimilarity:
     """Nominal, refitted and explained simulation beside what was measured."""
 
     nominal: Similarity
@@ -79,15 +79,15 @@ class Agreement:
     explained: Similarity
 
 
-def agreement(problem: Problem, refitted: Fit, best: Fit) -> Agreement:
+def agreement(problem: Problem, refitted: Fit, best: Fit) -> ThreefoldSimilarity:
     """On the poses of the problem."""
     found = (similarity(problem, f) for f in (None, refitted, best))
-    return Agreement(*found)
+    return ThreefoldSimilarity(*found)
 
 
 def held_out(
     problem: Problem, refitted: Fit, best: Fit
-) -> tuple[tuple[int, ...], Agreement | None]:
+) -> tuple[tuple[int, ...], ThreefoldSimilarity | None]:
     """Poses set aside, and agreement there of fits that never saw them.
 
     Which effect it is was decided with all poses; its values are fitted without these.

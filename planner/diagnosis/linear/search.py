@@ -24,6 +24,7 @@ from planner.diagnosis.linear.fit import (
 )
 from planner.diagnosis.linear.other_places import elsewhere, rigid
 from planner.diagnosis.linear.suspects import resonant, suspects
+from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS, SPRING_STRAYED
 from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 from planner.progress import Tell, quietly, within
@@ -31,8 +32,6 @@ from planner.progress import Tell, quietly, within
 FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
 STEPS, LAST_STEPS = 12, 30
 FEW = 5  # poses on which all are looked at where something is clearly wrong
-CLEARLY = 3.0  # misfit from which that is so
-ENOUGH = 1.15  # misfit at which nothing is left for a second effect to explain
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
 MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
@@ -40,8 +39,7 @@ POINTED = 2  # suspects settled on all lines
 MOVED = 2  # effects at other places, the same
 LESSENED = 3  # explanations that are looked at without one of their effects
 FEW_EFFECTS = 2  # at once
-MOST_EFFECTS, PAYS = 5, 1.5  # at once; factor by which one more has to lower the misfit
-STRAYED = 2.5  # prior sds that a spring does not move by chance
+MOST_EFFECTS = 5  # at once, where each pays
 Place = tuple[str, str]
 
 
@@ -70,11 +68,11 @@ def search(
     if not effects:
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
-    if _best_of_few(found).per_value > ENOUGH:
+    if _best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
         found = _lessened(problem, found)
-    leaders = _leaders(found) if _best_of_few(found).per_value > ENOUGH else []
+    leaders = _leaders(found) if _best_of_few(found).per_value > AT_NOISE else []
     led: list[Place] = []
     while len(led) < most_leaders and (leader := _next(leaders, led, found)) is not None:
         first = 0.6 + 0.4 * len(led) / most_leaders
@@ -110,14 +108,14 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
     # The softest place comes first: alone it may be all, though more places fit more closely.
     ends = _followed(problem, rough)
     ends += side_by_side(partial(staged, problem), families(effects))
-    missed = bool(ends) and min(f.per_value for f in ends) > ENOUGH
+    missed = bool(ends) and min(f.per_value for f in ends) > AT_NOISE
     if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
         ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
     return tuple(ends)
 
 
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
-    """The best to the end, the others, and the first of them if need be, less closely."""
+    """The best rough fits (with `first`, the first one too), the best of them on all lines."""
     few = _and_best(rough, LAST) if first else best_of(rough, LAST)
     return _settled(problem, best_of(_settled(problem, few, CLOSE, STEPS), POINTED))
 
@@ -129,30 +127,30 @@ def _settled(
 
 
 def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
-    """The first, and the best so many."""
+    """The first fit, and the `most` best ones."""
     return list({id(f): f for f in (*rough[:1], *best_of(rough, most))}.values())
 
 
 def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """With masses and resonators of the best at other places, where it misses the noise."""
+    """Adds fits whose masses and resonators stand elsewhere, where the best misses the noise."""
     best = min(found.finalists, key=lambda f: f.per_value)
-    if best.per_value <= ENOUGH:
+    if best.per_value <= AT_NOISE:
         return found
     near = best_of(elsewhere(problem, best, effects), MOVED)
     return Found((*found.finalists, *_settled(problem, near)), found.left)
 
 
 def _rigid(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """With the best's resonators as masses that do not swing."""
+    """Adds fits in which the best's resonators are replaced by masses that do not swing."""
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
     return Found((*found.finalists, *_settled(problem, rigid(problem, best, effects))), found.left)
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
-    """With one more effect after the other, as long as each pays and the noise is not reached."""
+    """Adds one effect after the other while each lowers the misfit and noise is not reached."""
     single = min(f.per_value for f in found.finalists if len(f.effect.parts()) == 1)
     best, before = min(found.finalists, key=lambda f: f.per_value), single
-    while ENOUGH < best.per_value < 1 + (before - 1) / PAYS:
+    while AT_NOISE < best.per_value < 1 + (before - 1) / PAYS:
         if len(best.effect.parts()) == MOST_EFFECTS:
             break
         more = [t for e in effects if (t := together(best.effect, e)) is not None]
@@ -165,12 +163,12 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
 
 
 def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
-    """With what is promising beside one effect that explains nearly everything.
+    """Adds pairs of one effect that explains nearly everything and each other effect.
 
-    Noise that is overstated hides a small second effect from `ENOUGH`, not from the evidence.
+    Noise that is overstated hides a small second effect from `AT_NOISE`, not from the evidence.
     """
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
-    if not best.effect.at or len(best.effect.parts()) > 1 or best.per_value > ENOUGH:
+    if not best.effect.at or len(best.effect.parts()) > 1 or best.per_value > AT_NOISE:
         return found
     tell("looking for a small second effect", 0.98)
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
@@ -179,9 +177,9 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
 
 
 def _lessened(problem: Problem, found: Found) -> Found:
-    """With what is left of the best when an effect is dropped again, fitted from there.
+    """Adds the best explanations without one of their effects each, fitted from where they are.
 
-    It may have led the fit out of a wrong minimum, and then explain nothing itself.
+    An effect may have led the fit out of a wrong minimum and then explain nothing itself.
     """
     there = [f for f in found.finalists if f.effect.at]
     less: list[tuple[Fit, Effect]] = []
@@ -196,9 +194,9 @@ def _lessened(problem: Problem, found: Found) -> Found:
 
 
 def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """With each spring called far off that the best moved far from where it is stated."""
+    """Adds pairs of the best with the stiffness of each joint whose springs it moved far."""
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
-    if not best.effect.at or best.per_value > ENOUGH:
+    if not best.effect.at or best.per_value > AT_NOISE:
         return found
     strayed = [e for e in effects if _strayed(best, e)]
     pairs = [p for e in strayed if (p := together(best.effect, e)) is not None]
@@ -233,7 +231,7 @@ def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
     """
     waiting = [f for f in leaders if _place(f.effect) not in led]
     best = _best_of_few(found)
-    if best.per_value <= ENOUGH:
+    if best.per_value <= AT_NOISE:
         members = [_place(e) for e in best.effect.parts()]
         waiting = [f for f in waiting if _place(f.effect) in members]
     return waiting[0] if waiting else None
@@ -262,13 +260,13 @@ def _strayed(fit: Fit, effect: Effect) -> bool:
     springs = effect.springs(misfit.setting.simulation) if effect.name == "joint_stiffness" else ()
     away = np.abs(fit.x - misfit.mean) / misfit.sd
     names = [p.name for p in misfit.parametrisation.parameters]
-    return any(away[names.index(name)] > STRAYED for name in springs if name in names)
+    return any(away[names.index(name)] > SPRING_STRAYED for name in springs if name in names)
 
 
 def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
     """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
     none = settle(problem, warm, CLOSE, STEPS)
-    clearly = none.per_value > CLEARLY
+    clearly = none.per_value > CLEARLY_WRONG
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
     looked = partial(glance if clearly else promise, few, warm=none)
     share = 0.6 / max(len(effects), 1)

@@ -7,30 +7,34 @@ course, takes what belongs to the pose.
 import numpy as np
 
 from planner.dataset.visits import Recorded
-from planner.diagnosis.effects.drift import BEND_SD, SD, Drift
+from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear.drift_fit import DriftProblem, problem_of
 from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.thresholds import (
+    ALIKE,
+    CLEAR,
+    DRIFT_BEND_SD,
+    DRIFT_COURSE,
+    DRIFT_GAINS,
+    DRIFT_LOG_SD,
+    DRIFT_MOVED,
+    DRIFT_STILL,
+)
 from planner.dynamics.simulation import Simulation
-
-ALIKE = 40.0  # neighbouring values that err alike where the simulation lacks something
-CLEAR = 8.0
-COURSE = 0.01  # relative sd of the change: no course is quite one of these
-SHARE = 3.0  # by which the misfit has to fall: physics that goes with the pose gains less
-MOVED = 3.0  # sds that the change has to be away from none
-STILL = 2.0  # times the noise: a pose that answers alike when visited again has not drifted
+from planner.inference.evidence import temper
 
 
 def fits(recorded: Recorded, nominal: Simulation) -> tuple[Fit, ...]:
     """The refitted simulation without drift, and with it: gradual, and at once."""
     problem = problem_of(recorded, nominal)
     plain = fit(problem, Effect(""))
-    end = Quantity("change", "1", 0.0, SD)
-    gradual = Drift("campaign", (end, Quantity("bend", "1", 0.0, BEND_SD)), "gradual")
+    end = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
+    gradual = Drift("campaign", (end, Quantity("bend", "1", 0.0, DRIFT_BEND_SD)), "gradual")
     found = [fit(problem, gradual, [plain])]
     count = len(problem.order) - 1
-    each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, SD) for i in range(count))
+    each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, DRIFT_LOG_SD) for i in range(count))
     free = fit(problem, Drift("campaign", each, "free"), [plain])
     found.append(fit(problem, Drift("campaign", (end,), "step", _since(free, problem)), [free]))
     return plain, *found
@@ -52,29 +56,28 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     plain, *found = fits(recorded, nominal)
     best = settle(problem_of(recorded, nominal), min(found, key=lambda f: f.per_value))
     finding = evaluate(plain, best)
-    explained = plain.per_value > SHARE * best.per_value
+    explained = plain.per_value > DRIFT_GAINS * best.per_value
     # A fit that drift led out of a wrong minimum gains by that alone.
     change, sd, _ = finding.parameters["change"]
-    there = explained and abs(change) > MOVED * sd
+    there = explained and abs(change) > DRIFT_MOVED * sd
     return (finding,) if there and finding.log_evidence > CLEAR else ()
 
 
 def evaluate(plain: Fit, best: Fit) -> Finding:
     """The gain of a fit with drift over the one without, and its parameters."""
-    misfit = max(best.per_value, 1.0)
-    temper = misfit * (1 + ALIKE * (1 - 1 / misfit))
-    values = best.parameters(temper)
+    t = temper(best.per_value, ALIKE)
+    values = best.parameters(t)
     size, sd, _ = values["change"]
     change = float(np.expm1(size))
-    told = {"change": (change, float(np.hypot((1 + change) * sd, COURSE * change)), "1")}
-    evidence = best.log_evidence(temper) - plain.log_evidence(temper)
+    told = {"change": (change, float(np.hypot((1 + change) * sd, DRIFT_COURSE * change)), "1")}
+    evidence = best.log_evidence(t) - plain.log_evidence(t)
     return Finding("drift", "campaign", evidence, told, best.effect.text(told))
 
 
 def _unchanged(recorded: Recorded) -> bool:
     """Whether a pose that was returned to answers as before."""
     apart = returned(recorded)
-    return apart is not None and apart < STILL
+    return apart is not None and apart < DRIFT_STILL
 
 
 def returned(recorded: Recorded) -> float | None:

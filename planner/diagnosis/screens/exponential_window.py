@@ -12,11 +12,9 @@ from scipy.optimize import minimize_scalar
 from planner.dataset.level_columns import pulse
 from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.thresholds import WINDOW_FASTEST_1_S, WINDOW_LEAST_1_S, WINDOW_RATE_WIDTH_1_S
 
-FASTEST_1_S = 50.0  # windows that fall faster leave nothing to look at
-LEAST_1_S = 0.05  # slower ones change no damping that matters
 LEAST_SAMPLES = 64
-PRIOR_1_S = 5.0  # width of what rates are expected
 
 
 def screen_window(recorded: Recorded) -> Finding | None:
@@ -28,12 +26,14 @@ def screen_window(recorded: Recorded) -> Finding | None:
     def loss(rate: float) -> float:
         return -_log_likelihood(told, rate)
 
-    found = minimize_scalar(loss, bounds=(-5.0, FASTEST_1_S), method="bounded")
+    found = minimize_scalar(loss, bounds=(-5.0, WINDOW_FASTEST_1_S), method="bounded")
     rate = float(found.x)
     curvature = (loss(rate + 0.01) - 2 * loss(rate) + loss(rate - 0.01)) / 1e-4
     sd = float(1 / np.sqrt(max(curvature, 1e-9)))
-    evidence = loss(0.0) - loss(rate) + float(np.log(np.sqrt(2 * np.pi) * sd / PRIOR_1_S))
-    if rate < LEAST_1_S or evidence < 0:
+    evidence = (
+        loss(0.0) - loss(rate) + float(np.log(np.sqrt(2 * np.pi) * sd / WINDOW_RATE_WIDTH_1_S))
+    )
+    if rate < WINDOW_LEAST_1_S or evidence < 0:
         return None
     text = (
         f"The noise of the force fades by {rate:.3g} ± {sd:.1g} 1/s after the pulse: an "

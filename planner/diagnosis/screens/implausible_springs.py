@@ -5,10 +5,7 @@ import numpy as np
 from planner.diagnosis.effects.joint_stiffness import JointStiffness
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear.fit import Fit
-
-FAR = 3.2  # prior sds that a spring does not move by chance, nor by what a fit in time neglects
-MOST = 1  # other joints that may be: several at once imitate what the law lacks
-FITS = 2.0  # χ² per value up to which a law is the joint's own; else springs imitate what it lacks
+from planner.diagnosis.thresholds import LAW_FITS, MOST_STRAYED, SPRING_STRAYED_BESIDE_LAW
 
 
 def strayed(
@@ -20,7 +17,7 @@ def strayed(
     well: on 36 concealed cases of seeds 19001 to 22001 it was 0.0 to 2.2 prior sds off, where truth
     scatters by one.
     """
-    if per_value > FITS:
+    if per_value > LAW_FITS:
         return ()
     misfit = plain.misfit
     simulation = misfit.setting.simulation
@@ -29,7 +26,7 @@ def strayed(
     found: dict[str, Finding] = {}
     for effect in JointStiffness.everywhere(simulation):
         springs = [name for name in effect.springs(simulation) if name in names]
-        far = [name for name in springs if abs(away[names.index(name)]) > FAR]
+        far = [name for name in springs if abs(away[names.index(name)]) > SPRING_STRAYED_BESIDE_LAW]
         if not far or effect.at in found:
             continue
         places = [names.index(name) for name in far]
@@ -42,4 +39,4 @@ def strayed(
         found[effect.at] = Finding("joint_stiffness", effect.at, evidence, told, effect.text(told))
     others = [f for at, f in found.items() if at != nonlinear]
     own = [found[nonlinear]] if nonlinear in found else []
-    return (*own, *(others if len(others) <= MOST else ()))
+    return (*own, *(others if len(others) <= MOST_STRAYED else ()))

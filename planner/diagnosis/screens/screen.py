@@ -18,7 +18,7 @@ class Screened:
 
 
 def screen(recorded: Recorded, nominal: Simulation, tell: Tell = quietly) -> Screened:
-    """Artefacts first, so that they are never called physics; then, on clean data, the rest."""
+    """Find artefacts first, so that they are not called physics, then the rest in clean data."""
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)
     by_level = force_levels.screen(clean, nominal, tell=tell)

@@ -12,40 +12,44 @@ import numpy as np
 from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import own_springs
+from planner.diagnosis.laws.fit_in_time import LawProblem
+from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
 from planner.diagnosis.laws.level_refits import Refit, base, refits
 from planner.diagnosis.laws.several_joints import (
-    Family,
-    Told,
     beginning,
     differences,
+    problem_of_levels,
     settled,
     straightened,
-    told_by,
 )
 from planner.diagnosis.laws.torque_laws import LAWS, Law, behaviour
+from planner.diagnosis.thresholds import (
+    INDEPENDENT,
+    SEVERAL_CHANGES,
+    SEVERAL_EVIDENCE,
+    SEVERAL_EXPLAINS,
+    SEVERAL_HOPEFUL,
+    SEVERAL_INEXACT,
+    SEVERAL_MATTERS,
+    SEVERAL_RIVAL,
+)
 from planner.dynamics.simulation import Simulation
+from planner.inference.evidence import unexplained_shares
 from planner.inference.parallel import side_by_side
 
 FITTED, LEAST_VISITS = 4, 3  # poses that laws are fitted to, of how many at least
 AFAR, NEAR, CLOSE = (0.3,), (0.1,), (0.03,)  # shares by which errors are softened, in turn
-RIVAL = 4.0  # times what the best law leaves: beyond, another is not followed further
-CHANGES = 0.05  # of its stiffness, from the weakest to the strongest hits: else a joint is linear
-MATTERS = 0.01  # of the levels' differences, that a joint's law must explain by itself
-HOPEFUL, EXPLAINED = 0.3, 0.8  # of the levels' differences at poses that were not fitted
-INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed
-INEXACT = 0.15  # relative sd of k and a, as found on concealed robots
-EVIDENCE = 50.0  # in nats: what is explained at other poses, by so many numbers, is no chance
 
 
 @dataclass(frozen=True, eq=False)
-class Shared:
+class SharedLaw:
     """A law at all joints, and the share of the levels' differences that it explains elsewhere.
 
     `changes` (m,): by how much of its stiffness each joint changes from the weakest hits to the
     strongest ones.
     """
 
-    family: Family
+    fit: LawMisfit
     changes: np.ndarray
     explained: float
     left: float
@@ -53,7 +57,7 @@ class Shared:
     @property
     def bent(self) -> list[int]:
         """Joints that change."""
-        return np.flatnonzero(np.abs(self.changes) > CHANGES).tolist()
+        return np.flatnonzero(np.abs(self.changes) > SEVERAL_CHANGES).tolist()
 
 
 def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
@@ -65,58 +69,60 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     fitted = set(np.linspace(0, len(visits) - 1, count).round().astype(int).tolist())
     few = replace(recorded, visits=tuple(visits[i] for i in sorted(fitted)))
     others = tuple(v for i, v in enumerate(visits) if i not in fitted)
-    told = told_by(few, base(few, nominal))
+    told = problem_of_levels(few, base(few, nominal))
     rest = replace(recorded, visits=others)
-    judged = told_by(rest, base(rest, nominal))
+    judged = problem_of_levels(rest, base(rest, nominal))
     found = _laws(told, judged, refits(few, nominal))
     best = found[0]
-    named = _that_matter(judged, best) if best.explained > EXPLAINED else []
+    named = _that_matter(judged, best) if best.explained > SEVERAL_EXPLAINS else []
     if len(named) < 2:
         return ()
-    shares = np.array([(f.left / best.left) ** (-INDEPENDENT / 2) for f in found])
-    sure = min(best.explained, float(shares[0] / shares.sum()))
+    share = unexplained_shares([f.left for f in found], INDEPENDENT)[0]
+    sure = min(best.explained, float(share))
     return _findings(best, own_springs(nominal)[0], named, sure)
 
 
-def _laws(told: Told, judged: Told, seen: Sequence[Refit]) -> list[Shared]:
+def _laws(told: LawProblem, judged: LawProblem, seen: Sequence[Refit]) -> list[SharedLaw]:
     """Laws fitted to what is told, best first as judged elsewhere."""
 
-    def closer(some: Sequence[Shared], softness: tuple[float, ...]) -> list[Shared]:
-        families = [one.family for one in some]
-        new = side_by_side(partial(_settled, told, judged, softness), families)
+    def closer(some: Sequence[SharedLaw], softness: tuple[float, ...]) -> list[SharedLaw]:
+        laws = [one.fit.law for one in some]
+        new = side_by_side(partial(_settled, told, judged, softness), laws)
         return [min(both, key=lambda one: one.left) for both in zip(some, new, strict=True)]
 
     begun = [beginning(seen, *kind, told.plain) for kind in _kinds(seen)]
     afar = _ordered(side_by_side(partial(_settled, told, judged, AFAR), begun))
     best = afar[0]
-    if best.explained < HOPEFUL or len(_that_matter(judged, best)) < 2:
+    if best.explained < SEVERAL_HOPEFUL or len(_that_matter(judged, best)) < 2:
         return afar
-    rivals = [one for one in afar if one.left < RIVAL * best.left]
+    rivals = [one for one in afar if one.left < SEVERAL_RIVAL * best.left]
     first, *rest = _ordered([*closer(rivals, NEAR), *afar[len(rivals) :]])
     return _ordered([*closer([first], CLOSE), *rest])
 
 
-def _ordered(some: Sequence[Shared]) -> list[Shared]:
+def _ordered(some: Sequence[SharedLaw]) -> list[SharedLaw]:
     return sorted(some, key=lambda one: one.left)
 
 
-def _settled(told: Told, judged: Told, softness: Sequence[float], begun: Family) -> Shared:
+def _settled(
+    told: LawProblem, judged: LawProblem, softness: Sequence[float], begun: LawAtJoints
+) -> SharedLaw:
     """Fitted to what is told, judged elsewhere."""
-    family = settled(told, begun, softness)
-    left, before, count = differences(judged, family)
+    fit = settled(told, begun, softness)
+    left, before, count = differences(judged, fit.law)
     to_explain = before - count
     explained = 1 - max(left - count, 0.0) / to_explain if to_explain > 0 else 0.0
-    changes = _changes(family, told.data.level)
-    return Shared(family, changes, explained, max(left - count, INDEPENDENT / 2))
+    changes = _changes(fit, told.data.level)
+    return SharedLaw(fit, changes, explained, max(left - count, INDEPENDENT / 2))
 
 
-def _that_matter(judged: Told, best: Shared) -> list[int]:
+def _that_matter(judged: LawProblem, best: SharedLaw) -> list[int]:
     """Joints that, with a spring in the stead of their law, would explain the levels less."""
-    whole, before, count = differences(judged, best.family)
+    whole, before, count = differences(judged, best.fit.law)
     out = []
     for j in best.bent:
-        left, _, _ = differences(judged, straightened(judged.plain, best.family, j))
-        if left - whole > MATTERS * (before - count):
+        left, _, _ = differences(judged, straightened(judged.plain, best.fit, j))
+        if left - whole > SEVERAL_MATTERS * (before - count):
             out.append(j)
     return out
 
@@ -129,51 +135,33 @@ def _kinds(seen: Sequence[Refit]) -> list[tuple[Law, int]]:
     return [(friction, 1), (stiffening, -1)]
 
 
-def _changes(family: Family, level: np.ndarray) -> np.ndarray:
-    if family.stiffer is None:
-        return np.zeros(len(family.scale))
-    share = family.stiffer / family.scale
+def _changes(fit: LawMisfit, level: np.ndarray) -> np.ndarray:
+    if fit.stiffer is None:
+        return np.zeros(len(fit.law.scale))
+    share = fit.stiffer / fit.law.scale
     strong, weak = (np.median(share[level == one], axis=0) for one in (level.max(), level.min()))
     return strong - weak
 
 
 def _findings(
-    best: Shared, ports: tuple[str, ...], named: list[int], sure: float
+    best: SharedLaw, ports: tuple[str, ...], named: list[int], sure: float
 ) -> tuple[Finding, ...]:
-    family = best.family
-    assert family.normal is not None
-    m = len(family.scale)
-    spread = np.linalg.inv(2 * family.normal)[-2 * m :, -2 * m :]
+    law = best.fit.law
+    m, spread = len(law.scale), best.fit.covariance(1.0)[len(law.x) :, len(law.x) :]
     out = []
     for j in named:
         port = ports[j]
-        own = spread[np.ix_([j, m + j], [j, m + j])]
-        parameters = _parameters(family, j, own)
+        parameters = law.parameters(j, spread[np.ix_([j, m + j], [j, m + j])], SEVERAL_INEXACT)
         told = ", ".join(
             f"{name.replace('_', ' ')} {v:.3g} ± {sd:.1g} {unit}"
             for name, (v, sd, unit) in parameters.items()
         )
-        how = behaviour(family.law.effect, family.sign)
+        how = behaviour(law.effect, law.sign)
         text = f"{port.replace('_', ' ').capitalize()} {how} ({told})."
         if not out:
             text += (
                 f" With the same in other joints it explains {100 * best.explained:.0f} % of how "
                 "FRFs change with the force at poses that were not fitted."
             )
-        out.append(Finding(family.law.effect, port, EVIDENCE, parameters, text, sure=sure))
+        out.append(Finding(law.effect, port, SEVERAL_EVIDENCE, parameters, text, sure=sure))
     return tuple(out)
-
-
-def _parameters(
-    family: Family, joint: int, spread: np.ndarray
-) -> dict[str, tuple[float, float, str]]:
-    k, a = float(family.k[joint]), float(family.a[joint])
-    values, slopes = (k, a), ((1.0, 0.0), (0.0, 1.0))
-    if family.law.effect == "friction":
-        values, slopes = (k, k * a), ((1.0, 0.0), (1.0, 1.0))
-    out = {}
-    for (name, unit), value, slope in zip(family.law.names, values, slopes, strict=True):
-        along = np.array(slope)
-        relative = np.hypot(np.sqrt(along @ spread @ along), INEXACT)
-        out[name] = (value, float(relative * abs(value)), unit)
-    return out

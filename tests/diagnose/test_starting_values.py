@@ -1,0 +1,37 @@
+"""Where fits in time begin, from the equivalent stiffness that a law's hits have."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from planner.diagnosis.laws.equivalent_stiffness import Equivalent
+from planner.diagnosis.laws.starting_values import faded, starts
+from planner.diagnosis.laws.torque_laws import LAWS
+
+SCALE, ANGLE = 1e5, 2e-4  # of the joint's stiffness in N·m/rad, at which the law bends in rad
+SWING = ANGLE * np.array([[0.3, 1.5], [0.5, 2.0], [0.2, 1.0], [0.8, 2.5]])  # weak and strong hits
+
+
+def begun(law, share):
+    delta = share * SCALE * (faded(law, SWING[:, 0], ANGLE) - faded(law, SWING[:, 1], ANGLE))
+    nothing, column = np.zeros(len(SWING)), np.ones((len(SWING), 1))
+    found = Equivalent(
+        nothing, nothing, nothing, SWING[:, :, None], delta[:, None], 1e2 * column,
+        nothing, nothing, nothing,
+    )  # fmt: skip
+    springs = SimpleNamespace(stiffness=np.array([SCALE]))
+    system = SimpleNamespace(elasticity=springs, blocks=np.array([0]), ports=("joint_1",))
+    return starts(found, cast(Any, system), 0, np.array([np.log(SCALE)]), 0)
+
+
+@pytest.mark.parametrize(
+    ("law", "share"), [(LAWS[0], 0.8), (LAWS[0], -0.5), (LAWS[1], 0.6), (LAWS[2], 0.4)]
+)
+def test_a_law_is_begun_near_itself_and_from_several_angles(law, share):
+    own = [one for one in begun(law, share) if one.kind is law and one.k[0] * share > 0]
+    assert len({float(one.a[0]) for one in own}) >= 3
+    assert min(abs(np.log(one.a[0] / ANGLE)) for one in own) < np.log(2)
+    nearest = min(own, key=lambda one: abs(np.log(one.a[0] / ANGLE)))
+    assert nearest.k[0] / SCALE == pytest.approx(share, rel=0.5)
