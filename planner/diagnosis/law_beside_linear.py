@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear.search import ENOUGH
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
@@ -42,7 +42,7 @@ def leaves_room(findings: Sequence[Finding]) -> bool:
 
 
 def beside(
-    recorded: Recorded, findings: Sequence[Finding], found: Diagnosis, tell: Tell = quietly
+    recorded: Dataset, findings: Sequence[Finding], found: Diagnosis, tell: Tell = quietly
 ) -> tuple[tuple[Finding, ...], Diagnosis] | None:
     """Findings of the levels once the best linear effect is known, and the diagnosis beside them.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 # The force belongs to the pulse where it exceeds this share of the peak and this many sds of noise.
-PULSE_SHARE, PULSE_SDS = 0.05, 4.0
+PULSE_SHARE, PULSE_SDS = 0.1, 4.0
 # Something has begun to happen where the force first exceeds these; a few samples earlier still.
 RISING_SHARE, RISING_SDS, RISING_SAMPLES = 0.01, 5.0, 4
 NORMAL_MAD = 1.4826  # sd of normal noise over its median absolute deviation
@@ -41,9 +41,7 @@ class Pulse(NamedTuple):
         return max(0, self.first - margin), min(samples, self.end + margin)
 
 
-def find_pulse(
-    force_n: np.ndarray, share: float = PULSE_SHARE, sds: float = PULSE_SDS
-) -> Pulse:
+def find_pulse(force_n: np.ndarray, share: float = PULSE_SHARE, sds: float = PULSE_SDS) -> Pulse:
     """The main pulse of a force (n,) in N.
 
     It reaches as far around the peak as the force stays above `share` of the peak and `sds` of

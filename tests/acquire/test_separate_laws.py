@@ -12,8 +12,8 @@ from known_robots import KR210
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
 from planner.cli.render_diagnosis import _next
+from planner.dataset.dataset import Dataset, Visit
 from planner.dataset.level_columns import column
-from planner.dataset.visits import Recorded, Visit
 from planner.design.law_discrimination import accelerance, forces_n, law_separation
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import receptances, system_of
@@ -46,7 +46,7 @@ def cell(tmp_path_factory):
     hits = tuple(struck(axis, 300.0, rng) for axis in range(3))
     q = KR210.poses(2, 8)
     visits = tuple(Visit(f"P{i}", row, 0.5 * i, hits) for i, row in enumerate(q))
-    recorded = Recorded(visits, (5.0, 50.0))
+    recorded = Dataset.of_visits(visits, (5.0, 50.0))
     plain = base(recorded, simulation)
     plain = replace(plain, x=plain.misfit.mean)  # records of noise say nothing of springs
     return recorded, simulation, plain

@@ -8,7 +8,8 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
 from planner.demo import Pool, shipped
 from planner.dynamics.vibration import direct_accelerance
 from planner.modal.modes import Mode

@@ -1,9 +1,9 @@
 """A campaign's recordings as a folder that everything else reads."""
 
 import pytest
+from planner.campaign.table import write_table
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.table import write_table
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.recording.folder import read_recordings

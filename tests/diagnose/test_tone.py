@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from known_robots import KR210
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.screens.tone import screen_tone
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
@@ -26,7 +26,7 @@ def poses():
     return KR210.poses(1, 3) + 0.01 * np.random.default_rng(1).standard_normal((4, 6))
 
 
-def sounding(plain: Recorded) -> Recorded:
+def sounding(plain: Dataset) -> Dataset:
     """The same with a tone whose phase no hit knows."""
     rng = np.random.default_rng(5)
     weak = [h for v in plain.visits for h in v.hits if not plain.level(h)]

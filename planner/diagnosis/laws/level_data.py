@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
-from planner.dataset.visits import Recorded
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
 from planner.diagnosis.linear.fit import Fit
@@ -40,7 +40,7 @@ class Data:
     fastest_hz: float
 
 
-def data_of(recorded: Recorded, plain: Fit) -> Data:
+def data_of(recorded: Dataset, plain: Fit) -> Data:
     """Columns of all visits, and what the linear simulation says of the strongest."""
     columns: list[Column] = []
     visits: list[int] = []

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.laws.equivalent_stiffness import System, receptances, system_of
 from planner.diagnosis.laws.level_data import (
     LAID,
@@ -74,7 +74,7 @@ class Family:
         return np.exp(self.middle + self.nu[1])
 
 
-def told_by(recorded: Recorded, plain: Fit) -> Told:
+def told_by(recorded: Dataset, plain: Fit) -> Told:
     """What laws are fitted to, and judged by."""
     places = [(n, c) for n, group in enumerate(recorded.columns_at(LAID)) for c in group]
     hits = strokes([n for n, _ in places], [c for _, c in places], FINER, LASTS_S)

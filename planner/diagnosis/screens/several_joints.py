@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import own_springs
 from planner.diagnosis.laws.level_refits import Refit, base, refits
@@ -56,7 +56,7 @@ class Shared:
         return np.flatnonzero(np.abs(self.changes) > CHANGES).tolist()
 
 
-def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
+def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     """One law at two joints or more; nothing where that does not explain the force levels."""
     visits = [v for v in recorded.visits if len({recorded.level(h) for h in v.hits}) > 1]
     if len(visits) < LEAST_VISITS:
