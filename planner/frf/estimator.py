@@ -106,9 +106,11 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
     share = np.mean(np.sum(told**2 * force_share[:, None], axis=0), axis=0)
     alone = np.einsum("nr,nr,nf->rf", weight**2, noise, square) / sff**2
-    if len(group) == 1 or not by_scatter:
-        known = not by_scatter or group[0].noise_known
-        variance = alone + np.abs(h) ** 2 * share if known else np.full(h.shape, np.nan)
+    if not by_scatter:
+        variance = alone + np.abs(h) ** 2 * share
+    elif len(group) == 1:
+        variance = alone if group[0].noise_known else np.full(h.shape, np.nan)
+        variance = variance + (np.abs(h) ** 2 * share if estimator == "weighted" else 0.0)
     else:
         left = np.abs(response - h * force[:, None]) ** 2
         if estimator == "weighted":
