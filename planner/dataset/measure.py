@@ -74,7 +74,7 @@ class MeasuredPose:
 
         Raises InputError where time histories and exported FRFs are mixed.
         """
-        return self._kept("frf", Averaged, self._average)
+        return self.kept("frf", Averaged, self._average)
 
     @cached_property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -97,12 +97,12 @@ class MeasuredPose:
         plain = self.frf
         if plain is None or not np.isfinite(plain.tail_s):
             return plain
-        return self._kept("ended frf", Frf, lambda: self._ended(plain))
+        return self.kept("ended frf", Frf, lambda: self._ended(plain))
 
     @cached_property
     def decomposed(self) -> Decomposed:
         """Modes, where there is an FRF."""
-        return self._kept("modes", Decomposed, self._decompose)
+        return self.kept("modes", Decomposed, self._decompose)
 
     @property
     def modal(self) -> ModalModel | None:
@@ -125,7 +125,7 @@ class MeasuredPose:
         keys = [self._key(what) for what in ("frf", "modes")]
         return self.store is not None and all(self.store.has(key) for key in keys)
 
-    def _kept(self, what: str, kind: type[T], make: Callable[[], T]) -> T:
+    def kept(self, what: str, kind: type[T], make: Callable[[], T]) -> T:
         """From the store, or made and kept there."""
         if self.store is None or self.given:
             return make()
@@ -244,7 +244,7 @@ def frf_of(
             hits += () if found else hits_from(records, axis=source.hit)
         return _frf(tuple(hits), tuple(frfs), band_hz, "h1", window_rate_1_s)
 
-    return pose._kept("accepted frf", Frf, make)
+    return pose.kept("accepted frf", Frf, make)
 
 
 def _frf(
