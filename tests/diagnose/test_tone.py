@@ -39,7 +39,7 @@ def sounding(plain: Dataset) -> Dataset:
             wave = np.cos(2 * np.pi * TONE_HZ * t + rng.uniform(0, 2 * np.pi))
             hits.append(replace(hit, acceleration_m_s2=hit.acceleration_m_s2 + size * wave))
         visits.append(replace(visit, hits=tuple(hits)))
-    return replace(plain, visits=tuple(visits))
+    return plain.corrected(visits)
 
 
 def test_a_tone_is_named_by_its_frequency(simulation, poses):

@@ -4,7 +4,7 @@ Laws are fitted to some of the poses and judged at the others.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -63,10 +63,10 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
         return ()
     count = min(FITTED, len(visits) - 1)
     fitted = set(np.linspace(0, len(visits) - 1, count).round().astype(int).tolist())
-    few = replace(recorded, visits=tuple(visits[i] for i in sorted(fitted)))
+    few = recorded.corrected(visits[i] for i in sorted(fitted))
     others = tuple(v for i, v in enumerate(visits) if i not in fitted)
     told = told_by(few, base(few, nominal))
-    rest = replace(recorded, visits=others)
+    rest = recorded.corrected(others)
     judged = told_by(rest, base(rest, nominal))
     found = _laws(told, judged, refits(few, nominal))
     best = found[0]
