@@ -160,14 +160,15 @@ def test_one_law_and_twice_the_same_need_no_hit(cell):
 def test_the_command_names_the_force(cell):
     laws = laws_of(cell, (DAHL, 0.5, SWING), (DEAD_ZONE, 0.5, SWING))
     finding = Finding("friction", "joint_3", 50.0, laws=laws)
-    explained = SimpleNamespace(whole=SimpleNamespace(established=((finding, 0.5),)))
+    established = SimpleNamespace(established=((finding, 0.5),))
+    explained = SimpleNamespace(whole=established, recorded=cell[0])
     q = KR210.poses(3, 9)
     given = Material(Path(), Path(), 0.0, q, ("A", "B", "C"))
-    told = next_hit(explained, cell[0], given)
+    told = next_hit(explained, given)
     assert told["pose"] in given.names
     assert told["hit"] in "xyz"
     assert told["force_n"][1] == pytest.approx(300.0, rel=0.1)  # all hits were of 300 N
     assert told["force_n"][0] < told["force_n"][1] <= 300.5
     assert told["between"] == ["friction at joint_3 (50 %)", "backlash at joint_3 (50 %)"]
     assert " N along " in _next(told)
-    assert next_hit(explained, cell[0], replace(given, offered=q[:0])) is None
+    assert next_hit(explained, replace(given, offered=q[:0])) is None

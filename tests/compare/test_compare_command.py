@@ -37,7 +37,7 @@ def bench(pool, tmp_path_factory):
     robot = Robot.load(robot_toml)
     config = decide(robot, [], campaign, "frozen")
     folder = tmp_path_factory.mktemp("kept")
-    poses = recorded(recordings, robot.joint_names, config.modes, folder, 1, lambda *_: None)
+    poses = recorded(recordings, robot.joint_names, config.modes, 1, lambda *_: None)
     return assemble(robot, config, poses)[0]
 
 
