@@ -86,7 +86,7 @@ def transform(
     chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
     windows = windows or Windows()
     found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
-    tail = float(np.mean([_tail(hit, after) for hit in hits]))
+    tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
     return Spectra(frequency[chosen], found, tail, before / rate, remarks)
 
 
@@ -135,12 +135,13 @@ def _transform(
     )
 
 
-def _tail(hit: Hit, after: int) -> float:
+def _tail(hit: Hit, before: int, after: int) -> float:
     """Time from the centroid of the pulse to the end of the samples that are used.
 
     Never left out: what looks quiet beside a loud stiff mode may be a soft one that still rings.
     """
     first, end = hit.pulse.around(len(hit.force_n))
+    first = max(first, hit.pulse.peak - before)
     pulse = np.clip(hit.force_n[first:end] - hit.pulse.offset_n, 0.0, None)
     centroid = first + float(np.sum(np.arange(pulse.size) * pulse) / np.sum(pulse))
     # A sample stands for the time around it: the last one ends half a step after itself.
