@@ -32,11 +32,10 @@ def pool(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def bench(pool, tmp_path_factory):
+def bench(pool):
     recordings, robot_toml, campaign = pool
     robot = Robot.load(robot_toml)
     config = decide(robot, [], campaign, "frozen")
-    folder = tmp_path_factory.mktemp("kept")
     poses = recorded(recordings, robot.joint_names, config.modes, 1, lambda *_: None)
     return assemble(robot, config, poses)[0]
 
