@@ -1,12 +1,13 @@
 """Where what can be computed again is kept between runs."""
 
-import os
-import sys
 from pathlib import Path
+
+import platformdirs
 
 
 def folder(name: str) -> Path:
     """The user's folder for a kind of cache; RuntimeError for a user without a home."""
-    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA")
-    own = "Library/Caches" if sys.platform == "darwin" else ".cache"
-    return (Path(base) if base else Path.home() / own) / "planner" / name
+    path = platformdirs.user_cache_path("planner", appauthor=False)
+    if not path.is_absolute():
+        raise RuntimeError("There is no home folder.")
+    return path / name

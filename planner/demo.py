@@ -16,7 +16,8 @@ from planner.campaign.importing import ImportReport
 from planner.campaign.labels import frequencies, label
 from planner.campaign.log_conversion import from_modal
 from planner.campaign.state import Measurement
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
 from planner.errors import InputError, NoPoseLeftError
 from planner.recording.folder import read_recordings
 from planner.recording.records import PoseRow
@@ -162,7 +163,8 @@ def _measured_hz(
     found = []
     for i, pose in enumerate(poses):
         progress(f"checking on unused pose {i + 1} of {len(poses)}")
-        sources = tuple(Source(r.file, str(r.file), r.hit) for r in pool.rows[pose] if r.file)
+        rows = pool.rows[pose]
+        sources = tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in rows if r.file)
         table = cell.config.modes
         measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
         modes = from_modal(measured.modal)

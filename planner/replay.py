@@ -26,6 +26,7 @@ from planner.campaign.model import Model, build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, fold
 from planner.dataset.measure import MeasuredPose, measure
+from planner.dataset.store import Store
 from planner.errors import InputError, NoPoseLeftError, PlannerError
 
 CLOSE = 1e-6  # relative; another processor rounds differently, another program errs by more
@@ -131,7 +132,9 @@ def _check_import(
                 f"{source.path} is not what was imported as {hit.file}; restore it from a copy."
             )
     table = model.cell.config.modes
-    measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
+    # Nothing that was kept is taken: to compute it again is what is asked for.
+    rate, anew = table.window_rate_1_s, Store(None)
+    measured = measure(sources, table.band_hz, window_rate_1_s=rate, store=anew)
     modes = from_modal(measured.modal)
     accepted = [v.accepted for v in measured.verdicts[len(hits) - len(event.hits) :]]
     if accepted != [hit.accepted for hit in event.hits]:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
+import numpy as np
 
 from planner import __version__
 from planner.campaign import store
@@ -48,7 +49,9 @@ from planner.campaign.model import Model, build
 from planner.campaign.proposals import propose
 from planner.campaign.question import question
 from planner.campaign.state import CampaignState, Measurement, fold, last_act
-from planner.dataset.measure import Source, frf_of
+from planner.dataset.dataset import Dataset, Progress, Recording
+from planner.dataset.measure import frf_of
+from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.frf.frf import Frf
 
@@ -120,6 +123,32 @@ class Campaign:
             sources = tuple(self.source_of(hit) for hit in measurement.accepted)
             self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
         return self._frfs[key]
+
+    def dataset(
+        self,
+        band_hz: tuple[float, float],
+        *,
+        window_rate_1_s: float = 0.0,
+        progress: Progress = lambda text: None,
+    ) -> Dataset:
+        """The accepted recordings of all poses in use, in the order of import.
+
+        Raises InputError where there are none.
+        """
+        found = [
+            Recording(measurement.pose, np.deg2rad(measurement.joints_deg), self.source_of(hit))
+            for measurement in self.state.used
+            for hit in measurement.accepted
+        ]
+        if not found:
+            raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
+        return Dataset.of(
+            found,
+            band_hz,
+            window_rate_1_s=window_rate_1_s,
+            progress=progress,
+            name=str(self.directory),
+        )
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from planner.dataset.measure import Source
+from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.folder import TABLE, files_in, read_recordings
 from planner.recording.records import PoseRow

@@ -13,7 +13,8 @@ from planner.campaign.deliveries import Delivery
 from planner.campaign.events import HitRecord, Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.measure import MeasuredPose, Source, measure
+from planner.dataset.measure import MeasuredPose, measure
+from planner.dataset.screened_files import Source
 from planner.errors import InputError
 
 SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move

@@ -70,7 +70,7 @@ def compare(
     config = decide(loaded, [row.joints_deg for row in rows], campaign, simulation)
     folder = out or _cache_folder()
     with bars(quiet=as_json) as progress:
-        poses = recorded(recordings, loaded.joint_names, config.modes, folder, workers, progress)
+        poses = recorded(recordings, loaded.joint_names, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)
         found = conduct(bench, study, folder, scheduler, workers, progress)

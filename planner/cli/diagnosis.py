@@ -9,8 +9,7 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
-    from planner.dataset.recorded import Recorded
-    from planner.dataset.visits import Recorded as Visits
+    from planner.dataset.dataset import Dataset
     from planner.diagnosis.diagnose import Explained
     from planner.diagnosis.finding import Finding
     from planner.diagnosis.linear.predict import ThreefoldSimilarity
@@ -45,7 +44,6 @@ def diagnose(
     from planner.cli.next_hit import next_hit
     from planner.cli.progress import counting
     from planner.cli.render_diagnosis import diagnosed
-    from planner.dataset.windowed import read_ended
     from planner.diagnosis.diagnose import explain
     from planner.dynamics.simulation import Simulation
     from planner.recording.folder import read_poses
@@ -54,26 +52,20 @@ def diagnose(
     started = time.perf_counter()
     modal.check(None, "h1", None, window_rate_1_s)
     given = material(recordings, robot, window_rate_1_s)
-    recordings, window_rate_1_s = given.recordings, given.window_rate_1_s
     nominal = Robot.load(given.robot)
     wanted = read_poses(predict, nominal.joint_names) if predict else ()
     with counting(quiet=as_json) as tell:
-        recorded = read_ended(
-            recordings,
-            nominal.joint_names,
-            nominal.config.band_hz,
-            window_rate_1_s,
-            lambda text: tell(text, 0.0),
+        recorded = given.read(
+            nominal.joint_names, nominal.config.band_hz, lambda text: tell(text, 0.0)
         )
-        visits = _visits(recordings, nominal, window_rate_1_s)
-        explained = explain(recorded, visits, Simulation(nominal), tell)
+        explained = explain(recorded, Simulation(nominal), tell)
         recorded, found = explained.recorded, explained.judged.diagnosis
         answer = _answer(explained)
         answer |= {"npz": None, "robot": None, "plots": []}
-        answer["next"] = next_hit(explained, visits, given.with_poses(wanted))
+        answer["next"] = next_hit(explained, given.with_poses(wanted))
         if wanted:
             rows = [(row.pose, row.joints_deg) for row in wanted]
-            answer["npz"] = str(_predict(found, rows, _target(out, predict, recordings)))
+            answer["npz"] = str(_predict(found, rows, _target(out, predict, given.recordings)))
         if out is not None:
             answer |= _written(out, nominal, recorded, found)
     answer["seconds"] = time.perf_counter() - started
@@ -87,18 +79,6 @@ def _target(out: Path | None, predict: Path | None, recordings: Path) -> Path:
     assert predict is not None
     folder = out if out is not None else recordings.absolute().parent / "predictions"
     return folder.absolute() / f"{predict.stem}.npz"
-
-
-def _visits(folder: Path, robot: "Robot", window_rate_1_s: float) -> "Visits | None":
-    """The hits themselves; None where there are only FRFs, or a window is stated."""
-    from planner.dataset.visits import read_visits
-    from planner.errors import RefusedError
-
-    try:
-        visits = read_visits(folder, robot.joint_names, robot.config.band_hz)
-    except RefusedError:
-        return None
-    return None if window_rate_1_s else visits
 
 
 def _answer(explained: "Explained") -> dict[str, Any]:
@@ -215,7 +195,7 @@ def _predict(found: "Diagnosis", rows: list[tuple[str, tuple[float, ...]]], path
     return path
 
 
-def _written(out: Path, robot: "Robot", recorded: "Recorded", found: "Diagnosis") -> dict[str, Any]:
+def _written(out: Path, robot: "Robot", recorded: "Dataset", found: "Diagnosis") -> dict[str, Any]:
     """The explained robot and the pictures, in a folder."""
     from planner.diagnosis.linear_diagnosis import Candidate
     from planner.diagnosis.write_explained import write_explained

@@ -10,7 +10,7 @@ import typer
 from planner.cli.answer import AsJson, respond, warn
 
 if TYPE_CHECKING:
-    from planner.dataset.recorded import Recorded
+    from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
     from planner.identification.agreement import Similarity
     from planner.identification.held_out import JudgedIdentification
@@ -63,7 +63,7 @@ def identify(
     from planner.cli import modal
     from planner.cli.progress import reporting
     from planner.cli.render_identification import identified
-    from planner.dataset.recorded import read_recorded
+    from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
     from planner.identification.extended_structure import Structure, extended
     from planner.identification.held_out import identify_judged
@@ -82,7 +82,13 @@ def identify(
     priors = Priors(mass=MASS, inertia=INERTIA, com_m=COM_M) if inertias else Priors()
     fitted = extended(simulation, priors) if extend else Structure(simulation, priors)
     with reporting("identifying", quiet=as_json) as progress:
-        recorded = read_recorded(recordings, nominal.joint_names, band, window_rate_1_s, progress)
+        recorded = Dataset.read(
+            recordings,
+            nominal.joint_names,
+            band,
+            window_rate_1_s=window_rate_1_s,
+            progress=progress,
+        )
         judged = identify_judged(
             recorded.frfs,
             recorded.q,
@@ -114,7 +120,7 @@ def _write(
     answer: dict[str, Any],
     out: Path,
     robot: "Robot",
-    recorded: "Recorded",
+    recorded: "Dataset",
     judged: "JudgedIdentification",
 ) -> None:
     """Write the identified robot, read it again, and say how well that one agrees."""
@@ -133,7 +139,7 @@ def _write(
 
 def _drawn(
     pictures: "Pictures",
-    recorded: "Recorded",
+    recorded: "Dataset",
     judged: "JudgedIdentification",
     nominal: "Simulation",
     band_hz: tuple[float, float],
@@ -160,7 +166,7 @@ def _told(progress: Callable[[str], None]) -> "Callable[[Progress], None]":
     return tell
 
 
-def _answer(robot: "Robot", recorded: "Recorded", judged: "JudgedIdentification") -> dict[str, Any]:
+def _answer(robot: "Robot", recorded: "Dataset", judged: "JudgedIdentification") -> dict[str, Any]:
     final = judged.final
     aside = [recorded.poses[i] for i in judged.held_out]
     remarks = [*recorded.remarks, *final.remarks]

@@ -1,13 +1,13 @@
 """What a diagnosis is given: a folder of recordings and a robot, or a campaign."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from planner.campaign import store
 from planner.campaign.campaign import Campaign
-from planner.campaign.table import write_table
+from planner.dataset.dataset import Dataset, Progress
 from planner.errors import InputError
 from planner.recording.records import PoseRow
 
@@ -18,7 +18,8 @@ OFFERED = 200  # of a campaign's candidates, evenly spread, that are looked at
 class Material:
     """Recordings, robot.toml, the analyser's window rate, and poses that could be measured next.
 
-    `offered` (n, dof) in rad, with their names; empty where none are known.
+    `recordings` is their folder, in which a `campaign` keeps its own. `offered` (n, dof) in rad,
+    with their names; empty where none are known.
     """
 
     recordings: Path
@@ -26,6 +27,18 @@ class Material:
     window_rate_1_s: float
     offered: np.ndarray
     names: tuple[str, ...]
+    campaign: Campaign | None = None
+
+    def read(
+        self, joint_names: tuple[str, ...], band_hz: tuple[float, float], progress: Progress
+    ) -> Dataset:
+        """The recordings; nothing is written. Raises as `Dataset.read` does."""
+        rate = self.window_rate_1_s
+        if self.campaign is None:
+            return Dataset.read(
+                self.recordings, joint_names, band_hz, window_rate_1_s=rate, progress=progress
+            )
+        return self.campaign.dataset(band_hz, window_rate_1_s=rate, progress=progress)
 
     def with_poses(self, rows: tuple[PoseRow, ...]) -> "Material":
         """The same with the poses of a table, unless a campaign offers its own."""
@@ -33,7 +46,7 @@ class Material:
             return self
         q = np.deg2rad(np.array([row.joints_deg for row in rows]))
         names = tuple(row.pose for row in rows)
-        return Material(self.recordings, self.robot, self.window_rate_1_s, q, names)
+        return replace(self, offered=q, names=names)
 
 
 def material(folder: Path, robot: Path | None, window_rate_1_s: float) -> Material:
@@ -47,9 +60,9 @@ def material(folder: Path, robot: Path | None, window_rate_1_s: float) -> Materi
         return Material(folder, robot, window_rate_1_s, np.zeros((0, 0)), ())
     campaign = Campaign(folder)
     cell = campaign.cell
-    recordings = write_table(campaign.directory, campaign.state, cell.robot.joint_names)
     chosen = np.flatnonzero(cell.allowed)[:OFFERED]
     names = tuple(f"candidate {i + 1}" for i in chosen)
     path = robot or campaign.directory / cell.config.robot
     rate = window_rate_1_s or cell.config.modes.window_rate_1_s
-    return Material(recordings, path, rate, cell.candidates.q[chosen], names)
+    recordings = campaign.directory / store.RECORDINGS
+    return Material(recordings, path, rate, cell.candidates.q[chosen], names, campaign)

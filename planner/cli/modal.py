@@ -6,7 +6,8 @@ from typing import Any
 import msgspec
 
 from planner.campaign.log_conversion import from_homogeneity
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
 from planner.errors import InputError, PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE

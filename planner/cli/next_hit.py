@@ -6,22 +6,20 @@ from typing import Any
 import numpy as np
 
 from planner.cli.material import Material
-from planner.dataset.visits import Recorded as Visits
 from planner.design.discrimination import Telling, most_telling
 from planner.design.law_discrimination import most_telling_forces, undecided
 from planner.diagnosis.diagnose import Explained
 from planner.diagnosis.laws.law_at_joints import Laws
 
 
-def next_hit(explained: Explained, visits: Visits | None, given: Material) -> dict[str, Any] | None:
+def next_hit(explained: Explained, given: Material) -> dict[str, Any] | None:
     """Pose, axis and peak forces; None if nothing is tied or no pose is offered."""
     if not len(given.offered):
         return None
     for finding, _ in explained.whole.established:
         laws = finding.laws and undecided(finding.laws)
         if laws and len(laws.candidates) > 1:
-            assert visits is not None
-            return _of_laws(finding.at, laws, visits.level_n, given)
+            return _of_laws(finding.at, laws, explained.recorded.level_n, given)
     found = explained.judged.diagnosis
     tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
     if len(tied) < 2:
@@ -29,7 +27,8 @@ def next_hit(explained: Explained, visits: Visits | None, given: Material) -> di
     fits, shares = [f for f, _ in tied], [p for _, p in tied]
     best = most_telling(found.problem, fits, shares, given.offered, found.temper)
     # Linear candidates answer in proportion: the harder, the less noise.
-    hardest = [float(visits.level_n[-1])] if visits is not None else []
+    recorded = explained.recorded
+    hardest = [float(recorded.level_n[-1])] if recorded.visits else []
     names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
     return _proposal(best, hardest, given, names)
 

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
 from planner.errors import RefusedError
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track

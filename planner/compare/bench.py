@@ -8,6 +8,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from planner import content_hash
 from planner.campaign.cell import Cell
 from planner.campaign.config import (
     CampaignConfig,
@@ -18,7 +19,6 @@ from planner.campaign.config import (
 )
 from planner.campaign.labels import label, observations
 from planner.campaign.state import Measurement
-from planner.compare import content_hash
 from planner.compare.pool import PoolPose
 from planner.errors import InputError
 from planner.frf.frf import Frf

@@ -16,7 +16,7 @@ from planner.compare.run import run
 from planner.compare.tasks import Run, Study, Task
 from planner.errors import InputError
 
-POSES, RUNS = "poses", "runs"
+RUNS = "runs"
 Progress = Callable[[str, int, int], None]  # what is counted, done, of how many
 
 
@@ -24,20 +24,18 @@ def recorded(
     recordings: Path,
     joint_names: tuple[str, ...],
     table: ModesTable,
-    folder: Path,
     workers: int,
     progress: Progress,
 ) -> tuple[PoolPose, ...]:
-    """All poses of a recordings folder; those made before are read from `folder`."""
+    """All poses of a recordings folder; what was found of them before is taken up."""
     files = pool.poses_of(recordings, joint_names, table)
-    made = _folder(folder / POSES)
-    found = {i: pose for i, f in enumerate(files) if (pose := pool.kept(made, f)) is not None}
+    found = {i: pool.make(None, f) for i, f in enumerate(files) if pool.kept(f)}
     todo = [i for i in range(len(files)) if i not in found]
     progress("poses", len(found), len(files))
-    for k, data in processes.each(pool.make, None, [files[i] for i in todo], workers):
-        if isinstance(data, Failure):
-            raise InputError(f"Pose {files[todo[k]].rows[0].pose}: {data.reason}")
-        found[todo[k]] = pool.keep(made, files[todo[k]], data)
+    for k, pose in processes.each(pool.make, None, [files[i] for i in todo], workers):
+        if isinstance(pose, Failure):
+            raise InputError(f"Pose {files[todo[k]].rows[0].pose}: {pose.reason}")
+        found[todo[k]] = pose
         progress("poses", len(found), len(files))
     return tuple(found[i] for i in range(len(files)))
 

@@ -6,11 +6,11 @@ import time
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from planner import content_hash
 from planner.campaign.acquisition_inputs import cost_of
 from planner.campaign.model import Model, build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
-from planner.compare import content_hash
 from planner.compare.bench import Bench, PoolCell, cell_of
 from planner.compare.score import Score, score
 from planner.compare.tasks import Run, Task

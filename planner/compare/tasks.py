@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from planner.compare import content_hash
+from planner import content_hash
 from planner.compare.bench import Bench
 from planner.design.pool_designs import NESTED
 from planner.design.propose import check_name

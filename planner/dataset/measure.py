@@ -1,47 +1,209 @@
-"""From the files of one pose to its modes: read, screen, average, identify."""
+"""From the files of one pose to its modes: read, screen, average, identify; each step once."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from pathlib import Path
+from functools import cached_property
+from importlib.metadata import version
+from typing import TypeVar
 
-from planner.errors import InputError, PlannerError, RefusedError
+import numpy as np
+
+from planner import content_hash
+from planner.dataset.screened_files import ScreenedFiles, Source, Verdict, read_files, renamed
+from planner.dataset.store import Store, user_store
+from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.homogeneity import Homogeneity, homogeneity
 from planner.modal.modes import ModalModel
-from planner.recording.records import FrfRecord, Hit, Record
+from planner.recording.records import FrfRecord, Hit
+
+OVER = 5.5  # e^−OVER of the slowest decay is left where the record ends
+PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
+
+T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Source:
-    """One file and what the table of recordings says about it (None: nothing)."""
+@dataclass(frozen=True, eq=False)
+class Averaged:
+    """FRF of a pose; None where nothing could be used. `remarks` says why, or what to know."""
 
-    path: Path
-    name: str
-    hit: str | None = None
-    repeat: int | None = None
+    verdicts: tuple[Verdict, ...]
+    frf: Frf | None
+    remarks: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What became of one file: accepted, or refused for a stated reason."""
+@dataclass(frozen=True, eq=False)
+class Decomposed:
+    """Modes of a pose's FRF and the comparison of its force levels (None: one level only)."""
 
-    source: Source
-    accepted: bool
-    reason: str = ""
-    axis: str | None = None
-    simulated: bool = False
-    remarks: tuple[str, ...] = ()
+    modal: ModalModel | None
+    homogeneity: Homogeneity | None
+    remarks: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPose:
-    """All that one pose's files gave; `frf` and `modal` are None where nothing could be used."""
+    """One pose's recordings and what follows from them, computed when first asked for and kept.
 
-    verdicts: tuple[Verdict, ...]
-    hits: tuple[Hit, ...]
-    frf: Frf | None
-    modal: ModalModel | None
-    remarks: tuple[str, ...] = ()
-    homogeneity: Homogeneity | None = None  # None: one force level only
+    FRFs and modes are looked up in `store` before files are read. `given` are hits that are at
+    hand already and are used as they are; there are no files then, and nothing is stored.
+    """
+
+    sources: tuple[Source, ...]
+    band_hz: tuple[float, float]
+    estimator: str = "h1"
+    window_rate_1_s: float = 0.0  # of an exponential window that the analyser laid over all
+    given: tuple[Hit, ...] = ()
+    store: Store | None = None
+
+    @cached_property
+    def files(self) -> ScreenedFiles:
+        """The files, read and screened."""
+        if self.given:
+            return ScreenedFiles((), (self.given,), self.given, ())
+        return read_files(self.sources, self.band_hz)
+
+    @property
+    def hits(self) -> tuple[Hit, ...]:
+        """The hits that the FRF is the average of."""
+        return self.files.agreeing
+
+    @cached_property
+    def averaged(self) -> Averaged:
+        """FRF of all good hits, or of exported FRFs, and a verdict on each file.
+
+        Raises InputError where time histories and exported FRFs are mixed.
+        """
+        return self.kept("frf", Averaged, self._average)
+
+    @cached_property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """One per file: none is dropped in silence."""
+        # What was kept may have been read from another copy of the same files.
+        both = zip(self.averaged.verdicts, self.sources, strict=True)
+        return tuple(replace(verdict, source=source) for verdict, source in both)
+
+    @property
+    def frf(self) -> Frf | None:
+        """See `averaged`."""
+        return self.averaged.frf
+
+    @cached_property
+    def ended_frf(self) -> Frf | None:
+        """The FRF under an exponential window by which decays are over; exported ones as they are.
+
+        What the window does is part of the model (`Frf.exponential_rate_1_s`).
+        """
+        plain = self.frf
+        if plain is None or not np.isfinite(plain.tail_s):
+            return plain
+        return self.kept("ended frf", Frf, lambda: self._ended(plain))
+
+    @cached_property
+    def decomposed(self) -> Decomposed:
+        """Modes, where there is an FRF."""
+        return self.kept("modes", Decomposed, self._decompose)
+
+    @property
+    def modal(self) -> ModalModel | None:
+        """See `decomposed`."""
+        return self.decomposed.modal
+
+    @property
+    def homogeneity(self) -> Homogeneity | None:
+        """See `decomposed`."""
+        return self.decomposed.homogeneity
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """On FRF and modes."""
+        return *self.averaged.remarks, *self.decomposed.remarks
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether FRF and modes are in the store, so that they cost nothing."""
+        keys = [self._key(what) for what in ("frf", "modes")]
+        return self.store is not None and all(self.store.has(key) for key in keys)
+
+    def kept(self, what: str, kind: type[T], make: Callable[[], T]) -> T:
+        """From the store, or made and kept there."""
+        if self.store is None or self.given:
+            return make()
+        key = self._key(what)
+        found = self.store.get(key, kind)
+        if found is None:
+            found = make()
+            if _digest(self.sources) == self._contents:  # no file changed while it was read
+                self.store.put(key, found)
+        return found
+
+    @cached_property
+    def _contents(self) -> str:
+        """Hash of the files' content, taken before they are read."""
+        return _digest(self.sources)
+
+    def _key(self, what: str) -> str:
+        """Hash of the files' content and of all else that a result depends on."""
+        told = [(s.name, s.path.suffix, s.hit, s.repeat) for s in self.sources]
+        how = self.band_hz, self.estimator, self.window_rate_1_s
+        return content_hash.digest(
+            what, program(), content_hash.of(told), content_hash.of(how), self._contents
+        )
+
+    def _average(self) -> Averaged:
+        files = self.files
+        said = files.verdicts
+        if not files.agreeing and not files.records:
+            return Averaged(said, None, ("No usable hit: nothing was estimated.",))
+        if files.agreeing and files.records:
+            raise InputError(
+                "The files of this pose mix time histories and exported FRFs; import one kind only."
+            )
+        try:
+            frf = _frf(
+                files.agreeing, files.records, self.band_hz, self.estimator, self.window_rate_1_s
+            )
+        except RefusedError as error:
+            return Averaged(said, None, (renamed(str(error), self.sources),))
+        return Averaged(said, frf, frf.remarks)
+
+    def _ended(self, plain: Frf) -> Frf:
+        from planner.frf.estimator import estimate
+
+        stated = self.window_rate_1_s
+        rate = max(0.0, OVER / plain.tail_s - stated)
+        return estimate(self.hits, self.band_hz, "weighted", rate, window_rate_1_s=stated)
+
+    def _decompose(self) -> Decomposed:
+        from planner.modal.estimate_modes import estimate_modes
+
+        if self.frf is None:
+            return Decomposed(None, None, ())
+        try:
+            modal = estimate_modes(self.frf, self.band_hz)
+        except RefusedError as error:
+            return Decomposed(None, None, (str(error),))
+        hits = self.hits
+        levels = homogeneity(hits, modal, self.band_hz, self.window_rate_1_s) if hits else None
+        told = (levels.remark,) if levels is not None and levels.remark else ()
+        return Decomposed(modal, levels, (*modal.remarks, *told))
+
+
+def program() -> str:
+    """What computes: this program's text and the libraries under it."""
+    libraries = ",".join(version(name) for name in ("numpy", "scipy"))
+    return content_hash.program(*PACKAGES) + libraries
+
+
+def _digest(sources: tuple[Source, ...]) -> str:
+    """Of all files' content; a file that cannot be read counts as it is named nowhere else."""
+    contents = []
+    for source in sources:
+        try:
+            contents.append(source.path.read_bytes())
+        except OSError as error:
+            contents.append(f"{source.path}: {error}".encode())
+    return content_hash.digest(*contents)
 
 
 def measure(
@@ -49,136 +211,52 @@ def measure(
     band_hz: tuple[float, float],
     estimator: str = "h1",
     window_rate_1_s: float = 0.0,
+    store: Store | None = None,
 ) -> MeasuredPose:
     """Read and screen every file, estimate the FRF from the good hits and the modes from it.
 
     A file that cannot be used is refused with its reason, never dropped in silence.
     `window_rate_1_s` is that of an exponential window e^(−rate·t) that the analyser has laid over
-    all channels: it is part of what is fitted, so that damping comes out without it.
+    all channels: it is part of what is fitted, so that damping comes out without it. Results are
+    looked up in `store`, by default the user's.
     """
-    from planner.modal.estimate_modes import estimate_modes
-
-    averaged = average(sources, band_hz, estimator, window_rate_1_s)
-    if averaged.frf is None:
-        return averaged
-    hits, remarks = averaged.hits, averaged.remarks
-    try:
-        modal = estimate_modes(averaged.frf, band_hz)
-    except RefusedError as error:
-        return replace(averaged, remarks=(*remarks, str(error)))
-    levels = homogeneity(hits, modal, band_hz, window_rate_1_s) if hits else None
-    told = (levels.remark,) if levels is not None and levels.remark else ()
-    remarks = (*remarks, *modal.remarks, *told)
-    return replace(averaged, modal=modal, remarks=remarks, homogeneity=levels)
-
-
-def average(
-    sources: tuple[Source, ...],
-    band_hz: tuple[float, float],
-    estimator: str = "h1",
-    window_rate_1_s: float = 0.0,
-) -> MeasuredPose:
-    """As `measure`, up to the FRF: no modes are estimated."""
-    verdicts: list[Verdict] = []
-    hits: list[tuple[int, Hit]] = []
-    frfs: list[FrfRecord] = []
-    for source in sources:
-        verdict, found, records = _read_one(source, band_hz)
-        hits += [(len(verdicts), hit) for hit in found]
-        frfs += records
-        verdicts.append(verdict)
-    hits = _drop_inconsistent(hits, verdicts, band_hz)
-    used = tuple(hit for _, hit in hits)
-    frf, remarks = _averaged(used, frfs, band_hz, estimator)
-    if frf is not None:
-        frf = replace(frf, exponential_rate_1_s=window_rate_1_s)
-    return MeasuredPose(tuple(verdicts), used, frf, None, remarks)
+    store = store or user_store()
+    found = MeasuredPose(sources, band_hz, estimator, window_rate_1_s, store=store)
+    _ = found.decomposed  # so that what is wrong with the files is said here
+    return found
 
 
 def frf_of(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
 ) -> Frf:
     """The FRF of files that were accepted before: the one that `measure` gave then."""
-    from planner.frf.estimator import estimate, from_records
-    from planner.recording.hits import hits_from
-    from planner.recording.read import read
+    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
-    hits, frfs = [], []
-    for source in sources:
-        records = read(source.path)
-        found = [record for record in records if isinstance(record, FrfRecord)]
-        frfs += found
-        hits += () if found else hits_from(records, axis=source.hit)
-    frf = estimate(tuple(hits), band_hz) if hits else from_records(tuple(frfs))
-    return replace(frf, exponential_rate_1_s=window_rate_1_s)
+    def make() -> Frf:
+        from planner.recording.hits import hits_from
+        from planner.recording.read import read
 
+        hits, frfs = [], []
+        for source in sources:
+            records = read(source.path)
+            found = [record for record in records if isinstance(record, FrfRecord)]
+            frfs += found
+            hits += () if found else hits_from(records, axis=source.hit)
+        return _frf(tuple(hits), tuple(frfs), band_hz, "h1", window_rate_1_s)
 
-def _read_one(
-    source: Source, band_hz: tuple[float, float]
-) -> tuple[Verdict, list[Hit], list[FrfRecord]]:
-    from planner.recording.hits import hits_from
-    from planner.recording.read import read
-    from planner.recording.screening import ScreeningLimits, screen
-
-    try:
-        records: tuple[Record, ...] = read(source.path)
-        frfs = [record for record in records if isinstance(record, FrfRecord)]
-        if frfs:
-            simulated = any(record.simulated for record in frfs)
-            return Verdict(source, True, "", source.hit, simulated), [], frfs
-        found = hits_from(records, axis=source.hit)
-    except PlannerError as error:
-        return Verdict(source, False, _rename(str(error), source)), [], []
-    limits = replace(ScreeningLimits(), band_hz=band_hz)
-    faults = [fault for hit in found for fault in screen(hit, limits)]
-    remarks = tuple(f.text for f in faults if not f.refuse)
-    simulated = any(hit.simulated for hit in found)
-    axis = found[0].axis
-    refusing = [fault for fault in faults if fault.refuse]
-    if refusing:
-        text = " ".join(fault.text for fault in refusing)
-        return Verdict(source, False, text, axis, simulated, remarks), [], []
-    hits = [replace(hit, repeat=source.repeat or hit.repeat) for hit in found]
-    return Verdict(source, True, "", axis, simulated, remarks), hits, []
+    return pose.kept("accepted frf", Frf, make)
 
 
-def _rename(text: str, source: Source) -> str:
-    """Say the name that the user gave, not that of the stored copy."""
-    return text.replace(str(source.path), source.name)
+def _frf(
+    hits: tuple[Hit, ...],
+    records: tuple[FrfRecord, ...],
+    band_hz: tuple[float, float],
+    estimator: str,
+    window_rate_1_s: float,
+) -> Frf:
+    from planner.frf.estimator import estimate
+    from planner.frf.exported import from_records
 
-
-def _drop_inconsistent(
-    hits: list[tuple[int, Hit]], verdicts: list[Verdict], band_hz: tuple[float, float]
-) -> list[tuple[int, Hit]]:
-    from planner.recording.screening import screen_repeats
-
-    if not hits:
-        return hits
-    kept = []
-    faults = screen_repeats(tuple(hit for _, hit in hits), band_hz)
-    for (index, hit), found in zip(hits, faults, strict=True):
-        refusing = [fault for fault in found if fault.refuse]
-        if refusing:
-            text = " ".join(fault.text for fault in refusing)
-            verdicts[index] = replace(verdicts[index], accepted=False, reason=text)
-        else:
-            kept.append((index, hit))
-    return kept
-
-
-def _averaged(
-    hits: tuple[Hit, ...], frfs: list[FrfRecord], band_hz: tuple[float, float], estimator: str
-) -> tuple[Frf | None, tuple[str, ...]]:
-    from planner.frf.estimator import estimate, from_records
-
-    if not hits and not frfs:
-        return None, ("No usable hit: nothing was estimated.",)
-    if hits and frfs:
-        raise InputError(
-            "The files of this pose mix time histories and exported FRFs; import one kind only."
-        )
-    try:
-        frf = estimate(hits, band_hz, estimator) if hits else from_records(tuple(frfs))
-    except RefusedError as error:
-        return None, (str(error),)
-    return frf, frf.remarks
+    if hits:
+        return estimate(hits, band_hz, estimator, window_rate_1_s=window_rate_1_s)
+    return from_records(records, window_rate_1_s)

@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from planner.dataset.recorded import Recorded
-from planner.dataset.visits import Recorded as Visits
-from planner.dataset.windowed import corrected
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
@@ -21,20 +19,21 @@ from planner.progress import Tell, within
 class Explained:
     """`recorded` as it was used, without artefacts; what explains it, judged; all candidates."""
 
-    recorded: Recorded
+    recorded: Dataset
     judged: JudgedDiagnosis
     whole: Together
 
 
-def explain(
-    recorded: Recorded, visits: Visits | None, simulation: Simulation, tell: Tell
-) -> Explained:
-    """What `simulation` lacks; `visits` are the hits themselves, None where there are only FRFs."""
+def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
+    """What `simulation` lacks; hits are screened unless a window is stated that they carry."""
     tell("looking at the measuring chain, the order in time and the force levels", 0.02)
-    recorded, visits, findings = _screened(recorded, visits, simulation, within(tell, 0.02, 0.2))
+    screened = bool(recorded.visits) and not recorded.window_rate_1_s
+    findings = ()
+    if screened:
+        recorded, findings = _screened(recorded, simulation, within(tell, 0.02, 0.2))
     linear = linear_effects_apply(findings)
     found = diagnose(
-        recorded.frfs,
+        recorded.ended_frfs,
         recorded.q,
         simulation,
         effects=None if linear or leaves_room(findings) else (),
@@ -45,7 +44,7 @@ def explain(
         found = beside_another(found)
     tell("looking for a nonlinear joint beside it", 0.85)
     closer = within(tell, 0.85, 0.95)
-    both = beside(visits, findings, found, closer) if visits is not None else None
+    both = beside(recorded, findings, found, closer) if screened else None
     if both is not None:
         findings, found = both
     elif not linear:
@@ -64,15 +63,12 @@ def explain(
 
 
 def _screened(
-    recorded: Recorded, visits: Visits | None, simulation: Simulation, tell: Tell
-) -> tuple[Recorded, Visits | None, tuple[Finding, ...]]:
-    """Recordings and hits corrected for artefacts, and what the hits themselves say."""
-    if visits is None:
-        return recorded, None, ()
-    found = screen(visits, simulation, tell)
+    recorded: Dataset, simulation: Simulation, tell: Tell
+) -> tuple[Dataset, tuple[Finding, ...]]:
+    """Recordings corrected for artefacts, and what the hits themselves say."""
+    found = screen(recorded, simulation, tell)
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
-    if artefacts:
-        said = f"The recordings were corrected for: {', '.join(artefacts)}."
-        remarks = (*recorded.remarks, said)
-        recorded = replace(corrected(recorded, found.clean), remarks=remarks)
-    return recorded, found.clean, found.findings
+    if not artefacts:
+        return recorded, found.findings
+    said = f"The recordings were corrected for: {', '.join(artefacts)}."
+    return replace(found.clean, remarks=(*recorded.remarks, said)), found.findings

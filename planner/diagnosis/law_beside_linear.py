@@ -8,7 +8,7 @@ the other has told.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.diagnosis.screens import force_levels
@@ -42,7 +42,7 @@ def leaves_room(findings: Sequence[Finding]) -> bool:
 
 
 def beside(
-    recorded: Recorded, findings: Sequence[Finding], found: Diagnosis, tell: Tell = quietly
+    recorded: Dataset, findings: Sequence[Finding], found: Diagnosis, tell: Tell = quietly
 ) -> tuple[tuple[Finding, ...], Diagnosis] | None:
     """Findings of the levels once the best linear effect is known, and the diagnosis beside them.
 

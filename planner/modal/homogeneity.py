@@ -5,7 +5,7 @@ Nonlinearity in Structural Dynamics, 2001, section 2.3). Friction, play and hard
 frequencies and damping depend on the level.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import ndtr
@@ -95,8 +95,7 @@ def homogeneity(
     if len(groups) < 2:
         return None
     try:
-        estimated = [estimate(group, band_hz) for group in groups]
-        frfs = [replace(frf, exponential_rate_1_s=window_rate_1_s) for frf in estimated]
+        frfs = [estimate(group, band_hz, window_rate_1_s=window_rate_1_s) for group in groups]
     except RefusedError:
         return None
     levels = tuple(

@@ -11,7 +11,7 @@ SAME_LEVEL = 1.8
 
 def peak_n(hit: Hit) -> float:
     """Largest force of a hit over its offset, in N."""
-    return float(np.max(np.abs(hit.force_n - np.median(hit.force_n))))
+    return hit.pulse.peak_n
 
 
 def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:

@@ -1,9 +1,12 @@
 """What a recording holds, before anything is computed from it."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+
+from planner.recording.pulse import Pulse, find_pulse
 
 AXES = ("x", "y", "z")
 
@@ -65,7 +68,11 @@ class Hit:
 
     `axis` is the hit direction as a signed axis of the tcp frame ("+x" … "-z"): the force acts on
     the structure along that signed axis, so that H_xx of a "-x" hit is −a_x/F. `acceleration_m_s2`
-    is already turned into +x, +y, +z of the sensor frame (parallel to the tcp frame).
+    is already turned into +x, +y, +z of the sensor frame (parallel to the tcp frame). `hit_point`
+    and `sensor` name the nodes where it was hit and where the sensor sits: files name none, and
+    all hits of a pose are then at the tcp. `direction_sd_rad` is how far the hand may have missed
+    the axis (sd of the angle), `gain_sd` the relative sd of the force's calibration: 0 where
+    nothing is known of it.
     """
 
     source: Path
@@ -76,6 +83,15 @@ class Hit:
     repeat: int = 1
     remarks: tuple[str, ...] = ()
     simulated: bool = False
+    hit_point: str = "tcp"
+    sensor: str = "tcp"
+    direction_sd_rad: float = 0.0
+    gain_sd: float = 0.0
+
+    @cached_property
+    def pulse(self) -> Pulse:
+        """Where the force's pulse lies."""
+        return find_pulse(self.force_n)
 
     @property
     def axis_index(self) -> int:

@@ -23,37 +23,23 @@ class ScreeningLimits:
 
 def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]:
     """Faults of one hit by itself; those with `refuse` make it unusable."""
-    limits = limits or ScreeningLimits()
-    force = hit.force_n
-    peak, noise = _peak(force), _noise(force)
-    where = int(np.argmax(np.abs(force)))
-    if peak == 0 or not np.any(hit.acceleration_m_s2):
+    limits, pulse = limits or ScreeningLimits(), hit.pulse
+    if pulse.peak_n == 0 or not np.any(hit.acceleration_m_s2):
         return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
-    faults = [
-        *_weak(hit, peak, noise, limits),
-        *_clipping(hit, limits),
-    ]
+    faults = [*_weak(hit, limits), *_clipping(hit, limits)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
-    faults += _polarity(force, where, peak)
-    faults += _pulse_whole(force, where, peak, noise, limits)
-    faults += _double(hit, where, peak, noise, limits)
-    faults += _soft(hit, limits)
-    return tuple(faults)
+    return (
+        *faults,
+        *_polarity(hit),
+        *_pulse_whole(hit, limits),
+        *_double(hit, limits),
+        *_soft(hit, limits),
+    )
 
 
-def _peak(force: np.ndarray) -> float:
-    return float(np.max(np.abs(force - np.median(force))))
-
-
-def _noise(force: np.ndarray) -> float:
-    """Robust sd of what is not the pulse (which is short)."""
-    centred = np.abs(force - np.median(force))
-    return float(1.4826 * np.median(centred))
-
-
-def _weak(hit: Hit, peak: float, noise: float, limits: ScreeningLimits) -> list[Fault]:
-    faults = []
+def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+    faults, peak, noise = [], hit.pulse.peak_n, hit.pulse.noise_n
     if peak < limits.least_snr * noise:
         faults.append(
             Fault(
@@ -98,56 +84,41 @@ def _longest_run(mask: np.ndarray) -> int:
     return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
-def _polarity(force: np.ndarray, where: int, peak: float) -> list[Fault]:
-    if force[where] - np.median(force) > 0:
+def _polarity(hit: Hit) -> list[Fault]:
+    pulse = hit.pulse
+    if hit.force_n[pulse.peak] > pulse.offset_n:
         return []
     return [
         Fault(
             "polarity",
-            f"The force pulse of {peak:.3g} N is negative: a hammer only pushes; check the "
+            f"The force pulse of {pulse.peak_n:.3g} N is negative: a hammer only pushes; check the "
             f"polarity of the force channel.",
         )
     ]
 
 
-def _pulse_span(force: np.ndarray, where: int, peak: float, noise: float) -> tuple[int, int]:
-    """First and last sample of the main pulse, where the force is above a share of its peak."""
-    level = max(0.05 * peak, 4 * noise)
-    above = np.abs(force - np.median(force)) > level
-    start = end = where
-    while start > 0 and above[start - 1]:
-        start -= 1
-    while end < len(force) - 1 and above[end + 1]:
-        end += 1
-    return start, end
-
-
-def _pulse_whole(
-    force: np.ndarray, where: int, peak: float, noise: float, limits: ScreeningLimits
-) -> list[Fault]:
-    start, end = _pulse_span(force, where, peak, noise)
-    if start < limits.least_pretrigger:
+def _pulse_whole(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+    pulse, samples = hit.pulse, len(hit.force_n)
+    if pulse.first < limits.least_pretrigger:
         return [Fault("truncated", "The pulse starts at the record's edge; set a pre-trigger.")]
-    if end >= len(force) - 8 or where > 0.8 * len(force):
+    if pulse.end > samples - 8 or pulse.peak > 0.8 * samples:
         return [Fault("truncated", "The record ends right after the pulse; check the trigger.")]
     return []
 
 
-def _double(
-    hit: Hit, where: int, peak: float, noise: float, limits: ScreeningLimits
-) -> list[Fault]:
+def _double(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
     """A second pulse: force that rises again after it had fallen.
 
     An anti-alias filter rings after a pulse, but what it adds above zero is never more than what
     it took below zero just before; a second push has no such counterpart.
     """
-    force = hit.force_n - np.median(hit.force_n)
+    pulse = hit.pulse
+    force, peak = hit.force_n - pulse.offset_n, pulse.peak_n
     ringing = max(0.0, -float(np.min(force)))
-    start, end = _pulse_span(hit.force_n, where, peak, noise)
-    rest = np.concatenate([force[: max(0, start - 1)], force[end + 2 :]])
+    rest = np.concatenate([force[: max(0, pulse.first - 1)], force[pulse.end + 1 :]])
     second = float(np.max(rest, initial=0.0))
-    valley = _valley(force[start : end + 1], peak)
-    least = max(limits.second_peak * peak, 6 * noise, 1.5 * ringing)
+    valley = _valley(force[pulse.first : pulse.end])
+    least = max(limits.second_peak * peak, 6 * pulse.noise_n, 1.5 * ringing)
     if max(second, valley) <= least:
         return []
     return [
@@ -159,7 +130,7 @@ def _double(
     ]
 
 
-def _valley(pulse: np.ndarray, peak: float) -> float:
+def _valley(pulse: np.ndarray) -> float:
     """How far the force rises again inside one pulse, above the lowest point between two tops."""
     top = int(np.argmax(pulse))
     pulse = np.clip(pulse, 0.0, None)  # coming back from below zero is the filter's ringing

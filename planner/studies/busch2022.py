@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.studies.busch2022_data import Recorded, load, split
+from planner.studies.busch2022_data import AnalysedPoses, load, split
 from planner.studies.busch2022_findings import findings
 from planner.studies.busch2022_frf import figure_12
 from planner.studies.busch2022_names import (
@@ -71,7 +71,7 @@ def study(progress: Progress) -> Report:
     )
 
 
-def _scores(seen: Recorded, outputs: list[Output], count: int) -> np.ndarray:
+def _scores(seen: AnalysedPoses, outputs: list[Output], count: int) -> np.ndarray:
     """Medians over splits (outputs, models, 3) of R², RMSE and the 95 % interval's coverage."""
     runs = np.empty((SPLITS, len(outputs), len(outputs[0].fits), 3))
     for seed in range(SPLITS):
@@ -97,7 +97,7 @@ def _kernels(names: tuple[str, ...]) -> dict[str, Fit]:
     return {name: (lambda s, kernel=name: fit_gp(s, kernel).predict) for name in names}
 
 
-def _frequency(seen: Recorded, k: int) -> Output:
+def _frequency(seen: AnalysedPoses, k: int) -> Output:
     """A mode's frequency, with the simulation's known at every pose."""
     low = seen.modes.simulated.frequency_hz[:, k]
 
@@ -118,7 +118,7 @@ def _only(output: Output, names: tuple[str, ...]) -> Output:
     return Output(output.y, output.sd, {name: output.fits[name] for name in names})
 
 
-def _residues(seen: Recorded, name: str) -> list[Output]:
+def _residues(seen: AnalysedPoses, name: str) -> list[Output]:
     """Real or imaginary parts of a direct residue, mode by mode, over the mode's rms there."""
     direction, part = name.split()
     axis = "xyz".index(direction[0])

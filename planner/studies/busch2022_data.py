@@ -10,8 +10,8 @@ from planner.campaign.config import load_campaign_config
 from planner.campaign.labels import label, observations
 from planner.campaign.log_conversion import from_mode
 from planner.campaign.state import Measurement
-from planner.dataset.measure import Source, measure
-from planner.demo import NAME, Pool, shipped
+from planner.dataset.dataset import Dataset
+from planner.demo import NAME, shipped
 from planner.frf.frf import Frf
 from planner.studies.report import Progress
 from planner.surrogate.modal_surrogate import ModalObservations
@@ -21,7 +21,7 @@ DESIGNS = 200  # Latin hypercubes, of which the one with the largest least dista
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class AnalysedPoses:
     """35 poses at x (35, d) in [0, 1], their labelled modes and their FRFs, and the simulation."""
 
     poses: tuple[str, ...]
@@ -30,25 +30,30 @@ class Recorded:
     frfs: tuple[Frf | None, ...]
 
 
-def load(progress: Progress) -> Recorded:
+def load(progress: Progress) -> AnalysedPoses:
     """Modal analysis of every recorded pose, labels by the simulation as in a campaign."""
     source = shipped(NAME)
     cell = Cell.load(
         source / "robot" / "robot.toml", load_campaign_config(source / "campaign.toml")
     )
-    pool = Pool.load(source / "recordings", cell.robot.joint_names)
-    found, frfs = [], []
-    for i, (pose, rows) in enumerate(pool.rows.items()):
-        progress(f"modal analysis of pose {pose}", 0.2 * i / len(pool.rows))
-        sources = tuple(Source(r.file, str(r.file), r.hit) for r in rows if r.file)
-        measured = measure(sources, cell.config.modes.band_hz)
-        modes = measured.modal.modes if measured.modal else ()
-        found.append(Measurement(pose, rows[0].joints_deg, (), tuple(from_mode(m) for m in modes)))
-        frfs.append(measured.frf)
-    seen = observations(cell, label(cell, tuple(found)))
-    x = seen.x[:, np.ptp(seen.x, axis=0) > 1e-6]
+    names, band_hz = cell.robot.joint_names, cell.config.modes.band_hz
+    seen = Dataset.read(source / "recordings", names, band_hz)
+    found = []
+    for i, entry in enumerate(seen.entries):
+        progress(f"modal analysis of pose {entry.pose}", 0.2 * i / len(seen.entries))
+        modal = entry.measured.modal
+        modes = tuple(from_mode(mode) for mode in (modal.modes if modal else ()))
+        joints_deg = tuple(float(angle) for angle in np.rad2deg(entry.q))
+        found.append(Measurement(entry.pose, joints_deg, (), modes))
+    modes = observations(cell, label(cell, tuple(found)))
+    x = modes.x[:, np.ptp(modes.x, axis=0) > 1e-6]
     x = (x - x.min(axis=0)) / np.ptp(x, axis=0)
-    return Recorded(tuple(pool.rows), x, seen, tuple(frfs))
+    return AnalysedPoses(
+        tuple(entry.pose for entry in seen.entries),
+        x,
+        modes,
+        tuple(entry.measured.frf for entry in seen.entries),
+    )
 
 
 def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
 from planner.studies import drawing
-from planner.studies.busch2022_data import Recorded, split
+from planner.studies.busch2022_data import AnalysedPoses, split
 from planner.surrogate.frf_bands import frf_band
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 
@@ -31,7 +31,7 @@ class Rebuilt:
     inside: float
 
 
-def figure_12(seen: Recorded) -> Rebuilt:
+def figure_12(seen: AnalysedPoses) -> Rebuilt:
     """FRFs at a pose put together from modes that five other poses tell."""
     target = seen.poses.index(TOLD)
     seed = next(s for s in range(100) if target in split(seen.x, s)[1])

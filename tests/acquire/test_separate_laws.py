@@ -11,8 +11,8 @@ from scipy.stats import spearmanr
 from planner.cli.material import Material
 from planner.cli.next_hit import next_hit
 from planner.cli.render_diagnosis import _next
+from planner.dataset.dataset import Dataset, Visit
 from planner.dataset.level_columns import column
-from planner.dataset.visits import Recorded, Visit
 from planner.design.law_discrimination import accelerance, forces_n, law_separation
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import receptances, system_of
@@ -46,7 +46,7 @@ def cell(tmp_path_factory):
     hits = tuple(struck(axis, 300.0, rng) for axis in range(3))
     q = KR210.poses(2, 8)
     visits = tuple(Visit(f"P{i}", row, 0.5 * i, hits) for i, row in enumerate(q))
-    recorded = Recorded(visits, (5.0, 50.0))
+    recorded = Dataset.of_visits(visits, (5.0, 50.0))
     plain = base(recorded, simulation)
     plain = replace(plain, x=plain.misfit.mean)  # records of noise say nothing of springs
     return recorded, simulation, plain
@@ -162,14 +162,15 @@ def test_one_law_and_twice_the_same_need_no_hit(cell):
 def test_the_command_names_the_force(cell):
     laws = laws_of(cell, (DAHL, 0.5, SWING), (DEAD_ZONE, 0.5, SWING))
     finding = Finding("friction", "joint_3", 50.0, laws=laws)
-    explained = SimpleNamespace(whole=SimpleNamespace(established=((finding, 0.5),)))
+    established = SimpleNamespace(established=((finding, 0.5),))
+    explained = SimpleNamespace(whole=established, recorded=cell[0])
     q = KR210.poses(3, 9)
     given = Material(Path(), Path(), 0.0, q, ("A", "B", "C"))
-    told = next_hit(explained, cell[0], given)
+    told = next_hit(explained, given)
     assert told["pose"] in given.names
     assert told["hit"] in "xyz"
     assert told["force_n"][1] == pytest.approx(300.0, rel=0.1)  # all hits were of 300 N
     assert told["force_n"][0] < told["force_n"][1] <= 300.5
     assert told["between"] == ["friction at joint_3 (50 %)", "backlash at joint_3 (50 %)"]
     assert " N along " in _next(told)
-    assert next_hit(explained, cell[0], replace(given, offered=q[:0])) is None
+    assert next_hit(explained, replace(given, offered=q[:0])) is None

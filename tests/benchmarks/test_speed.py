@@ -5,7 +5,9 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
+from planner.dataset.store import Store
 from planner.demo import Pool, shipped
 from planner.dynamics.vibration import direct_accelerance
 from planner.modal.modes import Mode
@@ -45,8 +47,8 @@ def test_files_to_modes(cell):
     folder = shipped("kr240_plane") / "recordings"
     rows = Pool.load(folder, cell.robot.joint_names).rows["A34"]
     sources = tuple(Source(r.file, r.file.name, r.hit) for r in rows)
-    found = []
-    spent = seconds(lambda: found.append(measure(sources, (4.0, 60.0)).modal))
+    found, anew = [], Store(None)
+    spent = seconds(lambda: found.append(measure(sources, (4.0, 60.0), store=anew).modal))
     print(f"\n12 hits from files to modes: {spent:.2f} s")
     assert all(modal is not None and len(modal.modes) >= 4 for modal in found)
 

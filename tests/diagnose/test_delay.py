@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.screens import artefacts
 from planner.dynamics.simulation import Simulation
 from planner.recording.records import Hit
@@ -26,7 +26,7 @@ def test_a_delay_is_measured(tmp_path, delay_s):
     simulation = Simulation(Robot.load(KR10.write(tmp_path / "robot")))
     plain = recorded(simulation, KR10.poses(4, 3))
     visits = (replace(v, hits=tuple(late(h, delay_s) for h in v.hits)) for v in plain.visits)
-    found = artefacts.screen(Recorded(tuple(visits), plain.band_hz), simulation)
+    found = artefacts.screen(Dataset.of_visits(tuple(visits), plain.band_hz), simulation)
     assert [f.effect for f in found] == ["channel_delay"]
     value, sd, unit = found[0].parameters["delay"]
     assert unit == "s"

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.dataset.visits import Recorded, Visit
+from planner.dataset.dataset import Dataset, Visit
 from planner.diagnosis.linear.predict import predicted
 from planner.diagnosis.linear_diagnosis import diagnose
 from planner.diagnosis.screens.screen import screen
@@ -110,7 +110,7 @@ def test_seed_004_harmonic_drives_that_harden(tmp_path, drives):
             for h in hits
         )
         visits.append(Visit(f"P{i}", row, i / 8, seen))
-    recorded = Recorded(tuple(visits), simulation.robot.config.band_hz)
+    recorded = Dataset.of_visits(tuple(visits), simulation.robot.config.band_hz)
     findings = screen(recorded, simulation).findings
     named = {f.at for f in findings}
     assert {f.effect for f in findings} == {"nonlinear_stiffness"}

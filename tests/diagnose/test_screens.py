@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.effects.sensor_chain import SensorChain
@@ -37,9 +37,9 @@ def plain(simulation):
     return recorded(simulation, KR210.poses(POSES, 3))
 
 
-def disturbed(plain: Recorded, change) -> Recorded:
+def disturbed(plain: Dataset, change) -> Dataset:
     visits = [replace(v, hits=tuple(replace(h, **change(h)) for h in v.hits)) for v in plain.visits]
-    return Recorded(tuple(visits), plain.band_hz)
+    return Dataset.of_visits(tuple(visits), plain.band_hz)
 
 
 def mixed(matrix: np.ndarray):
@@ -116,7 +116,7 @@ def test_drift_is_told_from_what_goes_with_the_pose(simulation):
 def test_a_pose_that_answers_as_before_has_not_drifted(plain):
     first = plain.visits[0]
     again = replace(first, order=1.0)
-    back = Recorded((*plain.visits, again), plain.band_hz)
+    back = Dataset.of_visits((*plain.visits, again), plain.band_hz)
     assert drift.returned(back) == 0.0
     assert drift.returned(plain) is None
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.dataset.visits import Recorded, Visit
+from planner.dataset.dataset import Dataset, Visit
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.law_beside_linear import leaves_room
 from planner.diagnosis.laws.equivalent_stiffness import receptances
@@ -125,7 +125,7 @@ def recorded(folder: Path, drives: tuple[int, ...], law: str, poses: int) -> tup
         )
         visits.append(Visit(f"P{i}", row, i / max(poses - 1, 1), of_pose))
     simulation = Simulation(Robot.load(toml))
-    return Recorded(tuple(visits), simulation.robot.config.band_hz), simulation, laws
+    return Dataset.of_visits(tuple(visits), simulation.robot.config.band_hz), simulation, laws
 
 
 def test_two_drives_that_harden_are_named_and_no_others(tmp_path):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.screens.tone import screen_tone
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
@@ -26,7 +26,7 @@ def poses():
     return KR210.poses(1, 3) + 0.01 * np.random.default_rng(1).standard_normal((4, 6))
 
 
-def sounding(plain: Recorded) -> Recorded:
+def sounding(plain: Dataset) -> Dataset:
     """The same with a tone whose phase no hit knows."""
     rng = np.random.default_rng(5)
     weak = [h for v in plain.visits for h in v.hits if not plain.level(h)]
@@ -39,7 +39,7 @@ def sounding(plain: Recorded) -> Recorded:
             wave = np.cos(2 * np.pi * TONE_HZ * t + rng.uniform(0, 2 * np.pi))
             hits.append(replace(hit, acceleration_m_s2=hit.acceleration_m_s2 + size * wave))
         visits.append(replace(visit, hits=tuple(hits)))
-    return replace(plain, visits=tuple(visits))
+    return plain.corrected(visits)
 
 
 def test_a_tone_is_named_by_its_frequency(simulation, poses):

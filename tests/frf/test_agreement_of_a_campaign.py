@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
 from planner.demo import Pool, shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from planner.errors import RefusedError
-from planner.frf.estimator import estimate, from_records
+from planner.frf.estimator import estimate
+from planner.frf.exported import from_records
 from planner.modal.estimate_modes import estimate_modes
 from planner.recording.records import FrfRecord
 from tests.support.simulated_hits import RATE_HZ, exact_accelerance, make_hit

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 
 from planner.frf.estimator import estimate
-from planner.frf.weighted import weighted
 from planner.recording.records import Hit
 
 RATE_HZ, SAMPLES = 400.0, 1024
@@ -43,7 +42,7 @@ def misfit(make, seeds=12):
 
 def test_variance_is_honest_and_error_smaller_than_that_of_h1():
     band = (4.0, 60.0)
-    ratio, error = misfit(lambda h: weighted(h, band, 2.0))
+    ratio, error = misfit(lambda h: estimate(h, band, "weighted", 2.0))
     plain_ratio, plain_error = misfit(lambda h: estimate(h, band, exponential_rate_1_s=2.0))
     assert 0.8 < ratio < 1.25
     assert plain_ratio > ratio

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.dataset.recorded import read_recorded
+from planner.dataset.dataset import Dataset
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.identification.agreement import fit_similarity
@@ -45,7 +45,7 @@ def one(folder: Path, n: int, seed: int, simulation: Simulation) -> dict[str, tu
     truth, robot = load_truth(TOML, scatter), simulation.robot
     named = [(f"P{i}", row) for i, row in enumerate(poses(n, seed))]
     record_poses(truth, named, folder, repeats=3, seed=seed)
-    recorded = read_recorded(folder, robot.joint_names, robot.config.band_hz)
+    recorded = Dataset.read(folder, robot.joint_names, robot.config.band_hz)
     silent = measured_frfs(truth, OTHERS, LINES, 1e-9)
     found = {"nominal": (None, fit_similarity(simulation, silent, OTHERS), None)}
     for name, priors in PRIORS.items():

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.dataset.measure import Source, measure
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
 from planner.demo import Pool, shipped
 from planner.dynamics.simulation import Simulation
 from planner.identification.agreement import fit_similarity

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.dataset.visits import Recorded, Visit
+from planner.dataset.dataset import Dataset, Visit
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import Hit
 
@@ -47,7 +47,7 @@ def test_hits_are_of_the_level_whose_cluster_holds_them():
     for seed in range(30):
         rng = np.random.default_rng(seed)
         hits = tuple(pushed(peak) for peak in rng.permutation(np.geomspace(500, 3500, 24)))
-        recorded = Recorded((Visit("P1", np.zeros(6), 0.0, hits),), (5.0, 50.0))
+        recorded = Dataset.of_visits((Visit("P1", np.zeros(6), 0.0, hits),), (5.0, 50.0))
         groups = levels(np.sort([peak_n(hit) for hit in hits]))
         for hit in hits:
             assert peak_n(hit) in groups[recorded.level(hit)]

@@ -12,7 +12,8 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins, load_campaign_config
 from planner.campaign.log_conversion import from_modal
 from planner.campaign.state import Measurement
-from planner.dataset.measure import Source, frf_of, measure
+from planner.dataset.measure import frf_of, measure
+from planner.dataset.screened_files import Source
 from planner.demo import NAME, Pool, shipped
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf

@@ -6,7 +6,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from planner.dataset.visits import read_visits
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.screens import screen as screens
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
@@ -48,7 +48,7 @@ def judge(case: Path, answer: str) -> Verdict:
     nominal = Simulation(Robot.load(case / "robot" / "robot.toml"))
     began = time.process_time()
     band = nominal.robot.config.band_hz
-    recorded = read_visits(case / "recordings", nominal.robot.joint_names, band)
+    recorded = Dataset.read(case / "recordings", nominal.robot.joint_names, band)
     found = screens.screen(recorded, nominal).findings
     seconds = time.process_time() - began
     hidden = tuple((e["effect"], e["at"]) for e in truth["effects"])

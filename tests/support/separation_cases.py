@@ -17,7 +17,7 @@ from planner.campaign.config import config_from_builtins
 from planner.campaign.model import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.visits import Recorded, Visit
+from planner.dataset.dataset import Dataset, Visit
 from planner.design.discrimination import most_telling
 from planner.design.law_discrimination import most_telling_forces, undecided
 from planner.diagnosis.effects import library
@@ -163,14 +163,14 @@ class OfLaws(Campaign):
         self.seen.append(Visit(f"P{number}", q, 0.0, hits))
 
     @property
-    def recorded(self) -> Recorded:
+    def recorded(self) -> Dataset:
         last = max(len(self.seen) - 1, 1)
         visits = tuple(replace(visit, order=i / last) for i, visit in enumerate(self.seen))
-        return Recorded(visits, self.band_hz)
+        return Dataset.of_visits(visits, self.band_hz)
 
     @property
     def frfs(self) -> tuple[Frf, ...]:
-        return self.recorded.frfs
+        return self.recorded.visit_frfs
 
     def look(self) -> None:
         simulation = self.case.cell.simulation

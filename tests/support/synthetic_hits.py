@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.dataset.visits import Recorded, Visit
+from planner.dataset.dataset import Dataset, Visit
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.recording.records import Hit
 
@@ -39,7 +39,7 @@ def recorded(
     peaks_n: tuple[float, ...] = (300.0, 1000.0),
     noise: float = 0.01,
     seed: int = 0,
-) -> Recorded:
+) -> Dataset:
     """Visits of q (n, dof); `factor` (e,) multiplies the stiffness at a visit and force level."""
     rng, visits = np.random.default_rng(seed), []
     springs = simulation.elasticity
@@ -50,4 +50,4 @@ def recorded(
             changed = simulation.changed(Elasticity(k, springs.damping, springs.loss_factor))
             hits += hits_on(changed, row, peak, rng, noise)
         visits.append(Visit(f"P{i + 1}", row, i / max(len(q) - 1, 1), tuple(hits)))
-    return Recorded(tuple(visits), simulation.robot.config.band_hz)
+    return Dataset.of_visits(tuple(visits), simulation.robot.config.band_hz)

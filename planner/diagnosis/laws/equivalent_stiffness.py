@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
-from planner.dataset.visits import Recorded
 from planner.diagnosis.linear.fit import Fit
 from planner.dynamics.simulation import Elasticity, Simulation
 
@@ -125,7 +125,7 @@ class Equivalent:
     count: np.ndarray
 
 
-def equivalent(recorded: Recorded, system: System) -> Equivalent:
+def equivalent(recorded: Dataset, system: System) -> Equivalent:
     """Fit Δ of every joint, by itself, to every pair of levels."""
     rows = []
     scale = system.elasticity.stiffness[system.blocks]

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
-from planner.dataset.visits import Recorded
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
 from planner.diagnosis.linear.fit import Fit
@@ -69,7 +69,7 @@ def real_rows(values: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(values).reshape(len(values), -1).view(float)
 
 
-def level_data(recorded: Recorded, plain: Fit) -> LevelData:
+def level_data(recorded: Dataset, plain: Fit) -> LevelData:
     """Columns of all visits on lines of their own."""
     columns: list[Column] = []
     visits: list[int] = []

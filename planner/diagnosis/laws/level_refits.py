@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import optimize
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.laws.equivalent_stiffness import receptances, swing, system_of
 from planner.diagnosis.laws.starting_values import faded
@@ -37,7 +37,7 @@ class Refit:
     swing: np.ndarray
 
 
-def base(recorded: Recorded, nominal: Simulation) -> Fit:
+def base(recorded: Dataset, nominal: Simulation) -> Fit:
     """The springs that fit best with the stated inertias, by logarithms.
 
     A full fit would bend inertias until they imitate what is not linear, and does not come back.
@@ -49,7 +49,7 @@ def base(recorded: Recorded, nominal: Simulation) -> Fit:
     return Fit(Effect(""), misfit, found.x, misfit.by_pose(found.x))
 
 
-def refits(recorded: Recorded, nominal: Simulation) -> tuple[Refit, ...]:
+def refits(recorded: Dataset, nominal: Simulation) -> tuple[Refit, ...]:
     """The linear fit to the hits of each force level, weakest level first."""
     out = []
     for level in range(len(recorded.level_n)):
@@ -57,7 +57,7 @@ def refits(recorded: Recorded, nominal: Simulation) -> tuple[Refit, ...]:
             replace(v, hits=tuple(h for h in v.hits if recorded.level(h) == level))
             for v in recorded.visits
         ]
-        own = replace(recorded, visits=tuple(v for v in of_level if v.hits))
+        own = recorded.corrected(v for v in of_level if v.hits)
         plain = base(own, nominal)
         system, swings = system_of(plain), []
         for number, columns in enumerate(own.columns):

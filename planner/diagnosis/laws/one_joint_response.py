@@ -16,7 +16,7 @@ from jax import Array
 from scipy import signal
 
 from planner import jax_setup
-from planner.dataset.level_columns import Column, pulse
+from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import System
 from planner.diagnosis.laws.torque_laws import Law, Step
 
@@ -50,11 +50,11 @@ def strokes(
     force, zero = np.zeros((len(columns), count)), np.zeros(len(columns))
     for row, column in enumerate(columns):
         hit = column.hits[0]
-        at = pulse(hit)
-        part = hit.sign * (hit.force_n[at.first : at.last] - np.median(hit.force_n))
+        first, end = hit.pulse.around(len(hit.force_n))
+        part = hit.sign * (hit.force_n[first:end] - hit.pulse.offset_n)
         fine = np.asarray(signal.resample(part, finer * len(part)))
         force[row, : min(len(fine), count)] = fine[:count]
-        zero[row] = (at.peak - at.first) / rate
+        zero[row] = (hit.pulse.peak - first) / rate
     axes = np.array([column.axis for column in columns])
     return Strokes(1 / (rate * finer), force, zero, np.asarray(visits), axes)
 

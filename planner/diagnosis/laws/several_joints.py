@@ -5,11 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.laws.equivalent_stiffness import system_of
 from planner.diagnosis.laws.fit_in_time import LawProblem, descended, misfits
 from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
-from planner.diagnosis.laws.level_data import LAID, LevelData, level_data, own_parameter
+from planner.diagnosis.laws.level_data import (
+    LAID,
+    LevelData,
+    level_data,
+    own_parameter,
+)
 from planner.diagnosis.laws.level_refits import Refit, begin
 from planner.diagnosis.laws.one_joint_response import strokes
 from planner.diagnosis.laws.torque_laws import LEAST_SHARE, Law
@@ -23,7 +28,7 @@ ROUNDS, GAIN = 5, 0.03  # of a descent at most, and what a round must gain of th
 DAMPING = Damping(first=1e-4, least=0.0, most=9.0, lighter=0.1, heavier=30.0)
 
 
-def problem_of_levels(recorded: Recorded, plain: Fit) -> LawProblem:
+def problem_of_levels(recorded: Dataset, plain: Fit) -> LawProblem:
     """What laws are fitted to, and judged by."""
     places = [(n, c) for n, group in enumerate(recorded.columns_at(LAID)) for c in group]
     hits = strokes([n for n, _ in places], [c for _, c in places], FINER, LASTS_S)

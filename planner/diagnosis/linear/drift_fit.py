@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Grade, Problem
@@ -62,11 +62,11 @@ class DriftProblem(Problem):
         return DriftMisfit(**fields, order=self.order)
 
 
-def problem_of(recorded: Recorded, nominal: Simulation) -> DriftProblem:
+def problem_of(recorded: Dataset, nominal: Simulation) -> DriftProblem:
     """Visits (n), each for itself, as data of `fit`: FRFs in m/s²/N, poses in rad.
 
     Raises InputError where nothing of them lies in robot.toml's band.
     """
-    band = common_band(recorded.frfs, recorded.band_hz)
+    band = common_band(recorded.visit_frfs, recorded.band_hz)
     order = np.array([visit.order for visit in recorded.visits])
-    return DriftProblem(recorded.frfs, recorded.q, nominal, band, order=order)
+    return DriftProblem(recorded.visit_frfs, recorded.visit_q, nominal, band, order=order)

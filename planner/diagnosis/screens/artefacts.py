@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.sensor_chain import SensorChain
 from planner.diagnosis.finding import Finding
@@ -91,7 +91,7 @@ class Chain:
     gain: float
 
 
-def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
+def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     """All artefacts that are clear; none where the recordings are in order."""
     window = screen_window(recorded)
     told = window is not None and window.log_evidence > CLEAR
@@ -101,10 +101,10 @@ def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
     return tuple(f for f in (*found, _delay(chain), _matrix(chain)) if f and f.log_evidence > CLEAR)
 
 
-def measure_chain(recorded: Recorded, nominal: Simulation) -> Chain:
+def measure_chain(recorded: Dataset, nominal: Simulation) -> Chain:
     """Fit A and delay together with springs and inertias."""
-    band = common_band(recorded.frfs, recorded.band_hz)
-    problem = Problem(recorded.frfs, recorded.q, nominal, band)
+    band = common_band(recorded.visit_frfs, recorded.band_hz)
+    problem = Problem(recorded.visit_frfs, recorded.visit_q, nominal, band)
     plain = fit(problem, Effect(""))
     bases = [kind.base for kind in KINDS if kind.effect != "sensor_gain"]
     effect = SensorChain.build(bases, late_s=LATE_S)
@@ -214,7 +214,7 @@ def matrix_of(finding: Finding) -> np.ndarray:
     return np.eye(3)
 
 
-def correct(recorded: Recorded, findings: Sequence[Finding]) -> Recorded:
+def correct(recorded: Dataset, findings: Sequence[Finding]) -> Dataset:
     """Recordings without the artefacts that were found; other findings change nothing.
 
     Accelerations are turned and shifted back; a window's rate is told to all that is estimated
@@ -227,16 +227,15 @@ def correct(recorded: Recorded, findings: Sequence[Finding]) -> Recorded:
             delay += finding.parameters["delay"][0]
         if finding.effect == "exponential_window":
             rate += finding.parameters["rate"][0]
-    unchanged = delay == 0 and np.array_equal(inverse, np.eye(3))
-    visits = (
-        recorded.visits
-        if unchanged
-        else tuple(
+    if delay or not np.array_equal(inverse, np.eye(3)):
+        visits = tuple(
             replace(v, hits=tuple(_corrected(hit, inverse, delay) for hit in v.hits))
             for v in recorded.visits
         )
+        return recorded.corrected(visits, rate)
+    return (
+        recorded if rate == recorded.window_rate_1_s else recorded.corrected(recorded.visits, rate)
     )
-    return Recorded(visits, recorded.band_hz, rate)
 
 
 def _corrected(hit: Hit, inverse: np.ndarray, delay_s: float) -> Hit:

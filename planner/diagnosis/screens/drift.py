@@ -6,7 +6,7 @@ course, takes what belongs to the pose.
 
 import numpy as np
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.finding import Finding
@@ -26,7 +26,7 @@ from planner.dynamics.simulation import Simulation
 from planner.inference.evidence import temper
 
 
-def fits(recorded: Recorded, nominal: Simulation) -> tuple[Fit, ...]:
+def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
     """The refitted simulation without drift, and with it: gradual, and at once."""
     problem = problem_of(recorded, nominal)
     plain = fit(problem, Effect(""))
@@ -49,7 +49,7 @@ def _since(free: Fit, problem: DriftProblem) -> float:
     return float(problem.order[cut])
 
 
-def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
+def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     """`drift`, where the recordings change with time and not with the pose alone."""
     if len(recorded.visits) < 4 or _unchanged(recorded):
         return ()
@@ -74,13 +74,13 @@ def evaluate(plain: Fit, best: Fit) -> Finding:
     return Finding("drift", "campaign", evidence, told, best.effect.text(told))
 
 
-def _unchanged(recorded: Recorded) -> bool:
+def _unchanged(recorded: Dataset) -> bool:
     """Whether a pose that was returned to answers as before."""
     apart = returned(recorded)
     return apart is not None and apart < DRIFT_STILL
 
 
-def returned(recorded: Recorded) -> float | None:
+def returned(recorded: Dataset) -> float | None:
     """χ² per value between first and last visit of a pose; largest of the poses, None without."""
     found = []
     for i, visit in enumerate(recorded.visits):

@@ -9,15 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from planner.dataset.level_columns import pulse
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.thresholds import WINDOW_FASTEST_1_S, WINDOW_LEAST_1_S, WINDOW_RATE_WIDTH_1_S
 
 LEAST_SAMPLES = 64
 
 
-def screen_window(recorded: Recorded) -> Finding | None:
+def screen_window(recorded: Dataset) -> Finding | None:
     """`exponential_window` with its rate, where the noise of the force decays after the pulse."""
     told = [part for visit in recorded.visits for part in map(_noise, visit.hits) if part]
     if not told:
@@ -49,13 +48,13 @@ def screen_window(recorded: Recorded) -> Finding | None:
 
 def _noise(hit) -> tuple[np.ndarray, np.ndarray] | None:
     """Times (n,) after the pulse in s, and what the force channel holds then."""
-    last = pulse(hit).last
+    _, last = hit.pulse.around(len(hit.force_n))
     rest = hit.force_n[last:]
     if len(rest) < LEAST_SAMPLES or len(np.unique(rest)) < LEAST_SAMPLES / 2:
         return None  # blanked by a force window, or coarser than its noise
     # Neighbours' differences: an offset, which a window would bend, is gone.
     steps = np.diff(rest)
-    return (np.arange(len(steps)) + last - pulse(hit).peak) / hit.sampling_rate_hz, steps
+    return (np.arange(len(steps)) + last - hit.pulse.peak) / hit.sampling_rate_hz, steps
 
 
 def _log_likelihood(told: Sequence[tuple[np.ndarray, np.ndarray]], rate: float) -> float:

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
+from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
-from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System, equivalent, system_of
 from planner.diagnosis.laws.fit_in_time import BATCH_DAMPING, LawProblem, advance
@@ -90,7 +90,7 @@ class WeighedLaw:
 
 
 def screen(
-    recorded: Recorded, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
+    recorded: Dataset, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
 ) -> tuple[Finding, ...]:
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it.
 
@@ -158,7 +158,7 @@ def _excess(found: Equivalent) -> float:
 
 
 def weigh(
-    recorded: Recorded, plain: Fit, system: System, found: Equivalent, tell: Tell = quietly
+    recorded: Dataset, plain: Fit, system: System, found: Equivalent, tell: Tell = quietly
 ) -> tuple[WeighedLaw, ...]:
     """Every law at the joints that come into question, fitted in time, most probable first."""
     data = level_data(recorded, plain)
@@ -258,7 +258,7 @@ def _shares(weighed: Sequence[WeighedLaw]) -> tuple[list[WeighedLaw], tuple[floa
     return there, tuple(unexplained_shares(left, INDEPENDENT).tolist())
 
 
-def _hardest(recorded: Recorded) -> Column:
+def _hardest(recorded: Dataset) -> Column:
     return max((c for group in recorded.columns for c in group), key=lambda c: c.peak_n)
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.screens import artefacts, drift, force_levels
 from planner.dynamics.simulation import Simulation
@@ -14,10 +14,10 @@ class Screened:
     """What was found, artefacts first, and the recordings without the artefacts."""
 
     findings: tuple[Finding, ...]
-    clean: Recorded
+    clean: Dataset
 
 
-def screen(recorded: Recorded, nominal: Simulation, tell: Tell = quietly) -> Screened:
+def screen(recorded: Dataset, nominal: Simulation, tell: Tell = quietly) -> Screened:
     """Find artefacts first, so that they are not called physics, then the rest in clean data."""
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)

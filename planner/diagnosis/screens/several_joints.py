@@ -4,12 +4,12 @@ Laws are fitted to some of the poses and judged at the others.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from planner.dataset.visits import Recorded
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import own_springs
 from planner.diagnosis.laws.fit_in_time import LawProblem
@@ -60,17 +60,17 @@ class SharedLaw:
         return np.flatnonzero(np.abs(self.changes) > SEVERAL_CHANGES).tolist()
 
 
-def screen(recorded: Recorded, nominal: Simulation) -> tuple[Finding, ...]:
+def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     """One law at two joints or more; nothing where that does not explain the force levels."""
     visits = [v for v in recorded.visits if len({recorded.level(h) for h in v.hits}) > 1]
     if len(visits) < LEAST_VISITS:
         return ()
     count = min(FITTED, len(visits) - 1)
     fitted = set(np.linspace(0, len(visits) - 1, count).round().astype(int).tolist())
-    few = replace(recorded, visits=tuple(visits[i] for i in sorted(fitted)))
+    few = recorded.corrected(visits[i] for i in sorted(fitted))
     others = tuple(v for i, v in enumerate(visits) if i not in fitted)
     told = problem_of_levels(few, base(few, nominal))
-    rest = replace(recorded, visits=others)
+    rest = recorded.corrected(others)
     judged = problem_of_levels(rest, base(rest, nominal))
     found = _laws(told, judged, refits(few, nominal))
     best = found[0]

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
-from planner.dataset.visits import Recorded
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.thresholds import (
     TONE_BESIDE_HZ,
@@ -15,7 +15,7 @@ from planner.diagnosis.thresholds import (
 )
 
 
-def screen_tone(recorded: Recorded) -> Finding | None:
+def screen_tone(recorded: Dataset) -> Finding | None:
     """`unknown`, naming the frequency, where levels differ at one frequency, whatever the pose.
 
     A tone adds the same to weak and strong hits, so that their FRFs differ there. Resonances,
@@ -51,7 +51,7 @@ def screen_tone(recorded: Recorded) -> Finding | None:
     return Finding("unknown", None, evidence, {"frequency": (hz, spacing / 2, "Hz")}, text)
 
 
-def _kept(recorded: Recorded, hz: float) -> float:
+def _kept(recorded: Dataset, hz: float) -> float:
     """What is left of a frequency from the third to the last quarter of the weakest hits.
 
     0 where it does not stand out from what lies beside it there.

@@ -22,8 +22,14 @@ def of(value: object) -> bytes:
 
 
 @cache
-def program() -> str:
-    """Hash of this program's own text: another version may come to other numbers."""
-    root = Path(__file__).parents[1]
+def program(*packages: str) -> str:
+    """Hash of this program's own text, or of some of its packages': another may compute otherwise.
+
+    Args:
+        packages: Names of folders in the program, such as "modal"; none for the whole program.
+    """
+    root = Path(__file__).parent
     files = sorted(p for p in root.rglob("*.py") if "campaigns" not in p.relative_to(root).parts)
+    if packages:
+        files = [p for p in files if p.relative_to(root).parts[0] in packages]
     return digest(*(p.relative_to(root).as_posix() + "\n" + p.read_text("utf-8") for p in files))

@@ -1,0 +1,323 @@
+"""Recordings read, screened and in order: what every analysis of several poses is given."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.dataset.level_columns import Column, column
+from planner.dataset.measure import MeasuredPose
+from planner.dataset.screened_files import Source
+from planner.dataset.store import Store, user_store
+from planner.errors import RefusedError
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.modal.modes import ModalModel
+from planner.recording.folder import read_recordings
+from planner.recording.force_levels import levels, peak_n
+from planner.recording.records import Hit
+
+# Rate (1/s) of an exponential window that is laid over all records: decays that they cut off are
+# then too small to matter, and FRFs hold at s = iω + rate.
+LAID = 2.0
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """Hits at one pose without leaving it: q (dof,) in rad, `order` 0 to 1 through the campaign.
+
+    Its hits are good by themselves. Some may disagree with their repeats: that is what screens
+    look for.
+    """
+
+    pose: str
+    q: np.ndarray
+    order: float
+    hits: tuple[Hit, ...]
+
+
+class Recording(NamedTuple):
+    """One file: the pose at which it was recorded, its readback q (dof,) in rad, where it lies."""
+
+    pose: str
+    q: np.ndarray
+    source: Source
+
+
+class Stay(NamedTuple):
+    """A visit before its files are read: which entry, which of its files, and as in `Visit`."""
+
+    entry: int
+    files: tuple[int, ...]
+    q: np.ndarray
+    order: float
+
+
+@dataclass(frozen=True, eq=False)
+class Entry:
+    """What has an FRF of its own: as a rule a pose with all its visits; q (dof,) in rad."""
+
+    pose: str
+    q: np.ndarray
+    measured: MeasuredPose
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Poses that were hit, in the order of recording; made by `read`, `of` or `of_visits`.
+
+    It never changes. FRFs, modes and columns are computed when they are first asked for. n counts
+    the poses with an FRF, v the visits with a hit. `refused` names the files that could not be
+    used, each with its reason; `window_rate_1_s` is that of an exponential window that all
+    channels carry.
+    """
+
+    entries: tuple[Entry, ...]  # also those without an FRF
+    stays: tuple[Stay, ...]
+    band_hz: tuple[float, float]
+    window_rate_1_s: float = 0.0
+    refused: tuple[tuple[str, str], ...] = ()
+    remarks: tuple[str, ...] = ()
+    simulated: bool = False
+
+    @classmethod
+    def read(
+        cls,
+        folder: Path,
+        joint_names: tuple[str, ...],
+        band_hz: tuple[float, float],
+        *,
+        window_rate_1_s: float = 0.0,
+        progress: Progress = lambda text: None,
+        store: Store | None = None,
+    ) -> "Dataset":
+        """Read and screen all hits of a folder with recordings.csv.
+
+        Args:
+            folder: Holds recordings.csv and the files that it names.
+            joint_names: Of the robot, in the order of the angles.
+            band_hz: Which the hits have to excite, and in which FRFs are wanted.
+            window_rate_1_s: Of an exponential window that the analyser laid over all channels.
+            progress: Is told which pose is read.
+            store: Where FRFs and modes are looked up and kept; by default the user's.
+
+        Raises:
+            InputError: The table is wrong, or a pose mixes time histories and exported FRFs.
+            RefusedError: No pose has a hit that can be used.
+        """
+        found = [
+            Recording(
+                row.pose,
+                np.deg2rad(row.joints_deg),
+                Source(row.file, str(row.file), row.hit, row.repeat),
+            )
+            for row in read_recordings(folder, joint_names).rows
+            if row.file
+        ]
+        return cls.of(
+            found,
+            band_hz,
+            window_rate_1_s=window_rate_1_s,
+            progress=progress,
+            store=store,
+            name=str(folder),
+        )
+
+    @classmethod
+    def of(
+        cls,
+        recordings: Sequence[Recording],
+        band_hz: tuple[float, float],
+        *,
+        window_rate_1_s: float = 0.0,
+        progress: Progress = lambda text: None,
+        store: Store | None = None,
+        name: str = "The recordings",
+    ) -> "Dataset":
+        """As `read`, of files wherever they are, in the order of recording.
+
+        `name` is what messages call them. Raises as `read` does.
+        """
+        store = store or user_store()
+        by_pose: dict[str, list[Recording]] = {}
+        for recording in recordings:
+            by_pose.setdefault(recording.pose, []).append(recording)
+        entries = []
+        for number, (pose, group) in enumerate(by_pose.items()):
+            progress(f"reading pose {pose}, {number} of {len(by_pose)} done")
+            sources = tuple(recording.source for recording in group)
+            measured = MeasuredPose(sources, band_hz, window_rate_1_s=window_rate_1_s, store=store)
+            _ = measured.averaged
+            q = np.mean([recording.q for recording in group], axis=0)
+            entries.append(Entry(pose, q, measured))
+        verdicts = [v for entry in entries for v in entry.measured.verdicts]
+        refused = tuple((v.source.name, v.reason) for v in verdicts if not v.accepted)
+        remarks = tuple(
+            f"Pose {entry.pose} is left out: {entry.measured.averaged.remarks[0]}"
+            for entry in entries
+            if entry.measured.frf is None
+        )
+        if len(remarks) == len(entries):
+            reason = refused[0][1] if refused else "".join(remarks[:1])
+            raise RefusedError(f"{name}: no pose has a hit that can be used: {reason}")
+        return cls(
+            tuple(entries),
+            _stays(recordings),
+            band_hz,
+            window_rate_1_s,
+            refused,
+            remarks,
+            any(v.simulated for v in verdicts),
+        )
+
+    @classmethod
+    def of_visits(
+        cls,
+        visits: Iterable[Visit],
+        band_hz: tuple[float, float],
+        window_rate_1_s: float = 0.0,
+    ) -> "Dataset":
+        """Of good hits that are at hand already; each visit is an entry of its own."""
+        return cls((), (), band_hz).corrected(visits, window_rate_1_s)
+
+    def corrected(self, visits: Iterable[Visit], window_rate_1_s: float | None = None) -> "Dataset":
+        """The same with other hits: those that a screen has corrected, or some of them only.
+
+        Each visit is an entry of its own then, with all its hits: what disagreed may agree now.
+        """
+        rate = self.window_rate_1_s if window_rate_1_s is None else window_rate_1_s
+        given = tuple(visits)
+        return replace(
+            self,
+            entries=tuple(
+                Entry(v.pose, v.q, MeasuredPose((), self.band_hz, "h1", rate, v.hits))
+                for v in given
+            ),
+            stays=tuple(Stay(i, (0,), v.q, v.order) for i, v in enumerate(given)),
+            window_rate_1_s=rate,
+        )
+
+    # -- by pose -------------------------------------------------------------------------------
+
+    @cached_property
+    def measured(self) -> tuple[Entry, ...]:
+        """The n entries with an FRF."""
+        return tuple(entry for entry in self.entries if entry.measured.frf is not None)
+
+    @property
+    def poses(self) -> tuple[str, ...]:
+        """Names of the n poses."""
+        return tuple(entry.pose for entry in self.measured)
+
+    @property
+    def q(self) -> np.ndarray:
+        """Mean readback (n, dof) in rad."""
+        return np.array([entry.q for entry in self.measured])
+
+    @property
+    def frfs(self) -> tuple[Frf, ...]:
+        """Of each pose, all its visits and force levels together."""
+        return _known(entry.measured.frf for entry in self.measured)
+
+    @property
+    def ended_frfs(self) -> tuple[Frf, ...]:
+        """The same, weighted, under exponential windows by which decays are over at the end."""
+        return _known(entry.measured.ended_frf for entry in self.measured)
+
+    @property
+    def modes(self) -> tuple[ModalModel | None, ...]:
+        """Of each pose; None where no mode was found."""
+        return tuple(entry.measured.modal for entry in self.measured)
+
+    # -- by visit ------------------------------------------------------------------------------
+
+    @cached_property
+    def visits(self) -> tuple[Visit, ...]:
+        """The v visits with a hit; a pose that was returned to has several.
+
+        None of a pose whose FRFs were exported.
+        """
+        out = []
+        for stay in self.stays:
+            entry = self.entries[stay.entry]
+            hits = tuple(hit for i in stay.files for hit in entry.measured.files.hits[i])
+            if hits:
+                out.append(Visit(entry.pose, stay.q, stay.order, hits))
+        return tuple(out)
+
+    @property
+    def visit_q(self) -> np.ndarray:
+        """Readback (v, dof) in rad."""
+        return np.array([visit.q for visit in self.visits])
+
+    @cached_property
+    def visit_frfs(self) -> tuple[Frf, ...]:
+        """Of each visit, all force levels together, as `frf`."""
+        return tuple(self.frf(visit.hits) for visit in self.visits)
+
+    def frf(self, hits: tuple[Hit, ...]) -> Frf:
+        """FRF of some hits of a visit, with an exponential window of rate LAID over them."""
+        return estimate(hits, self.band_hz, "h1", LAID, window_rate_1_s=self.window_rate_1_s)
+
+    # -- by force level ------------------------------------------------------------------------
+
+    @cached_property
+    def _by_level(self) -> list[np.ndarray]:
+        return levels(np.sort([peak_n(hit) for visit in self.visits for hit in visit.hits]))
+
+    @cached_property
+    def level_n(self) -> np.ndarray:
+        """Peak forces (levels,) in N, weakest first: the same for all visits."""
+        return np.array([float(np.exp(np.mean(np.log(group)))) for group in self._by_level])
+
+    def level(self, hit: Hit) -> int:
+        """Which of `level_n` a hit belongs to."""
+        weakest = [group[0] for group in self._by_level[1:]]
+        return int(np.searchsorted(weakest, peak_n(hit), side="right"))
+
+    @cached_property
+    def columns(self) -> tuple[tuple[Column, ...], ...]:
+        """Of each visit: one column per hit axis and force level that was hit, weakest first."""
+        return self.columns_at(LAID)
+
+    def columns_at(self, laid_1_s: float) -> tuple[tuple[Column, ...], ...]:
+        """As `columns`, with an exponential window of this rate (1/s) laid over the records."""
+        length = max(len(hit.force_n) for visit in self.visits for hit in visit.hits)
+        out = []
+        for visit in self.visits:
+            groups: dict[tuple[int, int], list[Hit]] = {}
+            for hit in visit.hits:
+                groups.setdefault((hit.axis_index, self.level(hit)), []).append(hit)
+            found = [
+                column(tuple(hits), *at, length, self.band_hz, laid_1_s, self.window_rate_1_s)
+                for at, hits in sorted(groups.items())
+            ]
+            out.append(tuple(found))
+        return tuple(out)
+
+
+def _stays(recordings: Sequence[Recording]) -> tuple[Stay, ...]:
+    """Neighbouring recordings of one pose are a visit."""
+    numbers: dict[str, int] = {}
+    files: dict[str, int] = {}
+    runs = [list(run) for _, run in groupby(recordings, key=lambda recording: recording.pose)]
+    found = []
+    for place, run in enumerate(runs):
+        pose = run[0].pose
+        first = files.get(pose, 0)
+        files[pose] = first + len(run)
+        entry = numbers.setdefault(pose, len(numbers))
+        q = np.mean([recording.q for recording in run], axis=0)
+        order = place / max(len(runs) - 1, 1)
+        found.append(Stay(entry, tuple(range(first, files[pose])), q, order))
+    return tuple(found)
+
+
+def _known(frfs: Iterable[Frf | None]) -> tuple[Frf, ...]:
+    return tuple(frf for frf in frfs if frf is not None)

@@ -1,0 +1,147 @@
+"""Results kept on disk under a hash of all that they depend on: computed once, found again.
+
+The store is shared by all commands and processes of a user. An entry is a checksum and what it
+covers: the key and the result. One that is damaged, half written or of another key is as good as
+none, and a store that cannot be written only costs time.
+"""
+
+import hashlib
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+
+from planner import cache_folder
+
+MOST_BYTES = 512 * 1024 * 1024  # about a thousand poses; then the entries unused longest go
+LEFT_SHARE = 0.8  # of MOST_BYTES that is left when some went, so that the next ones fit
+LONGEST_UNUSED_S = 180 * 24 * 3600.0
+WRITING_S = 3600.0  # a part older than this belongs to a process that was stopped
+LOOK_EVERY = 64  # entries written by a process, after which it looks at the size again
+DIGEST_BYTES = 32
+
+T = TypeVar("T")
+
+
+class Store:
+    """A folder of results by key; `folder` None keeps nothing."""
+
+    def __init__(self, folder: Path | None, most_bytes: int = MOST_BYTES):
+        self.folder, self.most_bytes = folder, most_bytes
+        self._written = 0
+
+    def result(self, key: str, kind: type[T], make: Callable[[], T]) -> T:
+        """What is kept under a key (hex), or else made now and kept.
+
+        Args:
+            key: Hash of all that the result depends on, the kind of result among it.
+            kind: Dataclass that msgspec can encode; arrays are allowed.
+            make: Makes the result; what it raises is raised, and nothing is kept.
+        """
+        found = self.get(key, kind)
+        if found is None:
+            found = make()
+            self.put(key, found)
+        return found
+
+    def get(self, key: str, kind: type[T]) -> T | None:
+        """What is kept under a key; None where nothing is, or nothing whole."""
+        if self.folder is None:
+            return None
+        path = self.folder / key
+        try:
+            data = path.read_bytes()
+        except OSError:
+            return None
+        body = data[DIGEST_BYTES:]
+        if data[:DIGEST_BYTES] != _checksum(key, body):
+            return None
+        try:
+            found = msgspec.msgpack.decode(body, type=kind, dec_hook=_decoded)
+        except (msgspec.MsgspecError, ValueError, TypeError, KeyError, NotImplementedError):
+            return None
+        with suppress(OSError):
+            os.utime(path)  # entries in use are the last to go
+        return found
+
+    def has(self, key: str) -> bool:
+        """Whether there is an entry, whole or not."""
+        return self.folder is not None and (self.folder / key).is_file()
+
+    def put(self, key: str, result: Any) -> None:
+        """Keep a result; another process sees all of it or nothing."""
+        if self.folder is None:
+            return
+        body = msgspec.msgpack.encode(result, enc_hook=_encoded)
+        part = None
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile(dir=self.folder, suffix=".part", delete=False) as file:
+                part = Path(file.name)
+                file.write(_checksum(key, body) + body)
+            os.replace(part, self.folder / key)
+            part = None
+            if self._written % LOOK_EVERY == 0:
+                self._thin_out(time.time())
+            self._written += 1
+        except OSError:
+            pass
+        finally:
+            if part is not None:
+                with suppress(OSError):
+                    part.unlink()
+
+    def _thin_out(self, now: float) -> None:
+        """Remove entries that nobody used for long, and the oldest where there are too many."""
+        assert self.folder is not None
+        entries = []
+        for path in self.folder.iterdir():
+            with suppress(OSError):
+                status = path.stat()
+                entries.append((now - status.st_mtime, status.st_size, path))
+        total = sum(size for _, size, _ in entries)
+        most = self.most_bytes if total <= self.most_bytes else LEFT_SHARE * self.most_bytes
+        for age, size, path in sorted(entries, key=lambda entry: -entry[0]):
+            part = path.suffix == ".part"
+            if age > (WRITING_S if part else LONGEST_UNUSED_S) or (total > most and not part):
+                with suppress(OSError):
+                    path.unlink()
+                total -= size
+
+
+def user_store() -> Store:
+    """The store of this user; one that keeps nothing where there is no home."""
+    try:
+        return Store(cache_folder.folder("poses"))
+    except RuntimeError:
+        return Store(None)
+
+
+def _checksum(key: str, body: bytes) -> bytes:
+    return hashlib.sha256(key.encode() + b"\n" + body).digest()
+
+
+def _encoded(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        data = np.ascontiguousarray(value)
+        return {"dtype": data.dtype.str, "shape": data.shape, "data": data.tobytes()}
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Path):
+        return str(value)
+    raise NotImplementedError(f"{type(value).__name__} cannot be kept")
+
+
+def _decoded(kind: type, value: Any) -> Any:
+    if kind is np.ndarray:
+        flat = np.frombuffer(value["data"], np.dtype(value["dtype"]))
+        return flat.reshape(value["shape"]).copy()
+    if kind is Path:
+        return Path(value)
+    raise NotImplementedError(f"{kind.__name__} cannot be read")

@@ -1,0 +1,148 @@
+"""Hits of one pose as spectra on common lines, with the power of the noise in each.
+
+No window is laid over the responses but an exponential one where it is asked for: what a record
+lacks because it ends before the decay is known exactly (`Frf.tail_s`) and is part of the model
+that is fitted later. The force is taken from the pulse alone (force window), because between
+pulses it holds only noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import RefusedError
+from planner.recording.records import Hit
+
+MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
+NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
+LEAST_SAMPLES = 64  # of a record after its pulse
+LEAST_QUIET = 8  # samples before the pulse that tell offset and noise
+FADED = 1e-3  # of the noise that a window leaves: fainter noise is the digits' own
+LAST_SAMPLES = 64  # of a record: they bound its noise where nothing was recorded before the pulse
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Exponential windows e^(−rate·t), t from the pulse's peak, rates in 1/s.
+
+    `laid_1_s` is laid over force and responses here, before the pulse too (there it is above 1):
+    the FRF is then exactly H at iω + rate. `carried_1_s` is in the records already.
+    """
+
+    laid_1_s: float = 0.0
+    carried_1_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class HitSpectra:
+    """Transforms of one hit: force (F,) in N and responses (3, F) in m/s², summed over samples.
+
+    `force_noise` and `noise` (3,) are the powers of the noise in them; `noise_known` is False where
+    nothing was recorded before the pulse and `noise` is no more than a bound.
+    """
+
+    axis: int
+    force: np.ndarray
+    response: np.ndarray
+    force_noise: float
+    force_window_s: float
+    noise: np.ndarray
+    noise_known: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Spectra of all hits of a pose at lines frequency_hz (F,).
+
+    `tail_s` as in `Frf`; `peak_s` is the time of the pulses' peaks, the same for all hits.
+    """
+
+    frequency_hz: np.ndarray
+    hits: tuple[HitSpectra, ...]
+    tail_s: float
+    peak_s: float
+    remarks: tuple[str, ...]
+
+
+def transform(
+    hits: tuple[Hit, ...],
+    band_hz: tuple[float, float],
+    windows: Windows | None = None,
+    samples: int | None = None,
+) -> Spectra:
+    """Spectra of hits that are cut so that all pulses lie at the same time.
+
+    Records are filled up with zeros to `samples`, where stated, so that poses share their lines.
+    Raises RefusedError if the hits do not fit together.
+    """
+    if not hits:
+        raise RefusedError("No usable hit is left at this pose; hit again.")
+    rate = hits[0].sampling_rate_hz
+    if any(abs(hit.sampling_rate_hz / rate - 1) > 1e-6 for hit in hits):
+        raise RefusedError("The hits of this pose have different sampling rates; use one.")
+    before, after, remarks = _alignment(hits)
+    length = max(before + after, samples or 0)
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    chosen = (frequency > 0) & (frequency <= min(MARGIN * band_hz[1], NYQUIST_SHARE * rate))
+    windows = windows or Windows()
+    found = tuple(_transform(hit, before, after, length, chosen, windows) for hit in hits)
+    tail = float(np.mean([_tail(hit, before, after) for hit in hits]))
+    return Spectra(frequency[chosen], found, tail, before / rate, remarks)
+
+
+def _alignment(hits: tuple[Hit, ...]) -> tuple[int, int, tuple[str, ...]]:
+    """Samples before the peak, and from it on, that every hit has."""
+    before = min(hit.pulse.peak for hit in hits)
+    after = min(len(hit.force_n) - hit.pulse.peak for hit in hits)
+    if after < LEAST_SAMPLES:
+        raise RefusedError("A record ends right after its pulse; record longer.")
+    if before + after < 0.9 * max(len(hit.force_n) for hit in hits):
+        return before, after, ("Records of different length were cut to the shortest.",)
+    return before, after, ()
+
+
+def _transform(
+    hit: Hit, before: int, after: int, length: int, chosen: np.ndarray, windows: Windows
+) -> HitSpectra:
+    pulse, samples = hit.pulse, len(hit.force_n)
+    start = pulse.peak - before
+    used = slice(start, pulse.peak + after)
+    t = (np.arange(samples) - pulse.peak) / hit.sampling_rate_hz
+    laid = np.exp(-windows.laid_1_s * t)
+    # The window that the records carry has made the noise after the pulse smaller than it was.
+    carried = np.exp(-windows.carried_1_s * np.maximum(t, 0))
+    known = pulse.quiet - start >= LEAST_QUIET
+    quiet = slice(start, pulse.quiet)
+    force, response = hit.force_n - pulse.offset_n, hit.acceleration_m_s2
+    if known:
+        force = force - np.mean(force[quiet])
+        response = response - np.mean(response[:, quiet], axis=1, keepdims=True)
+    noise = np.var(response[:, quiet] if known else response[:, -LAST_SAMPLES:], axis=1, ddof=1)
+    first, end = pulse.around(samples)
+    near = np.zeros(samples)
+    near[max(first, start) : end] = 1.0
+    aside = (force / np.maximum(carried, FADED))[(near == 0) & (carried > FADED)]
+    force_noise = float(np.var(aside, ddof=1)) if aside.size >= LEAST_QUIET else 0.0
+    window = near * laid
+    return HitSpectra(
+        hit.axis_index,
+        np.fft.rfft((hit.sign * force * window)[used], length)[chosen],
+        np.fft.rfft((response * laid)[:, used], length, axis=1)[:, chosen],
+        force_noise * float(np.sum(window**2)),
+        float(np.sum(near)) / hit.sampling_rate_hz,
+        noise * float(np.sum((laid * carried)[used] ** 2)),
+        known,
+    )
+
+
+def _tail(hit: Hit, before: int, after: int) -> float:
+    """Time from the centroid of the pulse to the end of the samples that are used.
+
+    Never left out: what looks quiet beside a loud stiff mode may be a soft one that still rings.
+    """
+    first, end = hit.pulse.around(len(hit.force_n))
+    first = max(first, hit.pulse.peak - before)
+    pulse = np.clip(hit.force_n[first:end] - hit.pulse.offset_n, 0.0, None)
+    centroid = first + float(np.sum(np.arange(pulse.size) * pulse) / np.sum(pulse))
+    # A sample stands for the time around it: the last one ends half a step after itself.
+    return (hit.pulse.peak + after - 0.5 - centroid) / hit.sampling_rate_hz

@@ -1,0 +1,69 @@
+"""A diagnosis reads a campaign's recordings and writes nothing into its folder."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.cli.material import material
+from planner.cli.run import run
+from planner.demo import NAME, Pool, shipped
+from planner.errors import InputError
+
+
+def content(folder: Path) -> dict[str, tuple[str, int]]:
+    """Hash and time of change of every file below a folder."""
+    return {
+        path.relative_to(folder).as_posix(): (
+            hashlib.sha256(path.read_bytes()).hexdigest(),
+            path.stat().st_mtime_ns,
+        )
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    source = shipped(NAME)
+    root = tmp_path_factory.mktemp("root")
+    toml = source / "robot" / "robot.toml"
+    made = Campaign.new(root / "campaign", toml, source / "campaign.toml")
+    band_hz = made.cell.config.modes.band_hz
+    with pytest.raises(InputError, match="import"):
+        made.dataset(band_hz)
+    pool = Pool.load(source / "recordings", made.cell.robot.joint_names)
+    for pose in list(pool.rows)[:2]:
+        made.import_paths((pool.folder,), pose)
+    return made
+
+
+def test_recordings_in_use_and_nothing_else(campaign):
+    before = content(campaign.directory)
+    given = material(campaign.directory, None, 0.0)
+    robot = campaign.cell.robot
+    recorded = given.read(robot.joint_names, campaign.cell.config.modes.band_hz, lambda text: None)
+    assert len(recorded.ended_frfs) == len(recorded.modes) == len(recorded.columns) == 2
+    used = campaign.state.used
+    assert recorded.poses == tuple(m.pose for m in used)
+    np.testing.assert_allclose(recorded.q, np.deg2rad([m.joints_deg for m in used]))
+    hits = [hit.sha256 for m in used for hit in m.accepted]
+    assert [hit.source.name[:64] for v in recorded.visits for hit in v.hits] == hits
+    table = campaign.cell.config.modes
+    for measurement, frf in zip(used, recorded.frfs, strict=True):
+        own = campaign.frf_of(measurement, table)
+        np.testing.assert_array_equal(frf.accelerance, own.accelerance)
+    assert recorded.simulated
+    assert content(campaign.directory) == before
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_diagnose_leaves_the_folder_byte_for_byte(campaign, capsys):
+    before = content(campaign.directory)
+    assert run(["diagnose", str(campaign.directory), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["simulated"]
+    assert content(campaign.directory) == before

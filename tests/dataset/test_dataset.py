@@ -1,0 +1,157 @@
+"""Recordings as one data set: poses, visits, levels; from a folder, from files, from hits."""
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.dataset.dataset import LAID, Dataset, Recording, Visit
+from planner.dataset.screened_files import Source
+from planner.dataset.store import Store
+from planner.errors import InputError, RefusedError
+from planner.frf.estimator import estimate
+from tests.support.simulated_hits import make_hit
+
+BAND_HZ = (4.0, 60.0)
+NOTHING_KEPT = Store(None)
+
+
+def write_hit(path: Path, hit) -> None:
+    t = np.arange(len(hit.force_n)) / hit.sampling_rate_hz
+    names = "time_s,force_n," + ",".join(f"acceleration_{axis}_m_s2" for axis in "xyz")
+    columns = np.column_stack([t, hit.force_n, *hit.acceleration_m_s2])
+    np.savetxt(path, columns, "%.12g", ",", header=names, comments="")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Pose A, then B, then A again; one hit of A disagrees, and one file of B is no recording."""
+    root = tmp_path_factory.mktemp("recordings")
+    rng = np.random.default_rng(5)
+    rows = []
+    for visit, pose in enumerate("ABA"):
+        for axis in "xyz":
+            for repeat in range(2):
+                name = f"{visit}{pose}{axis}{repeat}.csv"
+                hit = make_hit(rng, f"+{axis}", record_s=3.0, peak_n=(400, 1200)[repeat])
+                if name == "2Ax1.csv":
+                    hit = replace(hit, acceleration_m_s2=-hit.acceleration_m_s2)
+                write_hit(root / name, hit)
+                angle = {"A": 10.0, "B": 50.0}[pose] + 0.1 * visit
+                rows.append([pose, angle, f"+{axis}", 2 * visit + repeat + 1, name])
+    (root / "none.csv").write_text("hello\n")
+    rows.append(["C", 80.0, "+x", 1, "none.csv"])
+    with open(root / "recordings.csv", "w", newline="") as file:
+        csv.writer(file).writerows([["pose", "J1_deg", "hit", "repeat", "file"], *rows])
+    return root
+
+
+@pytest.fixture(scope="module")
+def read(folder):
+    return Dataset.read(folder, ("J1",), BAND_HZ, store=NOTHING_KEPT)
+
+
+def test_poses_and_visits_in_the_order_of_recording(read):
+    assert read.poses == ("A", "B")
+    np.testing.assert_allclose(np.rad2deg(read.q[:, 0]), [10.1, 50.1])
+    assert [visit.pose for visit in read.visits] == ["A", "B", "A"]
+    np.testing.assert_allclose(np.rad2deg(read.visit_q[:, 0]), [10.0, 50.1, 10.2])
+    np.testing.assert_allclose([visit.order for visit in read.visits], [0, 1 / 3, 2 / 3])
+
+
+def test_what_disagrees_is_left_out_of_frfs_and_kept_for_screens(read):
+    assert [Path(file).name for file, _ in read.refused] == ["2Ax1.csv", "none.csv"]
+    assert "opposite sign" in read.refused[0][1]
+    assert read.frfs[0].hits == (3, 4, 4)
+    assert [len(visit.hits) for visit in read.visits] == [6, 6, 6]
+    assert read.remarks == ("Pose C is left out: No usable hit: nothing was estimated.",)
+
+
+def test_frfs_of_a_pose_and_of_a_visit(read):
+    a = read.entries[0].measured.hits
+    np.testing.assert_array_equal(read.frfs[0].accelerance, estimate(a, BAND_HZ).accelerance)
+    assert read.frfs[0].exponential_rate_1_s == 0
+    ended = read.ended_frfs[0]
+    assert ended.exponential_rate_1_s * read.frfs[0].tail_s == pytest.approx(5.5)
+    assert [frf.exponential_rate_1_s for frf in read.visit_frfs] == [LAID] * 3
+
+
+def test_modes_of_each_pose(read):
+    for modal in read.modes:
+        assert modal is not None
+        np.testing.assert_allclose([m.frequency_hz for m in modal.modes], [11.0, 27.0], rtol=0.01)
+
+
+def test_columns_by_level_agree_with_the_frf_of_the_visit(read):
+    assert len(read.level_n) == 2
+    frf = read.visit_frfs[1]
+    for column in read.columns[1]:
+        same = np.isin(frf.frequency_hz, column.frequency_hz)
+        if same.sum() == len(column.frequency_hz):
+            of_all = frf.accelerance[:, column.axis][:, same]
+            near = np.linalg.norm(column.accelerance - of_all) / np.linalg.norm(of_all)
+            assert near < 0.2
+        assert column.rate_1_s == LAID
+        assert np.isfinite(column.variance[:, column.frequency_hz < 40]).all()
+    assert [(c.axis, c.level) for c in read.columns[1]] == [
+        (axis, level) for axis in range(3) for level in range(2)
+    ]
+
+
+def test_files_wherever_they_are_give_the_same(folder, read, tmp_path):
+    recordings = []
+    with open(folder / "recordings.csv", newline="") as file:
+        for row in csv.DictReader(file):
+            copy = tmp_path / f"kept-{row['file']}"
+            copy.write_bytes((folder / row["file"]).read_bytes())
+            source = Source(copy, f"stick/{row['file']}", row["hit"], int(row["repeat"]))
+            q = np.deg2rad([float(row["J1_deg"])])
+            recordings.append(Recording(row["pose"], q, source))
+    same = Dataset.of(recordings, BAND_HZ, store=NOTHING_KEPT)
+    assert same.poses == read.poses
+    np.testing.assert_array_equal(same.visit_q, read.visit_q)
+    for one, other in zip(same.frfs, read.frfs, strict=True):
+        np.testing.assert_array_equal(one.accelerance, other.accelerance)
+    assert [file for file, _ in same.refused] == ["stick/2Ax1.csv", "stick/none.csv"]
+    assert str(tmp_path) not in str(same.refused)
+
+
+def test_corrected_hits_make_entries_of_their_own(read):
+    louder = [
+        replace(
+            visit,
+            hits=tuple(
+                replace(hit, acceleration_m_s2=2 * hit.acceleration_m_s2) for hit in visit.hits
+            ),
+        )
+        for visit in read.visits
+    ]
+    now = read.corrected(louder, 0.5)
+    assert now.poses == ("A", "B", "A")
+    assert now.frfs[0].hits == (2, 2, 2)
+    assert now.frfs[0].exponential_rate_1_s == 0.5
+    np.testing.assert_allclose(now.visit_q, now.q)
+    assert (now.refused, now.remarks) == (read.refused, read.remarks)
+    np.testing.assert_allclose(now.frfs[1].accelerance, 2 * read.frfs[1].accelerance)
+    assert read.window_rate_1_s == 0
+    assert read.poses == ("A", "B")
+
+
+def test_hits_at_hand():
+    rng = np.random.default_rng(1)
+    hits = tuple(make_hit(rng, f"+{axis}") for axis in "xyz")
+    made = Dataset.of_visits([Visit("P", np.zeros(1), 0.0, hits)], BAND_HZ)
+    assert made.poses == ("P",)
+    np.testing.assert_array_equal(made.frfs[0].accelerance, estimate(hits, BAND_HZ).accelerance)
+    assert made.visits[0].hits == hits
+
+
+def test_nothing_usable_is_said_with_its_reason(tmp_path):
+    (tmp_path / "a.csv").write_text("hello\n")
+    (tmp_path / "recordings.csv").write_text("pose,J1_deg,hit,file\nA,1,+x,a.csv\n")
+    with pytest.raises(RefusedError, match=r"no pose has a hit that can be used.*a\.csv"):
+        Dataset.read(tmp_path, ("J1",), BAND_HZ, store=NOTHING_KEPT)
+    with pytest.raises(InputError, match="no column J2_deg"):
+        Dataset.read(tmp_path, ("J2",), BAND_HZ, store=NOTHING_KEPT)
