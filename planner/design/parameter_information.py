@@ -4,8 +4,6 @@ With covariance Σ = L Lᵀ of the parameters and Fisher information F of a hit,
 L (I + G)⁻¹ Lᵀ, G = Lᵀ F L, in the linearised model (Fedorov 1972; Chaloner & Verdinelli 1995).
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
@@ -45,13 +43,6 @@ def parameter_reduction(
         left = _left(outputs, poses[slice(i, i + CHUNK)], axes)
         parts.append(np.trace(matters) - np.einsum("ij,nji->n", matters, left))
     return np.concatenate(parts)
-
-
-def by_axes(
-    outputs: FrequencyOutputs, pose: Poses, target: Target, subsets: Sequence[Axes] = SUBSETS
-) -> np.ndarray:
-    """The same for one pose (n = 1) and every set of hit axes (len(subsets),)."""
-    return np.array([parameter_reduction(outputs, pose, target, axes)[0] for axes in subsets])
 
 
 def _left(outputs: FrequencyOutputs, poses: Poses, axes: Axes) -> np.ndarray:

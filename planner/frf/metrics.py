@@ -115,41 +115,6 @@ def direct_mean(values: np.ndarray) -> float:
     return float(mean_known(np.diagonal(values), axis=0))
 
 
-@dataclass(frozen=True, eq=False)
-class ModalError:
-    """Errors of simulated modes, (n, k) in % of the measured value; NaN where one is missing."""
-
-    frequency_percent: np.ndarray
-    damping_percent: np.ndarray
-
-    @property
-    def frequency_rmse_percent(self) -> np.ndarray:
-        """Root mean square over poses (k,)."""
-        return np.sqrt(mean_known(self.frequency_percent**2, axis=0))
-
-    @property
-    def damping_rmse_percent(self) -> np.ndarray:
-        """Root mean square over poses (k,)."""
-        return np.sqrt(mean_known(self.damping_percent**2, axis=0))
-
-
-def modal_error(
-    measured_hz: np.ndarray,
-    measured_damping: np.ndarray,
-    simulated_hz: np.ndarray,
-    simulated_damping: np.ndarray,
-) -> ModalError:
-    """Errors of natural frequencies (Hz) and damping ratios, all (n, k), column k the same mode.
-
-    NaN where a mode was not found (labels come from `planner.modal.mac.align`). A measured
-    damping ratio of 0 has no relative error: NaN.
-    """
-    return ModalError(
-        _relative_percent(measured_hz, simulated_hz),
-        _relative_percent(measured_damping, simulated_damping),
-    )
-
-
 def mean_known(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> np.ndarray:
     """Mean over an axis of the entries that are not NaN; NaN where there are none."""
     known = ~np.isnan(values)
@@ -194,9 +159,3 @@ def _similarity(error: np.ndarray, size: np.ndarray) -> np.ndarray:
     relative = np.where((measured == 0) & (whole == 0), 0.0, relative)
     similarity = np.maximum(0.0, 1 - relative)
     return np.where(np.all(unknown, axis=0), np.nan, similarity)
-
-
-def _relative_percent(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
-    measured, simulated = np.broadcast_arrays(measured, simulated)
-    nothing = np.full(measured.shape, np.nan)
-    return 100 * np.divide(simulated - measured, measured, out=nothing, where=measured != 0)

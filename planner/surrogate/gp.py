@@ -19,10 +19,9 @@ from scipy.linalg.lapack import dtrtri
 
 from planner import jax_setup
 from planner.errors import InputError
-from planner.surrogate.importance import Gaussians, sample
+from planner.surrogate.importance import Gaussians, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
 from planner.surrogate.predictive import Predictive
-from planner.surrogate.quasi_random import normal_points
 from planner.surrogate.training_data import Padded
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance

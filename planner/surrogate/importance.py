@@ -8,11 +8,19 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import logsumexp, softmax
+from scipy.special import logsumexp, ndtri, softmax
+from scipy.stats import qmc
 
 INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
+
+
+def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
+    """Quasi-random points (samples, dimensions) of N(0, 1): a scrambled Sobol sequence."""
+    sobol = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
+    unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
+    return ndtri(np.clip(unit, 1e-6, 1 - 1e-6))
 
 
 def sample(

@@ -24,11 +24,6 @@ class KernelAverage:
     weights: np.ndarray
 
     @property
-    def likeliest(self) -> tuple[str, ...]:
-        """Each output's likeliest kernel."""
-        return tuple(self.kernels[i] for i in np.argmax(self.weights, axis=0).tolist())
-
-    @property
     def posteriors(self) -> tuple[Posterior, ...]:
         """One a kernel."""
         return tuple(model.posterior for model in self.models)

@@ -2,7 +2,7 @@
 
 A shape is a pure function with unit variance: it takes the array library (numpy or jax.numpy),
 xa (…, a, d), xb (…, b, d) already divided by the length scales, and returns (…, a, b). A `Kernel`
-is an expression such as "matern52", "rbf+bias" or "rbf[:2]*periodic[2:3]+linear": shapes on
+is an expression such as "matern52", "rbf+bias" or "rbf[:2]*quadratic[2:3]+linear": shapes on
 columns of x, every factor with a length scale per column, every term with an amplitude.
 """
 
@@ -68,12 +68,6 @@ def _distance(xp: Any, xa: Any, xb: Any) -> Any:
     return xp.sqrt(xp.maximum(squared, 1e-30))
 
 
-def matern32(xp: Any, xa: Any, xb: Any) -> Any:
-    """Matérn 3/2."""
-    r = 3.0**0.5 * _distance(xp, xa, xb)
-    return (1 + r) * xp.exp(-r)
-
-
 def matern52(xp: Any, xa: Any, xb: Any) -> Any:
     """Matérn 5/2."""
     r = 5.0**0.5 * _distance(xp, xa, xb)
@@ -86,12 +80,8 @@ KERNELS: dict[str, Shape] = {
     "quadratic": quadratic,
     "cubic": cubic,
     "rbf": rbf,
-    "matern32": matern32,
     "matern52": matern52,
-    # Of angles in rad: an RBF of points on the unit circle, exp(−2 sin²(Δ/2)/ℓ²) (MacKay 1998).
-    "periodic": rbf,
 }
-ON_CIRCLE = frozenset({"periodic"})
 SCALELESS = frozenset({"bias"})
 
 
@@ -107,10 +97,7 @@ class Factor:
         """x (…, a, d) as the shape wants it, θ (…, p)."""
         if self.name in SCALELESS:
             return x
-        x, scale = x[..., self.columns], xp.exp(theta[..., None, self.scales])
-        if self.name in ON_CIRCLE:
-            return xp.concatenate([xp.cos(x) / scale, xp.sin(x) / scale], axis=-1)
-        return x / scale
+        return x[..., self.columns] / xp.exp(theta[..., None, self.scales])
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ heavier and its middle narrower.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
 from scipy.stats import norm
 
 HALVINGS = 60
@@ -36,13 +35,6 @@ class Predictive:
         """(q,)."""
         return np.sqrt(self.weights @ (self.sds**2 + (self.means - self.mean) ** 2))
 
-    def log_density(self, y: np.ndarray, least_sd: float = 0.0) -> np.ndarray:
-        """log p(y) (q,); no component counts as surer than `least_sd`."""
-        sds = np.maximum(self.sds, least_sd)
-        return np.asarray(
-            logsumexp(norm.logpdf(y, self.means, sds), axis=0, b=self.weights[:, None])
-        )
-
     def below(self, y: np.ndarray) -> np.ndarray:
         """Probability (q,) of a value below y (q,)."""
         sds = np.maximum(self.sds, 1e-300)
@@ -59,10 +51,6 @@ class Predictive:
             low, high = np.where(short, middle, low), np.where(short, high, middle)
         return (low + high) / 2
 
-    def interval(self, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds (q,) of the central interval that holds `level` of the probability."""
-        return self.quantile((1 - level) / 2), self.quantile((1 + level) / 2)
-
     def scaled(self, centre: float, scale: float) -> "Predictive":
         """Of centre + scale·y."""
         return Predictive(self.weights, centre + scale * self.means, abs(scale) * self.sds)
@@ -70,13 +58,3 @@ class Predictive:
     def widened(self, sd: np.ndarray) -> "Predictive":
         """With independent noise of sd (k, q) or (q,) added."""
         return Predictive(self.weights, self.means, np.hypot(self.sds, sd))
-
-
-def together(parts: list[Predictive], weights: np.ndarray) -> Predictive:
-    """The mixture of mixtures, in these proportions (sum to one)."""
-    shares = [w * p.weights for w, p in zip(weights.tolist(), parts, strict=True)]
-    return Predictive(
-        np.concatenate(shares),
-        np.concatenate([p.means for p in parts]),
-        np.concatenate([p.sds for p in parts]),
-    )

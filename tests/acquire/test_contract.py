@@ -13,9 +13,9 @@ from planner.design.mixed import mixed
 from planner.design.mutual_information import mutual_information
 from planner.design.parameter_information import (
     SUBSETS,
-    by_axes,
     d_information,
     parameter_information,
+    parameter_reduction,
 )
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import ACQUISITIONS, Travel, propose
@@ -99,7 +99,8 @@ def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
 
 def test_more_axes_tell_more(surrogate):
     outputs, poses = with_parameters(surrogate, X)
-    gain = by_axes(outputs, poses.one(3), outputs.workspace)
+    pose = poses.one(3)
+    gain = [parameter_reduction(outputs, pose, outputs.workspace, axes)[0] for axes in SUBSETS]
     for i, a in enumerate(SUBSETS):
         for j, b in enumerate(SUBSETS):
             if set(a) < set(b):

@@ -10,7 +10,6 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
 from planner.dataset.measure import Source, measure
 from planner.demo import Pool, shipped
-from planner.dynamics.vibration import direct_accelerance
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.surrogate.modal_surrogate import fit_surrogate
@@ -18,6 +17,7 @@ from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import load_truth
 from test_fusion import observed, simulated
+from tests.support.direct_solution import direct_accelerance
 
 pytestmark = pytest.mark.slow
 

@@ -9,10 +9,10 @@ import pytest
 
 from beam import first_hz
 from planner.diagnosis.effects.effect import Quantity
-from planner.diagnosis.frequencies import Change, explain
-from planner.modal.ringdown import ringdown
 from planner.recording.read import read
 from test_dropbear import FIRST_MODE, dwells
+from tests.support.decays import ringdown
+from tests.support.frequency_changes import Change, explain
 
 pytestmark = pytest.mark.slow
 

@@ -7,11 +7,11 @@ import pytest
 
 from planner.studies.models import single_output_gp
 from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.fused import fit_fused
-from planner.studies.models.mixture import mix
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import PRIOR, fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
+from tests.support.fused import fit_fused
+from tests.support.mixture import mix
 
 GRID = np.random.default_rng(8).random((40, 2))
 SPREAD = 0.5

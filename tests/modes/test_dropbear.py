@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.modal.ringdown import ringdown
 from planner.recording.read import read
 from planner.recording.records import TimeRecord
+from tests.support.decays import ringdown
 
 # Pin location (V) and first mode (Hz), as the shared data's README states them.
 FIRST_MODE = {1.645: 28.23, 2.081: 30.82, 2.502: 33.89, 2.933: 37.56, 3.365: 41.97}

@@ -16,6 +16,7 @@ from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.truth.deviation import AddedMass, Deviation, Spring
 from planner.truth.model import load_truth
+from tests.support.direct_solution import direct_accelerance
 
 LINES = np.linspace(5, 150, 50)
 MASS, RADIUS, MOMENT, STIFFNESS = 3.0, 0.4, 0.05, 60.0
@@ -81,7 +82,7 @@ def test_loss_factors_against_a_direct_solution(tmp_path):
     m = simulation.elastic.matrices(q)
     for i in range(2):
         matrices = m.mass[i], simulation.damping, simulation.stiffness, m.hit[i], m.sensor[i]
-        direct = vibration.direct_accelerance(*matrices, LINES)
+        direct = direct_accelerance(*matrices, LINES)
         found = simulation.accelerance(q, LINES)[i]
         assert np.abs(found - direct).max() < 1e-9 * np.abs(direct).max()
 

@@ -13,11 +13,9 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.studies.models.fidelity_levels import LowLevel, Samples
-from planner.studies.models.mixture import Mixture
-from planner.studies.models.sparse_gp import SparseGP, average_sparse, fit_sparse
+from planner.studies.models.sparse_gp import SparseGP, fit_sparse
 
 COUNT = 5
-FEW = 100  # measurements that leave the hyperparameters in doubt
 NODES = norm.ppf((np.arange(COUNT) + 0.5) / COUNT)
 NODES = NODES / np.std(NODES)
 
@@ -27,7 +25,7 @@ class MFDGP:
     """Fitted layers; the first one's output is centred and scaled for the second."""
 
     low: LowLevel
-    high: SparseGP | Mixture
+    high: SparseGP
     centre: float
     scale: float
 
@@ -51,22 +49,20 @@ def cutajar(d: int, shape: str = "rbf") -> str:
 
 
 def fit_mfdgp(
-    measured: Samples, low: LowLevel | Samples, inducing: int = 200, kernel: str | None = None
+    measured: Samples, low: LowLevel, inducing: int = 200, kernel: str | None = None
 ) -> MFDGP:
-    """Both layers; `low` may be a fitted (or exact) level, which is then layer 1.
+    """Fit layer 2 to the measured samples; `low`, fitted or exact, is layer 1.
 
-    Of few measurements, layer 2's hyperparameters are averaged (`sparse.average_sparse`).
+    `kernel` is an expression over (x_1 … x_d, f_1), default `cutajar`.
     """
-    level = fit_sparse(low, "rbf", inducing) if isinstance(low, Samples) else low
-    value, _ = level.predict(measured.x)
+    value, _ = low.predict(measured.x)
     centre, scale = float(np.mean(value)), float(np.std(value)) or 1.0
-    wide = _spread(level, measured.x, centre, scale)
+    wide = _spread(low, measured.x, centre, scale)
     tiled = Samples(wide, np.tile(measured.y, COUNT), np.tile(measured.sd, COUNT))
     weights = np.full(len(wide), 1 / COUNT)
     expression = kernel or cutajar(measured.x.shape[1])
     high = fit_sparse(tiled, expression, inducing, weights)
-    few = len(measured.y) <= FEW
-    return MFDGP(level, average_sparse(high, tiled, weights) if few else high, centre, scale)
+    return MFDGP(low, high, centre, scale)
 
 
 def _spread(low: LowLevel, x: np.ndarray, centre: float, scale: float) -> np.ndarray:

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
 
 from planner.errors import InputError
 from planner.studies.models.fidelity_levels import Averaged
-from planner.surrogate.predictive import Predictive, together
+from planner.surrogate.predictive import Predictive
 
 NEGLIGIBLE = 1e-4  # weight below which a model is not asked
 
@@ -55,3 +57,19 @@ def mix(models: Mapping[str, Averaged], prior: Mapping[str, float] | None = None
         dict(zip(names, (weight / total).tolist(), strict=True)),
         top + float(np.log(total)),
     )
+
+
+def together(parts: list[Predictive], weights: np.ndarray) -> Predictive:
+    """The mixture of mixtures, in these proportions (sum to one)."""
+    shares = [w * p.weights for w, p in zip(weights.tolist(), parts, strict=True)]
+    return Predictive(
+        np.concatenate(shares),
+        np.concatenate([p.means for p in parts]),
+        np.concatenate([p.sds for p in parts]),
+    )
+
+
+def log_density(found: Predictive, y: np.ndarray) -> np.ndarray:
+    """log p(y) (q,) of values y (q,)."""
+    each = norm.logpdf(y, found.means, found.sds)
+    return np.asarray(logsumexp(each, axis=0, b=found.weights[:, None]))

@@ -6,11 +6,11 @@ import numpy as np
 
 from planner.studies.models import recursive_ar1, single_output_gp
 from planner.studies.models.fidelity_levels import Averaged, LowLevel, Samples
-from planner.studies.models.mixture import Mixture, mix
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive, scales
 from planner.studies.models.single_output_gp import GRID_PRIOR, fit_gp
 from planner.surrogate.ar1 import OutputPrior
+from tests.support.mixture import Mixture, mix
 
 SHAPES = ("rbf", "matern52")
 GRID_SHAPES = (*SHAPES, "rbf+linear", "rbf+quadratic")  # many samples can tell a trend

@@ -1,0 +1,1 @@
+"""Tests of the planner; what they share is in `tests.support`."""
