@@ -24,7 +24,7 @@ def sobol(x: np.ndarray, count: int, seed: int) -> np.ndarray:
 def maximin_lhs(x: np.ndarray, count: int, seed: int) -> np.ndarray:
     """The poses (indices) of x (n, d) nearest to a maximin Latin hypercube, farthest first.
 
-    The hypercube has `count` points (scikit-optimize, as in seed 000). They are taken in the order
+    The hypercube has `count` points (scikit-optimize, as in Busch et al. 2022), taken in the order
     in which each is the farthest from all before it, so that every prefix is spread evenly too.
     """
     return nearest(x, _farthest_first(_hypercube(count, x.shape[1], seed)), count)

@@ -19,9 +19,10 @@ def sobol(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray
 
 
 def maximin_lhs(x: np.ndarray, taken: np.ndarray, count: int, seed: int) -> np.ndarray:
-    """The candidates nearest to a maximin Latin hypercube (scikit-optimize, as in seed 000).
+    """The candidates nearest to a maximin Latin hypercube.
 
-    The hypercube has room for what is taken; its points nearest to those are passed over.
+    By scikit-optimize, as in Busch et al. 2022. The hypercube has room for what is taken; its
+    points nearest to those are passed over.
     """
     from skopt.sampler import Lhs
 

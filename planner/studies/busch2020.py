@@ -1,4 +1,4 @@
-"""Seed 001 again (Busch et al. 2020): one FRF, trained up to 105° of joint 3, told up to 120°.
+"""The study of Busch et al. 2020: one FRF, trained up to 105° of joint 3, told up to 120°.
 
 The surfaces (GP, AR1, MFDGP, NARGP) see the amplitudes of the driving point, as in the paper; ours
 sees the complex FRFs of the same hits, three responses to each, and fuses their modes.
@@ -54,15 +54,15 @@ def study(progress: Progress) -> Report:
     thin = _thin_table(told, first)
     robots = _robot_table(ours, inside)
     return Report(
-        "seed-001",
+        "busch2020",
         "SIMULATED: the published robot in MuJoCo with a swaying dress pack, seeds 11 to 13; its "
         "simulation lacks the dress pack and has nominal stiffnesses.",
         (scores, thin, robots),
         _findings(scores, thin, ours),
         {
-            "seed_001_maps": _maps(told[1], first),
-            "seed_001_overlays": _overlays(told[1], first),
-            "seed_001_experiments": _experiments(thin, ours),
+            "busch2020_maps": _maps(told[1], first),
+            "busch2020_overlays": _overlays(told[1], first),
+            "busch2020_experiments": _experiments(thin, ours),
         },
     )
 
@@ -103,7 +103,7 @@ def _score_table(told: Told, seen: Sweep) -> Table:
         for name in NAMES
     ]
     title = f"R² and RMSE beyond {TRAINED_DEG:.0f}°, trained with 2,622 points below"
-    return Table("seed_001_r2", title, ("model", "R²", "RMSE m/s²/N", "R² in the paper"),
+    return Table("busch2020_r2", title, ("model", "R²", "RMSE m/s²/N", "R² in the paper"),
                  tuple(rows))  # fmt: skip
 
 
@@ -116,7 +116,7 @@ def _thin_table(told: dict[int, Told], seen: Sweep) -> Table:
         )
         for step in STEPS
     ]
-    return Table("seed_001_experiments", "R² with fewer experiments", ("trained with", *names),
+    return Table("busch2020_experiments", "R² with fewer experiments", ("trained with", *names),
                  tuple(rows))  # fmt: skip
 
 
@@ -126,7 +126,7 @@ def _robot_table(ours: dict[int, list[float]], inside: dict[int, list[float]]) -
         for seed in ROBOTS
     ]
     columns = ("", *(f"every {step}" for step in STEPS), "inside the 95 % band, %")
-    return Table("seed_001_robots", "R² of ours on three robots, every n-th experiment",
+    return Table("busch2020_robots", "R² of ours on three robots, every n-th experiment",
                  columns, tuple(rows))  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Seed 001's data: one FRF over joint 3, measured to 105°, by a robot with a mode too many.
+"""Data for Busch et al. 2020: one FRF over joint 3, measured to 105°; the robot has an extra mode.
 
 The published robot (`campaigns/kr240_busch2020`) as MuJoCo has it, with stiffnesses, damping and
 inertias of its own and, on its arm, a dress pack of hoses that sways across. Driving-point

@@ -1,4 +1,4 @@
-"""Seed 000 again (Busch et al. 2022): kernels and fusions for modal parameters over a plane.
+"""The study of Busch et al. 2022: kernels and fusions for modal parameters over a plane.
 
 Figures 7, 8, 10, 11 and 12 of the paper on the shipped campaign; medians over several splits into
 15 poses to train with and 20 to tell, for one split is luck.
@@ -62,12 +62,12 @@ def study(progress: Progress) -> Report:
     progress("FRFs", 0.95)
     twelve = figure_12(seen)
     return Report(
-        "seed-000",
+        "busch2022",
         "SIMULATED: the shipped campaign kr240_plane, 35 poses recorded in MuJoCo with a hammer's "
         "noise, modes as the planner finds them.",
         _tables(seven, eight, ten, eleven),
         findings(seven, eight, ten, eleven, twelve),
-        pictures(seven, eight, ten, eleven) | {"seed_000_figure_12": twelve.figure},
+        pictures(seven, eight, ten, eleven) | {"busch2022_figure_12": twelve.figure},
     )
 
 
@@ -141,13 +141,13 @@ def _tables(
 ) -> tuple[Table, ...]:
     title = "Figure 11: RMSE of residues {}, over the mode's size"
     return (
-        _table("seed_000_figure_7_r2", "Figure 7: R² of frequencies", seven, 0),
-        _table("seed_000_figure_7_rmse", "Figure 7: RMSE of frequencies in Hz", seven, 1),
+        _table("busch2022_figure_7_r2", "Figure 7: R² of frequencies", seven, 0),
+        _table("busch2022_figure_7_rmse", "Figure 7: RMSE of frequencies in Hz", seven, 1),
         _figure_8_table(eight),
-        _table("seed_000_figure_10_r2", "Figure 10: R² of damping ratios", ten, 0, KERNELS),
-        _table("seed_000_figure_10_rmse", "Figure 10: RMSE of damping in %", ten, 1, KERNELS),
+        _table("busch2022_figure_10_r2", "Figure 10: R² of damping ratios", ten, 0, KERNELS),
+        _table("busch2022_figure_10_rmse", "Figure 10: RMSE of damping in %", ten, 1, KERNELS),
         *(
-            _table(f"seed_000_figure_11_{name.replace(' ', '_')}", title.format(name), part, 1,
+            _table(f"busch2022_figure_11_{name.replace(' ', '_')}", title.format(name), part, 1,
                    KERNELS)
             for name, part in zip(RESIDUES, eleven, strict=True)
         ),
@@ -159,4 +159,4 @@ def _figure_8_table(eight: np.ndarray) -> Table:
     columns = [f"{name} {what}" for name in FUSIONS for what in ("R²", "RMSE", "inside")]
     rows = [(f"{n} poses", *map(float, row.ravel())) for n, row in zip(COUNTS, middle, strict=True)]
     title = "Figure 8: R², RMSE in Hz and share inside the 95 % interval, medians over modes"
-    return Table("seed_000_figure_8", title, ("", *columns), tuple(rows))
+    return Table("busch2022_figure_8", title, ("", *columns), tuple(rows))

@@ -1,4 +1,4 @@
-"""Seed 000's data: what the planner finds in the recordings of the shipped campaign (simulated)."""
+"""Data for Busch et al. 2022: modes in the recordings of the shipped campaign (simulated)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What seed 000 found, and whether it holds on the shipped campaign."""
+"""What Busch et al. 2022 found, and whether it holds on the shipped campaign."""
 
 import numpy as np
 

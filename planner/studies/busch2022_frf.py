@@ -1,4 +1,4 @@
-"""Figure 12 of seed 000: FRFs at a pose that was not trained with, from five poses' modes."""
+"""Figure 12 of Busch et al. 2022: FRFs at a pose left out, from the modes of five others."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""What seed 000's study compares, in the order of its scores."""
+"""What Busch et al. 2022's study compares, in the order of its scores."""
 
 KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
 FUSIONS = ("rbf", "AR1", "NARGP")

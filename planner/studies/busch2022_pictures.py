@@ -1,4 +1,4 @@
-"""Figures 7, 8, 10 and 11 of seed 000."""
+"""Figures 7, 8, 10 and 11 of Busch et al. 2022."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,16 +14,16 @@ def pictures(
 ) -> dict[str, Figure]:
     """By file name; scores (outputs, models, 3), in 8 by count, in 11 by residue."""
     return {
-        "seed_000_figure_7": _benchmark(
+        "busch2022_figure_7": _benchmark(
             seven, FREQUENCY_MODELS, "Figure 7: natural frequencies, 15 poses trained, 20 told",
             "RMSE (Hz)",
         ),
-        "seed_000_figure_8": _figure_8(eight),
-        "seed_000_figure_10": _benchmark(
+        "busch2022_figure_8": _figure_8(eight),
+        "busch2022_figure_10": _benchmark(
             ten, KERNELS, "Figure 10: damping ratios, 15 poses trained, 20 told",
             "RMSE (% of critical)",
         ),
-        "seed_000_figure_11": _figure_11(eleven),
+        "busch2022_figure_11": _figure_11(eleven),
     }  # fmt: skip
 
 

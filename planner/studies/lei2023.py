@@ -1,4 +1,4 @@
-"""Seed 003 again (Lei et al.): 144 modal parameters at 112 postures, together and one by one.
+"""The study of Lei et al. 2023: 144 modal parameters at 112 postures, together and one by one.
 
 Parameters are grouped by kind (all frequencies, all damping ratios, L and R, real and imaginary),
 which was chosen with robots 1 and 2.
@@ -56,7 +56,7 @@ def study(progress: Progress) -> Report:
     table, modes = _by_kind(scores), _by_mode(scores)
     better, steadier = _shares(scores)
     return Report(
-        "seed-003",
+        "lei2023",
         "SIMULATED: the KR240 with spindle in MuJoCo, seeds 11 to 13, with the scatter of a modal "
         "analysis: 0.2 % of f, 5 % of ζ, 5 % of a mode's L and R.",
         (table, modes),
@@ -77,7 +77,7 @@ def study(progress: Progress) -> Report:
                 steadier > 0.95,
             ),
         ),
-        {"seed_003_kinds": _kinds_figure(table), "seed_003_modes": _modes_figure(modes)},
+        {"lei2023_kinds": _kinds_figure(table), "lei2023_modes": _modes_figure(modes)},
     )
 
 
@@ -160,7 +160,7 @@ HEAD = ("together: mean", "spread", "one by one: mean", "spread", "scatter allow
 def _by_kind(scores: Scores) -> Table:
     rows = [(f"{kind} ({len(which)})", *_middle(scores, which)) for kind, which in KINDS.items()]
     return Table(
-        "seed_003_kinds", "5-fold R² by kind of parameter: medians over modes and three robots",
+        "lei2023_kinds", "5-fold R² by kind of parameter: medians over modes and three robots",
         ("outputs", *HEAD), tuple(rows),
     )  # fmt: skip
 
@@ -168,7 +168,7 @@ def _by_kind(scores: Scores) -> Table:
 def _by_mode(scores: Scores) -> Table:
     rows = [(f"mode {k + 1}", *_middle(scores, NUMBER[k, :1])) for k in range(MODES)]
     return Table(
-        "seed_003_frequencies", "5-fold R² of natural frequencies: medians over three robots",
+        "lei2023_frequencies", "5-fold R² of natural frequencies: medians over three robots",
         ("mode", *HEAD), tuple(rows),
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Seed 003's data: 9 modes by 16 parameters at 112 postures over a table, tool upright.
+"""Data for Lei et al. 2023: 9 modes by 16 parameters at 112 postures over a table, tool upright.
 
 Tool tip on a grid of 200 mm, seven turns about the tool's axis (the paper's section 5). The robot
 is the KR240 with spindle in MuJoCo, with stiffnesses, damping and inertias of its own; modal

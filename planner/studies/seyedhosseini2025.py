@@ -1,4 +1,4 @@
-"""Seed 002 again (Seyed Hosseini et al.): 254 postures in joint space, the last 15 told.
+"""The study of Seyed Hosseini et al. 2025: 254 postures in joint space, the last 15 told.
 
 A GP over the six joint angles, multi-task within each kind of parameter; FRFs put together again.
 """
@@ -62,17 +62,19 @@ def study(progress: Progress) -> Report:
     errors, correlation = _error_table(data, mean, sd), _correlations(data)
     frfs = {n: _frf(data, mean, sd, n) for n in SHOWN}
     rows = tuple((f"posture {n}", *frfs[n].r2) for n in SHOWN)
-    quality = Table("seed_002_frfs", "R² of |H| over 5 to 40 Hz", ("", "xx", "yy", "zz"), rows)
+    quality = Table(
+        "seyedhosseini2025_frfs", "R² of |H| over 5 to 40 Hz", ("", "xx", "yy", "zz"), rows
+    )
     return Report(
-        "seed-002",
+        "seyedhosseini2025",
         f"SIMULATED: a KR210-like robot in MuJoCo, seed {SEED}, along a trajectory of "
         "its tool, with the scatter of a modal analysis: 0.2 % of f, 5 % of ζ and of residues.",
         (errors, correlation, quality),
         _findings(errors, correlation, quality, seconds),
         {
-            "seed_002_figure_2": _heatmap(correlation),
-            "seed_002_figure_4": _last(data, mean, sd),
-            "seed_002_figure_5": _overlays(frfs),
+            "seyedhosseini2025_figure_2": _heatmap(correlation),
+            "seyedhosseini2025_figure_4": _last(data, mean, sd),
+            "seyedhosseini2025_figure_5": _overlays(frfs),
         },
     )
 
@@ -152,15 +154,15 @@ def _error_table(data: Data, mean: np.ndarray, sd: np.ndarray) -> Table:
         )
     columns = ("", "f off by %", "ζ off by %", "residues off by % of size", "MSE, scaled",
                "f inside 95 %", "all inside 95 %")  # fmt: skip
-    return Table("seed_002_errors", "The last 15 of 254 postures, against the truth", columns,
-                 tuple(rows))  # fmt: skip
+    title = "The last 15 of 254 postures, against the truth"
+    return Table("seyedhosseini2025_errors", title, columns, tuple(rows))
 
 
 def _correlations(data: Data) -> Table:
     joint = np.corrcoef(np.column_stack([data.q, data.measured[:, :TABLED]]).T)[:6, 6:]
     rows = tuple((f"joint {j + 1}", *map(float, row)) for j, row in enumerate(joint))
     modes = (f"mode {k + 1}" for k in range(TABLED))
-    return Table("seed_002_correlation", "Correlation of joint angles with frequencies",
+    return Table("seyedhosseini2025_correlation", "Correlation of joint angles with frequencies",
                  ("", *modes), rows)  # fmt: skip
 
 

@@ -1,8 +1,8 @@
 """AR1 of many outputs over a simulation that is known exactly at every pose.
 
-y_H(x) = ρ·y_L(x) + b + δ(x) (Kennedy & O'Hagan 2000; seed 000, section 2.3.1). The simulation is
-deterministic and costs milliseconds, so the low-fidelity level is evaluated, not modelled. An
-output without simulation is a plain GP: the same with no ρ·y_L.
+y_H(x) = ρ·y_L(x) + b + δ(x) (Kennedy & O'Hagan 2000; Busch et al. 2022, section 2.3.1). The
+simulation is deterministic and costs milliseconds, so the low-fidelity level is evaluated, not
+modelled. An output without simulation is a plain GP: the same with no ρ·y_L.
 """
 
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """AR1s (or GPs) that differ in their kernel, averaged by evidence, output by output.
 
-Damping of one robot is the same everywhere, of another a smooth function of the pose; seed 000
-(section 3.2) chose its kernel by hand.
+Damping of one robot is the same everywhere, of another a smooth function of the pose; Busch et
+al. 2022 (section 3.2) choose its kernel by hand.
 """
 
 from dataclasses import dataclass

@@ -35,27 +35,27 @@ def _squared_distance(xp: Any, xa: Any, xb: Any) -> Any:
 
 
 def bias(xp: Any, xa: Any, xb: Any) -> Any:
-    """Constant (seed 000, eq. 8)."""
+    """Constant (Busch et al. 2022, eq. 8)."""
     return xp.ones_like(xa[..., :, None, 0] * xb[..., None, :, 0])
 
 
 def linear(xp: Any, xa: Any, xb: Any) -> Any:
-    """x·x' (seed 000, eq. 4)."""
+    """x·x' (Busch et al. 2022, eq. 4)."""
     return xa @ xp.swapaxes(xb, -1, -2)
 
 
 def quadratic(xp: Any, xa: Any, xb: Any) -> Any:
-    """Square of the linear kernel (seed 000, eq. 5)."""
+    """Square of the linear kernel (Busch et al. 2022, eq. 5)."""
     return linear(xp, xa, xb) ** 2
 
 
 def cubic(xp: Any, xa: Any, xb: Any) -> Any:
-    """Cube of the linear kernel (seed 000, eq. 6)."""
+    """Cube of the linear kernel (Busch et al. 2022, eq. 6)."""
     return linear(xp, xa, xb) ** 3
 
 
 def rbf(xp: Any, xa: Any, xb: Any) -> Any:
-    """exp(−r²/2) (seed 000, eq. 7)."""
+    """exp(−r²/2) (Busch et al. 2022, eq. 7)."""
     return xp.exp(-_squared_distance(xp, xa, xb) / 2)
 
 

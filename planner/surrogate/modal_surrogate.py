@@ -1,9 +1,9 @@
 """The pose-dependent modal parameters: frequencies, damping ratios and residues by label.
 
-Frequencies are modelled as log f by AR1 over the simulation (primary feature of seed 000), or
-without it where the measurements speak against it, damping as log ζ by a GP whose kernel the
-measurements choose, residues part by part (real, imaginary) by AR1 on values scaled to the mode's
-own size. Logarithms keep frequencies and damping positive.
+Frequencies are modelled as log f by AR1 over the simulation (primary feature of Busch et al.
+2022), or without it where the measurements speak against it, damping as log ζ by a GP whose kernel
+the measurements choose, residues part by part (real, imaginary) by AR1 on values scaled to the
+mode's own size. Logarithms keep frequencies and damping positive.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +21,7 @@ from planner.surrogate.training_data import TrainingData
 FREQUENCY = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
 FREQUENCY_ALONE = OutputPrior(1.0, 0.0, amplitude=0.2, nugget=0.002, mean=float(np.log(20.0)))
 DAMPING = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0.03)))
-DAMPING_KERNELS = ("bias", "cubic", "matern52")  # seed 000's, and one that can follow anything
+DAMPING_KERNELS = ("bias", "cubic", "matern52")  # of Busch et al. 2022; any shape
 REACH = -0.25, 1.25  # of coordinates, beyond which damping stays as it is: polynomials run away
 VAGUEST = 10.0  # sd of a logarithm that is told from larger ones: their exponentials overflow
 RESIDUE = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)

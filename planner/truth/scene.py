@@ -53,7 +53,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Drawn:
-    """An effect of a case: name and place as in the contract, and true parameters (SI)."""
+    """An effect of a case: name and place as a diagnosis states them, true parameters in SI."""
 
     effect: str
     at: str | None

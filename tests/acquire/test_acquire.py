@@ -108,7 +108,7 @@ def test_a_planned_pose_is_known_to_within_its_noise(surrogate):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_strategy_keeps_the_contract(surrogate, name):
+def test_every_strategy_returns_distinct_reachable_poses(surrogate, name):
     taken = X[:20]
     first = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)
     again = propose(name, surrogate, X, simulated(X), 5, taken, seed=3)

@@ -1,4 +1,4 @@
-"""Driving the program from outside, as the contract says: commands, files and JSON only."""
+"""Driving the program from outside: by commands, files and JSON only."""
 
 import json
 import os

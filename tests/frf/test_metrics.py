@@ -1,4 +1,4 @@
-"""Metrics against the sums of seed 004's appendix B, the laws that they obey, and their edges."""
+"""Metrics against the sums of Birk et al. 2025, appendix B, their laws, and their edges."""
 
 import numpy as np
 import pytest

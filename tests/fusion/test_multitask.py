@@ -94,7 +94,7 @@ def test_degenerate_data_work():
 
 @pytest.mark.slow
 def test_144_outputs_train_in_less_than_the_paper_takes_for_three():
-    """Seed 003: 3.36 s for one group of three of its outputs; here nine groups of sixteen."""
+    """Lei et al. 2023 take 3.36 s for one group of three outputs; here nine groups of sixteen."""
     rng = np.random.default_rng(0)
     x = rng.random((90, 6))
     source = np.column_stack([np.sin(3 * x[:, i] + i) for i in range(6)])

@@ -98,7 +98,7 @@ def test_a_report_is_written_as_tables_and_pictures(tmp_path):
 
     figure = new((3, 2), "empty")
     table = Table("t", "T", ("a", "b"), (("x", 1.5),))
-    made = Report("seed-000", "data", (table,), (Finding("p", "h", True),), {"f": figure})
+    made = Report("busch2022", "data", (table,), (Finding("p", "h", True),), {"f": figure})
     files = write(made, tmp_path)
     assert [f.rsplit("/", 1)[1] for f in files] == ["t.csv", "f.png"]
     assert (tmp_path / "t.csv").read_text().split() == ["a,b", "x,1.5"]
@@ -107,7 +107,7 @@ def test_a_report_is_written_as_tables_and_pictures(tmp_path):
 
 
 def test_bad_input_is_one_sentence(tmp_path):
-    with pytest.raises(InputError, match=r"no study seed-9; choose one of seed-000"):
+    with pytest.raises(InputError, match=r"no study seed-9; choose one of busch2022"):
         registry.find("seed-9")
     file = tmp_path / "file"
     file.write_text("")

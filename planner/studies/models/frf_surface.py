@@ -1,4 +1,4 @@
-"""FRF-level fusion: amplitude over (frequency, pose coordinate), as in seed 001.
+"""FRF-level fusion: amplitude over (frequency, pose coordinate), as in Busch et al. 2020.
 
 The logarithm of the amplitude is modelled, so that it stays positive. The simulated surface is a
 complete grid (`grid`); measured on top of it: nothing of it (GP), a discrepancy (AR1), a smooth

@@ -1,4 +1,6 @@
-"""MFDGP: a deep GP over fidelities (Cutajar et al. 2019; seed 001, section 4), sparse variational.
+"""MFDGP: a sparse variational deep GP over fidelities (Cutajar et al. 2019).
+
+As used by Busch et al. 2020, section 4.
 
 Layer 1 is a sparse GP of the cheap samples, layer 2 one of (x, f_1(x)) with the kernel
 k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) (eq. 8 of the former). f_1 enters layer 2 with its whole

@@ -1,4 +1,4 @@
-"""Multi-task GP: t outputs that share what they learn about the poses (seed 003, section 2.3).
+"""Multi-task GP: t outputs share what they learn about poses (Lei et al. 2023, section 2.3).
 
 cov(f_a(x), f_b(x')) = B_ab k(x, x') (intrinsic coregionalisation, Bonilla et al. 2008), with
 B = L Lᵀ free and a noise per task. Every output is observed at every pose, so that K is
