@@ -7,13 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.scipy.linalg import cho_solve
-from scipy.optimize import minimize
 
+from planner.inference.quasi_newton import maximise
 from planner.surrogate.gp import Prior
 from planner.surrogate.kernels import parse
 from planner.surrogate.training_data import Padded
 
 JITTER = 1e-12
+REACH = 4.0  # sds of the prior beyond which nothing is looked for
 SOME = 128  # points that are enough to find the neighbourhood of the MAP
 
 _Data = tuple[np.ndarray, tuple[np.ndarray, ...]]
@@ -90,22 +91,8 @@ def most_probable(kernel: str, padded: Padded, prior: Prior, output: int) -> np.
 
 
 def _climb(kernel: str, data: _Data, starts: list[np.ndarray], steps: int = 200) -> np.ndarray:
-    p = len(starts[0])
-
-    def negative(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = _objective(kernel, data[0], z, *data[1])
-        found = np.isfinite(value)
-        return (-float(value), -np.array(slope)) if found else (1e10, np.zeros(p))
-
-    best, least = starts[0], np.inf
-    for start in starts:
-        done = minimize(
-            negative, start, jac=True, method="L-BFGS-B", bounds=[(-4.0, 4.0)] * p,
-            options={"maxiter": steps},
-        )  # fmt: skip
-        if done.fun < least:
-            best, least = done.x, done.fun
-    return best
+    y, rest = data
+    return maximise(lambda z: _objective(kernel, y, z, *rest), starts, -REACH, REACH, steps).x
 
 
 def laplace(kernel: str, padded: Padded, prior: Prior) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,6 @@ B ⊗ K_x + D and two small eigendecompositions do what one large Cholesky facto
 al. 2013). Hyperparameters: the most probable ones.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,9 +13,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.optimize import minimize
 
 from planner.errors import InputError
+from planner.inference.quasi_newton import maximise
 from planner.surrogate.kernels import parse
 
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd
@@ -158,43 +157,25 @@ def fit_multitask(
     centre, scale = y.mean(axis=0), y.std(axis=0)
     scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
     tasks = Tasks(x, (y - centre) / scale, kernel)
-    start = first_guess(tasks)
-    middle, width = start.flat(), prior_sds(start)
+    guess = first_guess(tasks)
+    middle, width = guess.flat(), prior_sds(guess)
 
-    def negative(vector: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = log_density(tasks, start.like(vector))
-        off = (vector - middle) / width
-        return -value + 0.5 * float(off @ off), -slope + off / width
+    # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
+    def posterior(z: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = log_density(tasks, guess.like(middle + width * z))
+        return value - 0.5 * float(z @ z), width * slope - z
 
-    found = _climb(negative, middle, REACH * width, middle, iterations)
-    if np.any(start.like(found).noise > 1):
+    def climb(z: np.ndarray, reach: float | np.ndarray, steps: int) -> np.ndarray:
+        return maximise(posterior, [z], -reach, reach, steps, FTOL).x
+
+    z = climb(np.zeros(len(middle)), REACH, iterations)
+    if np.any(guess.like(middle + width * z).noise > 1):
         # More noise than the output varies at all: a long first step has ended where an output
         # is given up. So first the poses' kernel and the noise, then the rest.
-        tasks_only = np.arange(len(middle)) < len(_lower(start.root)[0])
-        found = _climb(negative, middle, np.where(tasks_only, 0.0, REACH * width), middle, 20)
-        found = _climb(negative, middle, REACH * width, found, iterations)
-    h = start.like(found)
+        others = np.arange(len(middle)) >= len(_lower(guess.root)[0])
+        z = climb(climb(np.zeros(len(middle)), REACH * others, 20), REACH, iterations)
+    h = guess.like(middle + width * z)
     return MultiTaskGP(tasks, h, solve(tasks, h), centre, scale)
-
-
-def _climb(
-    negative: Callable[[np.ndarray], tuple[float, np.ndarray]], middle: np.ndarray,
-    reach: np.ndarray, start: np.ndarray, iterations: int,
-) -> np.ndarray:  # fmt: skip
-    # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
-    unit = np.where(reach > 0, reach / REACH, 1.0)
-
-    def scaled(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = negative(start + unit * z)
-        return value, slope * unit
-
-    lower, upper = (middle - reach - start) / unit, (middle + reach - start) / unit
-    done = minimize(
-        scaled, np.zeros_like(start), jac=True, method="L-BFGS-B",
-        bounds=list(zip(lower, upper, strict=True)),
-        options={"maxiter": iterations, "ftol": FTOL},
-    )  # fmt: skip
-    return start + unit * done.x
 
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:

@@ -51,9 +51,7 @@ def fit_gp(
     scale = scale or spread(samples.y)
     y, sd = (samples.y - centre) / scale, samples.sd / scale
     data = TrainingData(samples.x, y[:, None], sd[:, None], np.full((n, 1), np.nan))
-    mean, width = parse(kernel, samples.x.shape[1]).prior(
-        prior.amplitude, prior.nugget, prior.length, prior.spread, prior.length_spread
-    )
+    mean, width = prior.of_theta(parse(kernel, samples.x.shape[1]))
     bias = np.full(1, prior.bias_sd)
     stacked = Prior(np.zeros(1), bias, np.zeros(1), mean[None, :], width[None, :])
     padded = pad(data, np.zeros(1, bool))

@@ -16,13 +16,14 @@ import numpy as np
 from jax import Array
 from jax.scipy.linalg import solve_triangular
 from scipy.linalg import solve_triangular as solve_lower
-from scipy.optimize import minimize
 
+from planner.inference.quasi_newton import Peak, maximise
 from planner.studies.models.fidelity_levels import Samples, spread
 from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.kernels import parse
 
 PRIOR = OutputPrior(bias_sd=1.0, slope_sd=0.0, amplitude=1.0, nugget=0.03, length_spread=1.5)
+REACH = 4.0  # sds of the prior beyond which nothing is looked for
 JITTER = 1e-7  # relative to the prior variance, of the inducing points' covariance
 ROUNDS = (15, 60)  # steps of L-BFGS before and after the inducing points are chosen anew
 
@@ -54,24 +55,23 @@ class SparseGP:
 
 
 def fit_sparse(
-    samples: Samples, kernel: str = "rbf", inducing: int = 200, weights: np.ndarray | None = None,
-    prior: OutputPrior = PRIOR,
-) -> SparseGP:  # fmt: skip
+    samples: Samples, kernel: str = "rbf", inducing: int = 200, weights: np.ndarray | None = None
+) -> SparseGP:
     """Sparse GP of `samples`, x scaled to about [0, 1]; `weights` (n,) of the points, default 1."""
     x = samples.x
     w = np.ones(len(x)) if weights is None else weights
     centre, scale = float(np.mean(samples.y)), spread(samples.y)
     y, variance = (samples.y - centre) / scale, (samples.sd / scale) ** 2
-    k = parse(kernel, x.shape[1])
-    mean, sd = k.prior(
-        prior.amplitude, prior.nugget, prior.length, prior.spread, prior.length_spread
-    )
-    z, value = np.zeros(k.size), -np.inf
-    u = x[:1]
+    mean, sd = PRIOR.of_theta(parse(kernel, x.shape[1]))
+    peak, u = Peak(np.zeros(len(mean)), -np.inf), x[:1]
     for steps in ROUNDS:
-        u = choose_inducing(kernel, mean + sd * z, x, inducing)
-        z, value = _climb(kernel, z, (x, y, variance, w, u, mean, sd), steps)
-    evidence = value + 0.5 * float(z @ z) - float(w.sum()) * np.log(scale)
+        u = choose_inducing(kernel, mean + sd * peak.x, x, inducing)
+        data = x, y, variance, w, u, mean, sd
+        peak = maximise(
+            lambda z, data=data: bound(kernel, z, *data), [peak.x], -REACH, REACH, steps
+        )
+    z = peak.x
+    evidence = peak.log_density + 0.5 * float(z @ z) - float(w.sum()) * np.log(scale)
     theta = mean + sd * z
     root, inner, projected = (np.array(a) for a in _solve(kernel, theta, x, y, variance, w, u)[:3])
     return SparseGP(kernel, theta, u, root, inner, projected, centre, scale, evidence)
@@ -93,22 +93,6 @@ def choose_inducing(kernel: str, theta: np.ndarray, x: np.ndarray, count: int) -
         left = np.maximum(left - factor[i] ** 2, 0.0)
         rows.append(pick)
     return x[rows]
-
-
-def _climb(
-    kernel: str, z: np.ndarray, data: tuple[np.ndarray, ...], steps: int
-) -> tuple[np.ndarray, float]:
-    def negative(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = bound(kernel, z, *data)
-        if not (np.isfinite(value) and np.isfinite(slope).all()):
-            return 1e10, np.zeros(len(z))
-        return -float(value), -np.array(slope)
-
-    done = minimize(
-        negative, z, jac=True, method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(z),
-        options={"maxiter": steps},
-    )  # fmt: skip
-    return done.x, -float(done.fun)
 
 
 @partial(jax.jit, static_argnums=0)
