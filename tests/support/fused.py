@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.studies.models import recursive_ar1, single_output_gp
-from planner.studies.models.fidelity_levels import Averaged, LowLevel, Samples
+from planner.studies.models.fidelity_levels import AveragedModel, Level, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive, scales
 from planner.studies.models.single_output_gp import GRID_PRIOR, fit_gp
@@ -38,7 +38,7 @@ def fit_low(samples: Samples) -> Mixture:
     return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in shapes})
 
 
-def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float = 1e-3) -> Mixture:
+def fit_fused(measured: Samples, low: Level, low_spread: float, nugget: float = 1e-3) -> Mixture:
     """Mixture of AR1, NARGP and a GP that ignores the simulation.
 
     `low_spread` is the sd of the low level over the workspace, `nugget` the median prior of noise
@@ -48,7 +48,7 @@ def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float
         replace(p, nugget=nugget) for p in (recursive_ar1.PRIOR, single_output_gp.PRIOR)
     )
     _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
-    families: dict[str, dict[str, Averaged]] = {
+    families: dict[str, dict[str, AveragedModel]] = {
         "AR1": {
             name: fit_recursive(measured, low, low_spread, kernel, prior)
             for name, (kernel, prior) in _discrepancies(fused, measured.x.shape[1]).items()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError
-from planner.studies.models.fidelity_levels import Model, Samples
+from planner.studies.models.fidelity_levels import Level, Samples
 from planner.studies.models.grid_gp import GridGP, fit_grid
 from planner.studies.models.mfdgp import MFDGP, fit_mfdgp
 from planner.studies.models.sparse_gp import SparseGP, fit_sparse
@@ -55,7 +55,7 @@ class Frame:
 class Surface:
     """Fitted; `model` gives the log amplitude over scaled coordinates."""
 
-    model: Model
+    model: Level
     frame: Frame
 
     def predict(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,11 +73,6 @@ class Discrepancy:
     delta: GridGP
     slope: float
 
-    @property
-    def log_evidence(self) -> float:
-        """Of δ."""
-        return self.delta.log_evidence
-
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the log amplitude at x (q, 2)."""
         (low, low_sd), (mean, sd) = self.low.predict(x), self.delta.predict(x)
@@ -90,11 +85,6 @@ class Bent:
 
     low: GridGP
     high: SparseGP
-
-    @property
-    def log_evidence(self) -> float:
-        """Bound below it."""
-        return self.high.log_evidence
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the log amplitude at x (q, 2)."""
@@ -151,7 +141,7 @@ def _mfdgp(frame: Frame, measured: Grid, simulated: Grid) -> MFDGP:
     return fit_mfdgp(_samples(frame, measured), low, INDUCING)
 
 
-SURFACES: dict[str, Callable[[Frame, Grid, Grid], Model]] = {
+SURFACES: dict[str, Callable[[Frame, Grid, Grid], Level]] = {
     "GP": _gp,
     "AR1": _ar1,
     "NARGP": _nargp,

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.studies.models.fidelity_levels import Samples, spread
+from planner.studies.models.fidelity_levels import AveragedModel, Samples, spread
 from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.gp import Posterior, Prior, fit
 from planner.surrogate.kernels import parse
@@ -20,7 +20,7 @@ MANY = 64  # points; above, samples are fewer, for the hyperparameters are then 
 
 
 @dataclass(frozen=True, eq=False)
-class SingleGP:
+class SingleGP(AveragedModel):
     """A GP averaged over hyperparameters, of y = centre + scale·(…)."""
 
     posterior: Posterior
@@ -28,13 +28,8 @@ class SingleGP:
     scale: float
     log_evidence: float
 
-    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Median and sd (q,) of the noise-free output at x (q, d)."""
-        found = self.predictive(x)
-        return found.median, found.sd
-
     def predictive(self, x: np.ndarray) -> Predictive:
-        """The same, one Gaussian per sample of the hyperparameters."""
+        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
         return self.posterior.predictive(0, x, np.zeros(len(x))).scaled(self.centre, self.scale)
 
 
