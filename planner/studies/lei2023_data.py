@@ -20,8 +20,7 @@ MODES = 9
 TIP, BACK = (-0.3, 0.0, 0.157), (-0.25, 0.0, 0.157)  # points 1 and 1a in link_6, in m
 SCATTER = (0.002, 0.05, 0.05)  # relative sd of f, of ζ, and of L and R
 POINTS = ("1X", "1aX", "1Y", "1aY")
-F, ZETA, LEFT, RIGHT = slice(0, 1), slice(1, 2), slice(2, 8), slice(8, 16)  # of the parameters
-GROUPS = {"frequency": F, "damping": ZETA, "L (6 parts)": LEFT, "R (8 parts)": RIGHT}
+LEFT, RIGHT = slice(2, 8), slice(8, 16)  # of the parameters: L and R; 0 is f, 1 is ζ
 
 
 def true_robot(seed: int) -> Truth:

@@ -77,7 +77,7 @@ class Surrogate:
 
     def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
         """The same with the residues fitted too, to what `fit_surrogate` was given."""
-        return replace(self, residue=_fit_residues(seen, self.scale, True, taught))
+        return replace(self, residue=_fit_residues(seen, self.scale, taught))
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
@@ -131,29 +131,26 @@ def fit_primary(
     seen: ModalObservations,
     discrepancy: np.ndarray | None = None,
     left_out_hz: np.ndarray | None = None,
-    has_simulation: bool = True,
-    reference: SimulatedModes | None = None,
     belief: float = BELIEF,
 ) -> HedgedAR1:
-    """Fit log f of every label.
+    """Fit ln f of every label.
 
-    `discrepancy` (k,) is how far ln f of a simulation that was fitted to these very modes is off
-    elsewhere: its error at the measured poses says too little. None: it was not fitted.
-    `left_out_hz` (n, k) is what it said of each pose before it had seen it, by which it is judged.
-    `reference` is the simulation over the workspace: it says how large frequencies are before
-    anything is measured. `belief` is the simulation's probability before these frequencies.
+    Args:
+        seen: modes by label at n poses, and the simulation's there.
+        discrepancy: how far ln f (k,) of a simulation that was fitted to these very modes is off
+            elsewhere; its error at the measured poses says too little. None: it was not fitted.
+        left_out_hz: frequencies (n, k) that the simulation gave each pose before it was fitted to
+            that pose, by which it is judged.
+        belief: probability of the simulation before these frequencies.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
-    default = np.full(k, np.log(20.0) if has_simulation else np.nan)
-    if reference is not None:
-        default = _centre(_log(reference.frequency_hz), default)
     judged = None if left_out_hz is None else (_log(left_out_hz), (FREQUENCY,) * k)
     return fit_hedged(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
         tuple(_frequency_priors(k, discrepancy)),
         (FREQUENCY_ALONE,) * k,
-        _centre(low, default),
+        _centre(low, np.full(k, FREQUENCY_ALONE.mean)),
         SAMPLES,
         KEPT,
         judged,
@@ -174,29 +171,27 @@ def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
 
 def fit_surrogate(
     seen: ModalObservations,
-    has_simulation: bool = True,
-    reference: SimulatedModes | None = None,
     primary: HedgedAR1 | None = None,
     residues: bool = True,
     taught: bool = False,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
-    `reference` is as in `fit_primary`; `primary` is what that gave, where it was fitted already.
-    Without `residues` these are left out, which takes two thirds of the time. `taught`: the
-    simulation was identified from these measurements' own FRFs and fits them, so that damping and
-    residues are nearly its own.
+    Args:
+        seen: modes by label at n poses, and the simulation's there.
+        primary: what `fit_primary` gave, where it was called already.
+        residues: whether residues are fitted too, which takes two thirds of the time.
+        taught: whether the simulation was identified from these measurements' own FRFs and fits
+            them, so that damping and residues are nearly its own.
     """
     if primary is None:
-        primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
-    scale = _scale(seen, reference)
-    residue = _fit_residues(seen, scale, has_simulation, taught) if residues else None
+        primary = fit_primary(seen)
+    scale = _scale(seen)
+    residue = _fit_residues(seen, scale, taught) if residues else None
     return Surrogate(primary, fit_damping(seen, taught), residue, scale)
 
 
-def _fit_residues(
-    seen: ModalObservations, scale: np.ndarray, has_simulation: bool, taught: bool
-) -> HedgedAR1:
+def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> HedgedAR1:
     """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
     k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
@@ -205,7 +200,7 @@ def _fit_residues(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
         (RESIDUE_TAUGHT if taught else RESIDUE,) * (18 * k),
         (RESIDUE_ALONE,) * (18 * k),
-        np.zeros(18 * k) if has_simulation else np.full(18 * k, np.nan),
+        np.zeros(18 * k),
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
     )
@@ -227,11 +222,10 @@ def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), default)
 
 
-def _scale(seen: ModalObservations, reference: SimulatedModes | None) -> np.ndarray:
+def _scale(seen: ModalObservations) -> np.ndarray:
     """Size (k,) of each mode's residues: measured, else simulated, else typical."""
     out = np.full(seen.frequency_hz.shape[1], np.nan)
-    simulated = reference.residue if reference is not None else seen.simulated.residue
-    for residue in (seen.residue, seen.simulated.residue, simulated):
+    for residue in (seen.residue, seen.simulated.residue):
         size = np.abs(residue)
         known = np.isfinite(size)
         mean = np.where(known, size, 0.0) ** 2

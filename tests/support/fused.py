@@ -8,10 +8,13 @@ from planner.studies.models import recursive_ar1, single_output_gp
 from planner.studies.models.fidelity_levels import AveragedModel, Level, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive, scales
-from planner.studies.models.single_output_gp import GRID_PRIOR, fit_gp
+from planner.studies.models.single_output_gp import fit_gp
 from planner.surrogate.ar1 import OutputPrior
 from tests.support.mixture import Mixture, mix
 
+# A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to
+# tell an input that hardly matters. The spread is the likeliest on the development problems.
+GRID_PRIOR = replace(single_output_gp.PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
 SHAPES = ("rbf", "matern52")
 GRID_SHAPES = (*SHAPES, "rbf+linear", "rbf+quadratic")  # many samples can tell a trend
 SOME = 64

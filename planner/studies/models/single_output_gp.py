@@ -1,6 +1,6 @@
 """Exact GP of one output: any kernel expression, a noise per point, hyperparameters averaged."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import TrainingData, pad
 
 PRIOR = OutputPrior(bias_sd=1.0, slope_sd=0.0, amplitude=1.0, nugget=1e-3)  # of y scaled to sd 1
-# A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to
-# tell an input that hardly matters. The spread is the likeliest on the development problems.
-GRID_PRIOR = replace(PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
 MANY = 64  # points; above, samples are fewer, for the hyperparameters are then well determined
 
 
