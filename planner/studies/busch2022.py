@@ -1,7 +1,7 @@
 """The study of Busch et al. 2022: kernels and fusions for modal parameters over a plane.
 
 Figures 7, 8, 10, 11 and 12 of the paper on the shipped campaign; medians over several splits into
-15 poses to train with and 20 to tell, for one split is luck.
+15 poses to train with and 20 to predict, for one split is luck.
 """
 
 from collections.abc import Callable
@@ -9,22 +9,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.studies.busch2022_data import Recorded, load, split
-from planner.studies.busch2022_findings import findings
-from planner.studies.busch2022_frf import figure_12
-from planner.studies.busch2022_names import (
+from planner.studies.busch2022_data import (
     COUNTS,
     FREQUENCY_MODELS,
     FUSIONS,
     KERNELS,
     RESIDUES,
+    RecordedModes,
+    load,
+    split,
 )
+from planner.studies.busch2022_findings import findings
+from planner.studies.busch2022_frf import figure_12
 from planner.studies.busch2022_pictures import pictures
 from planner.studies.models.fidelity_levels import Exact, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
-from planner.studies.report import Progress, Report, Table
+from planner.studies.report import Progress, Report, Table, r_squared
 
 SPLITS = 5
 Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
@@ -32,7 +34,7 @@ Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """One modal parameter at all poses (35,), its sd, and the models that are to tell it."""
+    """One modal parameter at all poses (35,), its sd, and the models that predict it."""
 
     y: np.ndarray
     sd: np.ndarray
@@ -71,7 +73,7 @@ def study(progress: Progress) -> Report:
     )
 
 
-def _scores(seen: Recorded, outputs: list[Output], count: int) -> np.ndarray:
+def _scores(seen: RecordedModes, outputs: list[Output], count: int) -> np.ndarray:
     """Medians over splits (outputs, models, 3) of R², RMSE and the 95 % interval's coverage."""
     runs = np.empty((SPLITS, len(outputs), len(outputs[0].fits), 3))
     for seed in range(SPLITS):
@@ -89,15 +91,15 @@ def _run(
     mean, sd = fit(Samples.of(x[train], output.y[train], output.sd[train]))(x[test])
     off = mean - output.y[test]
     inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test])
-    r2 = 1 - np.mean(off**2) / np.var(output.y[test])
-    return float(r2), float(np.sqrt(np.mean(off**2))), float(inside.mean())
+    r2 = float(r_squared(mean, output.y[test]))
+    return r2, float(np.sqrt(np.mean(off**2))), float(inside.mean())
 
 
 def _kernels(names: tuple[str, ...]) -> dict[str, Fit]:
     return {name: (lambda s, kernel=name: fit_gp(s, kernel).predict) for name in names}
 
 
-def _frequency(seen: Recorded, k: int) -> Output:
+def _frequency(seen: RecordedModes, k: int) -> Output:
     """A mode's frequency, with the simulation's known at every pose."""
     low = seen.modes.simulated.frequency_hz[:, k]
 
@@ -118,7 +120,7 @@ def _only(output: Output, names: tuple[str, ...]) -> Output:
     return Output(output.y, output.sd, {name: output.fits[name] for name in names})
 
 
-def _residues(seen: Recorded, name: str) -> list[Output]:
+def _residues(seen: RecordedModes, name: str) -> list[Output]:
     """Real or imaginary parts of a direct residue, mode by mode, over the mode's rms there."""
     direction, part = name.split()
     axis = "xyz".index(direction[0])
@@ -133,7 +135,7 @@ def _table(
     name: str, title: str, scores: np.ndarray, part: int, names: tuple[str, ...] = FREQUENCY_MODELS
 ) -> Table:
     rows = [(f"mode {k + 1}", *map(float, row)) for k, row in enumerate(scores[..., part])]
-    return Table(name, f"{title}, 15 poses trained, 20 told", ("", *names), tuple(rows))
+    return Table(name, f"{title}, 15 poses trained, 20 predicted", ("", *names), tuple(rows))
 
 
 def _tables(

@@ -16,12 +16,17 @@ from planner.frf.frf import Frf
 from planner.studies.report import Progress
 from planner.surrogate.modal_surrogate import ModalObservations
 
+KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
+FUSIONS = ("rbf", "AR1", "NARGP")
+FREQUENCY_MODELS = (*KERNELS[1:], *FUSIONS[1:])
+COUNTS = tuple(range(3, 16))  # training sets B_3 … B_15 of the paper
+RESIDUES = tuple(f"{d} {part}" for d in ("xx", "yy") for part in ("real", "imaginary"))
 TRAINED = 15
 DESIGNS = 200  # Latin hypercubes, of which the one with the largest least distance is taken
 
 
 @dataclass(frozen=True, eq=False)
-class Recorded:
+class RecordedModes:
     """35 poses at x (35, d) in [0, 1], their labelled modes and their FRFs, and the simulation."""
 
     poses: tuple[str, ...]
@@ -30,7 +35,7 @@ class Recorded:
     frfs: tuple[Frf | None, ...]
 
 
-def load(progress: Progress) -> Recorded:
+def load(progress: Progress) -> RecordedModes:
     """Modal analysis of every recorded pose, labels by the simulation as in a campaign."""
     source = shipped(NAME)
     cell = Cell.load(
@@ -48,7 +53,7 @@ def load(progress: Progress) -> Recorded:
     seen = observations(cell, label(cell, tuple(found)))
     x = seen.x[:, np.ptp(seen.x, axis=0) > 1e-6]
     x = (x - x.min(axis=0)) / np.ptp(x, axis=0)
-    return Recorded(tuple(pool.rows), x, seen, tuple(frfs))
+    return RecordedModes(tuple(pool.rows), x, seen, tuple(frfs))
 
 
 def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:

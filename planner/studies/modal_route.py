@@ -15,7 +15,7 @@ from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 ABOVE = 2  # simulated modes beyond those in the band, which a measured one may be instead
 
 
-def tell_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
+def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """Amplitude and sd (f, p) at BEYOND_DEG in m/s²/N, from the modes of what was measured."""
     found = [estimate_modes(seen.frf(i), BAND_HZ).modes for i in range(len(seen.angles_deg))]
     count = max(len(modes) for modes in found)

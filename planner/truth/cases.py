@@ -25,7 +25,7 @@ from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
 from planner.truth.model import Truth, load_truth
 from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
-from planner.truth.secret import Secret, Visit, frfs, hit_poses, once
+from planner.truth.secret import HitVisit, Secret, frfs, hit_poses, once
 
 EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
 KINDS = ("null", *EFFECTS, "pair", "drives")  # "drives": one law in several joints
@@ -167,7 +167,7 @@ def _record(
     for number, index in enumerate(visits):
         scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
         readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-        planned.append(Visit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
+        planned.append(HitVisit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
     rows = []
     counts: dict[tuple[int, str], int] = {}
     found = hit_poses(truth, secret, planned, hammer, rng)

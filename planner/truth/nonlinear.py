@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 
 from planner.errors import InputError
-from planner.truth.laws import Law
+from planner.truth.laws import JointLaw
 from planner.truth.model import Truth
 from planner.truth.propagate import driven, weights
 
@@ -27,7 +27,7 @@ class Port:
     `link_point_m` is in the link's frame, `direction` in the world's.
     """
 
-    law: Law
+    law: JointLaw
     joint: str = ""
     link: str = ""
     link_point_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ class Port:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class StruckPose:
     """A robot at a pose q (rad), and forces (h, n) in N along tcp axes 0..2 (h,) that hit it."""
 
     truth: Truth
@@ -63,7 +63,7 @@ class _Linear:
     angles: np.ndarray  # (P, h, n), without the laws
 
 
-def respond(poses: Sequence[Pose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
+def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
     """Accelerations (h, 3, n) in m/s² of the sensor at each pose, from rest.
 
     The poses are integrated together, so all forces have the same length. Raises InputError if
@@ -83,7 +83,7 @@ def respond(poses: Sequence[Pose], ports: Sequence[Port], step_s: float) -> list
     return found
 
 
-def _linear(pose: Pose, ports: Sequence[Port], step_s: float) -> _Linear:
+def _linear(pose: StruckPose, ports: Sequence[Port], step_s: float) -> _Linear:
     truth, forces, axes = pose.truth, pose.forces_n, list(pose.axes)
     poles, shapes, entry, hit, sensor = truth.modal(pose.q)
     one = poles.imag >= 0  # the other of a pair adds the conjugate
@@ -149,7 +149,7 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
     return np.split(np.moveaxis(torques, 0, 2), np.cumsum(hits)[:-1], axis=1)
 
 
-def structural(pose: Pose, loss_factor: float, step_s: float) -> np.ndarray:
+def structural(pose: StruckPose, loss_factor: float, step_s: float) -> np.ndarray:
     """As `respond`, with K(1 + iη) instead of viscous damping: from the spectrum of the force."""
     n = pose.forces_n.shape[1]
     frequency = np.fft.rfftfreq(PADDING * n, step_s)

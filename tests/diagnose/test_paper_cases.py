@@ -24,8 +24,7 @@ from planner.truth.laws import Hardening
 from planner.truth.model import load_truth
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene, across, triple
-from planner.truth.secret import Secret, hit_poses
-from planner.truth.secret import Visit as Planned
+from planner.truth.secret import HitVisit, Secret, hit_poses
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
@@ -101,7 +100,7 @@ def test_birk2025_harmonic_drives_that_harden(tmp_path, drives):
     secret = Secret(Deviation(1), tuple(Port(law, joint=joint) for joint, law in laws.items()))
     shots = [("+" + axis, share * hammer.peak_n) for axis in "xyz" for share in (0.4, 1.0, 2.5)]
     made = hit_poses(
-        truth, secret, [Planned(row, shots) for row in q], hammer, np.random.default_rng(4)
+        truth, secret, [HitVisit(row, shots) for row in q], hammer, np.random.default_rng(4)
     )
     visits = []
     for i, (row, hits) in enumerate(zip(q, made, strict=True)):

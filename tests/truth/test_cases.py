@@ -13,7 +13,7 @@ from planner.recording.read import read
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import EFFECTS, KINDS, Case, make_case
-from planner.truth.deviation import Deviation, Harmonic, Scaled
+from planner.truth.deviation import Deviation, ScaledJoint, StiffnessRipple
 from planner.truth.laws import Backlash, Hardening
 from planner.truth.model import load_truth
 from planner.truth.scene import Scene
@@ -76,8 +76,8 @@ def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law,
     scene = Scene(arm, load_truth(arm.write(tmp_path)), 1, arm.poses(2), 1000.0)
     joints = [f"joint_{n}" for n in range(1, 7)]
     soft = Deviation(
-        scaled=tuple(Scaled(j, 0.4) for j in joints),
-        harmonics=tuple(Harmonic(j, 1, 0.3, 0.4) for j in joints),
+        scaled=tuple(ScaledJoint(j, 0.4) for j in joints),
+        harmonics=tuple(StiffnessRipple(j, 1, 0.3, 0.4) for j in joints),
     )
     for seed in range(20):
         drawn = EFFECTS[law](scene, Secret(soft), np.random.default_rng(seed))
