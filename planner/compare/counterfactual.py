@@ -10,8 +10,8 @@ from planner.compare.curves import Curves
 from planner.compare.pool import PoolPose
 from planner.compare.run import planned, play
 from planner.compare.tasks import LEFT, Run, Task
-from planner.design.pool_designs import NESTED
 from planner.design.propose import check_name
+from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
 LEAST = 2 + LEFT  # measured poses: one to begin with, one to choose, and some to judge by

@@ -14,7 +14,7 @@ from planner.compare import content_hash
 from planner.compare.bench import Bench, PoolCell, cell_of
 from planner.compare.score import Score, score
 from planner.compare.tasks import Run, Task
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
 INITIAL = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself

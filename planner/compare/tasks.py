@@ -6,8 +6,8 @@ import msgspec
 
 from planner.compare import content_hash
 from planner.compare.bench import Bench
-from planner.design.pool_designs import NESTED
 from planner.design.propose import check_name
+from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
 DEFAULT = "default"  # the strategy that `next` uses

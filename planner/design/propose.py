@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.design import space_filling
 from planner.design.cost import Cost, shortest_tour
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
 from planner.design.goal import goal
@@ -14,13 +13,13 @@ from planner.design.integrated_variance import integrated_variance
 from planner.design.mixed import mixed
 from planner.design.mutual_information import mutual_information
 from planner.design.parameter_information import d_information, parameter_information
+from planner.design.space_filling import DESIGNS
 from planner.design.variance import variance
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import Surrogate
 
 Score = Callable[[FrequencyOutputs, Poses], np.ndarray]
-Design = Callable[[np.ndarray, np.ndarray, int, int], np.ndarray]
 
 ACQUISITIONS: dict[str, Score] = {
     "variance": variance,
@@ -34,11 +33,6 @@ ACQUISITIONS: dict[str, Score] = {
 # What these look at is nothing where no parameter of the simulation is open.
 OF_PARAMETERS = ("parameter_information", "d_information")
 INFORMED = (*OF_PARAMETERS, "mixed", "goal")  # those that look at parameters at all
-DESIGNS: dict[str, Design] = {
-    "random": space_filling.random,
-    "sobol": space_filling.sobol,
-    "maximin_lhs": space_filling.maximin_lhs,
-}
 INTEGRATION = 200  # candidates (a Sobol prefix: evenly spread) that stand for the workspace
 NEAR = 1e-3  # in model coordinates: no second measurement at the same place
 

@@ -5,7 +5,8 @@ import pytest
 
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.integrated_variance import integrated_variance
-from planner.design.propose import ACQUISITIONS, DESIGNS, propose
+from planner.design.propose import ACQUISITIONS, propose
+from planner.design.space_filling import DESIGNS
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import fit_surrogate
 from test_fusion import observed, simulated

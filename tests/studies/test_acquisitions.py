@@ -19,7 +19,7 @@ import pytest
 
 from acquisition_cases import CELLS, campaign, make
 from planner.campaign.config import CostTable
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 NAMES = os.environ.get("STUDY_CELLS", ";".join(CELLS)).split(";")

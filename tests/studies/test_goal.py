@@ -15,7 +15,7 @@ import pytest
 from acquisition_cases import CELLS, OF_FRFS, Case, campaign, make
 from planner.campaign.cell import Cell
 from planner.campaign.config import GoalTable
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]
 SEEDS, FIRST = int(os.environ.get("STUDY_SEEDS", "4")), int(os.environ.get("STUDY_FIRST", "201"))
