@@ -14,7 +14,7 @@ from planner.design.propose import check_name
 from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
-LEAST = 2 + LEFT  # measured poses: one to begin with, one to choose, and some to judge by
+LEAST_POSES = 2 + LEFT  # measured: one to begin with, one to choose, and some to judge by
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
         check_name(acquisition)
     cell = campaign.cell
     used = [m for m in campaign.state.measurements.values() if not m.withdrawn and m.modes]
-    if len(used) < LEAST:
+    if len(used) < LEAST_POSES:
         return None
     table = cell.config.modes
     poses = [PoolPose(m, campaign.frf_of(m, table), (), "", m.simulated) for m in used]
@@ -57,7 +57,7 @@ def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
     except InputError:
         return None
     count = len(bench.measurements)
-    if count < LEAST:
+    if count < LEAST_POSES:
         return None
     task = Task(acquisition, 0, 1, count - LEFT)
     order = list(range(count - LEFT))

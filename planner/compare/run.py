@@ -17,7 +17,7 @@ from planner.compare.tasks import Run, Task
 from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
-INITIAL = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself
+INITIAL_DESIGN = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself
 
 # A cell's robot and the BLAS threads belong to the whole process, of which a cluster's worker may
 # use several threads.
@@ -38,7 +38,7 @@ def run(bench: Bench, task: Task) -> Run:
 
 def _run(bench: Bench, task: Task) -> Run:
     cell = cell_of(bench)
-    used = NESTED[INITIAL](cell.candidates.features, task.budget, task.seed)[: task.initial]
+    used = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)[: task.initial]
     rest = [i for i in planned(cell, task) if i not in used]
     return play(bench, used.tolist(), rest[: task.budget - task.initial], task)
 

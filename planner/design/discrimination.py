@@ -21,10 +21,10 @@ from planner.diagnosis.linear.predict import misfit_at
 from planner.frf.frf import Frf
 from planner.inference.parallel import side_by_side
 
-LINES = 96  # evenly over the band
-TRIED = 8  # poses at which fits are tried, the most promising in closed form
-LIKELIEST = 4  # fits that are tried there
-STEPS = 20  # of each
+FRF_LINES = 96  # lines over the band at which FRFs are compared, evenly spaced
+TRIED_POSES = 8  # poses at which candidates are fitted, the most promising in closed form
+MOST_CANDIDATES = 4  # candidates compared: the likeliest
+REFIT_STEPS = 20  # least-squares steps of each refit
 
 
 @dataclass(frozen=True)
@@ -48,14 +48,14 @@ def most_telling(
 ) -> Telling:
     """The hit that best separates two or more fits, at one of q (n, dof) in rad.
 
-    `probability` of each fit; χ² counts 1/`temper`. Only the LIKELIEST are looked at.
+    `probability` of each fit; χ² counts 1/`temper`. Only the MOST_CANDIDATES are looked at.
     """
-    likeliest = np.argsort(-np.asarray(probability))[:LIKELIEST].tolist()
+    likeliest = np.argsort(-np.asarray(probability))[:MOST_CANDIDATES].tolist()
     fits, probability = [fits[i] for i in likeliest], [probability[i] for i in likeliest]
     gain = np.nan_to_num(separation(problem, fits, probability, q, temper))
     share = np.array(probability) / np.sum(probability)
     axes = np.argmax(gain, axis=1)
-    promising = np.argsort(-np.max(gain, axis=1))[:TRIED].tolist()
+    promising = np.argsort(-np.max(gain, axis=1))[:TRIED_POSES].tolist()
     settled = side_by_side(partial(_to_the_end, problem), fits)
     hits = [(pose, int(axes[pose])) for pose in promising]
     odds = side_by_side(partial(_tried, problem, settled, share, q, temper), hits)
@@ -95,7 +95,7 @@ def odds_after(
     for true, source in enumerate(fits):
         frfs = (*problem.frfs, _foretold(problem, source, q, axis))
         more = replace(problem, frfs=frfs, q=np.vstack([problem.q, q]))
-        refitted = [carried_on(more, f, f.effect, STEPS) for f in fits]
+        refitted = [carried_on(more, f, f.effect, REFIT_STEPS) for f in fits]
         after = np.array([f.log_evidence(temper) for f in refitted])
         gained = after - before
         for other in range(len(fits)):
@@ -138,7 +138,7 @@ def separation(
         return gain
     share = np.array(probability) / np.sum(probability)
     noise = FrfNoise.of(problem.frfs, problem.band_hz, temper)
-    lines = np.linspace(*problem.band_hz, LINES)
+    lines = np.linspace(*problem.band_hz, FRF_LINES)
     # Lines closer than those of a record are not measured apart; farther ones stand for several.
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
     known = [fit.precision(temper) for fit in fits]

@@ -12,7 +12,7 @@ from planner.design.frequency_posterior import ALL_AXES, AXES, FrequencyOutputs,
 from planner.design.parameter_information import SUBSETS, Axes, parameter_reduction
 from planner.design.variance_reduction import reduction_by_label
 
-VISIBLE = 0.05  # least share of a mode's information: below it the mode may not be found at all
+LEAST_SHARE = 0.05  # of a mode's information: below it the mode may not be found at all
 
 
 def axis_shares(residue: np.ndarray) -> np.ndarray:
@@ -39,7 +39,7 @@ def best_axes(
     best, gain, rate = ALL_AXES, 0.0, -np.inf
     for axes in SUBSETS:
         seen = shares[:, list(axes)].sum(axis=1)
-        if axes != ALL_AXES and np.any(seen[counts] < VISIBLE):
+        if axes != ALL_AXES and np.any(seen[counts] < LEAST_SHARE):
             continue
         # The EMA's own part of the noise grows; the nugget, which is the pose's, stays.
         more = outputs.measurement * (1 / np.maximum(seen, 1e-9) - 1)

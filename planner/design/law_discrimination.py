@@ -19,12 +19,12 @@ from planner.diagnosis.laws.starting_values import faded
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear_diagnosis import TIED
 
-LOOKED_AT = 60  # poses: each takes tens of milliseconds
-APART = 2.0  # between two forces, so that hits of each are told from those of the other
-LEVELS = 6  # forces that are looked at, evenly in logarithms
-ROUNDS = 8  # of the iteration between swing and stiffness
-STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's own stiffness
-STILL = 1e-15  # rad: a swing as small as none
+MOST_POSES = 60  # poses evaluated: each takes tens of milliseconds
+FORCE_RATIO = 2.0  # least ratio of the two forces, so that hits of each are told from the other's
+FORCE_LEVELS = 6  # forces evaluated, evenly in logarithms
+SWING_ITERATIONS = 8  # between swing and stiffness
+DIFFERENCE_STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's stiffness
+LEAST_SWING_RAD = 1e-15  # a swing as small as none
 
 
 @dataclass(frozen=True)
@@ -48,24 +48,24 @@ def undecided(laws: Laws) -> Laws:
 def most_telling_forces(
     laws: Laws, weakest_n: float, hardest_n: float, q: np.ndarray
 ) -> TellingForces:
-    """The hits that best separate laws, at one of LOOKED_AT of q (n, dof) in rad.
+    """The hits that best separate laws, at one of MOST_POSES of q (n, dof) in rad.
 
     `weakest_n` and `hardest_n` are the peaks (N) of the hits so far: no harder ones are asked for,
-    and the two forces are APART, so that levels can be told.
+    and the two forces are FORCE_RATIO, so that levels can be told.
     """
     force = forces_n(weakest_n, hardest_n)
     last = len(q) - 1
-    looked_at = np.unique(np.linspace(0, last, LOOKED_AT).round().astype(int))
+    looked_at = np.unique(np.linspace(0, last, MOST_POSES).round().astype(int))
     gain = np.nan_to_num(law_separation(laws, q[looked_at], force))
-    gain[:, :, force[:-1] > hardest_n / APART] = 0.0
+    gain[:, :, force[:-1] > hardest_n / FORCE_RATIO] = 0.0
     row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
     best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
     return TellingForces(best, (float(force[level]), float(force[-1])))
 
 
 def forces_n(weakest_n: float, hardest_n: float) -> np.ndarray:
-    """Forces (LEVELS,) in N: as far below the weakest as a hammer goes well, none beyond."""
-    return np.geomspace(weakest_n / 2, hardest_n, LEVELS)
+    """Forces (FORCE_LEVELS,) in N: as far below the weakest as a hammer goes well, none beyond."""
+    return np.geomspace(weakest_n / 2, hardest_n, FORCE_LEVELS)
 
 
 def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray:
@@ -104,10 +104,10 @@ def accelerance(
     driven = found.port_hit[:, candidate.port].T  # (3, F)
     course = hit_force[:, None] * waves(found.s)
     stiffer = np.zeros((len(share), AXES), dtype=complex)
-    for _ in range(ROUNDS):
+    for _ in range(SWING_ITERATIONS):
         angle = driven / (1 + stiffer[..., None] * own)  # (L, 3, F) per N
         swing = share[:, None] * np.max(np.abs((angle @ course).real), axis=2)
-        slow = faded(candidate.law, np.maximum(swing, STILL), candidate.a)
+        slow = faded(candidate.law, np.maximum(swing, LEAST_SWING_RAD), candidate.a)
         stiffer = 0.5 * (stiffer + candidate.k * slow)
     angle = driven / (1 + stiffer[..., None] * own)
     through = np.moveaxis(found.sensor_port[:, :, candidate.port], 0, 1)  # (3, F)
@@ -129,16 +129,16 @@ def _told(
     misfit = misfit_at(laws.problem, laws.plain.effect, row[None], hit.frequency_hz, hit.rate_1_s)
     there, s = replace(laws.plain, misfit=misfit), misfit.setting.s[0]
     stiffer = candidate.x.copy()
-    stiffer[_own(laws, candidate)] += STEP
+    stiffer[_own(laws, candidate)] += DIFFERENCE_STEP
     here, moved = (receptances(system_of(there, x), 0, s) for x in (candidate.x, stiffer))
     share = force_n / hit.peak_n
     h = accelerance(here, candidate, hit.force, share)
     near = [
         accelerance(here, replace(candidate, nu=candidate.nu + step), hit.force, share)
-        for step in STEP * np.eye(2)
+        for step in DIFFERENCE_STEP * np.eye(2)
     ]
     near.append(accelerance(moved, candidate, hit.force, share))
-    return h, np.stack([(one - h) / STEP for one in near], axis=1)
+    return h, np.stack([(one - h) / DIFFERENCE_STEP for one in near], axis=1)
 
 
 def _own(laws: Laws, candidate: Candidate) -> int:

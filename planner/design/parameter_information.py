@@ -10,7 +10,7 @@ from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses
 
 Axes = tuple[int, ...]
 SUBSETS: tuple[Axes, ...] = ((0,), (1,), (2,), (0, 1), (0, 2), (1, 2), ALL_AXES)
-CHUNK = 64
+POSES_PER_CHUNK = 64  # which bounds the memory taken
 
 
 def parameter_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
@@ -25,8 +25,8 @@ def d_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
     """
     told = _moving(outputs, outputs.workspace)
     parts = []
-    for i in range(0, len(poses), CHUNK):
-        left = _left(outputs, poses[slice(i, i + CHUNK)], ALL_AXES)
+    for i in range(0, len(poses), POSES_PER_CHUNK):
+        left = _left(outputs, poses[slice(i, i + POSES_PER_CHUNK)], ALL_AXES)
         parts.append(-0.5 * np.linalg.slogdet(told.T @ left @ told)[1])
     return np.concatenate(parts) if parts else np.zeros(0)
 
@@ -39,8 +39,8 @@ def parameter_reduction(
         return np.zeros(len(poses))
     matters = _matters(outputs, target)
     parts = []
-    for i in range(0, len(poses), CHUNK):
-        left = _left(outputs, poses[slice(i, i + CHUNK)], axes)
+    for i in range(0, len(poses), POSES_PER_CHUNK):
+        left = _left(outputs, poses[slice(i, i + POSES_PER_CHUNK)], axes)
         parts.append(np.trace(matters) - np.einsum("ij,nji->n", matters, left))
     return np.concatenate(parts)
 

@@ -17,10 +17,10 @@ from planner.studies.report import PaperClaim, Progress, Report, Table, r_square
 
 PAPER_R2 = {"simulation": 0.353, "GP": 0.785, "MFDGP": 0.758, "NARGP": 0.982}
 SURFACES = ("GP", "AR1", "MFDGP", "NARGP")
-QUICK = ("GP", "AR1", "NARGP")  # MFDGP takes a minute: once, with every experiment
-STEPS = (1, 2, 3, 4)
+QUICK_SURFACES = ("GP", "AR1", "NARGP")  # MFDGP takes a minute: once, with every experiment
+EVERY = (1, 2, 3, 4)  # every n-th experiment is trained with
 ROBOTS = (11, 12, 13)  # seeds; ours was written with robots 1 and 2
-NAMES = ("simulation", *SURFACES, "ours")
+COMPARED = ("simulation", *SURFACES, "ours")
 SHOWN_DEG = (106.0, 113.0, 120.0)
 OURS_AT_LEAST = 0.985
 
@@ -37,17 +37,19 @@ def study(progress: Progress) -> Report:
     """R² beyond 105° of every model, with every, every 2nd, 3rd and 4th experiment."""
     first = sweep(ROBOTS[0])
     predicted = {
-        step: _predict(first.every(step), SURFACES if step == 1 else QUICK, progress, i / 6)
-        for i, step in enumerate(STEPS)
+        step: _predict(
+            first.every(step), SURFACES if step == 1 else QUICK_SURFACES, progress, i / 6
+        )
+        for i, step in enumerate(EVERY)
     }
     others = {}
     for i, seed in enumerate(ROBOTS[1:]):
         progress(f"robot {seed}", (4 + i) / 6)
         others[seed] = sweep(seed)
-    ours = {ROBOTS[0]: [_scores(predicted[step].amplitude["ours"], first)[0] for step in STEPS]}
-    inside = {ROBOTS[0]: [_inside(predicted[step], first) for step in STEPS]}
+    ours = {ROBOTS[0]: [_scores(predicted[step].amplitude["ours"], first)[0] for step in EVERY]}
+    inside = {ROBOTS[0]: [_inside(predicted[step], first) for step in EVERY]}
     for seed, seen in others.items():
-        runs = [_ours(seen.every(step)) for step in STEPS]
+        runs = [_ours(seen.every(step)) for step in EVERY]
         ours[seed] = [_scores(run.amplitude["ours"], seen)[0] for run in runs]
         inside[seed] = [_inside(run, seen) for run in runs]
     scores = _score_table(predicted[1], first)
@@ -102,7 +104,7 @@ def _inside(predicted: BeyondPrediction, seen: Sweep) -> float:
 def _score_table(predicted: BeyondPrediction, seen: Sweep) -> Table:
     rows = [
         (name, *_scores(predicted.amplitude[name], seen), PAPER_R2.get(name, float("nan")))
-        for name in NAMES
+        for name in COMPARED
     ]
     title = f"R² and RMSE beyond {TRAINED_DEG:.0f}°, trained with 2,622 points below"
     return Table("busch2020_r2", title, ("model", "R²", "RMSE m/s²/N", "R² in the paper"),
@@ -116,7 +118,7 @@ def _thin_table(predicted: dict[int, BeyondPrediction], seen: Sweep) -> Table:
             f"every {step}: {len(seen.every(step).angles_deg)} experiments",
             *(_scores(predicted[step].amplitude[name], seen)[0] for name in names),
         )
-        for step in STEPS
+        for step in EVERY
     ]
     return Table("busch2020_experiments", "R² with fewer experiments", ("trained with", *names),
                  tuple(rows))  # fmt: skip
@@ -127,7 +129,7 @@ def _robot_table(ours: dict[int, list[float]], inside: dict[int, list[float]]) -
         (f"robot {seed}", *ours[seed], float(np.mean(100 * np.array(inside[seed]))))
         for seed in ROBOTS
     ]
-    columns = ("", *(f"every {step}" for step in STEPS), "inside the 95 % band, %")
+    columns = ("", *(f"every {step}" for step in EVERY), "inside the 95 % band, %")
     return Table("busch2020_robots", "R² of ours on three robots, every n-th experiment",
                  columns, tuple(rows))  # fmt: skip
 
@@ -135,7 +137,7 @@ def _robot_table(ours: dict[int, list[float]], inside: dict[int, list[float]]) -
 def _findings(scores: Table, thin: Table, ours: dict[int, list[float]]) -> tuple[PaperClaim, ...]:
     r2 = {str(row[0]): float(row[1]) for row in scores.rows}
     worst = min(min(values) for values in ours.values())
-    shown = ", ".join(f"{name} {r2[name]:.3f}" for name in NAMES)
+    shown = ", ".join(f"{name} {r2[name]:.3f}" for name in COMPARED)
     nargp = [float(row[3]) for row in thin.rows]
     return (
         PaperClaim(
@@ -166,7 +168,7 @@ def _maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     figure = drawing.new((11.0, 6.2), f"Driving-point accelerance, measured to {TRAINED_DEG:.0f}°")
     panels = figure.subplots(2, 4, sharey=True).ravel()
     surfaces = {"measured": seen.amplitude, "truth (MuJoCo)": seen.truth}
-    surfaces |= {name: predicted.amplitude[name] for name in NAMES}
+    surfaces |= {name: predicted.amplitude[name] for name in COMPARED}
     top = _decibel(seen.amplitude).max()
     for panel, (name, amplitude) in zip(panels, surfaces.items(), strict=True):
         angles = seen.angles_deg if name == "measured" else BEYOND_DEG
@@ -225,13 +227,13 @@ def _experiments(thin: Table, ours: dict[int, list[float]]) -> Figure:
     figure = drawing.new((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every n-th experiment")
     panel = figure.subplots()
     values = np.array([row[1:] for row in thin.rows], dtype=float)
-    drawing.curves(panel, np.array(STEPS), thin.columns[1:], values)
+    drawing.curves(panel, np.array(EVERY), thin.columns[1:], values)
     panel.set_xlabel("every … experiment")
     panel.set_ylabel("R²")
     for seed in ROBOTS[1:]:
-        panel.plot(STEPS, ours[seed], ":", color=drawing.COLOURS["ours"], lw=1.0)
+        panel.plot(EVERY, ours[seed], ":", color=drawing.COLOURS["ours"], lw=1.0)
     panel.axhline(OURS_AT_LEAST, color="black", lw=0.8, ls="--")
-    panel.set_xticks(STEPS)
+    panel.set_xticks(EVERY)
     panel.set_ylim(min(0.5, float(values.min()) - 0.05), 1.02)
     panel.legend(fontsize=9, loc="lower left")
     return figure

@@ -28,7 +28,7 @@ from planner.studies.models.recursive_ar1 import fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
 from planner.studies.report import Progress, Report, Table, r_squared
 
-SPLITS = 5
+SPLITS = 5  # of the poses, over which medians are taken
 Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
 
 

@@ -22,7 +22,7 @@ FREQUENCY_MODELS = (*KERNELS[1:], *FUSIONS[1:])
 COUNTS = tuple(range(3, 16))  # training sets B_3 … B_15 of the paper
 RESIDUES = tuple(f"{d} {part}" for d in ("xx", "yy") for part in ("real", "imaginary"))
 TRAINED = 15
-TRIED_DESIGNS = 200  # Latin hypercubes, of which the one with the largest least distance is taken
+TRIED_DESIGNS = 200  # Latin hypercubes; that with the largest least distance is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,9 @@ def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
     The poses nearest to a maximin Latin hypercube (section 2.2).
     """
     rng = np.random.default_rng(seed)
-    designs = [qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(TRIED_DESIGNS)]
+    designs = [
+        qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(TRIED_DESIGNS)
+    ]
     points = max(designs, key=_least_distance)
     chosen: list[int] = []
     for point in points:

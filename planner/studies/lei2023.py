@@ -149,14 +149,14 @@ def _middle(scores: Scores, which: np.ndarray) -> list[float]:
     return [float(v) for v in (*values, np.median(scores.ceiling[:, which]))]
 
 
-HEAD = ("together: mean", "spread", "one by one: mean", "spread", "scatter allows")
+COLUMNS = ("together: mean", "spread", "one by one: mean", "spread", "scatter allows")
 
 
 def _by_kind(scores: Scores) -> Table:
     rows = [(f"{kind} ({len(which)})", *_middle(scores, which)) for kind, which in KINDS.items()]
     return Table(
         "lei2023_kinds", "5-fold R² by kind of parameter: medians over modes and three robots",
-        ("outputs", *HEAD), tuple(rows),
+        ("outputs", *COLUMNS), tuple(rows),
     )  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _by_mode(scores: Scores) -> Table:
     rows = [(f"mode {k + 1}", *_middle(scores, NUMBER[k, :1])) for k in range(MODES)]
     return Table(
         "lei2023_frequencies", "5-fold R² of natural frequencies: medians over three robots",
-        ("mode", *HEAD), tuple(rows),
+        ("mode", *COLUMNS), tuple(rows),
     )  # fmt: skip
 
 

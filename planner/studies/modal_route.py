@@ -12,14 +12,14 @@ from planner.studies.busch2020_data import ACROSS, BAND_HZ, BEYOND_DEG, SWEEP_DE
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 
-ABOVE = 2  # simulated modes beyond those in the band, which a measured one may be instead
+EXTRA_MODES = 2  # simulated, beyond those in the band, which a measured one may be instead
 
 
 def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """Amplitude and sd (f, p) at BEYOND_DEG in m/s²/N, from the modes of what was measured."""
     found = [estimate_modes(seen.frf(i), BAND_HZ).modes for i in range(len(seen.angles_deg))]
     count = max(len(modes) for modes in found)
-    guide = seen.modes(seen.angles_deg, count + ABOVE)
+    guide = seen.modes(seen.angles_deg, count + EXTRA_MODES)
     x = _scaled(seen.angles_deg)
     tracks = track(found, Guide(guide.frequency_hz, guide.shape), x, ordered=True)
     fitted = fit_surrogate(_observations(tracks, count, seen))

@@ -28,9 +28,9 @@ X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 7), np.linspace(-0.6, 0.6, 8), np.linspace
 TURN_RAD, TURNS = np.deg2rad(30.0), 7.3  # of the tool about itself: size, times along the path
 START_DEG = (0.0, -90.0, 100.0, 0.0, 80.0, 0.0)
 SCATTER = (0.002, 0.05, 0.05)  # sd of log f, of log ζ, of residues over their rms size
-SHOWN = (250, 251)  # postures of the paper's figure 5, counted from 1
+SHOWN_POSTURES = (250, 251)  # of the paper's figure 5, counted from 1
 LINES_HZ = np.linspace(5.0, 40.0, 281)
-SAMPLES = 256
+BAND_SAMPLES = 256  # of the modal parameters, for the band of an FRF
 FREQUENCY, DAMPING, RESIDUE = slice(0, MODES), slice(MODES, 2 * MODES), slice(2 * MODES, 8 * MODES)
 
 
@@ -59,8 +59,8 @@ def study(progress: Progress) -> Report:
     seconds = time.process_time() - start
     progress("FRFs", 0.8)
     errors, correlation = _error_table(data, mean, sd), _correlations(data)
-    frfs = {n: _frf(data, mean, sd, n) for n in SHOWN}
-    rows = tuple((f"posture {n}", *frfs[n].r2) for n in SHOWN)
+    frfs = {n: _frf(data, mean, sd, n) for n in SHOWN_POSTURES}
+    rows = tuple((f"posture {n}", *frfs[n].r2) for n in SHOWN_POSTURES)
     quality = Table(
         "seyedhosseini2025_frfs", "R² of |H| over 5 to 40 Hz", ("", "xx", "yy", "zz"), rows
     )
@@ -182,7 +182,7 @@ class Direct:
 
 def _frf(data: PostureData, mean: np.ndarray, sd: np.ndarray, posture: int) -> Direct:
     i = posture - 1 - (POSTURES - HELD_OUT)
-    noise = np.random.default_rng(posture).standard_normal((SAMPLES, mean.shape[1]))
+    noise = np.random.default_rng(posture).standard_normal((BAND_SAMPLES, mean.shape[1]))
     samples = np.abs(_synthesised(mean[i] + sd[i] * noise))
     truth = data.truth.accelerance(data.q[posture - 1], LINES_HZ)
     return Direct(

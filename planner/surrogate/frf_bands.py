@@ -12,11 +12,11 @@ import numpy as np
 
 from planner.frf import synthesis
 
-REACH = 5.0  # sds of a frequency over which is integrated
-STEP = 0.5  # of that integral, at most: in sds and in half widths of the resonance
+FREQUENCY_REACH = 5.0  # sds of a frequency over which is integrated
+FREQUENCY_STEP = 0.5  # at most, in sds and in half widths of the resonance
 MOST_NODES = 1000
 DAMPING_NODES = 5
-MOST_DAMPED = 0.95
+LARGEST_DAMPING = 0.95  # of a mode; beyond it there would be no oscillation
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ def frf_moments(
         zf, zd, weights = _nodes(float(np.max(prediction.frequency_sd_hz[i] / half_width)))
         f = log_normal(prediction.frequency_hz[i], prediction.frequency_sd_hz[i], zf[:, None])
         zeta = log_normal(prediction.damping_ratio[i], prediction.damping_sd[i], zd[:, None])
-        poles = synthesis.pole(f, np.minimum(zeta, MOST_DAMPED))  # (nodes, k)
+        poles = synthesis.pole(f, np.minimum(zeta, LARGEST_DAMPING))  # (nodes, k)
         mean[i], sd[i] = _modal_sum(
             prediction.residue[i], prediction.residue_sd[i], poles, weights, frequency_hz
         )
@@ -62,8 +62,8 @@ def _nodes(spread: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     The trapezoidal rule over the frequency errs by exp(−2π half width/step), `spread` being the
     frequency's sd over the resonance's half width; Gauss-Hermite over the damping.
     """
-    count = int(min(MOST_NODES, np.ceil(2 * REACH / STEP * max(1.0, spread))))
-    zf = np.linspace(-REACH, REACH, count + 1)
+    count = int(min(MOST_NODES, np.ceil(2 * FREQUENCY_REACH / FREQUENCY_STEP * max(1.0, spread))))
+    zf = np.linspace(-FREQUENCY_REACH, FREQUENCY_REACH, count + 1)
     zd, wd = np.polynomial.hermite_e.hermegauss(DAMPING_NODES)
     both = np.outer(np.exp(-(zf**2) / 2), wd).ravel()
     return np.repeat(zf, len(zd)), np.tile(zd, len(zf)), both / both.sum()

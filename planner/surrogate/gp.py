@@ -25,8 +25,8 @@ from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import Padded
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
-UNREMARKABLE = 1e-10
-SINGULAR = (
+SILENT_JITTER = 1e-10  # up to which nobody needs to know
+SINGULAR_REMARK = (
     "The covariance was singular until {:g} of its variance was added to the noise: two poses are "
     "nearly the same, and their sds claim more than that."
 )
@@ -160,7 +160,7 @@ def fit(
             continue
         weights = (np.swapaxes(whiten, 2, 3) @ (whiten @ y[:, None, :, None]))[..., 0]
         evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
-        remarks = (SINGULAR.format(jitter),) if jitter > UNREMARKABLE else ()
+        remarks = (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
         return Posterior(
             padded.x, padded.low, padded.mask, theta(z), whiten, weights, prior, kernel, evidence,
             remarks,

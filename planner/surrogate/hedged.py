@@ -12,8 +12,8 @@ from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.gp import Posterior, Prior
 from planner.surrogate.training_data import TrainingData
 
-BELIEF = 0.5  # in the simulation, before anything is measured
-SURE = 0.999  # weight from which the other model is not asked
+PRIOR_BELIEF = 0.5  # in the simulation, before anything is measured
+NEARLY_CERTAIN = 0.999  # weight from which the other model is not evaluated
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class HedgedAR1:
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
         mean, sd = self.likelier.predict(x, low)
-        unsure = np.flatnonzero(self.weight < SURE)
+        unsure = np.flatnonzero(self.weight < NEARLY_CERTAIN)
         if not len(unsure):
             return mean, sd
         other, other_sd = self.other.predict(x, low, unsure)
@@ -61,7 +61,7 @@ def fit_hedged(
     samples: int = 256,
     kept: int = 32,
     judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
-    belief: float = BELIEF,
+    belief: float = PRIOR_BELIEF,
 ) -> HedgedAR1:
     """Fit m outputs; arguments as of `fit_ar1`.
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
 from scipy.stats import qmc
 
-INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
+PROPOSAL_INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
 
@@ -43,8 +43,8 @@ def sample(
             centre, root = start
         else:
             centre, root = _around(points, softmax(_log_weight(points, like, proposals), axis=1))
-        proposals.append((centre, INFLATION * root))
-        moved = centre[:, None, :] + INFLATION * base @ np.swapaxes(root, 1, 2)
+        proposals.append((centre, PROPOSAL_INFLATION * root))
+        moved = centre[:, None, :] + PROPOSAL_INFLATION * base @ np.swapaxes(root, 1, 2)
         points = np.concatenate([points, moved], axis=1)
         like = np.concatenate([like, score(moved)], axis=1)
     log_weight = _log_weight(points, like, proposals)

@@ -12,7 +12,7 @@ from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.gp import Posterior
 from planner.surrogate.training_data import TrainingData
 
-SURE = 1e-3  # weight below which a kernel is not asked
+NEGLIGIBLE_WEIGHT = 1e-3  # below which a kernel is not evaluated
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class KernelAverage:
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        asked = np.flatnonzero(self.weights.max(axis=1) > SURE).tolist()
+        asked = np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
         found = [self.models[i].predict(x, low) for i in asked]
         w = self.weights[asked][:, None, :] / self.weights[asked].sum(axis=0)
         means, sds = (np.array([f[i] for f in found]) for i in (0, 1))

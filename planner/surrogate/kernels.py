@@ -17,11 +17,11 @@ import numpy as np
 from planner.errors import InputError
 
 Shape = Callable[[Any, Any, Any], Any]
-LARGE = 10_000  # pairs from which a matrix product pays in XLA too
+MATRIX_PAIRS = 10_000  # pairs from which a matrix product pays in XLA too
 
 
 def _squared_distance(xp: Any, xa: Any, xb: Any) -> Any:
-    if xp is np or xa.shape[-2] * xb.shape[-2] >= LARGE:
+    if xp is np or xa.shape[-2] * xb.shape[-2] >= MATRIX_PAIRS:
         # One matrix product. Cancellation leaves an error of 1e-16 |x|² in r²; the kernels are
         # smooth functions of r², so it stays that small.
         one_a, one_b = xp.ones_like(xa[..., :1]), xp.ones_like(xb[..., :1])

@@ -13,9 +13,9 @@ from planner.surrogate.gp import Prior
 from planner.surrogate.kernels import parse
 from planner.surrogate.training_data import Padded
 
-JITTER = 1e-12
+RELATIVE_JITTER = 1e-12  # of the largest prior variance, added to the diagonal
 REACH = 4.0  # sds of the prior beyond which nothing is looked for
-SOME = 128  # points that are enough to find the neighbourhood of the MAP
+SUBSET_POINTS = 128  # that are enough to find the neighbourhood of the MAP
 
 _Data = tuple[np.ndarray, tuple[np.ndarray, ...]]
 
@@ -53,7 +53,7 @@ def _covariance(
     """Covariance (c, c) of the data; entries that do not count are decoupled."""
     theta = mean + sd * z
     k = parse(kernel, x.shape[1]).covariance(jnp, theta, x, x) + fixed
-    noise = variance + jnp.exp(2 * theta[1]) + JITTER * jnp.max(jnp.diagonal(k))
+    noise = variance + jnp.exp(2 * theta[1]) + RELATIVE_JITTER * jnp.max(jnp.diagonal(k))
     return k * mask[:, None] * mask[None, :] + jnp.diag(jnp.where(mask > 0, noise, 1.0))
 
 
@@ -83,10 +83,10 @@ def most_probable(kernel: str, padded: Padded, prior: Prior, output: int) -> np.
     data = _data(padded, prior, output)
     p = prior.theta_mean.shape[1]
     starts = [np.r_[0.0, 0.0, np.full(p - 2, length)] for length in (0.0, 1.5, -2.0)]
-    if len(padded.x) <= SOME:
+    if len(padded.x) <= SUBSET_POINTS:
         return _climb(kernel, data, starts)
     known = np.flatnonzero(padded.mask[output])
-    some = known[np.linspace(0, len(known) - 1, min(SOME, len(known))).astype(int)]
+    some = known[np.linspace(0, len(known) - 1, min(SUBSET_POINTS, len(known))).astype(int)]
     return _climb(kernel, data, [_climb(kernel, _part(data, some), starts)], steps=15)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-HALVINGS = 60
+BISECTIONS = 60  # 2⁻⁶⁰ of the first interval: all digits of a double
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Predictive:
         reach = abs(norm.ppf(probability)) + 8
         low, high = (np.min(self.means - reach * self.sds, axis=0),
                      np.max(self.means + reach * self.sds, axis=0))  # fmt: skip
-        for _ in range(HALVINGS):
+        for _ in range(BISECTIONS):
             middle = (low + high) / 2
             short = self.below(middle) < probability
             low, high = np.where(short, middle, low), np.where(short, high, middle)

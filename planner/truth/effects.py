@@ -24,7 +24,7 @@ from planner.truth.scene import (
 )
 from planner.truth.secret import Secret, StiffnessDrift
 
-ALONG = 0.9  # cosine from which a link runs along an axis
+PARALLEL_COSINE = 0.9  # from which a link runs along an axis
 
 
 def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
@@ -79,7 +79,7 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
     link, along = f"link_{number}", scene.length(number)
     kind = str(rng.choice(["bending", "torsion", "both"], p=[0.5, 0.25, 0.25]))
     axis = np.array(scene.arm.joints[number - 1].axis, dtype=float)
-    if kind == "torsion" and abs(axis @ along) > ALONG * np.linalg.norm(along):
+    if kind == "torsion" and abs(axis @ along) > PARALLEL_COSINE * np.linalg.norm(along):
         kind = "bending"
     own = scene.stiffness(f"joint_{number}")
     parameters: Parameters = {"kind": kind}

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from scipy import signal
 
-OVERSAMPLING = 16
+OVERSAMPLING = 16  # time steps of the solution per sample of the analyser
 AXES = ("x", "y", "z")
 
 

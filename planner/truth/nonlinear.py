@@ -15,9 +15,9 @@ from planner.truth.laws import JointLaw
 from planner.truth.model import Truth
 from planner.truth.propagate import driven, weights
 
-CONTRACTION = 0.5  # of the fixed-point iteration within a step
-ACCURACY = 1e-7  # relative to a step's change of torque
-PADDING = 4
+MOST_CONTRACTION = 0.5  # of the fixed-point iteration within a step
+TORQUE_ACCURACY = 1e-7  # relative to a step's change of torque
+FFT_PADDING = 4  # record lengths, so that the response does not wrap around
 
 
 @dataclass(frozen=True)
@@ -126,9 +126,9 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
     gives = np.real(np.einsum("kph,kqh->pqh", felt, newer))
     slopes = np.array([port.law.slope for port in ports])
     contraction = float(np.max(np.einsum("pqh,q->ph", np.abs(gives), slopes)))
-    if contraction > CONTRACTION:
+    if contraction > MOST_CONTRACTION:
         raise InputError("A nonlinear joint is too stiff for the time step; shorten the step.")
-    iterations = max(2, int(np.ceil(np.log(ACCURACY) / np.log(contraction))))
+    iterations = max(2, int(np.ceil(np.log(TORQUE_ACCURACY) / np.log(contraction))))
 
     steps = np.moveaxis(np.concatenate([pose.angles for pose in linear], axis=1), 2, 0).copy()
     torques = np.zeros_like(steps)
@@ -152,11 +152,11 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
 def structural(pose: StruckPose, loss_factor: float, step_s: float) -> np.ndarray:
     """As `respond`, with K(1 + iη) instead of viscous damping: from the spectrum of the force."""
     n = pose.forces_n.shape[1]
-    frequency = np.fft.rfftfreq(PADDING * n, step_s)
+    frequency = np.fft.rfftfreq(FFT_PADDING * n, step_s)
     accelerance = structural_accelerance(pose.truth, loss_factor, pose.q, frequency)
-    spectrum = np.fft.rfft(pose.forces_n, PADDING * n, axis=1)
+    spectrum = np.fft.rfft(pose.forces_n, FFT_PADDING * n, axis=1)
     response = np.moveaxis(accelerance[:, list(pose.axes)], 1, 0) * spectrum[:, None]
-    return np.fft.irfft(response, PADDING * n, axis=2)[:, :, :n]
+    return np.fft.irfft(response, FFT_PADDING * n, axis=2)[:, :, :n]
 
 
 def structural_accelerance(

@@ -10,7 +10,7 @@ from planner.truth.deviation import Spring
 from planner.truth.model import Truth
 from planner.truth.secret import Secret
 
-PULSE_S = 0.008
+PULSE_S = 0.008  # duration of a middling hit
 
 Parameters = dict[str, float | str | list[float]]
 

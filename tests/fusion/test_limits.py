@@ -51,7 +51,7 @@ def test_jitter_that_was_needed_is_told(monkeypatch):
     data = TrainingData(x, np.ones((3, 1)), np.zeros((3, 1)), np.full((3, 1), np.nan))
     certain = OutputPrior(bias_sd=0.5, slope_sd=0.0, amplitude=0.3, nugget=1e-12, spread=1e-9)
     fitted = fit_ar1(data, (certain,), (certain,), np.full(1, np.nan))
-    assert fitted.posterior.remarks == (gp.SINGULAR.format(1e-7),)
+    assert fitted.posterior.remarks == (gp.SINGULAR_REMARK.format(1e-7),)
     assert fit_ar1(training(4), (PRIOR,), (PRIOR,), np.full(1, np.nan)).posterior.remarks == ()
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.frf import synthesis
-from planner.surrogate.frf_bands import MOST_DAMPED, ModalPrediction, log_normal
+from planner.surrogate.frf_bands import LARGEST_DAMPING, ModalPrediction, log_normal
 from planner.surrogate.importance import normal_points
 
 SAMPLES = 10_000
@@ -63,7 +63,7 @@ def _draws(
     f = log_normal(prediction.frequency_hz[i], prediction.frequency_sd_hz[i], normal[:, :k])
     zeta = log_normal(prediction.damping_ratio[i], prediction.damping_sd[i], normal[:, k : 2 * k])
     residue = prediction.residue[i] + prediction.residue_sd[i] * (zr[..., 0] + 1j * zr[..., 1])
-    return synthesis.pole(f, np.minimum(zeta, MOST_DAMPED)), residue
+    return synthesis.pole(f, np.minimum(zeta, LARGEST_DAMPING)), residue
 
 
 def _frfs(frequency_hz: np.ndarray, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:

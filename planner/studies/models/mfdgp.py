@@ -17,8 +17,8 @@ from scipy.stats import norm
 from planner.studies.models.fidelity_levels import Level, Samples
 from planner.studies.models.sparse_gp import SparseGP, fit_sparse
 
-COUNT = 5
-NODES = norm.ppf((np.arange(COUNT) + 0.5) / COUNT)
+NODE_COUNT = 5  # of the quadrature over f_1
+NODES = norm.ppf((np.arange(NODE_COUNT) + 0.5) / NODE_COUNT)
 NODES = NODES / np.std(NODES)
 
 
@@ -34,7 +34,7 @@ class MFDGP:
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
         wide = _spread(self.low, x, self.centre, self.scale)
-        mean, sd = (a.reshape(COUNT, -1) for a in self.high.predict(wide))
+        mean, sd = (a.reshape(NODE_COUNT, -1) for a in self.high.predict(wide))
         total = np.sqrt(np.mean(sd**2, axis=0) + np.var(mean, axis=0))
         return np.mean(mean, axis=0), total
 
@@ -55,15 +55,15 @@ def fit_mfdgp(
     value, _ = low.predict(measured.x)
     centre, scale = float(np.mean(value)), float(np.std(value)) or 1.0
     wide = _spread(low, measured.x, centre, scale)
-    tiled = Samples(wide, np.tile(measured.y, COUNT), np.tile(measured.sd, COUNT))
-    weights = np.full(len(wide), 1 / COUNT)
+    tiled = Samples(wide, np.tile(measured.y, NODE_COUNT), np.tile(measured.sd, NODE_COUNT))
+    weights = np.full(len(wide), 1 / NODE_COUNT)
     expression = kernel or cutajar(measured.x.shape[1])
     high = fit_sparse(tiled, expression, inducing, weights)
     return MFDGP(low, high, centre, scale)
 
 
 def _spread(low: Level, x: np.ndarray, centre: float, scale: float) -> np.ndarray:
-    """x (q, d) with the low level's value at each node: (COUNT·q, d + 1)."""
+    """x (q, d) with the low level's value at each node: (NODE_COUNT·q, d + 1)."""
     value, sd = low.predict(x)
     nodes = (value[None, :] + NODES[:, None] * sd[None, :] - centre) / scale
-    return np.column_stack([np.tile(x, (COUNT, 1)), nodes.reshape(-1)])
+    return np.column_stack([np.tile(x, (NODE_COUNT, 1)), nodes.reshape(-1)])
