@@ -1,4 +1,4 @@
-"""What every run of a comparison shares: robot, workspace, recorded poses, what is right there."""
+"""What all runs of a comparison share: robot, workspace, recorded poses, measured frequencies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,9 +44,9 @@ class PoolCell(Cell):
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A pool of n poses with k labels; travels to other processes and machines as it is.
+    """A pool of n poses with k labels; is pickled for other processes and machines.
 
-    `frequency_hz` (n, k) is what the recordings themselves say, by which predictions are judged.
+    `frequency_hz` (n, k) are the measured frequencies, by which predictions are judged.
     """
 
     robot: Robot

@@ -40,7 +40,7 @@ class Otherwise:
 
 
 def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
-    """What `acquisition` would have saved; None with too few measured poses to tell.
+    """What `acquisition` would have saved; None with too few measured poses.
 
     Raises InputError for an unknown acquisition.
     """

@@ -101,5 +101,5 @@ def paired(strategy: Curves, baseline: Curves) -> Paired | None:
 
 
 def baseline_of(strategies: Sequence[str]) -> str:
-    """What others are compared with: the maximin Latin hypercube, or the first one named."""
+    """The strategy that the others are compared with: maximin LHS, or the first one named."""
     return BASELINE if BASELINE in strategies else strategies[0]

@@ -11,7 +11,7 @@ from typing import Any
 
 from planner.errors import PlannerError
 
-DEFAULT_WORKERS = 2  # as many as most laptops can spare
+DEFAULT_WORKERS = 2  # processes, unless the user says otherwise
 ATTEMPTS = 3  # at an item whose process died
 
 

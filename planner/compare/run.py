@@ -44,7 +44,7 @@ def _run(bench: Bench, task: Task) -> Run:
 
 
 def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:
-    """A run that begins with the poses `used`, goes on with `then`, then as the model says."""
+    """A run: first the poses `used`, then those of `then`, then what the strategy proposes."""
     wall, process = time.perf_counter(), time.process_time()
     cell = cell_of(bench)
     counts, scores = [], []
@@ -93,9 +93,9 @@ def _fitted(
 
 def _judged(bench: Bench, model: Model, used: list[int]) -> Score:
     unused = np.setdiff1d(np.arange(len(bench.measurements)), used)
-    found = model.predict(bench.q[unused])
+    predicted = model.predict(bench.q[unused])
     truth = bench.frequency_hz[unused], bench.frequency_sd_hz[unused]
-    return score(found.frequency_hz, found.frequency_sd_hz, *truth)
+    return score(predicted.frequency_hz, predicted.frequency_sd_hz, *truth)
 
 
 def _chosen(bench: Bench, model: Model, state: CampaignState, acquisition: str) -> int:

@@ -1,4 +1,4 @@
-"""The pose, axis and forces of the hits that best tell apart laws of a joint that is not linear.
+"""The pose, axis and forces of the hits that best discriminate between nonlinear laws of a joint.
 
 Friction, play and a softening spring answer alike over a short range of force, and differ beyond.
 What each would answer follows from its equivalent stiffness at the swing that the hit gives the
@@ -20,7 +20,7 @@ from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear_diagnosis import TIED
 
 MOST_POSES = 60  # poses evaluated: each takes tens of milliseconds
-FORCE_RATIO = 2.0  # least ratio of the two forces, so that hits of each are told from the other's
+FORCE_RATIO = 2.0  # least ratio of the two forces, so that they count as two levels
 FORCE_LEVELS = 6  # forces evaluated, evenly in logarithms
 SWING_ITERATIONS = 8  # between swing and stiffness
 DIFFERENCE_STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's stiffness
@@ -51,7 +51,7 @@ def most_telling_forces(
     """The hits that best separate laws, at one of MOST_POSES of q (n, dof) in rad.
 
     `weakest_n` and `hardest_n` are the peaks (N) of the hits so far: no harder ones are asked for,
-    and the two forces are FORCE_RATIO, so that levels can be told.
+    and the two forces differ by FORCE_RATIO at least, so that they count as two levels.
     """
     force = forces_n(weakest_n, hardest_n)
     last = len(q) - 1
@@ -83,26 +83,26 @@ def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray
     floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
     quiet = floor * (laws.hit.peak_n / force_n) ** 2
     for place, row in enumerate(q):
-        told = [_told(laws, c, row, force_n) for c in laws.candidates]
+        predicted = [_predicted(laws, c, row, force_n) for c in laws.candidates]
         for level in range(len(force_n) - 1):
-            now = [(h[level] - h[-1], slope[level] - slope[-1]) for h, slope in told]
+            now = [(h[level] - h[-1], slope[level] - slope[-1]) for h, slope in predicted]
             scales = [
-                _scale(h[level], h[-1], quiet[level] + quiet[-1], laws.temper) for h, _ in told
+                _scale(h[level], h[-1], quiet[level] + quiet[-1], laws.temper) for h, _ in predicted
             ]
             gain[place, :, level] = expected_log_odds(now, scales, known, share)
     return gain
 
 
 def accelerance(
-    found: Receptances, candidate: Candidate, hit_force: np.ndarray, share: np.ndarray
+    receptance: Receptances, candidate: Candidate, hit_force: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
     """FRFs (L, 3, 3, F) in m/s²/N of a system with a law at one of its joints.
 
     `hit_force` (F,) in N·s is the spectrum of a hit, `share` (L,) how many times as hard it is.
     """
-    own = found.port_port[:, candidate.port]
-    driven = found.port_hit[:, candidate.port].T  # (3, F)
-    course = hit_force[:, None] * waves(found.s)
+    own = receptance.port_port[:, candidate.port]
+    driven = receptance.port_hit[:, candidate.port].T  # (3, F)
+    course = hit_force[:, None] * waves(receptance.s)
     stiffer = np.zeros((len(share), AXES), dtype=complex)
     for _ in range(SWING_ITERATIONS):
         angle = driven / (1 + stiffer[..., None] * own)  # (L, 3, F) per N
@@ -110,9 +110,11 @@ def accelerance(
         slow = faded(candidate.law, np.maximum(swing, LEAST_SWING_RAD), candidate.a)
         stiffer = 0.5 * (stiffer + candidate.k * slow)
     angle = driven / (1 + stiffer[..., None] * own)
-    through = np.moveaxis(found.sensor_port[:, :, candidate.port], 0, 1)  # (3, F)
+    through = np.moveaxis(receptance.sensor_port[:, :, candidate.port], 0, 1)  # (3, F)
     torque = (stiffer[..., None] * angle)[:, None]  # (L, 1, 3, F)
-    return found.s**2 * (np.moveaxis(found.sensor_hit, 0, 2) - through[:, None, :] * torque)
+    return receptance.s**2 * (
+        np.moveaxis(receptance.sensor_hit, 0, 2) - through[:, None, :] * torque
+    )
 
 
 def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> np.ndarray:
@@ -121,7 +123,7 @@ def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> n
     return np.sqrt(2 / (temper * (quiet + error)))
 
 
-def _told(
+def _predicted(
     laws: Laws, candidate: Candidate, row: np.ndarray, force_n: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """FRFs (L, 3, 3, F) of a law at a pose, and slopes (L, 3, 3, 3, F) by ν and its own spring."""

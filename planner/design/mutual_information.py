@@ -1,4 +1,4 @@
-"""Mutual information: the candidate that tells most about the rest of the workspace.
+"""Mutual information: the candidate most informative about the rest of the workspace.
 
 ½ log of the variance of a measurement at c given what is measured, over that given all other
 poses of the workspace as well (Krause, Singh & Guestrin 2008, eq. 7). Unlike variance it is not

@@ -1,4 +1,4 @@
-"""What hitting a pose would tell of the simulation's parameters: D- and I-optimal designs.
+"""Information that hits at a pose give about the simulation's parameters: D- and I-optimality.
 
 With covariance Σ = L Lᵀ of the parameters and Fisher information F of a hit, Σ becomes
 L (I + G)⁻¹ Lᵀ, G = Lᵀ F L, in the linearised model (Fedorov 1972; Chaloner & Verdinelli 1995).
@@ -23,11 +23,11 @@ def d_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
 
     ½ log det(Σ Σ'⁻¹) of those combinations of parameters that move the workspace's frequencies.
     """
-    told = _moving(outputs, outputs.workspace)
+    moving = _moving(outputs, outputs.workspace)
     parts = []
     for i in range(0, len(poses), POSES_PER_CHUNK):
         left = _left(outputs, poses[slice(i, i + POSES_PER_CHUNK)], ALL_AXES)
-        parts.append(-0.5 * np.linalg.slogdet(told.T @ left @ told)[1])
+        parts.append(-0.5 * np.linalg.slogdet(moving.T @ left @ moving)[1])
     return np.concatenate(parts) if parts else np.zeros(0)
 
 

@@ -1,4 +1,4 @@
-"""What a pose would tell of the simulation's own parameters: sensitivities and Fisher information.
+"""Sensitivity of frequencies and FRFs to the simulation's parameters, and Fisher information.
 
 The parameters are those that `identify` fits: logarithms of springs and dampers, inertias in sds
 of their prior.
@@ -27,7 +27,7 @@ POSES_PER_CHUNK = 8  # which bounds the memory taken
 class FrfNoise:
     """Sd of an FRF: a share of it and a floor (m/s²/N; None: a share of its rms), a line `step_hz`.
 
-    `misfit` is χ² per value of what was identified; above 1 everything tells that much less.
+    `misfit` is χ² per value of what was identified; above 1 the information is less by that factor.
     """
 
     relative: float

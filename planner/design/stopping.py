@@ -1,9 +1,8 @@
 """When to stop: the RMSE over the workspace as the model itself predicts it, with a probability.
 
 Samples of the error field (discrepancy and parameters together) give samples of its root mean
-square. The model's sds are not taken for granted: residuals of measurements that were left out say
-how large its errors are in units of them, to within what few residuals can say (a scaled inverse
-χ² distribution, Gelman et al. 2013, section 2.6).
+square. The model's sds are corrected: leave-one-out residuals, in units of the sds, give the
+posterior of a common factor on them (scaled inverse χ², Gelman et al. 2013, section 2.6).
 """
 
 from dataclasses import dataclass

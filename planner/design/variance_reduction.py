@@ -1,4 +1,4 @@
-"""What measuring a candidate takes from the variance over a target, in closed form and compiled.
+"""How much measuring a candidate lowers the variance over a target, in closed form and compiled.
 
 Measuring at c lowers the variance at u by cov(u, c)²/(var(c) + noise) (Sacks et al. 1989; Cohn
 1996). The posterior covariance is a kernel of x plus an inner product of few features (the
@@ -27,7 +27,7 @@ FEATURE_MULTIPLE = 2  # the number of features is rounded up to a multiple of it
 
 
 def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.ndarray:
-    """Expected reduction (n,) of the GP's variance over a target, labels weighed as it says.
+    """Expected reduction (n,) of the GP's variance over a target, weighted with its importance.
 
     Averaged over the hyperparameters, which are held.
     """

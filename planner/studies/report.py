@@ -1,7 +1,6 @@
 """What a study answers: tables, pictures, and the paper's findings with whether they hold here."""
 
 import csv
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +13,6 @@ from planner.report.plot_files import Pictures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Progress = Callable[[str, float], None]  # what is being done, and the share (0 to 1) that is done
 Cell = str | float
 
 

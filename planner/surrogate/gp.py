@@ -25,7 +25,7 @@ from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import Padded
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
-SILENT_JITTER = 1e-10  # up to which nobody needs to know
+SILENT_JITTER = 1e-10  # of the prior variance; a larger one is reported
 SINGULAR_REMARK = (
     "The covariance was singular until {:g} of its variance was added to the noise: two poses are "
     "nearly the same, and their sds claim more than that."
@@ -71,8 +71,8 @@ class Posterior:
         asked = range(len(self.mask)) if outputs is None else outputs.tolist()
         mean, sd = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
-            found = self.predictive(j, x, low[:, j])
-            mean[:, i], sd[:, i] = found.mean, found.sd
+            mixture = self.predictive(j, x, low[:, j])
+            mean[:, i], sd[:, i] = mixture.mean, mixture.sd
         return mean, sd
 
     def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:

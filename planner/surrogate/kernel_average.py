@@ -36,10 +36,10 @@ class KernelAverage:
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        asked = np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
-        found = [self.models[i].predict(x, low) for i in asked]
-        w = self.weights[asked][:, None, :] / self.weights[asked].sum(axis=0)
-        means, sds = (np.array([f[i] for f in found]) for i in (0, 1))
+        used = np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
+        predictions = [self.models[i].predict(x, low) for i in used]
+        w = self.weights[used][:, None, :] / self.weights[used].sum(axis=0)
+        means, sds = (np.array([f[i] for f in predictions]) for i in (0, 1))
         mean = np.sum(w * means, axis=0)
         return mean, np.sqrt(np.sum(w * (sds**2 + (means - mean) ** 2), axis=0))
 

@@ -77,8 +77,8 @@ def _precision(kernel: str, z: Array, *data: Array) -> Array:
 def most_probable(kernel: str, padded: Padded, prior: Prior, output: int) -> np.ndarray:
     """z = (θ − mean)/sd (p,) of one output where prior × likelihood is greatest (MAP).
 
-    L-BFGS from three lengths one after the other, which on a CPU is faster than side by side. Of
-    many points some find the place, and all of them the peak.
+    L-BFGS from three length scales, one after the other (faster on a CPU than side by side). Of
+    more than SUBSET_POINTS points, a subset finds a start for the fit to all of them.
     """
     data = _data(padded, prior, output)
     p = prior.theta_mean.shape[1]

@@ -1,4 +1,4 @@
-"""A prediction as what it is: a mixture of Gaussians, one per model and hyperparameter sample.
+"""A prediction as a mixture of Gaussians, one per model and hyperparameter sample.
 
 Mean and sd alone make it a Gaussian, which it is not where the models disagree: then its tails are
 heavier and its middle narrower.

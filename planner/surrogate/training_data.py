@@ -1,4 +1,4 @@
-"""Training data of many outputs over one set of poses, padded so that growth compiles nothing."""
+"""Training data of many outputs over one set of poses, padded to few sizes to compile rarely."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""How clearly an effect shows in the FRFs: a case that nobody could solve proves nothing."""
+"""How clearly an effect shows in the FRFs: cases whose effect is below the noise are not used."""
 
 from dataclasses import dataclass, replace
 

@@ -1,4 +1,4 @@
-"""How a true robot deviates from what its folder says: scatter, and linear physics left out."""
+"""How a true robot deviates from its robot folder: scatter, and linear physics left out."""
 
 from dataclasses import dataclass
 

@@ -97,7 +97,7 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
 
 
 def added_mass(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A lump on a link, or a payload that nobody told."""
+    """A lump on a link, or a payload missing from the robot folder."""
     number = int(rng.integers(2, 7))
     mass = scene.moving_kg * log_uniform(rng, 0.03, 0.15)
     place = rng.uniform(0.1, 1.0) * scene.length(number) + 0.1 * some_direction(rng)

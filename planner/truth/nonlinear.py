@@ -140,10 +140,10 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
         torque, after, now = torques[i - 1], states, before
         for _ in range(iterations):
             now = free - (gives * torque).sum(axis=1)
-            told = [
+            torques_after = [
                 p.law.torque(s, b, t) for p, s, b, t in zip(ports, states, before, now, strict=True)
             ]
-            torque, after = (np.array(part) for part in zip(*told, strict=True))
+            torque, after = (np.array(part) for part in zip(*torques_after, strict=True))
         y -= (newer * torque).sum(axis=1)
         torques[i], before, states = torque, now, after
     return np.split(np.moveaxis(torques, 0, 2), np.cumsum(hits)[:-1], axis=1)

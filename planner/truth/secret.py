@@ -91,14 +91,14 @@ def hit_poses(
         for visit in visits
     ]
     responses = _responses(truth, secret, visits, pulses, step_s, rng)
-    found = []
+    recorded = []
     for visit, forces, response in zip(visits, pulses, responses, strict=True):
         hits = [
             sampled(axis, force, _heard(secret.artefact, a, step_s), hammer, rng)
             for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
         ]
-        found.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
-    return found
+        recorded.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
+    return recorded
 
 
 def _responses(
@@ -161,13 +161,13 @@ def frfs(
     seed: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (F,) in Hz and FRFs (visit, 3, 3, F) in m/s²/N of visits from `once`."""
-    found = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
-    n = found[0][0].force_n.size
+    recorded = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
+    n = recorded[0][0].force_n.size
     frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
     used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     columns = [
         [np.fft.rfft(h.acceleration_m_s2)[:, used] / np.fft.rfft(h.force_n)[used] for h in hits]
-        for hits in found
+        for hits in recorded
     ]
     return frequency[used], np.moveaxis(np.array(columns), 1, 2)
 

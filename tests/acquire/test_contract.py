@@ -88,8 +88,8 @@ def test_parameters_are_refitted_as_foretold(surrogate):
 def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
     outputs, poses = over(surrogate, X, 30)
     exact = reduction(outputs, poses, outputs.workspace)
-    monkeypatch.setattr(module, "LARGE", 10)
-    monkeypatch.setattr(module, "EXACT", 20)
+    monkeypatch.setattr(module, "MANY_CANDIDATES", 10)
+    monkeypatch.setattr(module, "BEST_CANDIDATES", 20)
     screened = reduction(outputs, poses, outputs.workspace)
     best = np.argsort(exact)[-15:]
     np.testing.assert_allclose(screened[best], exact[best], rtol=1e-12)

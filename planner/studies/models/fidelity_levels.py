@@ -69,7 +69,7 @@ class AveragedModel:
 
 
 def spread(y: np.ndarray) -> float:
-    """Sd of y, 1 where that says nothing (fewer than two values, a constant)."""
+    """Sd of y, 1 where it is unknown (fewer than two values) or 0."""
     sd = float(np.std(y)) if len(y) > 1 else 0.0
     size = float(np.max(np.abs(y), initial=0.0))
     return sd if sd > 1e-12 * max(size, 1e-300) else 1.0

@@ -1,10 +1,10 @@
 """FRF-level fusion: amplitude over (frequency, pose coordinate), as in Busch et al. 2020.
 
 The logarithm of the amplitude is modelled, so that it stays positive. The simulated surface is a
-complete grid (`grid`); measured on top of it: nothing of it (GP), a discrepancy (AR1), a smooth
-function of it (NARGP) or a deep GP (MFDGP). Extrapolation over the pose is what none of these is
-good at where resonances move, for to a surface a moving peak is one that ends and one that
-begins; fusing the modes (`surrogate`) is.
+complete grid (`grid_gp`). The measured surface ignores it (GP), adds a discrepancy to it (AR1), is
+a smooth function of it (NARGP) or of its distribution (MFDGP). None of them extrapolates well over
+the pose where resonances move: a peak that moves is, to a surface, one that ends and another that
+begins. Fusing the modes (`planner.surrogate`) does.
 """
 
 from collections.abc import Callable

@@ -97,7 +97,7 @@ def scales(y: np.ndarray, low: np.ndarray, low_spread: float) -> tuple[float, fl
     """Sd of the low level, and what stands for the output's own.
 
     The output's is the low level's, corrected by how much more it varies over the measured poses,
-    as far as these are enough to tell.
+    shrunk towards no correction where these are few.
     """
     more = np.log(spread(y) / spread(low)) if len(y) > 1 else 0.0
     shrunk = (len(y) - 1) / (len(y) - 1 + ALIKE_COUNT) * more if len(y) > 1 else 0.0

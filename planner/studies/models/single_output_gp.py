@@ -36,7 +36,7 @@ def fit_gp(
 ) -> SingleGP:  # fmt: skip
     """GP of `samples`, x scaled to about [0, 1].
 
-    `prior` is in units of `scale`, which is the sd of y unless said otherwise.
+    `prior` is in units of `scale`, by default the sd of y.
     """
     n = len(samples.y)
     centre = float(np.mean(samples.y)) if n else 0.0
