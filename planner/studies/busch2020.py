@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.progress import Tell
 from planner.studies import drawing
 from planner.studies.busch2020_data import BEYOND_DEG, TRAINED_DEG, Sweep, sweep
 from planner.studies.modal_route import predict_beyond
 from planner.studies.models.frf_surface import Grid, fit_surface
-from planner.studies.report import PaperClaim, Progress, Report, Table, r_squared
+from planner.studies.report import PaperClaim, Report, Table, r_squared
 
 PAPER_R2 = {"simulation": 0.353, "GP": 0.785, "MFDGP": 0.758, "NARGP": 0.982}
 SURFACES = ("GP", "AR1", "MFDGP", "NARGP")
@@ -33,7 +34,7 @@ class BeyondPrediction:
     sd: np.ndarray
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """R² beyond 105° of every model, with every, every 2nd, 3rd and 4th experiment."""
     first = sweep(ROBOTS[0])
     predicted = {
@@ -74,9 +75,7 @@ def _ours(seen: Sweep) -> BeyondPrediction:
     return BeyondPrediction({"ours": amplitude}, sd)
 
 
-def _predict(
-    seen: Sweep, models: tuple[str, ...], progress: Progress, done: float
-) -> BeyondPrediction:
+def _predict(seen: Sweep, models: tuple[str, ...], progress: Tell, done: float) -> BeyondPrediction:
     lines, angles = seen.simulated_axes
     low = Grid(lines, angles, seen.simulated)
     measured = Grid(seen.lines_hz, seen.angles_deg, seen.amplitude)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.progress import Tell
 from planner.studies.busch2022_data import (
     COUNTS,
     FREQUENCY_MODELS,
@@ -26,7 +27,7 @@ from planner.studies.models.fidelity_levels import Exact, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
-from planner.studies.report import Progress, Report, Table, r_squared
+from planner.studies.report import Report, Table, r_squared
 
 SPLITS = 5  # of the poses, over which medians are taken
 Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
@@ -41,7 +42,7 @@ class Output:
     fits: dict[str, Fit]
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """All figures, and whether what the paper found in its own holds here."""
     seen = load(progress)
     modes = seen.modes

@@ -13,7 +13,7 @@ from planner.campaign.state import Measurement
 from planner.dataset.measure import Source, measure
 from planner.demo import NAME, Pool, shipped
 from planner.frf.frf import Frf
-from planner.studies.report import Progress
+from planner.progress import Tell
 from planner.surrogate.modal_surrogate import ModalObservations
 
 KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
@@ -35,7 +35,7 @@ class RecordedModes:
     frfs: tuple[Frf | None, ...]
 
 
-def load(progress: Progress) -> RecordedModes:
+def load(progress: Tell) -> RecordedModes:
     """Modal analysis of every recorded pose, labels by the simulation as in a campaign."""
     source = shipped(NAME)
     cell = Cell.load(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.progress import Tell
 from planner.studies import drawing
 from planner.studies.lei2023_data import (
     LEFT,
@@ -23,7 +24,7 @@ from planner.studies.lei2023_data import (
 from planner.studies.models.fidelity_levels import Samples
 from planner.studies.models.multitask import fit_multitask
 from planner.studies.models.single_output_gp import fit_gp
-from planner.studies.report import PaperClaim, Progress, Report, Table, r_squared
+from planner.studies.report import PaperClaim, Report, Table, r_squared
 
 ROBOTS = (11, 12, 13)
 FOLDS = 5
@@ -50,7 +51,7 @@ class Scores:
     seconds: float
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """R² by 5-fold cross-validation on three robots, and the time that training takes."""
     scores = _scores(progress)
     table, modes = _by_kind(scores), _by_mode(scores)
@@ -81,7 +82,7 @@ def study(progress: Progress) -> Report:
     )
 
 
-def _scores(progress: Progress) -> Scores:
+def _scores(progress: Tell) -> Scores:
     shape = len(ROBOTS), FOLDS, MODES * PARTS
     together, alone = np.empty((2, *shape))
     ceiling, spent = np.empty((shape[0], shape[2])), []

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 
 from planner.errors import InputError
-from planner.studies.report import Progress, Report
+from planner.progress import Tell
+from planner.studies.report import Report
 
 NAMES = ("busch2022", "busch2020", "seyedhosseini2025", "lei2023")
 ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
 
 
-def find(name: str) -> Callable[[Progress], Report]:
+def find(name: str) -> Callable[[Tell], Report]:
     """The study of that name; InputError if there is none."""
     from importlib import import_module
 

@@ -13,9 +13,10 @@ from matplotlib.figure import Figure
 
 from planner.errors import InputError
 from planner.frf import synthesis
+from planner.progress import Tell
 from planner.studies import drawing
 from planner.studies.models.multitask import fit_multitask
-from planner.studies.report import PaperClaim, Progress, Report, Table, r_squared
+from planner.studies.report import PaperClaim, Report, Table, r_squared
 from planner.truth import inverse
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation
@@ -48,7 +49,7 @@ class PostureData:
     truth: Truth
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """Errors and coverage at the last 15 postures, correlations, and FRFs."""
     progress("254 postures", 0.0)
     with tempfile.TemporaryDirectory() as folder:
