@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.studies.models.fidelity_levels import Level, Samples
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.recursive_ar1 import RecursiveAR1
 from planner.studies.models.single_output_gp import SingleGP
 from planner.surrogate.ar1 import AR1
@@ -51,7 +51,7 @@ def recursive(h: Hyperparameters) -> RecursiveAR1:
     return RecursiveAR1(Scaled(below, h.slope), model, 0.0, 1.0, 0.0, 1.0, 0.0)
 
 
-class Scaled(Level):
+class Scaled(FidelityLevel):
     """ρ times a level."""
 
     def __init__(self, level, slope):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.studies.models import recursive_ar1, single_output_gp
-from planner.studies.models.fidelity_levels import AveragedModel, Level, Samples
+from planner.studies.models.fidelity_levels import AveragedModel, FidelityLevel, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive, scales
 from planner.studies.models.single_output_gp import fit_gp
@@ -41,7 +41,9 @@ def fit_low(samples: Samples) -> Mixture:
     return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in shapes})
 
 
-def fit_fused(measured: Samples, low: Level, low_spread: float, nugget: float = 1e-3) -> Mixture:
+def fit_fused(
+    measured: Samples, low: FidelityLevel, low_spread: float, nugget: float = 1e-3
+) -> Mixture:
     """Mixture of AR1, NARGP and a GP that ignores the simulation.
 
     `low_spread` is the sd of the low level over the workspace, `nugget` the median prior of noise

@@ -30,7 +30,7 @@ class Samples:
         return cls(x[known], y[known], sd[known])
 
 
-class Level(Protocol):
+class FidelityLevel(Protocol):
     """What predicts one output with its uncertainty: a simulation or a fitted model."""
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

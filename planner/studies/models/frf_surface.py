@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError
-from planner.studies.models.fidelity_levels import Level, Samples
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.grid_gp import GridGP, fit_grid
 from planner.studies.models.mfdgp import MFDGP, fit_mfdgp
 from planner.studies.models.sparse_gp import SparseGP, fit_sparse
@@ -55,7 +55,7 @@ class Frame:
 class Surface:
     """Fitted; `model` gives the log amplitude over scaled coordinates."""
 
-    model: Level
+    model: FidelityLevel
     frame: Frame
 
     def predict(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +141,7 @@ def _mfdgp(frame: Frame, measured: Grid, simulated: Grid) -> MFDGP:
     return fit_mfdgp(_samples(frame, measured), low, INDUCING)
 
 
-SURFACES: dict[str, Callable[[Frame, Grid, Grid], Level]] = {
+SURFACES: dict[str, Callable[[Frame, Grid, Grid], FidelityLevel]] = {
     "GP": _gp,
     "AR1": _ar1,
     "NARGP": _nargp,

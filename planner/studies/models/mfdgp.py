@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from planner.studies.models.fidelity_levels import Level, Samples
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.sparse_gp import SparseGP, fit_sparse
 
 NODE_COUNT = 5  # of the quadrature over f_1
@@ -26,7 +26,7 @@ NODES = NODES / np.std(NODES)
 class MFDGP:
     """Fitted layers; the first one's output is centred and scaled for the second."""
 
-    low: Level
+    low: FidelityLevel
     high: SparseGP
     centre: float
     scale: float
@@ -46,7 +46,7 @@ def cutajar(d: int, shape: str = "rbf") -> str:
 
 
 def fit_mfdgp(
-    measured: Samples, low: Level, inducing: int = 200, kernel: str | None = None
+    measured: Samples, low: FidelityLevel, inducing: int = 200, kernel: str | None = None
 ) -> MFDGP:
     """Fit layer 2 to the measured samples; `low`, fitted or exact, is layer 1.
 
@@ -62,7 +62,7 @@ def fit_mfdgp(
     return MFDGP(low, high, centre, scale)
 
 
-def _spread(low: Level, x: np.ndarray, centre: float, scale: float) -> np.ndarray:
+def _spread(low: FidelityLevel, x: np.ndarray, centre: float, scale: float) -> np.ndarray:
     """x (q, d) with the low level's value at each node: (NODE_COUNT·q, d + 1)."""
     value, sd = low.predict(x)
     nodes = (value[None, :] + NODES[:, None] * sd[None, :] - centre) / scale

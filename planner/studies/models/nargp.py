@@ -8,7 +8,7 @@ Where the cheap level is uncertain, its uncertainty is carried through g by quad
 import numpy as np
 from scipy.stats import norm
 
-from planner.studies.models.fidelity_levels import Level, Samples
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.recursive_ar1 import PRIOR, ScaledAR1
 from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.predictive import Predictive
@@ -42,7 +42,7 @@ def perdikaris(d: int, shape: str = "rbf") -> str:
 
 
 def fit_nargp(
-    measured: Samples, low: Level, low_spread: float, kernel: str = "product",
+    measured: Samples, low: FidelityLevel, low_spread: float, kernel: str = "product",
     prior: OutputPrior = PRIOR,
 ) -> NARGP:  # fmt: skip
     """NARGP of the measured samples; `kernel` over (x, l), or "product": `perdikaris`."""

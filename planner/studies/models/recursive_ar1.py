@@ -10,7 +10,7 @@ from typing import Self
 
 import numpy as np
 
-from planner.studies.models.fidelity_levels import AveragedModel, Level, Samples, spread
+from planner.studies.models.fidelity_levels import AveragedModel, FidelityLevel, Samples, spread
 from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import TrainingData
@@ -24,7 +24,7 @@ ALIKE_COUNT = 2.0  # measurements' worth of belief that both levels vary by the 
 class ScaledAR1(AveragedModel):
     """AR1 over a low level, fitted to centred and scaled values: `model` is in these units."""
 
-    low: Level
+    low: FidelityLevel
     model: AR1
     low_centre: float
     low_scale: float
@@ -34,7 +34,7 @@ class ScaledAR1(AveragedModel):
 
     @classmethod
     def fit(
-        cls, measured: Samples, low: Level, low_spread: float, kernel: str, prior: OutputPrior,
+        cls, measured: Samples, low: FidelityLevel, low_spread: float, kernel: str, prior: OutputPrior,
         sees_low: bool = False,
     ) -> Self:  # fmt: skip
         """Fit the measured samples.
@@ -86,7 +86,7 @@ class RecursiveAR1(ScaledAR1):
 
 
 def fit_recursive(
-    measured: Samples, low: Level, low_spread: float, kernel: str = "matern52",
+    measured: Samples, low: FidelityLevel, low_spread: float, kernel: str = "matern52",
     prior: OutputPrior = PRIOR,
 ) -> RecursiveAR1:  # fmt: skip
     """AR1 of the measured samples; `low_spread` is the sd of the low level over the workspace."""
