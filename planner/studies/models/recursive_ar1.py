@@ -34,7 +34,8 @@ class ScaledAR1(AveragedModel):
 
     @classmethod
     def fit(
-        cls, measured: Samples, low: FidelityLevel, low_spread: float, kernel: str, prior: OutputPrior,
+        cls, measured: Samples, low: FidelityLevel, low_spread: float, kernel: str,
+        prior: OutputPrior,
         sees_low: bool = False,
     ) -> Self:  # fmt: skip
         """Fit the measured samples.
