@@ -1,4 +1,4 @@
-"""What results depend on, as a hash: they are kept under it and found again by it."""
+"""Hashes of all that a result depends on: the names under which results are kept."""
 
 import hashlib
 from functools import cache
@@ -8,7 +8,7 @@ import msgspec
 
 
 def digest(*parts: bytes | str) -> str:
-    """SHA-256 of the parts, each told from the next."""
+    """SHA-256 of the parts, each with its length, so that no two lists of parts coincide."""
     whole = hashlib.sha256()
     for part in parts:
         data = part.encode() if isinstance(part, str) else part

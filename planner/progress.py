@@ -1,14 +1,14 @@
-"""What is being done, and which share of it is, for whoever waits."""
+"""Progress of long work: functions that are called with a text and the share that is done."""
 
 from collections.abc import Callable
 
-Tell = Callable[[str, float], None]
+Tell = Callable[[str, float], None]  # what is being done, and the share (0 to 1) that is done
 
 
 def quietly(text: str, share: float) -> None:
-    """To nobody."""
+    """Report nothing."""
 
 
 def within(tell: Tell, first: float, last: float) -> Tell:
-    """To whom it is told of work that is only a part, from one share of the whole to another."""
+    """The `tell` of a part of the work, from the share `first` of the whole to `last`."""
     return lambda text, share: tell(text, first + (last - first) * share)

@@ -7,7 +7,7 @@ from planner.campaign.low_fidelity import PRIORS, LowFidelity
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
-from planner.design.propose import INTEGRATION
+from planner.design.propose import WORKSPACE_POSES
 from planner.dynamics.vibration import SimulatedModes
 from planner.identification.parameters import parametrise
 from planner.surrogate.modal_surrogate import Surrogate
@@ -63,7 +63,7 @@ def outlook(
             candidates.features[asked], inputs[asked], candidates.q[asked], informed
         )
         covariance = open_.covariance
-    workspace = poses[: min(INTEGRATION, MOST_INFORMED, cell.spread)]
+    workspace = poses[: min(WORKSPACE_POSES, MOST_INFORMED, cell.spread)]
     weights = cell.config.acquisition.mode_weights
     target = Target.evenly(workspace, None if weights is None else np.array(weights))
     goal = _goal(cell, low, surrogate, open_, target, simulated)

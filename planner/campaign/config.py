@@ -1,4 +1,4 @@
-"""campaign.toml: what the engineer decided (contract section 3)."""
+"""campaign.toml: what the engineer decided, as typed tables."""
 
 from pathlib import Path
 from typing import Any, Literal

@@ -14,7 +14,7 @@ from planner.identification.frequency_uncertainty import frequency_sd
 from planner.identification.identify import QUICK, Effort, identify
 from planner.identification.parameters import Priors
 from planner.identification.result import Identification
-from planner.surrogate.hedged import BELIEF
+from planner.surrogate.hedged import PRIOR_BELIEF
 
 # CAD masses and moments are right to 5 %, centres of mass to 1 cm.
 PRIORS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
@@ -176,7 +176,7 @@ class LowFidelity:
     @property
     def belief(self) -> float:
         """Probability that it is of use, by the FRFs: a whole matrix of them is hard to fit."""
-        return BELIEVED if self.taught else BELIEF
+        return BELIEVED if self.taught else PRIOR_BELIEF
 
     def frequency_sd(self, q: np.ndarray) -> np.ndarray:
         """Sd of ln f (n, count) that the identified parameters leave; 0 for a frozen simulation."""

@@ -9,8 +9,9 @@ from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.design.hit_axes import axis_shares
-from planner.design.propose import DESIGNS, INFORMED, Pick, Travel
+from planner.design.propose import INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
+from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
 
 # Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.

@@ -1,4 +1,4 @@
-"""The answers of the campaign commands as plain values (contract section 5)."""
+"""The answers of the campaign commands as plain values."""
 
 import dataclasses
 from collections.abc import Callable

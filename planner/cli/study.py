@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 def study(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="seed-000 to seed-003.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="busch2022, busch2020, seyedhosseini2025 or lei2023."),
+    ],
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write tables (CSV) and pictures here.")
     ] = None,

@@ -1,4 +1,4 @@
-"""What every run of a comparison shares: robot, workspace, recorded poses, what is right there."""
+"""What all runs of a comparison share: robot, workspace, recorded poses, measured frequencies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
 STILL_DEG = 0.5  # a joint whose angles over the pool differ by less does not move
-OUTSIDE = 0.02  # of the workspace's size by which readback may lie beside it
+OUTSIDE_TOLERANCE = 0.02  # of the workspace's size by which readback may lie beside it
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +44,9 @@ class PoolCell(Cell):
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A pool of n poses with k labels; travels to other processes and machines as it is.
+    """A pool of n poses with k labels; is pickled for other processes and machines.
 
-    `frequency_hz` (n, k) is what the recordings themselves say, by which predictions are judged.
+    `frequency_hz` (n, k) are the measured frequencies, by which predictions are judged.
     """
 
     robot: Robot
@@ -135,7 +135,7 @@ def _usable(
         raise InputError(
             "All poses of the workspace are the same, so there is nothing to choose; record more."
         )
-    inside = np.all((x > -OUTSIDE) & (x < 1 + OUTSIDE), axis=1)
+    inside = np.all((x > -OUTSIDE_TOLERANCE) & (x < 1 + OUTSIDE_TOLERANCE), axis=1)
     if not inside.all():
         away = [p.measurement.pose for p, near in zip(found, inside, strict=True) if not near]
         remarks.append(

@@ -7,7 +7,7 @@ from typing import Any
 from planner.compare.processes import ATTEMPTS, Failure, attempt
 from planner.errors import InputError
 
-TIMEOUT_S = 10.0
+CONNECT_TIMEOUT_S = 10.0  # for the scheduler, and for its first worker
 
 
 def each(
@@ -50,14 +50,14 @@ def _connected(address: str) -> Any:
     # What Dask has to say of lost connections is said here in one sentence.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        client = Client(address, timeout=TIMEOUT_S, set_as_default=False)
+        client = Client(address, timeout=CONNECT_TIMEOUT_S, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
             f"No Dask scheduler answers at {address} ({type(error).__name__}); start one with "
             f"`dask scheduler` and name its address."
         ) from None
     try:
-        client.wait_for_workers(1, timeout=TIMEOUT_S)
+        client.wait_for_workers(1, timeout=CONNECT_TIMEOUT_S)
     except TimeoutError:
         client.close()
         raise InputError(

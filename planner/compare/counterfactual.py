@@ -10,11 +10,11 @@ from planner.compare.curves import Curves
 from planner.compare.pool import PoolPose
 from planner.compare.run import planned, play
 from planner.compare.tasks import LEFT, Run, Task
-from planner.design.pool_designs import NESTED
 from planner.design.propose import check_name
+from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
-LEAST = 2 + LEFT  # measured poses: one to begin with, one to choose, and some to judge by
+LEAST_POSES = 2 + LEFT  # measured: one to begin with, one to choose, and some to judge by
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Otherwise:
 
 
 def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
-    """What `acquisition` would have saved; None with too few measured poses to tell.
+    """What `acquisition` would have saved; None with too few measured poses.
 
     Raises InputError for an unknown acquisition.
     """
@@ -48,7 +48,7 @@ def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
         check_name(acquisition)
     cell = campaign.cell
     used = campaign.state.used
-    if len(used) < LEAST:
+    if len(used) < LEAST_POSES:
         return None
     table = cell.config.modes
     poses = [PoolPose(m, campaign.frf_of(m, table), (), "", m.simulated) for m in used]
@@ -57,7 +57,7 @@ def otherwise(campaign: Campaign, acquisition: str) -> Otherwise | None:
     except InputError:
         return None
     count = len(bench.measurements)
-    if count < LEAST:
+    if count < LEAST_POSES:
         return None
     task = Task(acquisition, 0, 1, count - LEFT)
     order = list(range(count - LEFT))

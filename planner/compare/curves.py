@@ -8,7 +8,7 @@ import numpy as np
 from planner.compare.tasks import Run
 
 GOAL_PERCENT = 1.0
-RESAMPLES = 2000
+BOOTSTRAP_RESAMPLES = 2000  # of the seeds
 BASELINE = "maximin_lhs"
 
 
@@ -94,12 +94,12 @@ def paired(strategy: Curves, baseline: Curves) -> Paired | None:
     a, b = strategy.only(shared), baseline.only(shared)
     apart = a.frequency_rmse_percent - b.frequency_rmse_percent
     saved = (a.each_to_goal - b.each_to_goal).astype(float)
-    picks = np.random.default_rng(0).integers(len(shared), size=(RESAMPLES, len(shared)))
+    picks = np.random.default_rng(0).integers(len(shared), size=(BOOTSTRAP_RESAMPLES, len(shared)))
     interval = np.percentile(np.median(apart[picks], axis=1), (2.5, 97.5), axis=0).T
     goal = np.percentile(np.mean(saved[picks], axis=1), (2.5, 97.5))
     return Paired(len(shared), np.median(apart, axis=0), interval, float(saved.mean()), goal)
 
 
 def baseline_of(strategies: Sequence[str]) -> str:
-    """What others are compared with: the maximin Latin hypercube, or the first one named."""
+    """The strategy that the others are compared with: maximin LHS, or the first one named."""
     return BASELINE if BASELINE in strategies else strategies[0]

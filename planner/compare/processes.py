@@ -11,7 +11,7 @@ from typing import Any
 
 from planner.errors import PlannerError
 
-WORKERS = 2
+DEFAULT_WORKERS = 2  # processes, unless the user says otherwise
 ATTEMPTS = 3  # at an item whose process died
 
 
@@ -23,7 +23,10 @@ class Failure:
 
 
 def each(
-    function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any], workers: int = WORKERS
+    function: Callable[[Any, Any], Any],
+    shared: Any,
+    items: Sequence[Any],
+    workers: int = DEFAULT_WORKERS,
 ) -> Iterator[tuple[int, Any]]:
     """Index and function(shared, item), or its Failure, of every item as they come.
 

@@ -14,10 +14,10 @@ from planner.campaign.state import CampaignState
 from planner.compare.bench import Bench, PoolCell, cell_of
 from planner.compare.score import Score, score
 from planner.compare.tasks import Run, Task
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
-INITIAL = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself
+INITIAL_DESIGN = "maximin_lhs"  # gives the initial poses, so that this baseline is nested in itself
 
 # A cell's robot and the BLAS threads belong to the whole process, of which a cluster's worker may
 # use several threads.
@@ -38,13 +38,13 @@ def run(bench: Bench, task: Task) -> Run:
 
 def _run(bench: Bench, task: Task) -> Run:
     cell = cell_of(bench)
-    used = NESTED[INITIAL](cell.candidates.features, task.budget, task.seed)[: task.initial]
+    used = NESTED[INITIAL_DESIGN](cell.candidates.features, task.budget, task.seed)[: task.initial]
     rest = [i for i in planned(cell, task) if i not in used]
     return play(bench, used.tolist(), rest[: task.budget - task.initial], task)
 
 
 def play(bench: Bench, used: list[int], then: list[int], task: Task) -> Run:
-    """A run that begins with the poses `used`, goes on with `then`, then as the model says."""
+    """A run: first the poses `used`, then those of `then`, then what the strategy proposes."""
     wall, process = time.perf_counter(), time.process_time()
     cell = cell_of(bench)
     counts, scores = [], []
@@ -93,9 +93,9 @@ def _fitted(
 
 def _judged(bench: Bench, model: Model, used: list[int]) -> Score:
     unused = np.setdiff1d(np.arange(len(bench.measurements)), used)
-    found = model.predict(bench.q[unused])
+    predicted = model.predict(bench.q[unused])
     truth = bench.frequency_hz[unused], bench.frequency_sd_hz[unused]
-    return score(found.frequency_hz, found.frequency_sd_hz, *truth)
+    return score(predicted.frequency_hz, predicted.frequency_sd_hz, *truth)
 
 
 def _chosen(bench: Bench, model: Model, state: CampaignState, acquisition: str) -> int:

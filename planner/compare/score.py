@@ -20,9 +20,10 @@ class Score(NamedTuple):
 def score(
     predicted_hz: np.ndarray, sd_hz: np.ndarray, measured_hz: np.ndarray, measured_sd: np.ndarray
 ) -> Score:
-    """All (u, k) in Hz; NaN in the measured ones where a mode was not found.
+    """Score predictions of k frequencies at u poses.
 
-    Intervals hold both the prediction's sd and the measurement's own.
+    All arguments are (u, k) in Hz, the measured ones NaN where a mode was not found. Intervals
+    contain the prediction's sd and the measurement's own.
     """
     known = np.isfinite(measured_hz)
     relative = np.where(known, predicted_hz / np.where(known, measured_hz, 1.0) - 1, np.nan)

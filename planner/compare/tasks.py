@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import msgspec
-import numpy as np
 
 from planner import content_hash
 from planner.compare.bench import Bench
-from planner.design.pool_designs import NESTED
 from planner.design.propose import check_name
+from planner.design.space_filling import NESTED
 from planner.errors import InputError
 
 DEFAULT = "default"  # the strategy that `next` uses
@@ -86,8 +85,3 @@ class Study:
         names = dict.fromkeys(self.strategies.values())
         seeds = range(self.repeats)
         return tuple(Task(name, s, self.initial, self.budget) for s in seeds for name in names)
-
-
-def finite(values: np.ndarray | list[float]) -> list[float | None]:
-    """Numbers as JSON wants them: what is not finite becomes null."""
-    return [float(v) if np.isfinite(v) else None for v in values]

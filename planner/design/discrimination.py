@@ -1,10 +1,11 @@
-"""What one more measurement would do to tell apart candidates that the recordings leave tied.
+"""Which hit best discriminates between candidate explanations that the recordings leave tied.
 
-Of each pair, the χ² by which one candidate's FRFs would miss the other's even if it were fitted to
-them too, its posterior being the prior: T-optimality (Atkinson & Fedorov 1975), after which what
-mere refitting follows counts for nothing, as it still does in Hunter & Reiner (1965). In closed
-form refitting is a linear step; a mass that may lie on this link or that goes farther, so that the
-most promising hits are tried: every candidate is fitted to what every other one foretells.
+T-optimal design (Atkinson & Fedorov 1975): for each pair of candidates, the χ² misfit that remains
+when one is refitted to the FRFs that the other predicts, its present posterior being the prior.
+(Hunter & Reiner 1965 compare without refitting, which counts differences that refitting removes.)
+For all poses the refit is one linear step in closed form. Parameters such as the place of a mass
+can move farther than that, so at the most promising hits every candidate is truly refitted to the
+FRF that every other one predicts.
 """
 
 from collections.abc import Sequence
@@ -21,10 +22,10 @@ from planner.diagnosis.linear.predict import misfit_at
 from planner.frf.frf import Frf
 from planner.inference.parallel import side_by_side
 
-LINES = 96  # evenly over the band
-TRIED = 8  # poses at which fits are tried, the most promising in closed form
-LIKELIEST = 4  # fits that are tried there
-STEPS = 20  # of each
+FRF_LINES = 96  # lines over the band at which FRFs are compared, evenly spaced
+TRIED_POSES = 8  # poses at which candidates are fitted, the most promising in closed form
+MOST_CANDIDATES = 4  # candidates compared: the likeliest
+REFIT_STEPS = 20  # least-squares steps of each refit
 
 
 @dataclass(frozen=True)
@@ -48,14 +49,14 @@ def most_telling(
 ) -> Telling:
     """The hit that best separates two or more fits, at one of q (n, dof) in rad.
 
-    `probability` of each fit; χ² counts 1/`temper`. Only the LIKELIEST are looked at.
+    `probability` of each fit; χ² counts 1/`temper`. Only the MOST_CANDIDATES are looked at.
     """
-    likeliest = np.argsort(-np.asarray(probability))[:LIKELIEST].tolist()
+    likeliest = np.argsort(-np.asarray(probability))[:MOST_CANDIDATES].tolist()
     fits, probability = [fits[i] for i in likeliest], [probability[i] for i in likeliest]
     gain = np.nan_to_num(separation(problem, fits, probability, q, temper))
     share = np.array(probability) / np.sum(probability)
     axes = np.argmax(gain, axis=1)
-    promising = np.argsort(-np.max(gain, axis=1))[:TRIED].tolist()
+    promising = np.argsort(-np.max(gain, axis=1))[:TRIED_POSES].tolist()
     settled = side_by_side(partial(_to_the_end, problem), fits)
     hits = [(pose, int(axes[pose])) for pose in promising]
     odds = side_by_side(partial(_tried, problem, settled, share, q, temper), hits)
@@ -86,16 +87,16 @@ def odds_after(
     axis: int,
     temper: float,
 ) -> float:
-    """Logarithm of the odds that a hit at q (dof,) gives, all fitted to what each foretells.
+    """Logarithm of the odds that a hit at q (dof,) gives, all fitted to what each predicts.
 
     `fits` are settled on the problem's recordings; `share` (fits,) sums to 1.
     """
     before = np.array([f.log_evidence(temper) for f in fits])
     out = 0.0
     for true, source in enumerate(fits):
-        frfs = (*problem.frfs, _foretold(problem, source, q, axis))
+        frfs = (*problem.frfs, _predicted_column(problem, source, q, axis))
         more = replace(problem, frfs=frfs, q=np.vstack([problem.q, q]))
-        refitted = [carried_on(more, f, f.effect, STEPS) for f in fits]
+        refitted = [carried_on(more, f, f.effect, REFIT_STEPS) for f in fits]
         after = np.array([f.log_evidence(temper) for f in refitted])
         gained = after - before
         for other in range(len(fits)):
@@ -105,8 +106,8 @@ def odds_after(
     return out
 
 
-def _foretold(problem: Problem, source: Fit, q: np.ndarray, axis: int) -> Frf:
-    """The FRF column that a fit foretells at q (dof,), with the noise of those measured."""
+def _predicted_column(problem: Problem, source: Fit, q: np.ndarray, axis: int) -> Frf:
+    """The FRF column that a fit predicts at q (dof,), with the noise of those measured."""
     like, noise = problem.frfs[0], FrfNoise.of(problem.frfs, problem.band_hz, 1.0)
     rate = like.exponential_rate_1_s
     there = misfit_at(problem, source.effect, q[None], like.frequency_hz, rate)
@@ -129,8 +130,8 @@ def separation(
 ) -> np.ndarray:
     """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
 
-    q in rad; of the true one of the fits to each other one, averaged as probable as they are.
-    0 where there are fewer than two.
+    q in rad. The odds are those of the true fit to each other one, averaged with the probabilities
+    of the fits; 0 where there are fewer than two.
     """
     q = np.atleast_2d(q)
     gain = np.zeros((len(q), AXES))
@@ -138,39 +139,42 @@ def separation(
         return gain
     share = np.array(probability) / np.sum(probability)
     noise = FrfNoise.of(problem.frfs, problem.band_hz, temper)
-    lines = np.linspace(*problem.band_hz, LINES)
+    lines = np.linspace(*problem.band_hz, FRF_LINES)
     # Lines closer than those of a record are not measured apart; farther ones stand for several.
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
     known = [fit.precision(temper) for fit in fits]
     rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):
-        told = [
+        predicted = [
             tuple(
                 one[0] for one in misfit_at(problem, f.effect, row[None], lines, rate).response(f.x)
             )
             for f in fits
         ]
-        scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in told]
-        gain[place] = expected_log_odds(told, scales, known, share)
+        scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in predicted]
+        gain[place] = expected_log_odds(predicted, scales, known, share)
     return gain
 
 
 def expected_log_odds(
-    told: Sequence[tuple[np.ndarray, np.ndarray]],
+    predicted: Sequence[tuple[np.ndarray, np.ndarray]],
     scales: Sequence[np.ndarray],
     known: Sequence[np.ndarray],
     share: np.ndarray,
 ) -> np.ndarray:
     """Of the true candidate to each other one (3,), for a hit along each axis.
 
-    Each candidate tells an FRF (3, 3, F) and its slopes (D, 3, 3, F), weighs what it would be
-    measured as with its scale (3, 3, F), and has `known` (D, D), the precision of its parameters.
+    Args:
+        predicted: of each candidate the FRF (3, 3, F) and its derivatives (D, 3, 3, F).
+        scales: of each candidate the weight (3, 3, F) of a deviation from its FRF: √2 over its sd.
+        known: of each candidate the precision (D, D) of its parameters.
+        share: probability (candidates,), of sum 1.
     """
     gain = np.zeros(AXES)
-    for true, other in permutations(range(len(told)), 2):
+    for true, other in permutations(range(len(predicted)), 2):
         weight = share[true] * share[other] / (1 - share[true])
-        missed = scales[true] * (told[true][0] - told[other][0])
-        moved = scales[true] * told[other][1]
+        missed = scales[true] * (predicted[true][0] - predicted[other][0])
+        moved = scales[true] * predicted[other][1]
         for axis in range(AXES):
             left = _left(missed[:, axis], moved[:, :, axis], known[other])
             gain[axis] += weight * left / 2

@@ -1,7 +1,7 @@
-"""Along which axes to hit: minutes are saved where one column of the FRF matrix tells enough.
+"""Along which axes to hit: fewer axes save minutes where they give enough information.
 
 In white noise the information about a mode's frequency grows with the square of its peaks: a hit
-along axis j tells the share |R_j|² / Σ |R_j|² of what hits along all axes tell, R_j being the
+along axis j gives the share |R_j|² / Σ |R_j|² of what hits along all axes give, R_j being the
 column of its residue matrix. A measurement's variance is that much larger (heteroscedastic noise).
 """
 
@@ -12,11 +12,11 @@ from planner.design.frequency_posterior import ALL_AXES, AXES, FrequencyOutputs,
 from planner.design.parameter_information import SUBSETS, Axes, parameter_reduction
 from planner.design.variance_reduction import reduction_by_label
 
-VISIBLE = 0.05  # least share of a mode's information: below it the mode may not be found at all
+LEAST_SHARE = 0.05  # of a mode's information: below it the mode may not be found at all
 
 
 def axis_shares(residue: np.ndarray) -> np.ndarray:
-    """Share (n, k, 3) of what is told of each mode, by hit axis; residue (n, k, 3, 3).
+    """Share (n, k, 3) of the information about each mode, by hit axis; residue (n, k, 3, 3).
 
     A third each where the simulation has no such mode.
     """
@@ -39,13 +39,13 @@ def best_axes(
     best, gain, rate = ALL_AXES, 0.0, -np.inf
     for axes in SUBSETS:
         seen = shares[:, list(axes)].sum(axis=1)
-        if axes != ALL_AXES and np.any(seen[counts] < VISIBLE):
+        if axes != ALL_AXES and np.any(seen[counts] < LEAST_SHARE):
             continue
         # The EMA's own part of the noise grows; the nugget, which is the pose's, stays.
         more = outputs.measurement * (1 / np.maximum(seen, 1e-9) - 1)
-        told = float(np.sum(each[:, 0] * variance[:, 0] / (variance[:, 0] + more)))
-        told += parameter_reduction(outputs, pose, outputs.workspace, axes)[0]
+        reduced = float(np.sum(each[:, 0] * variance[:, 0] / (variance[:, 0] + more)))
+        reduced += parameter_reduction(outputs, pose, outputs.workspace, axes)[0]
         minutes = travel + cost.per_pose + cost.hitting(axes)
-        if told / minutes > rate:
-            best, gain, rate = axes, told, told / minutes
+        if reduced / minutes > rate:
+            best, gain, rate = axes, reduced, reduced / minutes
     return best, gain

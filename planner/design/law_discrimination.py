@@ -1,4 +1,4 @@
-"""The pose, axis and forces of the hits that best tell apart laws of a joint that is not linear.
+"""The pose, axis and forces of the hits that best discriminate between nonlinear laws of a joint.
 
 Friction, play and a softening spring answer alike over a short range of force, and differ beyond.
 What each would answer follows from its equivalent stiffness at the swing that the hit gives the
@@ -19,12 +19,12 @@ from planner.diagnosis.laws.starting_values import faded
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR, TIED
 
-LOOKED_AT = 60  # poses: each takes tens of milliseconds
-APART = 2.0  # between two forces, so that hits of each are told from those of the other
-LEVELS = 6  # forces that are looked at, evenly in logarithms
-ROUNDS = 8  # of the iteration between swing and stiffness
-STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's own stiffness
-STILL = 1e-15  # rad: a swing as small as none
+MOST_POSES = 60  # poses evaluated: each takes tens of milliseconds
+FORCE_RATIO = 2.0  # least ratio of the two forces, so that they count as two levels
+FORCE_LEVELS = 6  # forces evaluated, evenly in logarithms
+SWING_ITERATIONS = 8  # between swing and stiffness
+DIFFERENCE_STEP = 1e-3  # of finite differences in ν and in the logarithm of the joint's stiffness
+LEAST_SWING_RAD = 1e-15  # a swing as small as none
 
 
 @dataclass(frozen=True)
@@ -48,24 +48,24 @@ def undecided(laws: Laws) -> Laws:
 def most_telling_forces(
     laws: Laws, weakest_n: float, hardest_n: float, q: np.ndarray
 ) -> TellingForces:
-    """The hits that best separate laws, at one of LOOKED_AT of q (n, dof) in rad.
+    """The hits that best separate laws, at one of MOST_POSES of q (n, dof) in rad.
 
     `weakest_n` and `hardest_n` are the peaks (N) of the hits so far: no harder ones are asked for,
-    and the two forces are APART, so that levels can be told.
+    and the two forces differ by FORCE_RATIO at least, so that they count as two levels.
     """
     force = forces_n(weakest_n, hardest_n)
     last = len(q) - 1
-    looked_at = np.unique(np.linspace(0, last, LOOKED_AT).round().astype(int))
+    looked_at = np.unique(np.linspace(0, last, MOST_POSES).round().astype(int))
     gain = np.nan_to_num(law_separation(laws, q[looked_at], force))
-    gain[:, :, force[:-1] > hardest_n / APART] = 0.0
+    gain[:, :, force[:-1] > hardest_n / FORCE_RATIO] = 0.0
     row, axis, level = (int(i) for i in np.unravel_index(int(np.argmax(gain)), gain.shape))
     best = Telling(int(looked_at[row]), axis, float(gain[row, axis, level]))
     return TellingForces(best, (float(force[level]), float(force[-1])))
 
 
 def forces_n(weakest_n: float, hardest_n: float) -> np.ndarray:
-    """Forces (LEVELS,) in N: as far below the weakest as a hammer goes well, none beyond."""
-    return np.geomspace(weakest_n / 2, hardest_n, LEVELS)
+    """Forces (FORCE_LEVELS,) in N: as far below the weakest as a hammer goes well, none beyond."""
+    return np.geomspace(weakest_n / 2, hardest_n, FORCE_LEVELS)
 
 
 def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray:
@@ -83,37 +83,39 @@ def law_separation(laws: Laws, q: np.ndarray, force_n: np.ndarray) -> np.ndarray
     floor = np.median(laws.hit.variance[np.isfinite(laws.hit.variance)])
     quiet = floor * (laws.hit.peak_n / force_n) ** 2
     for place, row in enumerate(q):
-        told = [_told(laws, c.law, row, force_n) for c in laws.candidates]
+        predicted = [_predicted(laws, c.law, row, force_n) for c in laws.candidates]
         for level in range(len(force_n) - 1):
-            now = [(h[level] - h[-1], slope[level] - slope[-1]) for h, slope in told]
+            now = [(h[level] - h[-1], slope[level] - slope[-1]) for h, slope in predicted]
             scales = [
-                _scale(h[level], h[-1], quiet[level] + quiet[-1], laws.temper) for h, _ in told
+                _scale(h[level], h[-1], quiet[level] + quiet[-1], laws.temper) for h, _ in predicted
             ]
             gain[place, :, level] = expected_log_odds(now, scales, known, share)
     return gain
 
 
 def accelerance(
-    found: Receptances, law: LawAtJoints, hit_force: np.ndarray, share: np.ndarray
+    receptance: Receptances, law: LawAtJoints, hit_force: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
     """FRFs (L, 3, 3, F) in m/s²/N of a system with a law at one of its joints.
 
     `hit_force` (F,) in N·s is the spectrum of a hit, `share` (L,) how many times as hard it is.
     """
     port = int(law.ports[0])
-    own = found.port_port[:, port]
-    driven = found.port_hit[:, port].T  # (3, F)
-    course = hit_force[:, None] * waves(found.s)
+    own = receptance.port_port[:, port]
+    driven = receptance.port_hit[:, port].T  # (3, F)
+    course = hit_force[:, None] * waves(receptance.s)
     stiffer = np.zeros((len(share), AXES), dtype=complex)
-    for _ in range(ROUNDS):
+    for _ in range(SWING_ITERATIONS):
         angle = driven / (1 + stiffer[..., None] * own)  # (L, 3, F) per N
         swing = share[:, None] * np.max(np.abs((angle @ course).real), axis=2)
-        slow = faded(law.kind, np.maximum(swing, STILL), float(law.a[0]))
+        slow = faded(law.kind, np.maximum(swing, LEAST_SWING_RAD), float(law.a[0]))
         stiffer = 0.5 * (stiffer + law.k[0] * slow)
     angle = driven / (1 + stiffer[..., None] * own)
-    through = np.moveaxis(found.sensor_port[:, :, port], 0, 1)  # (3, F)
+    through = np.moveaxis(receptance.sensor_port[:, :, port], 0, 1)  # (3, F)
     torque = (stiffer[..., None] * angle)[:, None]  # (L, 1, 3, F)
-    return found.s**2 * (np.moveaxis(found.sensor_hit, 0, 2) - through[:, None, :] * torque)
+    return receptance.s**2 * (
+        np.moveaxis(receptance.sensor_hit, 0, 2) - through[:, None, :] * torque
+    )
 
 
 def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> np.ndarray:
@@ -122,7 +124,7 @@ def _scale(h: np.ndarray, hardest: np.ndarray, quiet: float, temper: float) -> n
     return np.sqrt(2 / (temper * (quiet + error)))
 
 
-def _told(
+def _predicted(
     laws: Laws, law: LawAtJoints, row: np.ndarray, force_n: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """FRFs (L, 3, 3, F) of a law at a pose, and slopes (L, 3, 3, 3, F) by ν and its own spring."""
@@ -130,16 +132,16 @@ def _told(
     misfit = misfit_at(laws.problem, laws.plain.effect, row[None], hit.frequency_hz, hit.rate_1_s)
     there, s = replace(laws.plain, misfit=misfit), misfit.setting.s[0]
     stiffer = law.x.copy()
-    stiffer[_own(laws, law)] += STEP
+    stiffer[_own(laws, law)] += DIFFERENCE_STEP
     here, moved = (receptances(system_of(there, x), 0, s) for x in (law.x, stiffer))
     share = force_n / hit.peak_n
     h = accelerance(here, law, hit.force, share)
     near = [
         accelerance(here, replace(law, nu=law.nu + step[:, None]), hit.force, share)
-        for step in STEP * np.eye(2)
+        for step in DIFFERENCE_STEP * np.eye(2)
     ]
     near.append(accelerance(moved, law, hit.force, share))
-    return h, np.stack([(one - h) / STEP for one in near], axis=1)
+    return h, np.stack([(one - h) / DIFFERENCE_STEP for one in near], axis=1)
 
 
 def _own(laws: Laws, law: LawAtJoints) -> int:

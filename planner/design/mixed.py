@@ -1,4 +1,4 @@
-"""Mixed: what a pose tells of the simulation's parameters plus what it tells of the discrepancy.
+"""Mixed: information about the simulation's parameters plus information about its discrepancy.
 
 For a simulation that learns and whose physics may be incomplete: both are reductions of the same
 mean variance over the workspace, so that they add up.

@@ -1,4 +1,4 @@
-"""Mutual information: the candidate that tells most about the rest of the workspace.
+"""Mutual information: the candidate most informative about the rest of the workspace.
 
 ½ log of the variance of a measurement at c given what is measured, over that given all other
 poses of the workspace as well (Krause, Singh & Guestrin 2008, eq. 7). Unlike variance it is not
@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 
-SAME = 1e-6  # in model coordinates
+COINCIDENCE = 1e-6  # distance in model coordinates below which two poses are the same
 
 
 def mutual_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
@@ -18,7 +18,7 @@ def mutual_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
     at = outputs.workspace.poses
     distance = np.linalg.norm(poses.x[:, None] - at.x[None], axis=2)
     same = np.argmin(distance, axis=1)
-    coincides = np.min(distance, axis=1) < SAME
+    coincides = np.min(distance, axis=1) < COINCIDENCE
     for k, weight in enumerate(outputs.weights):
         if not weight:
             continue

@@ -1,10 +1,8 @@
-"""What hitting a pose would tell of the simulation's parameters: D- and I-optimal designs.
+"""Information that hits at a pose give about the simulation's parameters: D- and I-optimality.
 
 With covariance Σ = L Lᵀ of the parameters and Fisher information F of a hit, Σ becomes
 L (I + G)⁻¹ Lᵀ, G = Lᵀ F L, in the linearised model (Fedorov 1972; Chaloner & Verdinelli 1995).
 """
-
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses
 
 Axes = tuple[int, ...]
 SUBSETS: tuple[Axes, ...] = ((0,), (1,), (2,), (0, 1), (0, 2), (1, 2), ALL_AXES)
-CHUNK = 64
+POSES_PER_CHUNK = 64  # which bounds the memory taken
 
 
 def parameter_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
@@ -25,11 +23,11 @@ def d_information(outputs: FrequencyOutputs, poses: Poses) -> np.ndarray:
 
     ½ log det(Σ Σ'⁻¹) of those combinations of parameters that move the workspace's frequencies.
     """
-    told = _moving(outputs, outputs.workspace)
+    moving = _moving(outputs, outputs.workspace)
     parts = []
-    for i in range(0, len(poses), CHUNK):
-        left = _left(outputs, poses[slice(i, i + CHUNK)], ALL_AXES)
-        parts.append(-0.5 * np.linalg.slogdet(told.T @ left @ told)[1])
+    for i in range(0, len(poses), POSES_PER_CHUNK):
+        left = _left(outputs, poses[slice(i, i + POSES_PER_CHUNK)], ALL_AXES)
+        parts.append(-0.5 * np.linalg.slogdet(moving.T @ left @ moving)[1])
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
@@ -41,17 +39,10 @@ def parameter_reduction(
         return np.zeros(len(poses))
     matters = _matters(outputs, target)
     parts = []
-    for i in range(0, len(poses), CHUNK):
-        left = _left(outputs, poses[slice(i, i + CHUNK)], axes)
+    for i in range(0, len(poses), POSES_PER_CHUNK):
+        left = _left(outputs, poses[slice(i, i + POSES_PER_CHUNK)], axes)
         parts.append(np.trace(matters) - np.einsum("ij,nji->n", matters, left))
     return np.concatenate(parts)
-
-
-def by_axes(
-    outputs: FrequencyOutputs, pose: Poses, target: Target, subsets: Sequence[Axes] = SUBSETS
-) -> np.ndarray:
-    """The same for one pose (n = 1) and every set of hit axes (len(subsets),)."""
-    return np.array([parameter_reduction(outputs, pose, target, axes)[0] for axes in subsets])
 
 
 def _left(outputs: FrequencyOutputs, poses: Poses, axes: Axes) -> np.ndarray:

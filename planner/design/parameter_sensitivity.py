@@ -1,4 +1,4 @@
-"""What a pose would tell of the simulation's own parameters: sensitivities and Fisher information.
+"""Sensitivity of frequencies and FRFs to the simulation's parameters, and Fisher information.
 
 The parameters are those that `identify` fits: logarithms of springs and dampers, inertias in sds
 of their prior.
@@ -19,15 +19,15 @@ from planner.identification.parameters import Parametrisation
 
 # Lines around each mode at which the information is summed up, in half-widths of its resonance.
 AROUND = np.array([-6.0, -3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0, 6.0])
-BETWEEN = 9  # lines spread over the band besides
-CHUNK = 8
+EVEN_LINES = 9  # lines spread evenly over the band besides
+POSES_PER_CHUNK = 8  # which bounds the memory taken
 
 
 @dataclass(frozen=True)
 class FrfNoise:
     """Sd of an FRF: a share of it and a floor (m/s²/N; None: a share of its rms), a line `step_hz`.
 
-    `misfit` is χ² per value of what was identified; above 1 everything tells that much less.
+    `misfit` is χ² per value of what was identified; above 1 the information is less by that factor.
     """
 
     relative: float
@@ -72,7 +72,9 @@ class OpenParameters:
 
     def information(self, q: np.ndarray) -> np.ndarray:
         """Fisher information (n, 3, p, p) of one hit along each tcp axis at q (n, dof) in rad."""
-        parts = [self._information(q[i : i + CHUNK]) for i in range(0, len(q), CHUNK)]
+        parts = [
+            self._information(q[i : i + POSES_PER_CHUNK]) for i in range(0, len(q), POSES_PER_CHUNK)
+        ]
         p = len(self.covariance)
         return np.concatenate(parts) if parts else np.zeros((0, AXES, p, p))
 
@@ -112,7 +114,7 @@ class OpenParameters:
         f, zeta = modes.frequency_hz[..., None], modes.damping_ratio[..., None]
         near = (f * (1 + np.minimum(zeta, 0.1) * AROUND)).reshape(len(q), -1)
         near = np.where((near > low) & (near < high), near, low)
-        even = np.broadcast_to(np.linspace(low, high, BETWEEN), (len(q), BETWEEN))
+        even = np.broadcast_to(np.linspace(low, high, EVEN_LINES), (len(q), EVEN_LINES))
         lines = np.sort(np.concatenate([near, even], axis=1), axis=1)
         edges = np.concatenate(
             [lines[:, :1], (lines[:, 1:] + lines[:, :-1]) / 2, lines[:, -1:]], axis=1

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.design import space_filling
 from planner.design.cost import Cost, shortest_tour
 from planner.design.frequency_posterior import ALL_AXES, FrequencyOutputs, Poses, Target
 from planner.design.goal import goal
@@ -14,13 +13,13 @@ from planner.design.integrated_variance import integrated_variance
 from planner.design.mixed import mixed
 from planner.design.mutual_information import mutual_information
 from planner.design.parameter_information import d_information, parameter_information
+from planner.design.space_filling import DESIGNS
 from planner.design.variance import variance
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.surrogate.modal_surrogate import Surrogate
 
 Score = Callable[[FrequencyOutputs, Poses], np.ndarray]
-Design = Callable[[np.ndarray, np.ndarray, int, int], np.ndarray]
 
 ACQUISITIONS: dict[str, Score] = {
     "variance": variance,
@@ -34,13 +33,8 @@ ACQUISITIONS: dict[str, Score] = {
 # What these look at is nothing where no parameter of the simulation is open.
 OF_PARAMETERS = ("parameter_information", "d_information")
 INFORMED = (*OF_PARAMETERS, "mixed", "goal")  # those that look at parameters at all
-DESIGNS: dict[str, Design] = {
-    "random": space_filling.random,
-    "sobol": space_filling.sobol,
-    "maximin_lhs": space_filling.maximin_lhs,
-}
-INTEGRATION = 200  # candidates (a Sobol prefix: evenly spread) that stand for the workspace
-NEAR = 1e-3  # in model coordinates: no second measurement at the same place
+WORKSPACE_POSES = 200  # candidates (a Sobol prefix: evenly spread) that stand for the workspace
+LEAST_DISTANCE = 1e-3  # in model coordinates, to poses measured or proposed before
 
 
 @dataclass(frozen=True)
@@ -83,7 +77,7 @@ def workspace_outputs(
 ) -> tuple[FrequencyOutputs, Poses]:
     """Posterior over the first candidates, which stand for the workspace; all as poses."""
     poses = Poses.plain(x, surrogate.frequency_inputs(simulated))
-    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:INTEGRATION])), poses
+    return FrequencyOutputs.of(surrogate, Target.evenly(poses[:WORKSPACE_POSES])), poses
 
 
 def propose(
@@ -107,7 +101,7 @@ def propose(
     check_name(name)
     taken = np.zeros((0, x.shape[1])) if exclude is None else exclude
     distance = np.min(np.linalg.norm(x[:, None] - taken[None], axis=2), axis=1, initial=np.inf)
-    free = np.flatnonzero((distance > NEAR) & (True if allowed is None else allowed))
+    free = np.flatnonzero((distance > LEAST_DISTANCE) & (True if allowed is None else allowed))
     if not free.size:
         return ()
     if name in DESIGNS:
@@ -146,7 +140,7 @@ def _one_after_another(
         picks.append(Pick(index, float(gain[best]), spent, axes))
         at = None if travel is None else travel.q[index]
         outputs = outputs.planning(poses.one(index), axes)
-        free = free[np.linalg.norm(poses.x[free] - poses.x[index], axis=1) > NEAR]
+        free = free[np.linalg.norm(poses.x[free] - poses.x[index], axis=1) > LEAST_DISTANCE]
     return tuple(picks)
 
 

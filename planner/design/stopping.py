@@ -1,9 +1,8 @@
 """When to stop: the RMSE over the workspace as the model itself predicts it, with a probability.
 
 Samples of the error field (discrepancy and parameters together) give samples of its root mean
-square. The model's sds are not taken for granted: residuals of measurements that were left out say
-how large its errors are in units of them, to within what few residuals can say (a scaled inverse
-χ² distribution, Gelman et al. 2013, section 2.6).
+square. The model's sds are corrected: leave-one-out residuals, in units of the sds, give the
+posterior of a common factor on them (scaled inverse χ², Gelman et al. 2013, section 2.6).
 """
 
 from dataclasses import dataclass
@@ -13,10 +12,10 @@ import numpy as np
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.surrogate.gp import Posterior
 
-SAMPLES = 400
+FIELD_SAMPLES = 400  # samples of the error field, at least
 # Errors are as large as the model says, to within a factor of two, before any is seen.
 PRIOR_COUNT = 4.0
-POINTS = 64  # of the workspace, the first ones, over which the mean is taken
+WORKSPACE_POINTS = 64  # of the workspace, the first ones, over which the mean is taken
 
 
 @dataclass(frozen=True)
@@ -70,13 +69,13 @@ def forecast(
 
 
 def mean_squares(outputs: FrequencyOutputs, seed: int = 0) -> np.ndarray:
-    """Samples (≥ SAMPLES,) of the weighted mean square error of ln f over the workspace."""
+    """Samples (≥ FIELD_SAMPLES,) of the weighted mean square error of ln f over the workspace."""
     rng = np.random.default_rng(seed)
-    poses = outputs.workspace.poses[:POINTS]
-    importance = outputs.workspace.importance[:POINTS]
+    poses = outputs.workspace.poses[:WORKSPACE_POINTS]
+    importance = outputs.workspace.importance[:WORKSPACE_POINTS]
     importance = importance / importance.sum()
     samples = outputs.posterior.theta.shape[1]
-    each = -(-SAMPLES // samples)
+    each = -(-FIELD_SAMPLES // samples)
     p = len(outputs.covariance_root)
     parameters = rng.standard_normal((samples * each, p)) @ outputs.covariance_root.T
     total = np.zeros(samples * each)

@@ -1,4 +1,4 @@
-"""What measuring a candidate takes from the variance over a target, in closed form and compiled.
+"""How much measuring a candidate lowers the variance over a target, in closed form and compiled.
 
 Measuring at c lowers the variance at u by cov(u, c)²/(var(c) + noise) (Sacks et al. 1989; Cohn
 1996). The posterior covariance is a kernel of x plus an inner product of few features (the
@@ -19,15 +19,15 @@ from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.inference.parallel import side_by_side
 from planner.surrogate.kernels import parse
 
-BLOCK = 128  # candidates at a time: their covariances with the target stay in the cache
-TASK = 64  # blocks a call where there are many; calls of equal shape are compiled once
-LARGE = 20_000  # candidates from which all but the EXACT best are done in single precision
-EXACT = 1_000
-WIDTH = 2  # the number of features is rounded up to a multiple of it, for the same reason
+BLOCK_CANDIDATES = 128  # at a time: their covariances with the target stay in the cache
+BLOCKS_PER_CALL = 64  # where there are many; calls of equal shape are compiled once
+MANY_CANDIDATES = 20_000  # from which all but the best are done in single precision
+BEST_CANDIDATES = 1_000  # that are then done in double precision
+FEATURE_MULTIPLE = 2  # the number of features is rounded up to a multiple of it: fewer compilations
 
 
 def reduction(outputs: FrequencyOutputs, poses: Poses, target: Target) -> np.ndarray:
-    """Expected reduction (n,) of the GP's variance over a target, labels weighed as it says.
+    """Expected reduction (n,) of the GP's variance over a target, weighted with its importance.
 
     Averaged over the hyperparameters, which are held.
     """
@@ -43,11 +43,11 @@ def reduction_by_label(
     the prior covariance, which ranks the others well enough.
     """
     labels, double = range(outputs.count), partial(_label, outputs, target, np.float64)
-    if len(poses) <= LARGE:
+    if len(poses) <= MANY_CANDIDATES:
         return _both([double(poses, k) for k in labels])
     single = partial(_label, outputs, target, np.float32, poses)
     gained, variance = _both(side_by_side(single, labels))
-    best = np.argpartition(np.sum(gained, axis=0), -EXACT)[-EXACT:]
+    best = np.argpartition(np.sum(gained, axis=0), -BEST_CANDIDATES)[-BEST_CANDIDATES:]
     gained[:, best], _ = _both(side_by_side(partial(double, poses[best]), labels))
     return gained, variance
 
@@ -67,7 +67,11 @@ def _label(
     b, _ = _features(outputs, k, target.poses, sign=1.0)
     scale = va + outputs.noise[k]
     n = len(poses)
-    step = BLOCK * TASK if n > 4 * BLOCK * TASK else BLOCK
+    step = (
+        BLOCK_CANDIDATES * BLOCKS_PER_CALL
+        if n > 4 * BLOCK_CANDIDATES * BLOCKS_PER_CALL
+        else BLOCK_CANDIDATES
+    )
     kernel = outputs.posterior.kernel
     rows = (_filled(poses.x, step), np.stack([_filled(one, step) for one in a]))
     x, a = (one.astype(precision) for one in rows)
@@ -92,7 +96,10 @@ def _squares(
         xc, ac = one
         return (delta.covariance(jnp, theta, xc, xu) + ac @ b.T) ** 2 @ weight
 
-    blocks = x.reshape(-1, BLOCK, x.shape[1]), a.reshape(-1, BLOCK, a.shape[1])
+    blocks = (
+        x.reshape(-1, BLOCK_CANDIDATES, x.shape[1]),
+        a.reshape(-1, BLOCK_CANDIDATES, a.shape[1]),
+    )
     return jax.lax.map(block, blocks).reshape(-1)
 
 
@@ -114,7 +121,7 @@ def _features(
     linear = np.stack([np.full(len(low), prior.bias_sd[k]), prior.slope_sd[k] * low])
     linear = np.broadcast_to(linear, (len(white), *linear.shape))
     both = np.swapaxes(np.concatenate([linear, sign * white], axis=1), 1, 2)
-    empty = np.zeros((*both.shape[:2], -both.shape[2] % WIDTH))
+    empty = np.zeros((*both.shape[:2], -both.shape[2] % FEATURE_MULTIPLE))
     return np.concatenate([both, empty], axis=2), np.maximum(own, 0.0)
 
 

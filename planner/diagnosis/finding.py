@@ -1,4 +1,4 @@
-"""What a screen found: an effect of the contract at a place, with odds and parameters."""
+"""What a screen found: an effect at a place, with odds and parameters."""
 
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING

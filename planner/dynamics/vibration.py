@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 PROPORTIONAL = 1e-10  # off-diagonal modal damping below this is rounding
 # A critically damped mode has a double pole, for which there is no residue: split by this share
@@ -196,19 +195,3 @@ def receptance(solved: Poles, frequency_hz: np.ndarray) -> np.ndarray:
 def accelerance(solved: Poles, frequency_hz: np.ndarray) -> np.ndarray:
     """Accelerance (n, 3s, 3h, F) in m/s²/N at frequency_hz (F,)."""
     return (2j * np.pi * np.asarray(frequency_hz)) ** 2 * receptance(solved, frequency_hz)
-
-
-def direct_accelerance(
-    mass: np.ndarray,
-    damping: np.ndarray,
-    stiffness: np.ndarray,
-    hit: np.ndarray,
-    sensor: np.ndarray,
-    frequency_hz: np.ndarray,
-) -> np.ndarray:
-    """The same (3s, 3h, F) for one pose by solving at each line: slow, the reference of tests."""
-    lines = []
-    for w in 2 * np.pi * np.asarray(frequency_hz):
-        dynamic = stiffness - w**2 * mass + 1j * w * damping
-        lines.append(-(w**2) * sensor @ scipy.linalg.solve(dynamic, hit.T.astype(complex)))
-    return np.stack(lines, axis=-1)

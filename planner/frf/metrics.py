@@ -1,4 +1,4 @@
-"""How well simulated FRFs and modes agree with measured ones (seed 004, appendix B).
+"""How well simulated FRFs and modes agree with measured ones (Birk et al. 2025, appendix B).
 
 FRFs have the shape (pose, response, hit, F), accelerance in m/s²/N. Columns that were never hit
 are NaN in the measured FRFs and in every figure made from them; averages leave them out. Two FRFs
@@ -17,7 +17,7 @@ import numpy as np
 def frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
     """FRAC over magnitudes, (..., F) and (..., F) to (...), in [0, 1].
 
-    (|a|ᵀ|b|)² / (|a|ᵀ|a| · |b|ᵀ|b|): appendix B.1 of seed 004. It sees the shape only: neither
+    (|a|ᵀ|b|)² / (|a|ᵀ|a| · |b|ᵀ|b|): Birk et al. 2025, appendix B.1. It sees shape only, neither
     scale nor phase counts.
     """
     return complex_frac(np.abs(measured), np.abs(simulated))
@@ -26,7 +26,7 @@ def frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
 def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
     """FRAC with phase, |aᴴb|² / (aᴴa · bᴴb), (..., F) and (..., F) to (...), in [0, 1].
 
-    The criterion as it is used elsewhere (reference 25 of seed 004): one complex factor for all
+    The usual criterion (Birk et al. 2025, reference 25): one complex factor for all
     lines does not count.
     """
     a, b = np.broadcast_arrays(measured, simulated)
@@ -70,7 +70,7 @@ class Agreement:
 
     @property
     def global_frac(self) -> np.ndarray:
-        """Global FRAC (response, hit) over magnitudes (seed 004, appendix B.1)."""
+        """Global FRAC (response, hit) over magnitudes (Birk et al. 2025, appendix B.1)."""
         return mean_known(self.frac, axis=0)
 
     @property
@@ -80,7 +80,7 @@ class Agreement:
 
     @property
     def frobenius(self) -> np.ndarray:
-        """Frobenius similarity (response, hit) over magnitudes (seed 004, appendix B.2)."""
+        """Frobenius similarity (response, hit) over magnitudes (Birk et al. 2025, appendix B.2)."""
         return _similarity(self.error, self.size)
 
 
@@ -111,43 +111,8 @@ def stack(parts: Sequence[Agreement]) -> Agreement:
 
 
 def direct_mean(values: np.ndarray) -> float:
-    """Mean of a figure (response, hit) over the direct FRFs xx, yy, zz, as seed 004 reports it."""
+    """Mean of a figure (response, hit) over the direct FRFs xx, yy, zz, as in Birk et al. 2025."""
     return float(mean_known(np.diagonal(values), axis=0))
-
-
-@dataclass(frozen=True, eq=False)
-class ModalError:
-    """Errors of simulated modes, (n, k) in % of the measured value; NaN where one is missing."""
-
-    frequency_percent: np.ndarray
-    damping_percent: np.ndarray
-
-    @property
-    def frequency_rmse_percent(self) -> np.ndarray:
-        """Root mean square over poses (k,)."""
-        return np.sqrt(mean_known(self.frequency_percent**2, axis=0))
-
-    @property
-    def damping_rmse_percent(self) -> np.ndarray:
-        """Root mean square over poses (k,)."""
-        return np.sqrt(mean_known(self.damping_percent**2, axis=0))
-
-
-def modal_error(
-    measured_hz: np.ndarray,
-    measured_damping: np.ndarray,
-    simulated_hz: np.ndarray,
-    simulated_damping: np.ndarray,
-) -> ModalError:
-    """Errors of natural frequencies (Hz) and damping ratios, all (n, k), column k the same mode.
-
-    NaN where a mode was not found (labels come from `planner.modal.mac.align`). A measured
-    damping ratio of 0 has no relative error: NaN.
-    """
-    return ModalError(
-        _relative_percent(measured_hz, simulated_hz),
-        _relative_percent(measured_damping, simulated_damping),
-    )
 
 
 def mean_known(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> np.ndarray:
@@ -194,9 +159,3 @@ def _similarity(error: np.ndarray, size: np.ndarray) -> np.ndarray:
     relative = np.where((measured == 0) & (whole == 0), 0.0, relative)
     similarity = np.maximum(0.0, 1 - relative)
     return np.where(np.all(unknown, axis=0), np.nan, similarity)
-
-
-def _relative_percent(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
-    measured, simulated = np.broadcast_arrays(measured, simulated)
-    nothing = np.full(measured.shape, np.nan)
-    return 100 * np.divide(simulated - measured, measured, out=nothing, where=measured != 0)

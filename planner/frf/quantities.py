@@ -23,14 +23,6 @@ def convert(frequency_hz: np.ndarray, frf: np.ndarray, given: str, wanted: str) 
     )
 
 
-def convert_variance(
-    frequency_hz: np.ndarray, variance: np.ndarray, given: str, wanted: str
-) -> np.ndarray:
-    """Variance E|δH|² (..., F) that goes with `convert`, in the square of the FRF's unit."""
-    power = 2 * _times(frequency_hz, given, wanted)
-    return np.asarray(variance) * (2 * np.pi * np.asarray(frequency_hz)) ** float(power)
-
-
 def _times(frequency_hz: np.ndarray, given: str, wanted: str) -> int:
     for kind in (given, wanted):
         if kind not in DERIVATIVE:

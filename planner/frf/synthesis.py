@@ -14,7 +14,7 @@ def accelerance(frequency_hz: np.ndarray, poles: np.ndarray, residues: np.ndarra
     """Accelerance (m/s²/N) of modes.
 
     frequency_hz (F,); poles (..., m) in rad/s; residues (..., m, *out) in m/(N·s).
-    Returns (..., *out, F) = −ω² Σ_m [R/(iω−λ) + R*/(iω−λ*)] (seed 000, eq. 9).
+    Returns (..., *out, F) = −ω² Σ_m [R/(iω−λ) + R*/(iω−λ*)] (Busch et al. 2022, eq. 9).
     """
     iw = 2j * np.pi * np.asarray(frequency_hz)
     poles = np.asarray(poles)

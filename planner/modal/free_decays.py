@@ -42,11 +42,11 @@ class _Decays:
     rate_hz: float
 
 
-def modes_from_record(
+def analyse_record(
     record: TimeRecord,
     force_channel: str | None = None,
     band_hz: tuple[float, float] | None = None,
-) -> ModalModel:
+) -> tuple[ModalModel, Identification]:
     """Modes of the free decays after each hit of a record; no use is made of the force's size.
 
     The hits are found in `force_channel` (default: the channel of quantity force, else the only
@@ -54,15 +54,9 @@ def modes_from_record(
     one decay). `band_hz` defaults to what rate and length allow. Every mode's `shape` has one
     entry per responding channel, in the order that the remarks name; residues are NaN because
     nothing scales them. Remarks say which channels and pulses are faulty. Raises InputError for
-    an unknown force channel and RefusedError where no mode can be found.
+    an unknown force channel and RefusedError where no mode can be found. Returned beside the modes
+    is all that led to them (stabilisation diagram, fit).
     """
-    return analyse_record(record, force_channel, band_hz)[0]
-
-
-def analyse_record(
-    record: TimeRecord, force_channel: str | None, band_hz: tuple[float, float] | None
-) -> tuple[ModalModel, Identification]:
-    """The same with everything in between (stabilisation diagram, fit)."""
     remarks = list(record.remarks)
     force = _force(record, force_channel)
     decays = _decays(record, force, remarks)

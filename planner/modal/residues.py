@@ -170,13 +170,3 @@ def realign(shape: np.ndarray) -> complex:
     turned = shape * np.exp(-1j * phase)
     sign = np.sign(turned.real[np.argmax(np.abs(turned))]) or 1.0
     return complex(sign * np.exp(-1j * phase))
-
-
-def collinearity(shape: np.ndarray) -> float:
-    """Mode phase collinearity in [0, 1]: 1 for a shape all in phase (Pappa et al., 1993)."""
-    centred = np.asarray(shape)
-    xx, yy = np.sum(centred.real**2), np.sum(centred.imag**2)
-    xy = np.sum(centred.real * centred.imag)
-    if xx + yy == 0:
-        return 0.0
-    return float(((xx - yy) ** 2 + 4 * xy**2) / (xx + yy) ** 2)

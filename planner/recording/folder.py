@@ -1,4 +1,4 @@
-"""recordings.csv and predict.csv (contract section 2)."""
+"""recordings.csv and predict.csv."""
 
 import csv
 import io

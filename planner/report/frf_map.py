@@ -1,4 +1,4 @@
-"""FRF map of a path: magnitude over frequency and pose (Campbell map of seed 004, section 2.5)."""
+"""FRF map of a path: magnitude over frequency and pose (Birk et al. 2025, section 2.5)."""
 
 import numpy as np
 from matplotlib.axes import Axes

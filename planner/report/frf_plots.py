@@ -51,30 +51,6 @@ def frf_figure(
     return figure
 
 
-def uncertainty_figure(
-    features: np.ndarray,
-    names: tuple[str, ...],
-    sd_percent: np.ndarray,
-    measured: np.ndarray,
-    title: str = "",
-) -> Figure:
-    """Predicted frequency sd (n,) in % over the first two model coordinates (n, d)."""
-    figure = Figure(figsize=(6.0, 4.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.subplots()
-    second = features[:, 1] if features.shape[1] > 1 else np.zeros(len(features))
-    points = panel.scatter(features[:, 0], second, c=sd_percent, s=14, cmap="viridis")
-    figure.colorbar(points, label="sd of frequency (%)")
-    if len(measured):
-        other = measured[:, 1] if measured.shape[1] > 1 else np.zeros(len(measured))
-        panel.plot(measured[:, 0], other, "rx", label="measured")
-        panel.legend(fontsize=8)
-    panel.set_xlabel(f"{names[0]} (scaled to the workspace)")
-    panel.set_ylabel(f"{names[1]} (scaled)" if len(names) > 1 else "")
-    panel.set_title(title, fontsize=10)
-    return figure
-
-
 def png(figure: Figure, dpi: int = 80) -> bytes:
     """The figure as PNG bytes, the same for the same figure."""
     buffer = io.BytesIO()

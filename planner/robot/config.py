@@ -1,4 +1,4 @@
-"""robot.toml: what URDF cannot say (contract section 1)."""
+"""robot.toml: what URDF cannot say."""
 
 from pathlib import Path
 

@@ -2,8 +2,8 @@
 
 Each [[compliance]] of robot.toml is a small rotation right after (outboard of) its joint's own,
 about an axis of the joint's child frame; joints themselves are held by their brakes. The mass
-matrix does not depend on stiffness or damping (seed 004, section 2; seed 001, section 2.1), and
-is linear in the inertias of the bodies.
+matrix does not depend on stiffness or damping (Birk et al. 2025, section 2; Busch et al. 2020,
+section 2.1), and is linear in the inertias of the bodies.
 """
 
 import copy

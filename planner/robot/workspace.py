@@ -15,7 +15,7 @@ TRIES = 4  # points tried per candidate wanted, before a sparse workspace is acc
 
 
 class WorkspaceTable(Protocol):
-    """The [workspace] table of campaign.toml (contract section 3)."""
+    """The [workspace] table of campaign.toml."""
 
     @property
     def joints_deg(self) -> list[tuple[float, float]] | None: ...

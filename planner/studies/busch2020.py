@@ -1,4 +1,4 @@
-"""Seed 001 again (Busch et al. 2020): one FRF, trained up to 105° of joint 3, told up to 120°.
+"""The study of Busch et al. 2020: one FRF, trained up to 105° of joint 3, predicted up to 120°.
 
 The surfaces (GP, AR1, MFDGP, NARGP) see the amplitudes of the driving point, as in the paper; ours
 sees the complex FRFs of the same hits, three responses to each, and fuses their modes.
@@ -9,114 +9,117 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.progress import Tell
 from planner.studies import drawing
 from planner.studies.busch2020_data import BEYOND_DEG, TRAINED_DEG, Sweep, sweep
-from planner.studies.modal_route import tell_beyond
+from planner.studies.modal_route import predict_beyond
 from planner.studies.models.frf_surface import Grid, fit_surface
-from planner.studies.report import Finding, Progress, Report, Table
+from planner.studies.report import PaperClaim, Report, Table, r_squared
 
 PAPER_R2 = {"simulation": 0.353, "GP": 0.785, "MFDGP": 0.758, "NARGP": 0.982}
 SURFACES = ("GP", "AR1", "MFDGP", "NARGP")
-QUICK = ("GP", "AR1", "NARGP")  # MFDGP takes a minute: once, with every experiment
-STEPS = (1, 2, 3, 4)
+QUICK_SURFACES = ("GP", "AR1", "NARGP")  # MFDGP takes a minute: once, with every experiment
+EVERY = (1, 2, 3, 4)  # every n-th experiment is trained with
 ROBOTS = (11, 12, 13)  # seeds; ours was written with robots 1 and 2
-NAMES = ("simulation", *SURFACES, "ours")
+COMPARED = ("simulation", *SURFACES, "ours")
 SHOWN_DEG = (106.0, 113.0, 120.0)
 OURS_AT_LEAST = 0.985
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class BeyondPrediction:
     """Amplitude (f, p) at BEYOND_DEG by name, and the sd of ours."""
 
     amplitude: dict[str, np.ndarray]
     sd: np.ndarray
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """R² beyond 105° of every model, with every, every 2nd, 3rd and 4th experiment."""
     first = sweep(ROBOTS[0])
-    told = {
-        step: _tell(first.every(step), SURFACES if step == 1 else QUICK, progress, i / 6)
-        for i, step in enumerate(STEPS)
+    predicted = {
+        step: _predict(
+            first.every(step), SURFACES if step == 1 else QUICK_SURFACES, progress, i / 6
+        )
+        for i, step in enumerate(EVERY)
     }
     others = {}
     for i, seed in enumerate(ROBOTS[1:]):
         progress(f"robot {seed}", (4 + i) / 6)
         others[seed] = sweep(seed)
-    ours = {ROBOTS[0]: [_scores(told[step].amplitude["ours"], first)[0] for step in STEPS]}
-    inside = {ROBOTS[0]: [_inside(told[step], first) for step in STEPS]}
+    ours = {ROBOTS[0]: [_scores(predicted[step].amplitude["ours"], first)[0] for step in EVERY]}
+    inside = {ROBOTS[0]: [_inside(predicted[step], first) for step in EVERY]}
     for seed, seen in others.items():
-        runs = [_ours(seen.every(step)) for step in STEPS]
+        runs = [_ours(seen.every(step)) for step in EVERY]
         ours[seed] = [_scores(run.amplitude["ours"], seen)[0] for run in runs]
         inside[seed] = [_inside(run, seen) for run in runs]
-    scores = _score_table(told[1], first)
-    thin = _thin_table(told, first)
+    scores = _score_table(predicted[1], first)
+    thin = _thin_table(predicted, first)
     robots = _robot_table(ours, inside)
     return Report(
-        "seed-001",
+        "busch2020",
         "SIMULATED: the published robot in MuJoCo with a swaying dress pack, seeds 11 to 13; its "
         "simulation lacks the dress pack and has nominal stiffnesses.",
         (scores, thin, robots),
         _findings(scores, thin, ours),
         {
-            "seed_001_maps": _maps(told[1], first),
-            "seed_001_overlays": _overlays(told[1], first),
-            "seed_001_experiments": _experiments(thin, ours),
+            "busch2020_maps": _maps(predicted[1], first),
+            "busch2020_overlays": _overlays(predicted[1], first),
+            "busch2020_experiments": _experiments(thin, ours),
         },
     )
 
 
-def _ours(seen: Sweep) -> Told:
-    amplitude, sd = tell_beyond(seen)
-    return Told({"ours": amplitude}, sd)
+def _ours(seen: Sweep) -> BeyondPrediction:
+    amplitude, sd = predict_beyond(seen)
+    return BeyondPrediction({"ours": amplitude}, sd)
 
 
-def _tell(seen: Sweep, models: tuple[str, ...], progress: Progress, done: float) -> Told:
+def _predict(seen: Sweep, models: tuple[str, ...], progress: Tell, done: float) -> BeyondPrediction:
     lines, angles = seen.simulated_axes
     low = Grid(lines, angles, seen.simulated)
     measured = Grid(seen.lines_hz, seen.angles_deg, seen.amplitude)
     at = seen.lines_hz, BEYOND_DEG
-    told = {"simulation": fit_surface(low, low, "GP").predict(*at)[0]}
+    predicted = {"simulation": fit_surface(low, low, "GP").predict(*at)[0]}
     for model in models:
         progress(f"{model}, {len(seen.angles_deg)} experiments", done)
-        told[model] = fit_surface(measured, low, model).predict(*at)[0]
+        predicted[model] = fit_surface(measured, low, model).predict(*at)[0]
     progress(f"ours, {len(seen.angles_deg)} experiments", done)
     ours = _ours(seen)
-    return Told(told | ours.amplitude, ours.sd)
+    return BeyondPrediction(predicted | ours.amplitude, ours.sd)
 
 
 def _scores(amplitude: np.ndarray, seen: Sweep) -> tuple[float, float]:
     """R² and RMSE in m/s²/N against the truth without noise."""
-    off = np.mean((amplitude - seen.truth) ** 2)
-    return float(1 - off / np.var(seen.truth)), float(np.sqrt(off))
+    rmse = np.sqrt(np.mean((amplitude - seen.truth) ** 2))
+    return float(r_squared(amplitude, seen.truth)), float(rmse)
 
 
-def _inside(told: Told, seen: Sweep) -> float:
+def _inside(predicted: BeyondPrediction, seen: Sweep) -> float:
     """Share of the truth within 1.96 sd of ours."""
-    return float(np.mean(np.abs(told.amplitude["ours"] - seen.truth) < 1.96 * told.sd))
+    return float(np.mean(np.abs(predicted.amplitude["ours"] - seen.truth) < 1.96 * predicted.sd))
 
 
-def _score_table(told: Told, seen: Sweep) -> Table:
+def _score_table(predicted: BeyondPrediction, seen: Sweep) -> Table:
     rows = [
-        (name, *_scores(told.amplitude[name], seen), PAPER_R2.get(name, float("nan")))
-        for name in NAMES
+        (name, *_scores(predicted.amplitude[name], seen), PAPER_R2.get(name, float("nan")))
+        for name in COMPARED
     ]
     title = f"R² and RMSE beyond {TRAINED_DEG:.0f}°, trained with 2,622 points below"
-    return Table("seed_001_r2", title, ("model", "R²", "RMSE m/s²/N", "R² in the paper"),
+    return Table("busch2020_r2", title, ("model", "R²", "RMSE m/s²/N", "R² in the paper"),
                  tuple(rows))  # fmt: skip
 
 
-def _thin_table(told: dict[int, Told], seen: Sweep) -> Table:
+def _thin_table(predicted: dict[int, BeyondPrediction], seen: Sweep) -> Table:
     names = ("GP", "AR1", "NARGP", "ours")
     rows = [
         (
             f"every {step}: {len(seen.every(step).angles_deg)} experiments",
-            *(_scores(told[step].amplitude[name], seen)[0] for name in names),
+            *(_scores(predicted[step].amplitude[name], seen)[0] for name in names),
         )
-        for step in STEPS
+        for step in EVERY
     ]
-    return Table("seed_001_experiments", "R² with fewer experiments", ("trained with", *names),
+    return Table("busch2020_experiments", "R² with fewer experiments", ("trained with", *names),
                  tuple(rows))  # fmt: skip
 
 
@@ -125,33 +128,33 @@ def _robot_table(ours: dict[int, list[float]], inside: dict[int, list[float]]) -
         (f"robot {seed}", *ours[seed], float(np.mean(100 * np.array(inside[seed]))))
         for seed in ROBOTS
     ]
-    columns = ("", *(f"every {step}" for step in STEPS), "inside the 95 % band, %")
-    return Table("seed_001_robots", "R² of ours on three robots, every n-th experiment",
+    columns = ("", *(f"every {step}" for step in EVERY), "inside the 95 % band, %")
+    return Table("busch2020_robots", "R² of ours on three robots, every n-th experiment",
                  columns, tuple(rows))  # fmt: skip
 
 
-def _findings(scores: Table, thin: Table, ours: dict[int, list[float]]) -> tuple[Finding, ...]:
+def _findings(scores: Table, thin: Table, ours: dict[int, list[float]]) -> tuple[PaperClaim, ...]:
     r2 = {str(row[0]): float(row[1]) for row in scores.rows}
     worst = min(min(values) for values in ours.values())
-    shown = ", ".join(f"{name} {r2[name]:.3f}" for name in NAMES)
+    shown = ", ".join(f"{name} {r2[name]:.3f}" for name in COMPARED)
     nargp = [float(row[3]) for row in thin.rows]
     return (
-        Finding(
-            "The simulation alone, which lacks a mode, tells the FRF poorly (R² 0.353).",
+        PaperClaim(
+            "The simulation alone, which lacks a mode, predicts the FRF poorly (R² 0.353).",
             f"R² {r2['simulation']:.3f}",
             r2["simulation"] < 0.5,
         ),
-        Finding(
+        PaperClaim(
             "NARGP extrapolates where GP and MFDGP do not (0.982 against 0.785 and 0.758).",
             shown,
             r2["NARGP"] >= 0.95 and max(r2["GP"], r2["MFDGP"]) < r2["NARGP"],
         ),
-        Finding(
+        PaperClaim(
             "NARGP stays accurate with every third experiment.",
             f"R² {nargp[0]:.3f} with all, {nargp[2]:.3f} with every third",
             nargp[2] >= 0.95,
         ),
-        Finding(
+        PaperClaim(
             "(ours) Fusing the modes extrapolates to R² ≥ 0.985, with every 4th experiment too.",
             f"least R² over three robots and all steps {worst:.3f}",
             worst >= OURS_AT_LEAST,
@@ -159,12 +162,12 @@ def _findings(scores: Table, thin: Table, ours: dict[int, list[float]]) -> tuple
     )
 
 
-def _maps(told: Told, seen: Sweep) -> Figure:
-    """What is measured, the truth beyond, and what each model says there, in one colour scale."""
+def _maps(predicted: BeyondPrediction, seen: Sweep) -> Figure:
+    """What is measured, the truth beyond, and what each model predicts there, one colour scale."""
     figure = drawing.new((11.0, 6.2), f"Driving-point accelerance, measured to {TRAINED_DEG:.0f}°")
     panels = figure.subplots(2, 4, sharey=True).ravel()
     surfaces = {"measured": seen.amplitude, "truth (MuJoCo)": seen.truth}
-    surfaces |= {name: told.amplitude[name] for name in NAMES}
+    surfaces |= {name: predicted.amplitude[name] for name in COMPARED}
     top = _decibel(seen.amplitude).max()
     for panel, (name, amplitude) in zip(panels, surfaces.items(), strict=True):
         angles = seen.angles_deg if name == "measured" else BEYOND_DEG
@@ -188,7 +191,7 @@ def _decibel(amplitude: np.ndarray) -> np.ndarray:
     return 20 * np.log10(np.maximum(amplitude, 1e-9))
 
 
-def _overlays(told: Told, seen: Sweep) -> Figure:
+def _overlays(predicted: BeyondPrediction, seen: Sweep) -> Figure:
     figure = drawing.new((9.0, 8.0), "FRFs beyond the training, at three angles")
     panels = figure.subplots(len(SHOWN_DEG), 1, sharex=True)
     colours = drawing.COLOURS
@@ -196,9 +199,13 @@ def _overlays(told: Told, seen: Sweep) -> Figure:
         i = int(np.flatnonzero(angle == BEYOND_DEG)[0])
         for name in ("simulation", "GP", "MFDGP", "NARGP"):
             panel.plot(
-                seen.lines_hz, told.amplitude[name][:, i], color=colours[name], lw=1.1, label=name
+                seen.lines_hz,
+                predicted.amplitude[name][:, i],
+                color=colours[name],
+                lw=1.1,
+                label=name,
             )
-        mean, sd = told.amplitude["ours"][:, i], told.sd[:, i]
+        mean, sd = predicted.amplitude["ours"][:, i], predicted.sd[:, i]
         panel.fill_between(
             seen.lines_hz, np.maximum(mean - 1.96 * sd, 0), mean + 1.96 * sd,
             color=colours["ours"], alpha=0.25, lw=0,
@@ -219,13 +226,13 @@ def _experiments(thin: Table, ours: dict[int, list[float]]) -> Figure:
     figure = drawing.new((7.0, 4.2), f"R² beyond {TRAINED_DEG:.0f}° with every n-th experiment")
     panel = figure.subplots()
     values = np.array([row[1:] for row in thin.rows], dtype=float)
-    drawing.curves(panel, np.array(STEPS), thin.columns[1:], values)
+    drawing.curves(panel, np.array(EVERY), thin.columns[1:], values)
     panel.set_xlabel("every … experiment")
     panel.set_ylabel("R²")
     for seed in ROBOTS[1:]:
-        panel.plot(STEPS, ours[seed], ":", color=drawing.COLOURS["ours"], lw=1.0)
+        panel.plot(EVERY, ours[seed], ":", color=drawing.COLOURS["ours"], lw=1.0)
     panel.axhline(OURS_AT_LEAST, color="black", lw=0.8, ls="--")
-    panel.set_xticks(STEPS)
+    panel.set_xticks(EVERY)
     panel.set_ylim(min(0.5, float(values.min()) - 0.05), 1.02)
     panel.legend(fontsize=9, loc="lower left")
     return figure

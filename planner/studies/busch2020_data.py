@@ -1,4 +1,4 @@
-"""Seed 001's data: one FRF over joint 3, measured to 105°, by a robot with a mode too many.
+"""Data for Busch et al. 2020: one FRF over joint 3, measured to 105°; the robot has an extra mode.
 
 The published robot (`campaigns/kr240_busch2020`) as MuJoCo has it, with stiffnesses, damping and
 inertias of its own and, on its arm, a dress pack of hoses that sways across. Driving-point
@@ -16,7 +16,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation, Resonator
+from planner.truth.deviation import AttachedResonator, Deviation
 from planner.truth.model import Truth, load_truth
 
 BAND_HZ = (5.0, 30.0)
@@ -26,14 +26,14 @@ SIMULATED_SHAPE = (251, 51)  # lines by angles: 12,801 points
 MEASURED_SHAPE = (138, 19)  # 2,622 points
 NOISE, FLOOR = 0.02, 0.005  # of an FRF's line, and of its rms over the band
 BEYOND_DEG = np.arange(106.0, 121.0)
-DRESS_PACK = Resonator("link_3", (0.2, 0.3, -0.18), (0.0, 0.0, 1.0), 40.0, 21.0, 0.03)
+DRESS_PACK = AttachedResonator("link_3", (0.2, 0.3, -0.18), (0.0, 0.0, 1.0), 40.0, 21.0, 0.03)
 ACROSS = 2  # the tcp axis that lies across the arm's plane
 HITS = (0, 0, 10)  # along it only
 
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """What is measured at angles (n,) in ° and simulated, and the truth to be told beyond."""
+    """What is measured at angles (n,) in ° and simulated, and the truth beyond."""
 
     lines_hz: np.ndarray  # (f,) of what is measured
     angles_deg: np.ndarray  # (n,)

@@ -1,7 +1,7 @@
-"""Seed 000 again (Busch et al. 2022): kernels and fusions for modal parameters over a plane.
+"""The study of Busch et al. 2022: kernels and fusions for modal parameters over a plane.
 
 Figures 7, 8, 10, 11 and 12 of the paper on the shipped campaign; medians over several splits into
-15 poses to train with and 20 to tell, for one split is luck.
+15 poses to train with and 20 to predict, for one split is luck.
 """
 
 from collections.abc import Callable
@@ -9,37 +9,40 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.studies.busch2022_data import AnalysedPoses, load, split
-from planner.studies.busch2022_findings import findings
-from planner.studies.busch2022_frf import figure_12
-from planner.studies.busch2022_names import (
+from planner.progress import Tell
+from planner.studies.busch2022_data import (
     COUNTS,
     FREQUENCY_MODELS,
     FUSIONS,
     KERNELS,
     RESIDUES,
+    AnalysedPoses,
+    load,
+    split,
 )
+from planner.studies.busch2022_findings import findings
+from planner.studies.busch2022_frf import figure_12
 from planner.studies.busch2022_pictures import pictures
 from planner.studies.models.fidelity_levels import Exact, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
-from planner.studies.report import Progress, Report, Table
+from planner.studies.report import Report, Table, r_squared
 
-SPLITS = 5
+SPLITS = 5  # of the poses, over which medians are taken
 Fit = Callable[[Samples], Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]]
 
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """One modal parameter at all poses (35,), its sd, and the models that are to tell it."""
+    """One modal parameter at all poses (35,), its sd, and the models that predict it."""
 
     y: np.ndarray
     sd: np.ndarray
     fits: dict[str, Fit]
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """All figures, and whether what the paper found in its own holds here."""
     seen = load(progress)
     modes = seen.modes
@@ -62,12 +65,12 @@ def study(progress: Progress) -> Report:
     progress("FRFs", 0.95)
     twelve = figure_12(seen)
     return Report(
-        "seed-000",
+        "busch2022",
         "SIMULATED: the shipped campaign kr240_plane, 35 poses recorded in MuJoCo with a hammer's "
         "noise, modes as the planner finds them.",
         _tables(seven, eight, ten, eleven),
         findings(seven, eight, ten, eleven, twelve),
-        pictures(seven, eight, ten, eleven) | {"seed_000_figure_12": twelve.figure},
+        pictures(seven, eight, ten, eleven) | {"busch2022_figure_12": twelve.figure},
     )
 
 
@@ -89,8 +92,8 @@ def _run(
     mean, sd = fit(Samples.of(x[train], output.y[train], output.sd[train]))(x[test])
     off = mean - output.y[test]
     inside = np.abs(off) < 1.96 * np.hypot(sd, output.sd[test])
-    r2 = 1 - np.mean(off**2) / np.var(output.y[test])
-    return float(r2), float(np.sqrt(np.mean(off**2))), float(inside.mean())
+    r2 = float(r_squared(mean, output.y[test]))
+    return r2, float(np.sqrt(np.mean(off**2))), float(inside.mean())
 
 
 def _kernels(names: tuple[str, ...]) -> dict[str, Fit]:
@@ -133,7 +136,7 @@ def _table(
     name: str, title: str, scores: np.ndarray, part: int, names: tuple[str, ...] = FREQUENCY_MODELS
 ) -> Table:
     rows = [(f"mode {k + 1}", *map(float, row)) for k, row in enumerate(scores[..., part])]
-    return Table(name, f"{title}, 15 poses trained, 20 told", ("", *names), tuple(rows))
+    return Table(name, f"{title}, 15 poses trained, 20 predicted", ("", *names), tuple(rows))
 
 
 def _tables(
@@ -141,13 +144,13 @@ def _tables(
 ) -> tuple[Table, ...]:
     title = "Figure 11: RMSE of residues {}, over the mode's size"
     return (
-        _table("seed_000_figure_7_r2", "Figure 7: R² of frequencies", seven, 0),
-        _table("seed_000_figure_7_rmse", "Figure 7: RMSE of frequencies in Hz", seven, 1),
+        _table("busch2022_figure_7_r2", "Figure 7: R² of frequencies", seven, 0),
+        _table("busch2022_figure_7_rmse", "Figure 7: RMSE of frequencies in Hz", seven, 1),
         _figure_8_table(eight),
-        _table("seed_000_figure_10_r2", "Figure 10: R² of damping ratios", ten, 0, KERNELS),
-        _table("seed_000_figure_10_rmse", "Figure 10: RMSE of damping in %", ten, 1, KERNELS),
+        _table("busch2022_figure_10_r2", "Figure 10: R² of damping ratios", ten, 0, KERNELS),
+        _table("busch2022_figure_10_rmse", "Figure 10: RMSE of damping in %", ten, 1, KERNELS),
         *(
-            _table(f"seed_000_figure_11_{name.replace(' ', '_')}", title.format(name), part, 1,
+            _table(f"busch2022_figure_11_{name.replace(' ', '_')}", title.format(name), part, 1,
                    KERNELS)
             for name, part in zip(RESIDUES, eleven, strict=True)
         ),
@@ -159,4 +162,4 @@ def _figure_8_table(eight: np.ndarray) -> Table:
     columns = [f"{name} {what}" for name in FUSIONS for what in ("R²", "RMSE", "inside")]
     rows = [(f"{n} poses", *map(float, row.ravel())) for n, row in zip(COUNTS, middle, strict=True)]
     title = "Figure 8: R², RMSE in Hz and share inside the 95 % interval, medians over modes"
-    return Table("seed_000_figure_8", title, ("", *columns), tuple(rows))
+    return Table("busch2022_figure_8", title, ("", *columns), tuple(rows))

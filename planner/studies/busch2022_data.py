@@ -1,4 +1,4 @@
-"""Seed 000's data: what the planner finds in the recordings of the shipped campaign (simulated)."""
+"""Data for Busch et al. 2022: modes in the recordings of the shipped campaign (simulated)."""
 
 from dataclasses import dataclass
 
@@ -13,11 +13,16 @@ from planner.campaign.state import Measurement
 from planner.dataset.dataset import Dataset
 from planner.demo import NAME, shipped
 from planner.frf.frf import Frf
-from planner.studies.report import Progress
+from planner.progress import Tell
 from planner.surrogate.modal_surrogate import ModalObservations
 
+KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
+FUSIONS = ("rbf", "AR1", "NARGP")
+FREQUENCY_MODELS = (*KERNELS[1:], *FUSIONS[1:])
+COUNTS = tuple(range(3, 16))  # training sets B_3 … B_15 of the paper
+RESIDUES = tuple(f"{d} {part}" for d in ("xx", "yy") for part in ("real", "imaginary"))
 TRAINED = 15
-DESIGNS = 200  # Latin hypercubes, of which the one with the largest least distance is taken
+TRIED_DESIGNS = 200  # Latin hypercubes; that with the largest least distance is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +35,7 @@ class AnalysedPoses:
     frfs: tuple[Frf | None, ...]
 
 
-def load(progress: Progress) -> AnalysedPoses:
+def load(progress: Tell) -> AnalysedPoses:
     """Modal analysis of every recorded pose, labels by the simulation as in a campaign."""
     source = shipped(NAME)
     cell = Cell.load(
@@ -62,7 +67,9 @@ def split(x: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
     The poses nearest to a maximin Latin hypercube (section 2.2).
     """
     rng = np.random.default_rng(seed)
-    designs = [qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(DESIGNS)]
+    designs = [
+        qmc.LatinHypercube(x.shape[1], rng=rng).random(TRAINED) for _ in range(TRIED_DESIGNS)
+    ]
     points = max(designs, key=_least_distance)
     chosen: list[int] = []
     for point in points:

@@ -1,10 +1,10 @@
-"""Figures 7, 8, 10 and 11 of seed 000."""
+"""Figures 7, 8, 10 and 11 of Busch et al. 2022."""
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from planner.studies import drawing
-from planner.studies.busch2022_names import COUNTS, FREQUENCY_MODELS, FUSIONS, KERNELS
+from planner.studies.busch2022_data import COUNTS, FREQUENCY_MODELS, FUSIONS, KERNELS
 
 FLOOR = -0.2  # of R² in bars; less is drawn cut off
 
@@ -14,16 +14,16 @@ def pictures(
 ) -> dict[str, Figure]:
     """By file name; scores (outputs, models, 3), in 8 by count, in 11 by residue."""
     return {
-        "seed_000_figure_7": _benchmark(
-            seven, FREQUENCY_MODELS, "Figure 7: natural frequencies, 15 poses trained, 20 told",
+        "busch2022_figure_7": _benchmark(
+            seven, FREQUENCY_MODELS, "Figure 7: frequencies, 15 poses trained, 20 predicted",
             "RMSE (Hz)",
         ),
-        "seed_000_figure_8": _figure_8(eight),
-        "seed_000_figure_10": _benchmark(
-            ten, KERNELS, "Figure 10: damping ratios, 15 poses trained, 20 told",
+        "busch2022_figure_8": _figure_8(eight),
+        "busch2022_figure_10": _benchmark(
+            ten, KERNELS, "Figure 10: damping ratios, 15 poses trained, 20 predicted",
             "RMSE (% of critical)",
         ),
-        "seed_000_figure_11": _figure_11(eleven),
+        "busch2022_figure_11": _figure_11(eleven),
     }  # fmt: skip
 
 
@@ -45,7 +45,8 @@ def _figure_8(eight: np.ndarray) -> Figure:
     counts = np.array(COUNTS)
     modes = eight.shape[1]
     figure = drawing.new(
-        (3.2 * modes, 6.4), "Figure 8: natural frequencies, told with N poses (medians over splits)"
+        (3.2 * modes, 6.4),
+        "Figure 8: natural frequencies, predicted with N poses (medians over splits)",
     )
     panels = figure.subplots(2, modes, sharex=True)
     for k in range(modes):
@@ -65,7 +66,7 @@ def _figure_8(eight: np.ndarray) -> Figure:
 
 
 def _figure_11(eleven: np.ndarray) -> Figure:
-    figure = drawing.new((10.0, 6.4), "Figure 11: residues, 15 poses trained, 20 told")
+    figure = drawing.new((10.0, 6.4), "Figure 11: residues, 15 poses trained, 20 predicted")
     panels = figure.subplots(2, 2, sharex=True)
     modes = _modes(eleven.shape[1])
     for row, direction in enumerate(("xx", "yy")):

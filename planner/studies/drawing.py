@@ -59,6 +59,23 @@ def legend(figure: Figure, panel: Axes) -> None:
     )
 
 
+def frf(
+    panel: Axes, frequency_hz: np.ndarray, predicted: np.ndarray,
+    band: tuple[np.ndarray, np.ndarray] | np.ndarray, title: str,
+) -> None:  # fmt: skip
+    """A predicted amplitude (F,) and its 95 % band, lower and upper (F,), in m/s²/N."""
+    lower, upper = band
+    panel.fill_between(
+        frequency_hz, np.maximum(lower, 0), upper, color="tab:red", alpha=0.25, lw=0,
+        label="95 % band",
+    )  # fmt: skip
+    panel.plot(frequency_hz, predicted, color="tab:red", lw=1.4, label="predicted")
+    panel.set_title(title, fontsize=10)
+    panel.set_xlim(frequency_hz[0], frequency_hz[-1])
+    panel.set_ylim(bottom=0)
+    panel.grid(True, alpha=0.25)
+
+
 def curves(panel: Axes, x: np.ndarray, names: Sequence[str], values: np.ndarray) -> None:
     """values (x, names) as lines with points."""
     for i, name in enumerate(names):

@@ -1,4 +1,4 @@
-"""Seed 003 again (Lei et al.): 144 modal parameters at 112 postures, together and one by one.
+"""The study of Lei et al. 2023: 144 modal parameters at 112 postures, together and one by one.
 
 Parameters are grouped by kind (all frequencies, all damping ratios, L and R, real and imaginary),
 which was chosen with robots 1 and 2.
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.progress import Tell
 from planner.studies import drawing
 from planner.studies.lei2023_data import (
     LEFT,
@@ -23,7 +24,7 @@ from planner.studies.lei2023_data import (
 from planner.studies.models.fidelity_levels import Samples
 from planner.studies.models.multitask import fit_multitask
 from planner.studies.models.single_output_gp import fit_gp
-from planner.studies.report import Finding, Progress, Report, Table
+from planner.studies.report import PaperClaim, Report, Table, r_squared
 
 ROBOTS = (11, 12, 13)
 FOLDS = 5
@@ -50,43 +51,38 @@ class Scores:
     seconds: float
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """R² by 5-fold cross-validation on three robots, and the time that training takes."""
     scores = _scores(progress)
     table, modes = _by_kind(scores), _by_mode(scores)
     better, steadier = _shares(scores)
     return Report(
-        "seed-003",
+        "lei2023",
         "SIMULATED: the KR240 with spindle in MuJoCo, seeds 11 to 13, with the scatter of a modal "
         "analysis: 0.2 % of f, 5 % of ζ, 5 % of a mode's L and R.",
         (table, modes),
         (
-            Finding(
+            PaperClaim(
                 "144 parameters train in less time than the paper's group of three (3.36 s).",
                 f"{scores.seconds:.2f} s of one processor for all 144",
                 scores.seconds < PAPER_S,
             ),
-            Finding(
-                "Together the parameters are told better than one by one (mean R²), in all cases.",
+            PaperClaim(
+                "Together all parameters are predicted better than one by one (mean R²).",
                 f"in {100 * better:.0f} % of the parameters that scatter does not bury",
                 better > 0.95,
             ),
-            Finding(
-                "Together they are told more steadily (spread of R² over folds), in all cases.",
+            PaperClaim(
+                "Together all are predicted more steadily (spread of R² over folds).",
                 f"in {100 * steadier:.0f} % of them",
                 steadier > 0.95,
             ),
         ),
-        {"seed_003_kinds": _kinds_figure(table), "seed_003_modes": _modes_figure(modes)},
+        {"lei2023_kinds": _kinds_figure(table), "lei2023_modes": _modes_figure(modes)},
     )
 
 
-def r2(told: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Per output (t,), of told and measured values (n, t)."""
-    return 1 - np.mean((told - measured) ** 2, axis=0) / np.var(measured, axis=0)
-
-
-def _scores(progress: Progress) -> Scores:
+def _scores(progress: Tell) -> Scores:
     shape = len(ROBOTS), FOLDS, MODES * PARTS
     together, alone = np.empty((2, *shape))
     ceiling, spent = np.empty((shape[0], shape[2])), []
@@ -97,10 +93,10 @@ def _scores(progress: Progress) -> Scores:
         for j in range(FOLDS):
             progress(f"robot {seed}, fold {j + 1} of {FOLDS}", (i + j / FOLDS) / shape[0])
             train, test = fold != j, fold == j
-            told, seconds = _together(x[train], y[train], x[test])
+            predicted, seconds = _together(x[train], y[train], x[test])
             spent.append(seconds)
-            together[i, j] = r2(told, y[test])
-            alone[i, j] = r2(_alone(x[train], y[train], x[test]), y[test])
+            together[i, j] = r_squared(predicted, y[test], 0)
+            alone[i, j] = r_squared(_alone(x[train], y[train], x[test]), y[test], 0)
     # The first robot's first fold also compiles.
     return Scores(together, alone, ceiling, float(np.max(spent[1:])))
 
@@ -116,14 +112,14 @@ def _data(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _together(x: np.ndarray, y: np.ndarray, there: np.ndarray) -> tuple[np.ndarray, float]:
-    """Told values (q, 144) and the seconds of processor that training took."""
+    """BeyondPrediction values (q, 144) and the seconds of processor that training took."""
     start = time.process_time()
     models = [fit_multitask(x, y[:, kind]) for kind in KINDS.values()]
     seconds = time.process_time() - start
-    told = np.empty((len(there), y.shape[1]))
+    predicted = np.empty((len(there), y.shape[1]))
     for kind, model in zip(KINDS.values(), models, strict=True):
-        told[:, kind] = model.predict(there)[0]
-    return told, seconds
+        predicted[:, kind] = model.predict(there)[0]
+    return predicted, seconds
 
 
 def _alone(x: np.ndarray, y: np.ndarray, there: np.ndarray) -> np.ndarray:
@@ -154,22 +150,22 @@ def _middle(scores: Scores, which: np.ndarray) -> list[float]:
     return [float(v) for v in (*values, np.median(scores.ceiling[:, which]))]
 
 
-HEAD = ("together: mean", "spread", "one by one: mean", "spread", "scatter allows")
+COLUMNS = ("together: mean", "spread", "one by one: mean", "spread", "scatter allows")
 
 
 def _by_kind(scores: Scores) -> Table:
     rows = [(f"{kind} ({len(which)})", *_middle(scores, which)) for kind, which in KINDS.items()]
     return Table(
-        "seed_003_kinds", "5-fold R² by kind of parameter: medians over modes and three robots",
-        ("outputs", *HEAD), tuple(rows),
+        "lei2023_kinds", "5-fold R² by kind of parameter: medians over modes and three robots",
+        ("outputs", *COLUMNS), tuple(rows),
     )  # fmt: skip
 
 
 def _by_mode(scores: Scores) -> Table:
     rows = [(f"mode {k + 1}", *_middle(scores, NUMBER[k, :1])) for k in range(MODES)]
     return Table(
-        "seed_003_frequencies", "5-fold R² of natural frequencies: medians over three robots",
-        ("mode", *HEAD), tuple(rows),
+        "lei2023_frequencies", "5-fold R² of natural frequencies: medians over three robots",
+        ("mode", *COLUMNS), tuple(rows),
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Seed 003's data: 9 modes by 16 parameters at 112 postures over a table, tool upright.
+"""Data for Lei et al. 2023: 9 modes by 16 parameters at 112 postures over a table, tool upright.
 
 Tool tip on a grid of 200 mm, seven turns about the tool's axis (the paper's section 5). The robot
 is the KR240 with spindle in MuJoCo, with stiffnesses, damping and inertias of its own; modal
@@ -20,8 +20,7 @@ MODES = 9
 TIP, BACK = (-0.3, 0.0, 0.157), (-0.25, 0.0, 0.157)  # points 1 and 1a in link_6, in m
 SCATTER = (0.002, 0.05, 0.05)  # relative sd of f, of ζ, and of L and R
 POINTS = ("1X", "1aX", "1Y", "1aY")
-F, ZETA, LEFT, RIGHT = slice(0, 1), slice(1, 2), slice(2, 8), slice(8, 16)  # of the parameters
-GROUPS = {"frequency": F, "damping": ZETA, "L (6 parts)": LEFT, "R (8 parts)": RIGHT}
+LEFT, RIGHT = slice(2, 8), slice(8, 16)  # of the parameters: L and R; 0 is f, 1 is ζ
 
 
 def true_robot(seed: int) -> Truth:

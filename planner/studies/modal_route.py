@@ -1,4 +1,4 @@
-"""An FRF over a sweep by way of its modes: found at every angle, fused, put together again.
+"""An FRF over a sweep by its modes: estimated at every angle, fused, synthesised again.
 
 To a surface of amplitudes a moving peak is one that ends and one that begins; to its mode it is a
 frequency that changes smoothly, and that the simulation follows.
@@ -12,16 +12,16 @@ from planner.studies.busch2020_data import ACROSS, BAND_HZ, BEYOND_DEG, SWEEP_DE
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
 
-ABOVE = 2  # simulated modes beyond those in the band, which a measured one may be instead
+EXTRA_MODES = 2  # simulated, beyond those in the band, which a measured one may be instead
 
 
-def tell_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
+def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """Amplitude and sd (f, p) at BEYOND_DEG in m/s²/N, from the modes of what was measured."""
-    found = [estimate_modes(seen.frf(i), BAND_HZ).modes for i in range(len(seen.angles_deg))]
-    count = max(len(modes) for modes in found)
-    guide = seen.modes(seen.angles_deg, count + ABOVE)
+    modes = [estimate_modes(seen.frf(i), BAND_HZ).modes for i in range(len(seen.angles_deg))]
+    count = max(len(each) for each in modes)
+    guide = seen.modes(seen.angles_deg, count + EXTRA_MODES)
     x = _scaled(seen.angles_deg)
-    tracks = track(found, Guide(guide.frequency_hz, guide.shape), x, ordered=True)
+    tracks = track(modes, Guide(guide.frequency_hz, guide.shape), x, ordered=True)
     fitted = fit_surrogate(_observations(tracks, count, seen))
     prediction = fitted.predict(_scaled(BEYOND_DEG), seen.modes(BEYOND_DEG, count))
     mean, sd = frf_moments(prediction, seen.lines_hz)

@@ -1,17 +1,20 @@
-"""The studies by name."""
+"""The studies by name: first author and year of the paper."""
 
 from collections.abc import Callable
 
 from planner.errors import InputError
-from planner.studies.report import Progress, Report
+from planner.progress import Tell
+from planner.studies.report import Report
 
-NAMES = ("seed-000", "seed-001", "seed-002", "seed-003")
+NAMES = ("busch2022", "busch2020", "seyedhosseini2025", "lei2023")
+ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
 
 
-def find(name: str) -> Callable[[Progress], Report]:
+def find(name: str) -> Callable[[Tell], Report]:
     """The study of that name; InputError if there is none."""
     from importlib import import_module
 
+    name = ALIASES.get(name, name)
     if name not in NAMES:
         raise InputError(f"There is no study {name}; choose one of {', '.join(NAMES)}.")
-    return import_module(f"planner.studies.{name.replace('-', '_')}").study
+    return import_module(f"planner.studies.{name}").study

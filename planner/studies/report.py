@@ -1,10 +1,11 @@
 """What a study answers: tables, pictures, and the paper's findings with whether they hold here."""
 
 import csv
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from planner.errors import InputError
 from planner.report.plot_files import Pictures
@@ -12,7 +13,6 @@ from planner.report.plot_files import Pictures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Progress = Callable[[str, float], None]  # what is being done, and the share (0 to 1) that is done
 Cell = str | float
 
 
@@ -27,7 +27,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Finding:
+class PaperClaim:
     """A sentence of the paper, the figures found here, and whether they bear it out."""
 
     paper: str
@@ -42,12 +42,17 @@ class Report:
     study: str
     data: str
     tables: tuple[Table, ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[PaperClaim, ...]
     figures: "dict[str, Figure]" = field(default_factory=dict)
 
     def table(self, name: str) -> Table:
         """The table of that name; KeyError if there is none."""
         return {t.name: t for t in self.tables}[name]
+
+
+def r_squared(predicted: np.ndarray, measured: np.ndarray, axis: int | None = None) -> np.ndarray:
+    """Coefficient of determination R² over an axis (all entries if None)."""
+    return 1 - np.mean((predicted - measured) ** 2, axis=axis) / np.var(measured, axis=axis)
 
 
 def check_folder(folder: Path | None) -> None:

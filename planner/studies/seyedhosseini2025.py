@@ -1,4 +1,4 @@
-"""Seed 002 again (Seyed Hosseini et al.): 254 postures in joint space, the last 15 told.
+"""The study of Seyed Hosseini et al. 2025: 254 postures in joint space, the last 15 predicted.
 
 A GP over the six joint angles, multi-task within each kind of parameter; FRFs put together again.
 """
@@ -13,30 +13,30 @@ from matplotlib.figure import Figure
 
 from planner.errors import InputError
 from planner.frf import synthesis
+from planner.progress import Tell
 from planner.studies import drawing
 from planner.studies.models.multitask import fit_multitask
-from planner.studies.report import Finding, Progress, Report, Table
+from planner.studies.report import PaperClaim, Report, Table, r_squared
 from planner.truth import inverse
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation
 from planner.truth.model import Truth, load_truth
 
-POSTURES, TOLD = 254, 15
+POSTURES, HELD_OUT = 254, 15
 MODES, TABLED = 6, 4  # modes 5 and 6 are there for the FRFs up to 40 Hz
 SEED = 11
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 7), np.linspace(-0.6, 0.6, 8), np.linspace(0.7, 1.2, 5)
 TURN_RAD, TURNS = np.deg2rad(30.0), 7.3  # of the tool about itself: size, times along the path
 START_DEG = (0.0, -90.0, 100.0, 0.0, 80.0, 0.0)
 SCATTER = (0.002, 0.05, 0.05)  # sd of log f, of log ζ, of residues over their rms size
-SHOWN = (250, 251)  # postures of the paper's figure 5, counted from 1
+SHOWN_POSTURES = (250, 251)  # of the paper's figure 5, counted from 1
 LINES_HZ = np.linspace(5.0, 40.0, 281)
-SAMPLES = 256
+BAND_SAMPLES = 256  # of the modal parameters, for the band of an FRF
 FREQUENCY, DAMPING, RESIDUE = slice(0, MODES), slice(MODES, 2 * MODES), slice(2 * MODES, 8 * MODES)
-Told = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
-class Data:
+class PostureData:
     """Postures q (n, 6) in rad, x scaled to [0, 1], parameters as measured and as they are.
 
     Columns (48): log f of six modes, log ζ, then Rxx, Ryy, Rzz real and imaginary, mode by mode.
@@ -49,7 +49,7 @@ class Data:
     truth: Truth
 
 
-def study(progress: Progress) -> Report:
+def study(progress: Tell) -> Report:
     """Errors and coverage at the last 15 postures, correlations, and FRFs."""
     progress("254 postures", 0.0)
     with tempfile.TemporaryDirectory() as folder:
@@ -60,24 +60,26 @@ def study(progress: Progress) -> Report:
     seconds = time.process_time() - start
     progress("FRFs", 0.8)
     errors, correlation = _error_table(data, mean, sd), _correlations(data)
-    frfs = {n: _frf(data, mean, sd, n) for n in SHOWN}
-    rows = tuple((f"posture {n}", *frfs[n].r2) for n in SHOWN)
-    quality = Table("seed_002_frfs", "R² of |H| over 5 to 40 Hz", ("", "xx", "yy", "zz"), rows)
+    frfs = {n: _frf(data, mean, sd, n) for n in SHOWN_POSTURES}
+    rows = tuple((f"posture {n}", *frfs[n].r2) for n in SHOWN_POSTURES)
+    quality = Table(
+        "seyedhosseini2025_frfs", "R² of |H| over 5 to 40 Hz", ("", "xx", "yy", "zz"), rows
+    )
     return Report(
-        "seed-002",
+        "seyedhosseini2025",
         f"SIMULATED: a KR210-like robot in MuJoCo, seed {SEED}, along a trajectory of "
         "its tool, with the scatter of a modal analysis: 0.2 % of f, 5 % of ζ and of residues.",
         (errors, correlation, quality),
         _findings(errors, correlation, quality, seconds),
         {
-            "seed_002_figure_2": _heatmap(correlation),
-            "seed_002_figure_4": _last(data, mean, sd),
-            "seed_002_figure_5": _overlays(frfs),
+            "seyedhosseini2025_figure_2": _heatmap(correlation),
+            "seyedhosseini2025_figure_4": _last(data, mean, sd),
+            "seyedhosseini2025_figure_5": _overlays(frfs),
         },
     )
 
 
-def _data(folder: Path) -> Data:
+def _data(folder: Path) -> PostureData:
     truth = load_truth(KR210.write(folder, 3), Deviation(SEED, 0.15, 0.1, 0.05))
     q = _trajectory(truth)
     x = (q - q.min(axis=0)) / np.maximum(np.ptp(q, axis=0), 1e-3)  # joint 4 hardly moves
@@ -86,7 +88,7 @@ def _data(folder: Path) -> Data:
     size[RESIDUE] = np.repeat(_sizes(clean), 6)
     each = np.repeat(SCATTER, (MODES, MODES, 6 * MODES)) * size
     rng = np.random.default_rng([SEED, 1])
-    return Data(q, x, clean + each * rng.standard_normal(clean.shape), clean, truth)
+    return PostureData(q, x, clean + each * rng.standard_normal(clean.shape), clean, truth)
 
 
 def _trajectory(truth: Truth) -> np.ndarray:
@@ -124,17 +126,19 @@ def _sizes(clean: np.ndarray) -> np.ndarray:
     return np.sqrt(np.mean(parts**2, axis=(0, 2)))
 
 
-def _fit(data: Data) -> Told:
+def _fit(data: PostureData) -> tuple[np.ndarray, np.ndarray]:
     """Mean and sd (15, 48) at the last postures, trained with those before."""
-    x, y, there = data.x[:-TOLD], data.measured[:-TOLD], data.x[-TOLD:]
-    told = [fit_multitask(x, y[:, kind]).predict(there) for kind in (FREQUENCY, DAMPING, RESIDUE)]
-    mean, sd = (np.concatenate([t[i] for t in told], axis=1) for i in (0, 1))
+    x, y, there = data.x[:-HELD_OUT], data.measured[:-HELD_OUT], data.x[-HELD_OUT:]
+    predicted = [
+        fit_multitask(x, y[:, kind]).predict(there) for kind in (FREQUENCY, DAMPING, RESIDUE)
+    ]
+    mean, sd = (np.concatenate([t[i] for t in predicted], axis=1) for i in (0, 1))
     return mean, sd
 
 
-def _error_table(data: Data, mean: np.ndarray, sd: np.ndarray) -> Table:
+def _error_table(data: PostureData, mean: np.ndarray, sd: np.ndarray) -> Table:
     """Against the truth without scatter."""
-    off, spread = mean - data.clean[-TOLD:], np.std(data.measured[:-TOLD], axis=0)
+    off, spread = mean - data.clean[-HELD_OUT:], np.std(data.measured[:-HELD_OUT], axis=0)
     rows = []
     for k in range(TABLED):
         parts = np.arange(6) + RESIDUE.start + 6 * k
@@ -152,35 +156,34 @@ def _error_table(data: Data, mean: np.ndarray, sd: np.ndarray) -> Table:
         )
     columns = ("", "f off by %", "ζ off by %", "residues off by % of size", "MSE, scaled",
                "f inside 95 %", "all inside 95 %")  # fmt: skip
-    return Table("seed_002_errors", "The last 15 of 254 postures, against the truth", columns,
-                 tuple(rows))  # fmt: skip
+    title = "The last 15 of 254 postures, against the truth"
+    return Table("seyedhosseini2025_errors", title, columns, tuple(rows))
 
 
-def _correlations(data: Data) -> Table:
+def _correlations(data: PostureData) -> Table:
     joint = np.corrcoef(np.column_stack([data.q, data.measured[:, :TABLED]]).T)[:6, 6:]
     rows = tuple((f"joint {j + 1}", *map(float, row)) for j, row in enumerate(joint))
     modes = (f"mode {k + 1}" for k in range(TABLED))
-    return Table("seed_002_correlation", "Correlation of joint angles with frequencies",
+    return Table("seyedhosseini2025_correlation", "Correlation of joint angles with frequencies",
                  ("", *modes), rows)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Direct:
-    """Amplitudes (3, F) of xx, yy, zz: told, its 95 % band (2, 3, F), and the truth; R² (3,)."""
+    """Amplitudes (3, F) of xx, yy, zz: predicted, 95 % band (2, 3, F) and truth; R² (3,)."""
 
-    told: np.ndarray
+    predicted: np.ndarray
     band: np.ndarray
     truth: np.ndarray
 
     @property
     def r2(self) -> tuple[float, ...]:
-        off = np.mean((self.told - self.truth) ** 2, axis=1)
-        return tuple(map(float, 1 - off / np.var(self.truth, axis=1)))
+        return tuple(map(float, r_squared(self.predicted, self.truth, 1)))
 
 
-def _frf(data: Data, mean: np.ndarray, sd: np.ndarray, posture: int) -> Direct:
-    i = posture - 1 - (POSTURES - TOLD)
-    noise = np.random.default_rng(posture).standard_normal((SAMPLES, mean.shape[1]))
+def _frf(data: PostureData, mean: np.ndarray, sd: np.ndarray, posture: int) -> Direct:
+    i = posture - 1 - (POSTURES - HELD_OUT)
+    noise = np.random.default_rng(posture).standard_normal((BAND_SAMPLES, mean.shape[1]))
     samples = np.abs(_synthesised(mean[i] + sd[i] * noise))
     truth = data.truth.accelerance(data.q[posture - 1], LINES_HZ)
     return Direct(
@@ -201,29 +204,29 @@ def _synthesised(parameters: np.ndarray) -> np.ndarray:
 
 def _findings(
     errors: Table, correlation: Table, quality: Table, seconds: float
-) -> tuple[Finding, ...]:
+) -> tuple[PaperClaim, ...]:
     f, zeta, inside = (np.array([row[i] for row in errors.rows], float) for i in (1, 2, 5))
     strength = np.abs([row[1:4] for row in correlation.rows]).max(axis=1)
     r2 = np.array([row[1:] for row in quality.rows], float)
     return (
-        Finding(
+        PaperClaim(
             "Joints 2 and 3 matter far more to modes 1 to 3 than joint 1.",
             "largest |correlation| of joints 1 to 6: " + ", ".join(f"{v:.2f}" for v in strength),
             bool(min(strength[1], strength[2]) > 2 * strength[0]),
         ),
-        Finding(
-            "A GP over joint angles tells the last 15 postures' modal parameters accurately.",
+        PaperClaim(
+            "A GP over joint angles predicts the last 15 postures' modal parameters accurately.",
             f"frequencies off by {f.mean():.2f} %, {inside.mean():.0f} % inside their 95 % "
             f"interval; fitted in {seconds:.1f} s",
             bool(f.mean() < 2.0 and inside.mean() > 75),
         ),
-        Finding(
-            "Damping ratios are told less surely than frequencies.",
+        PaperClaim(
+            "Damping ratios are predicted less surely than frequencies.",
             f"off by {zeta.mean():.1f} % against {f.mean():.2f} %",
             bool(zeta.mean() > f.mean()),
         ),
-        Finding(
-            "FRFs put together from told modes agree with those measured.",
+        PaperClaim(
+            "FRFs put together from predicted modes agree with those measured.",
             f"R² of |H| at postures 250 and 251 from {r2.min():.3f} to {r2.max():.3f}",
             bool(r2.min() > 0.9),
         ),
@@ -246,10 +249,10 @@ def _heatmap(correlation: Table) -> Figure:
     return figure
 
 
-def _last(data: Data, mean: np.ndarray, sd: np.ndarray) -> Figure:
+def _last(data: PostureData, mean: np.ndarray, sd: np.ndarray) -> Figure:
     figure = drawing.new((12.0, 6.4), "Figure 4: the last 15 of 254 postures")
     panels = figure.subplots(2, TABLED, sharex=True)
-    number = np.arange(POSTURES - TOLD, POSTURES) + 1
+    number = np.arange(POSTURES - HELD_OUT, POSTURES) + 1
     for row, (scale, unit) in enumerate(((1.0, "frequency (Hz)"), (100.0, "damping ratio (%)"))):
         for k, panel in enumerate(panels[row]):
             c = MODES * row + k
@@ -257,12 +260,21 @@ def _last(data: Data, mean: np.ndarray, sd: np.ndarray) -> Figure:
             panel.fill_between(
                 number, low, high, color="tab:red", alpha=0.25, lw=0, label="95 % interval"
             )
-            panel.plot(number, scale * np.exp(mean[:, c]), color="tab:red", lw=1.4, label="told")
             panel.plot(
-                number, scale * np.exp(data.measured[-TOLD:, c]), "k.", label="measured (simulated)"
+                number, scale * np.exp(mean[:, c]), color="tab:red", lw=1.4, label="predicted"
             )
             panel.plot(
-                number, scale * np.exp(data.clean[-TOLD:, c]), "k", lw=0.8, label="truth (MuJoCo)"
+                number,
+                scale * np.exp(data.measured[-HELD_OUT:, c]),
+                "k.",
+                label="measured (simulated)",
+            )
+            panel.plot(
+                number,
+                scale * np.exp(data.clean[-HELD_OUT:, c]),
+                "k",
+                lw=0.8,
+                label="truth (MuJoCo)",
             )
             panel.grid(True, alpha=0.25)
             if row == 0:
@@ -275,21 +287,13 @@ def _last(data: Data, mean: np.ndarray, sd: np.ndarray) -> Figure:
 
 
 def _overlays(frfs: dict[int, Direct]) -> Figure:
-    figure = drawing.new((12.0, 6.4), "Figure 5: FRFs put together from told modes")
+    figure = drawing.new((12.0, 6.4), "Figure 5: FRFs put together from predicted modes")
     panels = figure.subplots(len(frfs), 3, sharex=True)
     for row, (posture, frf) in zip(panels, frfs.items(), strict=True):
         for axis, panel in enumerate(row):
-            panel.fill_between(
-                LINES_HZ, *frf.band[:, axis], color="tab:red", alpha=0.25, lw=0, label="95 % band"
-            )
-            panel.plot(LINES_HZ, frf.told[axis], color="tab:red", lw=1.4, label="told")
+            title = f"posture {posture}, {'xyz'[axis] * 2}, R² {frf.r2[axis]:.3f}"
+            drawing.frf(panel, LINES_HZ, frf.predicted[axis], frf.band[:, axis], title)
             panel.plot(LINES_HZ, frf.truth[axis], "k--", lw=1.1, label="truth (MuJoCo)")
-            panel.set_title(
-                f"posture {posture}, {'xyz'[axis] * 2}, R² {frf.r2[axis]:.3f}", fontsize=10
-            )
-            panel.set_xlim(LINES_HZ[0], LINES_HZ[-1])
-            panel.set_ylim(bottom=0)
-            panel.grid(True, alpha=0.25)
         row[0].set_ylabel("|H| (m/s²/N)")
     for panel in panels[-1]:
         panel.set_xlabel("frequency (Hz)")

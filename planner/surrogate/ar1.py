@@ -1,8 +1,8 @@
 """AR1 of many outputs over a simulation that is known exactly at every pose.
 
-y_H(x) = ρ·y_L(x) + b + δ(x) (Kennedy & O'Hagan 2000; seed 000, section 2.3.1). The simulation is
-deterministic and costs milliseconds, so the low-fidelity level is evaluated, not modelled. An
-output without simulation is a plain GP: the same with no ρ·y_L.
+y_H(x) = ρ·y_L(x) + b + δ(x) (Kennedy & O'Hagan 2000; Busch et al. 2022, section 2.3.1). The
+simulation is deterministic and costs milliseconds, so the low-fidelity level is evaluated, not
+modelled. An output without simulation is a plain GP: the same with no ρ·y_L.
 """
 
 from dataclasses import dataclass
@@ -32,6 +32,12 @@ class OutputPrior:
     length: float = 0.8
     spread: float = 1.0
     length_spread: float = 0.8
+
+    def of_theta(self, kernel: Kernel) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (p,) of a kernel's hyperparameters θ, which are logarithms."""
+        return kernel.prior(
+            self.amplitude, self.nugget, self.length, self.spread, self.length_spread
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +124,7 @@ def _unknown_sd(low: np.ndarray, priors: tuple[OutputPrior, ...]) -> np.ndarray:
 
 
 def _stack(priors: list[OutputPrior], uses_low: np.ndarray, kernel: Kernel) -> Prior:
-    theta = [
-        kernel.prior(p.amplitude, p.nugget, p.length, p.spread, p.length_spread) for p in priors
-    ]
+    theta = [p.of_theta(kernel) for p in priors]
     return Prior(
         mean=np.array([p.mean for p in priors]) * ~uses_low,
         bias_sd=np.array([p.bias_sd for p in priors]),

@@ -1,9 +1,9 @@
-"""FRFs of predicted modes, with uncertainty: exact moments, and quasi-Monte-Carlo beside them.
+"""FRFs of predicted modes with uncertainty: mean and standard deviation by quadrature.
 
 A prediction's frequencies, damping ratios and residues are independent, log-normal the first two,
 normal the last. An FRF is a sum over modes of a residue times a function of its pole, so mean and
-variance need only that function's moments over two variables: quadrature does it (`frf_moments`).
-Bands of the magnitude need samples (`frf_band`; seed 000, section 3.4; Saltelli et al. 2010).
+variance need only that function's moments over two variables, which quadrature gives. Busch et al.
+2022 (section 3.4) draw 10,000 quasi-random samples instead; the tests compare with those.
 """
 
 from dataclasses import dataclass
@@ -11,15 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.frf import synthesis
-from planner.surrogate.quasi_random import normal_points
 
-SAMPLES = 10_000
-REACH = 5.0  # sds of a frequency over which is integrated
-STEP = 0.5  # of that integral, at most: in sds and in half widths of the resonance
+FREQUENCY_REACH = 5.0  # sds of a frequency over which is integrated
+FREQUENCY_STEP = 0.5  # at most, in sds and in half widths of the resonance
 MOST_NODES = 1000
 DAMPING_NODES = 5
-MOST_DAMPED = 0.95
-CHUNK = 64  # samples at a time, which stay in the cache
+LARGEST_DAMPING = 0.95  # of a mode; beyond it there would be no oscillation
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +34,6 @@ class ModalPrediction:
     residue_sd: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
-class FrfBand:
-    """Of q poses and F lines: mean and sd of the complex FRF, and a band of its magnitude.
-
-    mean (q, 3, 3, F) in m/s²/N, sd the root of E|H − mean|², lower and upper bounds of |H|.
-    """
-
-    mean: np.ndarray
-    sd: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-
-
 def frf_moments(
     prediction: ModalPrediction, frequency_hz: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -65,7 +49,7 @@ def frf_moments(
         zf, zd, weights = _nodes(float(np.max(prediction.frequency_sd_hz[i] / half_width)))
         f = log_normal(prediction.frequency_hz[i], prediction.frequency_sd_hz[i], zf[:, None])
         zeta = log_normal(prediction.damping_ratio[i], prediction.damping_sd[i], zd[:, None])
-        poles = synthesis.pole(f, np.minimum(zeta, MOST_DAMPED))  # (nodes, k)
+        poles = synthesis.pole(f, np.minimum(zeta, LARGEST_DAMPING))  # (nodes, k)
         mean[i], sd[i] = _modal_sum(
             prediction.residue[i], prediction.residue_sd[i], poles, weights, frequency_hz
         )
@@ -78,8 +62,8 @@ def _nodes(spread: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     The trapezoidal rule over the frequency errs by exp(−2π half width/step), `spread` being the
     frequency's sd over the resonance's half width; Gauss-Hermite over the damping.
     """
-    count = int(min(MOST_NODES, np.ceil(2 * REACH / STEP * max(1.0, spread))))
-    zf = np.linspace(-REACH, REACH, count + 1)
+    count = int(min(MOST_NODES, np.ceil(2 * FREQUENCY_REACH / FREQUENCY_STEP * max(1.0, spread))))
+    zf = np.linspace(-FREQUENCY_REACH, FREQUENCY_REACH, count + 1)
     zd, wd = np.polynomial.hermite_e.hermegauss(DAMPING_NODES)
     both = np.outer(np.exp(-(zf**2) / 2), wd).ravel()
     return np.repeat(zf, len(zd)), np.tile(zd, len(zf)), both / both.sum()
@@ -102,52 +86,6 @@ def _modal_sum(
         square = (np.abs(r) ** 2 + 2 * s**2) * power + 2 * (r**2 * cross).real
         total, variance = total + mean, variance + square - np.abs(mean) ** 2
     return np.asarray(total), np.sqrt(np.maximum(variance, 0.0))
-
-
-def frf_band(
-    prediction: ModalPrediction, frequency_hz: np.ndarray, level: float = 0.95,
-    samples: int = SAMPLES, seed: int = 0, rows: int = 32,
-) -> FrfBand:  # fmt: skip
-    """The same by scrambled Sobol points, with the band that holds `level` of |H|.
-
-    `rows` lines are worked on at a time, for quantiles need every sample of a line.
-    """
-    q, k = prediction.frequency_hz.shape
-    normal = normal_points(samples, 20 * k, seed)
-    shape = (q, 3, 3, len(frequency_hz))
-    mean, parts = np.empty(shape, complex), [np.empty(shape) for _ in range(3)]
-    for i in range(q):
-        poles, residue = _draws(prediction, i, normal)
-        for start in range(0, len(frequency_hz), rows):
-            part = slice(start, start + rows)
-            h = _frfs(frequency_hz[part], poles, residue)
-            mean[i, ..., part] = h.mean(axis=0)
-            size = np.abs(h)
-            variance = np.mean(size**2, axis=0) - np.abs(mean[i, ..., part]) ** 2
-            bounds = np.quantile(size, [(1 - level) / 2, (1 + level) / 2], axis=0)
-            for out, value in zip(parts, (np.sqrt(np.maximum(variance, 0)), *bounds), strict=True):
-                out[i, ..., part] = value
-    return FrfBand(mean, *parts)
-
-
-def _draws(
-    prediction: ModalPrediction, i: int, normal: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Poles (s, k) and residues (s, k, 3, 3) of pose i."""
-    k = prediction.frequency_hz.shape[1]
-    zr = normal[:, 2 * k :].reshape(len(normal), k, 3, 3, 2)
-    f = log_normal(prediction.frequency_hz[i], prediction.frequency_sd_hz[i], normal[:, :k])
-    zeta = log_normal(prediction.damping_ratio[i], prediction.damping_sd[i], normal[:, k : 2 * k])
-    residue = prediction.residue[i] + prediction.residue_sd[i] * (zr[..., 0] + 1j * zr[..., 1])
-    return synthesis.pole(f, np.minimum(zeta, MOST_DAMPED)), residue
-
-
-def _frfs(frequency_hz: np.ndarray, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
-    """(s, 3, 3, F)."""
-    chunks = [slice(start, start + CHUNK) for start in range(0, len(poles), CHUNK)]
-    return np.concatenate(
-        [synthesis.accelerance(frequency_hz, poles[c], residue[c]) for c in chunks]
-    )
 
 
 def log_normal(median: np.ndarray, sd: np.ndarray, z: np.ndarray) -> np.ndarray:

@@ -19,15 +19,14 @@ from scipy.linalg.lapack import dtrtri
 
 from planner import jax_setup
 from planner.errors import InputError
-from planner.surrogate.importance import Gaussians, sample
+from planner.surrogate.importance import Gaussians, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
 from planner.surrogate.predictive import Predictive
-from planner.surrogate.quasi_random import normal_points
 from planner.surrogate.training_data import Padded
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
-UNREMARKABLE = 1e-10
-SINGULAR = (
+SILENT_JITTER = 1e-10  # of the prior variance; a larger one is reported
+SINGULAR_REMARK = (
     "The covariance was singular until {:g} of its variance was added to the noise: two poses are "
     "nearly the same, and their sds claim more than that."
 )
@@ -72,8 +71,8 @@ class Posterior:
         asked = range(len(self.mask)) if outputs is None else outputs.tolist()
         mean, sd = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
-            found = self.predictive(j, x, low[:, j])
-            mean[:, i], sd[:, i] = found.mean, found.sd
+            mixture = self.predictive(j, x, low[:, j])
+            mean[:, i], sd[:, i] = mixture.mean, mixture.sd
         return mean, sd
 
     def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:
@@ -161,7 +160,7 @@ def fit(
             continue
         weights = (np.swapaxes(whiten, 2, 3) @ (whiten @ y[:, None, :, None]))[..., 0]
         evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
-        remarks = (SINGULAR.format(jitter),) if jitter > UNREMARKABLE else ()
+        remarks = (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
         return Posterior(
             padded.x, padded.low, padded.mask, theta(z), whiten, weights, prior, kernel, evidence,
             remarks,

@@ -1,7 +1,7 @@
-"""AR1 and a GP that ignores the simulation, output by output as the data believe in either.
+"""AR1 and a GP that ignores the simulation, each output weighted by the evidence of either.
 
 A simulation whose modes are in another order, or that lacks physics, makes AR1 several times worse
-than a GP. Each output therefore weighs the two by their evidence (see `mixture`).
+than a GP. So the two are averaged with their evidence as weights (Hoeting et al. 1999).
 """
 
 from dataclasses import dataclass, replace
@@ -12,13 +12,13 @@ from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.gp import Posterior, Prior
 from planner.surrogate.training_data import TrainingData
 
-BELIEF = 0.5  # in the simulation, before anything is measured
-SURE = 0.999  # weight from which the other model is not asked
+PRIOR_BELIEF = 0.5  # in the simulation, before anything is measured
+NEARLY_CERTAIN = 0.999  # weight from which the other model is not evaluated
 
 
 @dataclass(frozen=True, eq=False)
 class HedgedAR1:
-    """Of every output the likelier model, the other one, and the likelier one's weight (m,)."""
+    """For every output the likelier model, the other one, and the likelier one's weight (m,)."""
 
     likelier: AR1
     other: AR1
@@ -42,7 +42,7 @@ class HedgedAR1:
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
         mean, sd = self.likelier.predict(x, low)
-        unsure = np.flatnonzero(self.weight < SURE)
+        unsure = np.flatnonzero(self.weight < NEARLY_CERTAIN)
         if not len(unsure):
             return mean, sd
         other, other_sd = self.other.predict(x, low, unsure)
@@ -61,13 +61,13 @@ def fit_hedged(
     samples: int = 256,
     kept: int = 32,
     judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
-    belief: float = BELIEF,
+    belief: float = PRIOR_BELIEF,
 ) -> HedgedAR1:
     """Fit m outputs; arguments as of `fit_ar1`.
 
-    `judged` are low-fidelity values (n, m) and priors by which the simulation is believed, where
-    those of `data` have seen the very measurements: what it said of each pose before. `belief` is
-    its probability before these data.
+    `judged` are low-fidelity values (n, m) and their priors by which the simulation is judged, for
+    a simulation that was fitted to these very measurements: what it gave each pose before it was
+    fitted to that pose. `belief` is the simulation's probability before these data.
     """
     fused = fit_ar1(data, with_low, without_low, centre, samples, kept)
     believed = fused

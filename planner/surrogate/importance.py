@@ -8,11 +8,20 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import logsumexp, softmax
+from scipy.special import logsumexp, ndtri, softmax
 
-INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
+PROPOSAL_INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
+
+
+def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
+    """Quasi-random points (samples, dimensions) of N(0, 1): a scrambled Sobol sequence."""
+    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+
+    sobol = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
+    unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
+    return ndtri(np.clip(unit, 1e-6, 1 - 1e-6))
 
 
 def sample(
@@ -35,8 +44,8 @@ def sample(
             centre, root = start
         else:
             centre, root = _around(points, softmax(_log_weight(points, like, proposals), axis=1))
-        proposals.append((centre, INFLATION * root))
-        moved = centre[:, None, :] + INFLATION * base @ np.swapaxes(root, 1, 2)
+        proposals.append((centre, PROPOSAL_INFLATION * root))
+        moved = centre[:, None, :] + PROPOSAL_INFLATION * base @ np.swapaxes(root, 1, 2)
         points = np.concatenate([points, moved], axis=1)
         like = np.concatenate([like, score(moved)], axis=1)
     log_weight = _log_weight(points, like, proposals)

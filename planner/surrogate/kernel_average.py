@@ -1,7 +1,7 @@
 """AR1s (or GPs) that differ in their kernel, averaged by evidence, output by output.
 
-Damping of one robot is the same everywhere, of another a smooth function of the pose; seed 000
-(section 3.2) chose its kernel by hand.
+Damping of one robot is the same everywhere, of another a smooth function of the pose; Busch et
+al. 2022 (section 3.2) choose its kernel by hand.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.gp import Posterior
 from planner.surrogate.training_data import TrainingData
 
-SURE = 1e-3  # weight below which a kernel is not asked
+NEGLIGIBLE_WEIGHT = 1e-3  # below which a kernel is not evaluated
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,11 +22,6 @@ class KernelAverage:
     kernels: tuple[str, ...]
     models: tuple[AR1, ...]
     weights: np.ndarray
-
-    @property
-    def likeliest(self) -> tuple[str, ...]:
-        """Each output's likeliest kernel."""
-        return tuple(self.kernels[i] for i in np.argmax(self.weights, axis=0).tolist())
 
     @property
     def posteriors(self) -> tuple[Posterior, ...]:
@@ -41,10 +36,10 @@ class KernelAverage:
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        asked = np.flatnonzero(self.weights.max(axis=1) > SURE).tolist()
-        found = [self.models[i].predict(x, low) for i in asked]
-        w = self.weights[asked][:, None, :] / self.weights[asked].sum(axis=0)
-        means, sds = (np.array([f[i] for f in found]) for i in (0, 1))
+        used = np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
+        predictions = [self.models[i].predict(x, low) for i in used]
+        w = self.weights[used][:, None, :] / self.weights[used].sum(axis=0)
+        means, sds = (np.array([f[i] for f in predictions]) for i in (0, 1))
         mean = np.sum(w * means, axis=0)
         return mean, np.sqrt(np.sum(w * (sds**2 + (means - mean) ** 2), axis=0))
 

@@ -2,7 +2,7 @@
 
 A shape is a pure function with unit variance: it takes the array library (numpy or jax.numpy),
 xa (…, a, d), xb (…, b, d) already divided by the length scales, and returns (…, a, b). A `Kernel`
-is an expression such as "matern52", "rbf+bias" or "rbf[:2]*periodic[2:3]+linear": shapes on
+is an expression such as "matern52", "rbf+bias" or "rbf[:2]*quadratic[2:3]+linear": shapes on
 columns of x, every factor with a length scale per column, every term with an amplitude.
 """
 
@@ -17,11 +17,11 @@ import numpy as np
 from planner.errors import InputError
 
 Shape = Callable[[Any, Any, Any], Any]
-LARGE = 10_000  # pairs from which a matrix product pays in XLA too
+MATRIX_PAIRS = 10_000  # pairs from which a matrix product pays in XLA too
 
 
 def _squared_distance(xp: Any, xa: Any, xb: Any) -> Any:
-    if xp is np or xa.shape[-2] * xb.shape[-2] >= LARGE:
+    if xp is np or xa.shape[-2] * xb.shape[-2] >= MATRIX_PAIRS:
         # One matrix product. Cancellation leaves an error of 1e-16 |x|² in r²; the kernels are
         # smooth functions of r², so it stays that small.
         one_a, one_b = xp.ones_like(xa[..., :1]), xp.ones_like(xb[..., :1])
@@ -35,27 +35,27 @@ def _squared_distance(xp: Any, xa: Any, xb: Any) -> Any:
 
 
 def bias(xp: Any, xa: Any, xb: Any) -> Any:
-    """Constant (seed 000, eq. 8)."""
+    """Constant (Busch et al. 2022, eq. 8)."""
     return xp.ones_like(xa[..., :, None, 0] * xb[..., None, :, 0])
 
 
 def linear(xp: Any, xa: Any, xb: Any) -> Any:
-    """x·x' (seed 000, eq. 4)."""
+    """x·x' (Busch et al. 2022, eq. 4)."""
     return xa @ xp.swapaxes(xb, -1, -2)
 
 
 def quadratic(xp: Any, xa: Any, xb: Any) -> Any:
-    """Square of the linear kernel (seed 000, eq. 5)."""
+    """Square of the linear kernel (Busch et al. 2022, eq. 5)."""
     return linear(xp, xa, xb) ** 2
 
 
 def cubic(xp: Any, xa: Any, xb: Any) -> Any:
-    """Cube of the linear kernel (seed 000, eq. 6)."""
+    """Cube of the linear kernel (Busch et al. 2022, eq. 6)."""
     return linear(xp, xa, xb) ** 3
 
 
 def rbf(xp: Any, xa: Any, xb: Any) -> Any:
-    """exp(−r²/2) (seed 000, eq. 7)."""
+    """exp(−r²/2) (Busch et al. 2022, eq. 7)."""
     return xp.exp(-_squared_distance(xp, xa, xb) / 2)
 
 
@@ -66,12 +66,6 @@ def _distance(xp: Any, xa: Any, xb: Any) -> Any:
     # √ has no slope at 0, so gradients there would be undefined. Asking twice whether r² is 0 will
     # not do: XLA computes it anew in each place, by fused operations that leave 1e-33 in one.
     return xp.sqrt(xp.maximum(squared, 1e-30))
-
-
-def matern32(xp: Any, xa: Any, xb: Any) -> Any:
-    """Matérn 3/2."""
-    r = 3.0**0.5 * _distance(xp, xa, xb)
-    return (1 + r) * xp.exp(-r)
 
 
 def matern52(xp: Any, xa: Any, xb: Any) -> Any:
@@ -86,12 +80,8 @@ KERNELS: dict[str, Shape] = {
     "quadratic": quadratic,
     "cubic": cubic,
     "rbf": rbf,
-    "matern32": matern32,
     "matern52": matern52,
-    # Of angles in rad: an RBF of points on the unit circle, exp(−2 sin²(Δ/2)/ℓ²) (MacKay 1998).
-    "periodic": rbf,
 }
-ON_CIRCLE = frozenset({"periodic"})
 SCALELESS = frozenset({"bias"})
 
 
@@ -107,10 +97,7 @@ class Factor:
         """x (…, a, d) as the shape wants it, θ (…, p)."""
         if self.name in SCALELESS:
             return x
-        x, scale = x[..., self.columns], xp.exp(theta[..., None, self.scales])
-        if self.name in ON_CIRCLE:
-            return xp.concatenate([xp.cos(x) / scale, xp.sin(x) / scale], axis=-1)
-        return x / scale
+        return x[..., self.columns] / xp.exp(theta[..., None, self.scales])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Leave-one-out: what each measurement would have been predicted as without it.
+"""Leave-one-out: how each measurement is predicted from all the others.
 
 For every hyperparameter sample the answer is in closed form (Sundararajan & Keerthi 2001): error
 α_i/(K⁻¹)_ii with variance 1/(K⁻¹)_ii, the measurement's own noise included. The samples, which
@@ -61,18 +61,20 @@ def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
     return LeaveOneOut(error, sd, rank)
 
 
-def report(found: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, ...]) -> list[str]:
+def report(residuals: LeaveOneOut, poses: tuple[str, ...], outputs: tuple[str, ...]) -> list[str]:
     """Lines for the user: coverage, and the poses that surprise most."""
-    count = int(np.isfinite(found.rank).sum())
+    count = int(np.isfinite(residuals.rank).sum())
     if count == 0:
         return ["Nothing is measured yet that could be left out."]
-    pairs = zip(LEVELS, found.coverage(), strict=True)
+    pairs = zip(LEVELS, residuals.coverage(), strict=True)
     shares = ", ".join(f"{100 * level:.0f} %: {100 * share:.0f} %" for level, share in pairs)
     lines = [
         f"Left out one by one, {count} values lie inside their intervals as follows: {shares}."
     ]
-    for i in found.worst():
-        score = np.where(np.isfinite(found.error[i]), np.abs(found.error[i] / found.sd[i]), 0.0)
+    for i in residuals.worst():
+        score = np.where(
+            np.isfinite(residuals.error[i]), np.abs(residuals.error[i] / residuals.sd[i]), 0.0
+        )
         j = int(np.argmax(score))
         if score[j] > 2:
             lines.append(f"{poses[i]}: {outputs[j]} is {score[j]:.1f} sd off what the others say.")

@@ -7,14 +7,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.scipy.linalg import cho_solve
-from scipy.optimize import minimize
 
+from planner.inference.quasi_newton import maximise
 from planner.surrogate.gp import Prior
 from planner.surrogate.kernels import parse
 from planner.surrogate.training_data import Padded
 
-JITTER = 1e-12
-SOME = 128  # points that are enough to find the neighbourhood of the MAP
+RELATIVE_JITTER = 1e-12  # of the largest prior variance, added to the diagonal
+REACH = 4.0  # sds of the prior beyond which nothing is looked for
+SUBSET_POINTS = 128  # that are enough to find the neighbourhood of the MAP
 
 _Data = tuple[np.ndarray, tuple[np.ndarray, ...]]
 
@@ -52,7 +53,7 @@ def _covariance(
     """Covariance (c, c) of the data; entries that do not count are decoupled."""
     theta = mean + sd * z
     k = parse(kernel, x.shape[1]).covariance(jnp, theta, x, x) + fixed
-    noise = variance + jnp.exp(2 * theta[1]) + JITTER * jnp.max(jnp.diagonal(k))
+    noise = variance + jnp.exp(2 * theta[1]) + RELATIVE_JITTER * jnp.max(jnp.diagonal(k))
     return k * mask[:, None] * mask[None, :] + jnp.diag(jnp.where(mask > 0, noise, 1.0))
 
 
@@ -76,36 +77,22 @@ def _precision(kernel: str, z: Array, *data: Array) -> Array:
 def most_probable(kernel: str, padded: Padded, prior: Prior, output: int) -> np.ndarray:
     """z = (θ − mean)/sd (p,) of one output where prior × likelihood is greatest (MAP).
 
-    L-BFGS from three lengths one after the other, which on a CPU is faster than side by side. Of
-    many points some find the place, and all of them the peak.
+    L-BFGS from three length scales, one after the other (faster on a CPU than side by side). Of
+    more than SUBSET_POINTS points, a subset finds a start for the fit to all of them.
     """
     data = _data(padded, prior, output)
     p = prior.theta_mean.shape[1]
     starts = [np.r_[0.0, 0.0, np.full(p - 2, length)] for length in (0.0, 1.5, -2.0)]
-    if len(padded.x) <= SOME:
+    if len(padded.x) <= SUBSET_POINTS:
         return _climb(kernel, data, starts)
     known = np.flatnonzero(padded.mask[output])
-    some = known[np.linspace(0, len(known) - 1, min(SOME, len(known))).astype(int)]
+    some = known[np.linspace(0, len(known) - 1, min(SUBSET_POINTS, len(known))).astype(int)]
     return _climb(kernel, data, [_climb(kernel, _part(data, some), starts)], steps=15)
 
 
 def _climb(kernel: str, data: _Data, starts: list[np.ndarray], steps: int = 200) -> np.ndarray:
-    p = len(starts[0])
-
-    def negative(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = _objective(kernel, data[0], z, *data[1])
-        found = np.isfinite(value)
-        return (-float(value), -np.array(slope)) if found else (1e10, np.zeros(p))
-
-    best, least = starts[0], np.inf
-    for start in starts:
-        done = minimize(
-            negative, start, jac=True, method="L-BFGS-B", bounds=[(-4.0, 4.0)] * p,
-            options={"maxiter": steps},
-        )  # fmt: skip
-        if done.fun < least:
-            best, least = done.x, done.fun
-    return best
+    y, rest = data
+    return maximise(lambda z: _objective(kernel, y, z, *rest), starts, -REACH, REACH, steps).x
 
 
 def laplace(kernel: str, padded: Padded, prior: Prior) -> tuple[np.ndarray, np.ndarray]:

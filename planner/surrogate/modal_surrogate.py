@@ -1,9 +1,9 @@
 """The pose-dependent modal parameters: frequencies, damping ratios and residues by label.
 
-Frequencies are modelled as log f by AR1 over the simulation (primary feature of seed 000), or
-without it where the measurements speak against it, damping as log ζ by a GP whose kernel the
-measurements choose, residues part by part (real, imaginary) by AR1 on values scaled to the mode's
-own size. Logarithms keep frequencies and damping positive.
+Frequencies are modelled as log f by AR1 over the simulation (primary feature of Busch et al.
+2022), or without it where the measurements speak against it, damping as log ζ by a GP whose kernel
+the measurements choose, residues part by part (real, imaginary) by AR1 on values scaled to the
+mode's own size. Logarithms keep frequencies and damping positive.
 """
 
 from dataclasses import dataclass, replace
@@ -13,24 +13,24 @@ import numpy as np
 from planner.dynamics.vibration import SimulatedModes
 from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.frf_bands import ModalPrediction
-from planner.surrogate.hedged import BELIEF, HedgedAR1, fit_hedged
+from planner.surrogate.hedged import PRIOR_BELIEF, HedgedAR1, fit_hedged
 from planner.surrogate.kernel_average import KernelAverage, fit_shapes
 from planner.surrogate.training_data import TrainingData
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
-FREQUENCY = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
-FREQUENCY_ALONE = OutputPrior(1.0, 0.0, amplitude=0.2, nugget=0.002, mean=float(np.log(20.0)))
-DAMPING = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0.03)))
-DAMPING_KERNELS = ("bias", "cubic", "matern52")  # seed 000's, and one that can follow anything
-REACH = -0.25, 1.25  # of coordinates, beyond which damping stays as it is: polynomials run away
-VAGUEST = 10.0  # sd of a logarithm that is told from larger ones: their exponentials overflow
-RESIDUE = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
-RESIDUE_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
+FREQUENCY_PRIOR = OutputPrior(bias_sd=0.15, slope_sd=0.2, amplitude=0.03, nugget=0.002)
+FREQUENCY_PRIOR_ALONE = OutputPrior(1.0, 0.0, amplitude=0.2, nugget=0.002, mean=float(np.log(20.0)))
+DAMPING_PRIOR = OutputPrior(1.0, 0.0, amplitude=0.15, nugget=0.05, mean=float(np.log(0.03)))
+DAMPING_KERNELS = ("bias", "cubic", "matern52")  # of Busch et al. 2022; any shape
+DAMPING_RANGE = -0.25, 1.25  # of coordinates; beyond it damping stays: polynomials run away
+LARGEST_LOG_SD = 10.0  # of a logarithm: exponentials of larger ones overflow
+RESIDUE_PRIOR = OutputPrior(bias_sd=0.2, slope_sd=0.5, amplitude=0.2, nugget=0.02)
+RESIDUE_PRIOR_ALONE = OutputPrior(bias_sd=0.7, slope_sd=0.0, amplitude=0.5, nugget=0.02)
 # Beside a simulation that was identified from these very recordings and fits them.
-DAMPING_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
-RESIDUE_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
+DAMPING_PRIOR_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nugget=0.02)
+RESIDUE_PRIOR_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
-NUGGET = 1e-3  # of ln f beside an identified simulation
+FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
 SAMPLES, KEPT = 256, 32
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
@@ -77,7 +77,7 @@ class Surrogate:
 
     def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
         """The same with the residues fitted too, to what `fit_surrogate` was given."""
-        return replace(self, residue=_fit_residues(seen, self.scale, True, taught))
+        return replace(self, residue=_fit_residues(seen, self.scale, taught))
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""
@@ -87,7 +87,9 @@ class Surrogate:
         """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted."""
         q, k = len(x), self.count
         mean, sd = self.primary.predict(x, _log(simulated.frequency_hz))
-        log_zeta, zeta_sd = self.damping.predict(np.clip(x, *REACH), _log(simulated.damping_ratio))
+        log_zeta, zeta_sd = self.damping.predict(
+            np.clip(x, *DAMPING_RANGE), _log(simulated.damping_ratio)
+        )
         f, zeta = np.exp(mean), np.exp(log_zeta)
         parts, parts_sd = self._parts(x, simulated)
         parts = parts.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
@@ -111,7 +113,7 @@ class Surrogate:
 
 def _relative_sd(sd: np.ndarray) -> np.ndarray:
     """Sd of a log-normal variable over its median."""
-    sd = np.minimum(sd, VAGUEST)
+    sd = np.minimum(sd, LARGEST_LOG_SD)
     return np.sqrt(np.expm1(sd**2)) * np.exp(sd**2 / 2)
 
 
@@ -131,29 +133,26 @@ def fit_primary(
     seen: ModalObservations,
     discrepancy: np.ndarray | None = None,
     left_out_hz: np.ndarray | None = None,
-    has_simulation: bool = True,
-    reference: SimulatedModes | None = None,
-    belief: float = BELIEF,
+    belief: float = PRIOR_BELIEF,
 ) -> HedgedAR1:
-    """Fit log f of every label.
+    """Fit ln f of every label.
 
-    `discrepancy` (k,) is how far ln f of a simulation that was fitted to these very modes is off
-    elsewhere: its error at the measured poses says too little. None: it was not fitted.
-    `left_out_hz` (n, k) is what it said of each pose before it had seen it, by which it is judged.
-    `reference` is the simulation over the workspace: it says how large frequencies are before
-    anything is measured. `belief` is the simulation's probability before these frequencies.
+    Args:
+        seen: modes by label at n poses, and the simulation's there.
+        discrepancy: how far ln f (k,) of a simulation that was fitted to these very modes is off
+            elsewhere; its error at the measured poses says too little. None: it was not fitted.
+        left_out_hz: frequencies (n, k) that the simulation gave each pose before it was fitted to
+            that pose, by which it is judged.
+        belief: probability of the simulation before these frequencies.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
-    default = np.full(k, np.log(20.0) if has_simulation else np.nan)
-    if reference is not None:
-        default = _centre(_log(reference.frequency_hz), default)
-    judged = None if left_out_hz is None else (_log(left_out_hz), (FREQUENCY,) * k)
+    judged = None if left_out_hz is None else (_log(left_out_hz), (FREQUENCY_PRIOR,) * k)
     return fit_hedged(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
         tuple(_frequency_priors(k, discrepancy)),
-        (FREQUENCY_ALONE,) * k,
-        _centre(low, default),
+        (FREQUENCY_PRIOR_ALONE,) * k,
+        _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
         SAMPLES,
         KEPT,
         judged,
@@ -168,44 +167,42 @@ def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
     low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
     data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low)
     centre = _centre(low, np.full(count, np.nan))
-    with_low, without_low = (DAMPING_TAUGHT,) * count, (DAMPING,) * count
+    with_low, without_low = (DAMPING_PRIOR_TAUGHT,) * count, (DAMPING_PRIOR,) * count
     return fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
 
 
 def fit_surrogate(
     seen: ModalObservations,
-    has_simulation: bool = True,
-    reference: SimulatedModes | None = None,
     primary: HedgedAR1 | None = None,
     residues: bool = True,
     taught: bool = False,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
-    `reference` is as in `fit_primary`; `primary` is what that gave, where it was fitted already.
-    Without `residues` these are left out, which takes two thirds of the time. `taught`: the
-    simulation was identified from these measurements' own FRFs and fits them, so that damping and
-    residues are nearly its own.
+    Args:
+        seen: modes by label at n poses, and the simulation's there.
+        primary: what `fit_primary` gave, where it was called already.
+        residues: whether residues are fitted too, which takes two thirds of the time.
+        taught: whether the simulation was identified from these measurements' own FRFs and fits
+            them, so that damping and residues are nearly its own.
     """
     if primary is None:
-        primary = fit_primary(seen, has_simulation=has_simulation, reference=reference)
-    scale = _scale(seen, reference)
-    residue = _fit_residues(seen, scale, has_simulation, taught) if residues else None
+        primary = fit_primary(seen)
+    scale = _scale(seen)
+    residue = _fit_residues(seen, scale, taught) if residues else None
     return Surrogate(primary, fit_damping(seen, taught), residue, scale)
 
 
-def _fit_residues(
-    seen: ModalObservations, scale: np.ndarray, has_simulation: bool, taught: bool
-) -> HedgedAR1:
+def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> HedgedAR1:
     """Fit the real and imaginary parts of every label's residues, in units of `scale`."""
     k, wide = len(scale), np.repeat(scale, 18)
     parts_sd = np.repeat(seen.residue_sd.reshape(len(seen.x), 9 * k), 2, axis=1)
     low = _parts(seen.simulated.residue) / wide
     return fit_hedged(
         TrainingData(seen.x, _parts(seen.residue) / wide, parts_sd / wide, low),
-        (RESIDUE_TAUGHT if taught else RESIDUE,) * (18 * k),
-        (RESIDUE_ALONE,) * (18 * k),
-        np.zeros(18 * k) if has_simulation else np.full(18 * k, np.nan),
+        (RESIDUE_PRIOR_TAUGHT if taught else RESIDUE_PRIOR,) * (18 * k),
+        (RESIDUE_PRIOR_ALONE,) * (18 * k),
+        np.zeros(18 * k),
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
     )
@@ -213,9 +210,16 @@ def _fit_residues(
 
 def _frequency_priors(k: int, discrepancy: np.ndarray | None) -> list[OutputPrior]:
     if discrepancy is None:
-        return [FREQUENCY] * k
+        return [FREQUENCY_PRIOR] * k
     return [
-        replace(FREQUENCY, bias_sd=size, slope_sd=size, amplitude=size, nugget=NUGGET, spread=0.5)
+        replace(
+            FREQUENCY_PRIOR,
+            bias_sd=size,
+            slope_sd=size,
+            amplitude=size,
+            nugget=FITTED_NUGGET,
+            spread=0.5,
+        )
         for size in map(float, discrepancy)
     ]
 
@@ -227,11 +231,10 @@ def _centre(low: np.ndarray, default: np.ndarray) -> np.ndarray:
     return np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), default)
 
 
-def _scale(seen: ModalObservations, reference: SimulatedModes | None) -> np.ndarray:
+def _scale(seen: ModalObservations) -> np.ndarray:
     """Size (k,) of each mode's residues: measured, else simulated, else typical."""
     out = np.full(seen.frequency_hz.shape[1], np.nan)
-    simulated = reference.residue if reference is not None else seen.simulated.residue
-    for residue in (seen.residue, seen.simulated.residue, simulated):
+    for residue in (seen.residue, seen.simulated.residue):
         size = np.abs(residue)
         known = np.isfinite(size)
         mean = np.where(known, size, 0.0) ** 2

@@ -1,4 +1,4 @@
-"""A prediction as what it is: a mixture of Gaussians, one per model and hyperparameter sample.
+"""A prediction as a mixture of Gaussians, one per model and hyperparameter sample.
 
 Mean and sd alone make it a Gaussian, which it is not where the models disagree: then its tails are
 heavier and its middle narrower.
@@ -7,9 +7,9 @@ heavier and its middle narrower.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp, ndtr, ndtri
+from scipy.special import ndtr, ndtri
 
-HALVINGS = 60
+BISECTIONS = 60  # 2⁻⁶⁰ of the first interval: all digits of a double
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +35,6 @@ class Predictive:
         """(q,)."""
         return np.sqrt(self.weights @ (self.sds**2 + (self.means - self.mean) ** 2))
 
-    def log_density(self, y: np.ndarray, least_sd: float = 0.0) -> np.ndarray:
-        """log p(y) (q,); no component counts as surer than `least_sd`."""
-        sds = np.maximum(self.sds, least_sd)
-        return np.asarray(
-            logsumexp(_log_normal(y, self.means, sds), axis=0, b=self.weights[:, None])
-        )
-
     def below(self, y: np.ndarray) -> np.ndarray:
         """Probability (q,) of a value below y (q,)."""
         sds = np.maximum(self.sds, 1e-300)
@@ -52,15 +45,11 @@ class Predictive:
         reach = abs(ndtri(probability)) + 8
         low, high = (np.min(self.means - reach * self.sds, axis=0),
                      np.max(self.means + reach * self.sds, axis=0))  # fmt: skip
-        for _ in range(HALVINGS):
+        for _ in range(BISECTIONS):
             middle = (low + high) / 2
             short = self.below(middle) < probability
             low, high = np.where(short, middle, low), np.where(short, high, middle)
         return (low + high) / 2
-
-    def interval(self, level: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds (q,) of the central interval that holds `level` of the probability."""
-        return self.quantile((1 - level) / 2), self.quantile((1 + level) / 2)
 
     def scaled(self, centre: float, scale: float) -> "Predictive":
         """Of centre + scale·y."""
@@ -69,18 +58,3 @@ class Predictive:
     def widened(self, sd: np.ndarray) -> "Predictive":
         """With independent noise of sd (k, q) or (q,) added."""
         return Predictive(self.weights, self.means, np.hypot(self.sds, sd))
-
-
-def together(parts: list[Predictive], weights: np.ndarray) -> Predictive:
-    """The mixture of mixtures, in these proportions (sum to one)."""
-    shares = [w * p.weights for w, p in zip(weights.tolist(), parts, strict=True)]
-    return Predictive(
-        np.concatenate(shares),
-        np.concatenate([p.means for p in parts]),
-        np.concatenate([p.sds for p in parts]),
-    )
-
-
-def _log_normal(y: np.ndarray, mean: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """Logarithm of the normal density; shapes broadcast."""
-    return -0.5 * ((y - mean) / sd) ** 2 - np.log(sd) - 0.5 * np.log(2 * np.pi)

@@ -1,10 +1,10 @@
-"""Training data of many outputs over one set of poses, padded so that growth compiles nothing."""
+"""Training data of many outputs over one set of poses, padded to few sizes to compile rarely."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-CAPACITIES = (16, 24, 32, 48, 64, 96, 128, 256, 512)
+PADDED_SIZES = (16, 24, 32, 48, 64, 96, 128, 256, 512)  # each is compiled once
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Padded:
 
 def capacity(n: int) -> int:
     """Smallest padded size that holds n poses."""
-    return next((c for c in CAPACITIES if c >= n), -(-n // CAPACITIES[-1]) * CAPACITIES[-1])
+    return next((c for c in PADDED_SIZES if c >= n), -(-n // PADDED_SIZES[-1]) * PADDED_SIZES[-1])
 
 
 def pad(data: TrainingData, uses_low: np.ndarray) -> Padded:

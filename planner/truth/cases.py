@@ -25,11 +25,11 @@ from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
 from planner.truth.model import Truth, load_truth
 from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
-from planner.truth.secret import Secret, Visit, frfs, hit_poses, once
+from planner.truth.secret import HitVisit, Secret, frfs, hit_poses, once
 
 EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
 KINDS = ("null", *EFFECTS, "pair", "drives")  # "drives": one law in several joints
-MIX = ("null", *EFFECTS, "pair", "null", "pair", "pair")  # so often: there are many pairs to tell
+MIX = ("null", *EFFECTS, "pair", "null", "pair", "pair")  # pairs more often: there are many kinds
 DRIVES = 2, 4  # how many joints, at least and at most
 # Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
@@ -71,8 +71,8 @@ def make_case(kind: str, robot: str, seed: int, folder: Path) -> Case:
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
     truth = load_truth(robot_toml, plain.deviation)
     scene = Scene(arm, truth, per_joint, poses, hammer.peak_n)
-    found, measures = _conceal(kind, scene, plain, robot_toml, hammer, rng)
-    secret = found[-1].secret if found else plain
+    concealed, measures = _conceal(kind, scene, plain, robot_toml, hammer, rng)
+    secret = concealed[-1].secret if concealed else plain
     truth = load_truth(robot_toml, secret.deviation)
     _record(truth, secret, poses[:POSES], folder / "recordings", hammer, rng)
     held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
@@ -84,13 +84,13 @@ def make_case(kind: str, robot: str, seed: int, folder: Path) -> Case:
             "seed": seed,
             "elastic_freedoms": 6 * per_joint,
             "noise": hammer.noise,
-            "outside_library": any(drawn.effect == "unknown" for drawn in found),
+            "outside_library": any(drawn.effect == "unknown" for drawn in concealed),
             "effects": [
                 {"effect": d.effect, "at": d.at, "parameters": d.parameters, **asdict(m)}
-                for d, m in zip(found, measures, strict=True)
+                for d, m in zip(concealed, measures, strict=True)
             ],
             "held_out": _held_out(truth, secret, held_out, arm, hammer),
-            "salt": secrets.token_hex(16),  # so that nobody can try answers against the hash
+            "salt": secrets.token_hex(16),  # so that answers cannot be found by trying hashes
         },
         indent=1,
     )
@@ -106,15 +106,15 @@ def _conceal(
     hammer: Hammer,
     rng: np.random.Generator,
 ) -> tuple[list[Drawn], list[Detectability]]:
-    """Effects one upon the other, each drawn until the FRFs show it beyond doubt."""
+    """Effects added one after the other, each drawn until it shows clearly in the FRFs."""
     several = {"null": lambda *_: [], "pair": _pair, "drives": _drives}
     names = several[kind](scene, rng) if kind in several else [kind]
-    found: list[Drawn] = []
+    concealed: list[Drawn] = []
     measures: list[Detectability] = []
     for name in names:
         for _ in range(ATTEMPTS):
             drawn = EFFECTS[name](scene, secret, rng)
-            if kind == "drives" and not _joins(drawn, found):
+            if kind == "drives" and not _joins(drawn, concealed):
                 continue
             with_it = load_truth(robot_toml, drawn.secret.deviation)
             if not all(np.all(with_it.poles(q)[0].real < 0) for q in scene.poses):
@@ -122,7 +122,7 @@ def _conceal(
             without = load_truth(robot_toml, secret.deviation)
             measure = detectability(without, secret, with_it, drawn.secret, scene, hammer)
             if measure.shows(in_levels=name in NONLINEAR, in_time=name == "drift"):
-                found.append(drawn)
+                concealed.append(drawn)
                 measures.append(measure)
                 secret = drawn.secret
                 break
@@ -130,7 +130,7 @@ def _conceal(
             raise NothingShowsError(
                 f"No {name} of this robot shows in the noise; take another seed."
             )
-    return found, measures
+    return concealed, measures
 
 
 def _pair(scene: Scene, rng: np.random.Generator) -> list[str]:
@@ -145,11 +145,11 @@ def _drives(scene: Scene, rng: np.random.Generator) -> list[str]:
     return [str(rng.choice(list(NONLINEAR)))] * int(rng.integers(DRIVES[0], DRIVES[1] + 1))
 
 
-def _joins(drawn: Drawn, found: list[Drawn]) -> bool:
+def _joins(drawn: Drawn, concealed: list[Drawn]) -> bool:
     """Whether a law is at a joint of its own, and hardens or softens as the others do."""
-    numbers = [next(iter(d.parameters.values())) for d in (drawn, *found)]
+    numbers = [next(iter(d.parameters.values())) for d in (drawn, *concealed)]
     signs = {v > 0 for v in numbers if isinstance(v, float)}
-    return len(signs) == 1 and all(d.at != drawn.at for d in found)
+    return len(signs) == 1 and all(d.at != drawn.at for d in concealed)
 
 
 def _record(
@@ -167,11 +167,11 @@ def _record(
     for number, index in enumerate(visits):
         scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
         readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-        planned.append(Visit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
+        planned.append(HitVisit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
     rows = []
     counts: dict[tuple[int, str], int] = {}
-    found = hit_poses(truth, secret, planned, hammer, rng)
-    for index, readback, hits in zip(visits, readbacks, found, strict=True):
+    recorded = hit_poses(truth, secret, planned, hammer, rng)
+    for index, readback, hits in zip(visits, readbacks, recorded, strict=True):
         for hit in hits:
             repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
             rows.append((f"P{index + 1:02d}", readback, repeat, hit))

@@ -1,4 +1,4 @@
-"""How clearly an effect shows in the FRFs: a case that nobody could solve proves nothing."""
+"""How clearly an effect shows in the FRFs: cases whose effect is below the noise are not used."""
 
 from dataclasses import dataclass, replace
 
@@ -9,9 +9,9 @@ from planner.truth.model import Truth
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret, frfs, once
 
-POSES = 3
-CLEARLY = 3.0  # times the noise of a single hit's FRF
-AT_LEAST = 0.05
+COMPARED_POSES = 3  # the first ones of the scene
+LEAST_NOISE_RATIO = 3.0  # change over the noise of a single hit's FRF
+LEAST_CHANGE = 0.05  # of the FRFs, relative
 LOW, HIGH = 0.4, 2.5  # of the middling peak force
 
 
@@ -35,7 +35,7 @@ class Detectability:
         seen = [self.change]
         seen += [self.level_change] if in_levels else []
         seen += [self.time_change] if in_time else []
-        return min(seen) > max(AT_LEAST, CLEARLY * self.frf_noise)
+        return min(seen) > max(LEAST_CHANGE, LEAST_NOISE_RATIO * self.frf_noise)
 
 
 def detectability(
@@ -43,7 +43,7 @@ def detectability(
 ) -> Detectability:
     """Compare noise-free hits without (`truth`, `secret`) and with the effect."""
     quiet = replace(hammer, noise=0.0, force_noise=0.0)
-    poses, band, peak = scene.poses[:POSES], scene.arm.band_hz, scene.peak_n
+    poses, band, peak = scene.poses[:COMPARED_POSES], scene.arm.band_hz, scene.peak_n
     middling = [once(q, peak) for q in poses]
     plain = frfs(truth, secret, middling, quiet, band)[1]
     noisy = frfs(truth, secret, middling, hammer, band)[1]

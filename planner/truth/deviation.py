@@ -1,4 +1,4 @@
-"""How a true robot deviates from what its folder says: scatter, and linear physics left out."""
+"""How a true robot deviates from its robot folder: scatter, and linear physics left out."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class Spring:
 
 
 @dataclass(frozen=True)
-class AddedMass:
+class AttachedMass:
     """A compact mass (kg) on a link, at a position (m) in the link's frame."""
 
     link: str
@@ -31,7 +31,7 @@ class AddedMass:
 
 
 @dataclass(frozen=True)
-class Resonator:
+class AttachedResonator:
     """A small mass (kg) on a spring of its own, at a position (m) and along a direction of a link.
 
     `frequency_hz` and `damping_ratio` are those that it has on a link that is held.
@@ -46,7 +46,7 @@ class Resonator:
 
 
 @dataclass(frozen=True)
-class Scaled:
+class ScaledJoint:
     """Stiffness and damping of a joint about its own axis, times a factor."""
 
     joint: str
@@ -54,7 +54,7 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class Harmonic:
+class StiffnessRipple:
     """Stiffness of a joint about its own axis, times 1 + c cos(n q) + s sin(n q)."""
 
     joint: str
@@ -88,8 +88,8 @@ class Deviation:
     inertia: float = 0.0
     com_m: float = 0.0
     extra: tuple[Spring, ...] = ()
-    added: tuple[AddedMass, ...] = ()
-    resonators: tuple[Resonator, ...] = ()
-    scaled: tuple[Scaled, ...] = ()
-    harmonics: tuple[Harmonic, ...] = ()
+    added: tuple[AttachedMass, ...] = ()
+    resonators: tuple[AttachedResonator, ...] = ()
+    scaled: tuple[ScaledJoint, ...] = ()
+    harmonics: tuple[StiffnessRipple, ...] = ()
     feedback: tuple[Feedback, ...] = ()

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from planner.truth.deviation import AddedMass, Harmonic, Resonator, Scaled
-from planner.truth.laws import Backlash, Friction, Hardening, Law
+from planner.truth.deviation import AttachedMass, AttachedResonator, ScaledJoint, StiffnessRipple
+from planner.truth.laws import Backlash, Friction, Hardening, JointLaw
 from planner.truth.nonlinear import Port
 from planner.truth.scene import (
     Draw,
@@ -22,9 +22,9 @@ from planner.truth.scene import (
     some_joint,
     triple,
 )
-from planner.truth.secret import Drift, Secret
+from planner.truth.secret import Secret, StiffnessDrift
 
-ALONG = 0.9  # cosine from which a link runs along an axis
+PARALLEL_COSINE = 0.9  # from which a link runs along an axis
 
 
 def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
@@ -32,7 +32,7 @@ def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
     joint = some_joint(rng)
     factor = log_uniform(rng, 0.3, 0.55) if rng.random() < 0.7 else log_uniform(rng, 2.0, 3.5)
     parameters: Parameters = {"factor": factor, "stiffness": factor * scene.stiffness(joint)}
-    change = deviate(secret, scaled=(Scaled(joint, factor),))
+    change = deviate(secret, scaled=(ScaledJoint(joint, factor),))
     return Drawn("joint_stiffness", joint, parameters, change)
 
 
@@ -79,7 +79,7 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
     link, along = f"link_{number}", scene.length(number)
     kind = str(rng.choice(["bending", "torsion", "both"], p=[0.5, 0.25, 0.25]))
     axis = np.array(scene.arm.joints[number - 1].axis, dtype=float)
-    if kind == "torsion" and abs(axis @ along) > ALONG * np.linalg.norm(along):
+    if kind == "torsion" and abs(axis @ along) > PARALLEL_COSINE * np.linalg.norm(along):
         kind = "bending"
     own = scene.stiffness(f"joint_{number}")
     parameters: Parameters = {"kind": kind}
@@ -97,11 +97,11 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
 
 
 def added_mass(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """A lump on a link, or a payload that nobody told."""
+    """A lump on a link, or a payload missing from the robot folder."""
     number = int(rng.integers(2, 7))
     mass = scene.moving_kg * log_uniform(rng, 0.03, 0.15)
     place = rng.uniform(0.1, 1.0) * scene.length(number) + 0.1 * some_direction(rng)
-    lump = AddedMass(f"link_{number}", triple(place), mass)
+    lump = AttachedMass(f"link_{number}", triple(place), mass)
     parameters: Parameters = {"mass": mass, "position_m": place.tolist()}
     return Drawn("added_mass", lump.link, parameters, deviate(secret, added=(lump,)))
 
@@ -111,7 +111,7 @@ def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
     number = int(rng.integers(2, 7))
     low, *_, high = scene.truth.modes(scene.poses[0], 4)[0]
     place = rng.uniform(0.3, 1.0) * scene.length(number)
-    small = Resonator(
+    small = AttachedResonator(
         f"link_{number}",
         triple(place),
         triple(some_direction(rng)),
@@ -133,7 +133,7 @@ def angle_dependent_stiffness(scene: Scene, secret: Secret, rng: np.random.Gener
     """Stiffness that goes with the joint's angle: first or second harmonic."""
     joint, order = some_joint(rng), int(rng.integers(1, 3))
     size, phase = rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
-    wave = Harmonic(joint, order, float(size * np.cos(phase)), float(size * np.sin(phase)))
+    wave = StiffnessRipple(joint, order, float(size * np.cos(phase)), float(size * np.sin(phase)))
     parameters: Parameters = {"order": float(order), "cosine": wave.cosine, "sine": wave.sine}
     change = deviate(secret, harmonics=(wave,))
     return Drawn("angle_dependent_stiffness", joint, parameters, change)
@@ -146,7 +146,9 @@ def structural_damping(scene: Scene, secret: Secret, rng: np.random.Generator) -
     return Drawn("structural_damping", "joints", {"loss_factor": loss}, change)
 
 
-def _in_joint(effect: str, joint: str, law: Law, parameters: Parameters, secret: Secret) -> Drawn:
+def _in_joint(
+    effect: str, joint: str, law: JointLaw, parameters: Parameters, secret: Secret
+) -> Drawn:
     change = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
     return Drawn(effect, joint, parameters, change)
 
@@ -198,7 +200,7 @@ def backlash(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
 def drift(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Stiffnesses change in the course of the campaign."""
     size = rng.uniform(0.12, 0.35) * rng.choice([-1, 1])
-    law = Drift(float(size), str(rng.choice(["linear", "warming", "step"])))
+    law = StiffnessDrift(float(size), str(rng.choice(["linear", "warming", "step"])))
     parameters: Parameters = {"change": law.change, "course": law.course}
     return Drawn("drift", "campaign", parameters, replace(secret, drift=law))
 

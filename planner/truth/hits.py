@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from scipy import signal
 
-OVERSAMPLING = 16
+OVERSAMPLING = 16  # time steps of the solution per sample of the analyser
 AXES = ("x", "y", "z")
 
 
@@ -147,7 +147,7 @@ def record_poses(
     hammer: Hammer | None = None,
     seed: int = 0,
 ) -> Path:
-    """A recordings folder (contract section 2) of poses (name, q in rad); returns its path.
+    """A recordings folder of poses (name, q in rad); returns its path.
 
     Angles in recordings.csv are the readback, and it is there that the truth is evaluated.
     """
@@ -194,7 +194,7 @@ def write_predict(
     poses: Sequence[tuple[str, np.ndarray]],
     peak_force_n: float | None = None,
 ) -> Path:
-    """`predict.csv` (contract section 2): poses (name, q in rad) of which the FRF is wanted."""
+    """`predict.csv`: poses (name, q in rad) of which the FRF is wanted."""
     path = folder / "predict.csv"
     force = [] if peak_force_n is None else [f"{peak_force_n:g}"]
     with open(path, "w", newline="", encoding="utf-8") as file:

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 
-class Law(Protocol):
+class JointLaw(Protocol):
     """A torque added to the linear spring's, with an internal state (0 at rest)."""
 
     @property
@@ -36,7 +36,7 @@ class Elastic(ABC):
     def torque(
         self, state: np.ndarray, before: np.ndarray, now: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """See `Law`."""
+        """See `JointLaw`."""
         return self.at(now), state
 
 

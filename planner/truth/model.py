@@ -15,7 +15,7 @@ import numpy as np
 import scipy.linalg
 
 from planner.errors import InputError
-from planner.truth.deviation import Deviation, Resonator, Spring
+from planner.truth.deviation import AttachedResonator, Deviation, Spring
 from planner.truth.mjcf import Builder
 from planner.truth.propagate import driven
 
@@ -331,7 +331,7 @@ def _times(spring: Spring, factor: float) -> Spring:
     return replace(spring, stiffness=factor * spring.stiffness, damping=factor * spring.damping)
 
 
-def _spring(small: Resonator, number: int) -> Spring:
+def _spring(small: AttachedResonator, number: int) -> Spring:
     w = 2 * np.pi * small.frequency_hz
     damping = 2 * small.damping_ratio * small.mass_kg * w
     return Spring(f"resonator {number}", small.direction, small.mass_kg * w**2, damping, slide=True)

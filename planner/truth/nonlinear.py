@@ -11,13 +11,13 @@ import numpy as np
 import scipy.linalg
 
 from planner.errors import InputError
-from planner.truth.laws import Law
+from planner.truth.laws import JointLaw
 from planner.truth.model import Truth
 from planner.truth.propagate import driven, weights
 
-CONTRACTION = 0.5  # of the fixed-point iteration within a step
-ACCURACY = 1e-7  # relative to a step's change of torque
-PADDING = 4
+MOST_CONTRACTION = 0.5  # of the fixed-point iteration within a step
+TORQUE_ACCURACY = 1e-7  # relative to a step's change of torque
+FFT_PADDING = 4  # record lengths, so that the response does not wrap around
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Port:
     `link_point_m` is in the link's frame, `direction` in the world's.
     """
 
-    law: Law
+    law: JointLaw
     joint: str = ""
     link: str = ""
     link_point_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ class Port:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class StruckPose:
     """A robot at a pose q (rad), and forces (h, n) in N along tcp axes 0..2 (h,) that hit it."""
 
     truth: Truth
@@ -63,7 +63,7 @@ class _Linear:
     angles: np.ndarray  # (P, h, n), without the laws
 
 
-def respond(poses: Sequence[Pose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
+def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
     """Accelerations (h, 3, n) in m/s² of the sensor at each pose, from rest.
 
     The poses are integrated together, so all forces have the same length. Raises InputError if
@@ -83,7 +83,7 @@ def respond(poses: Sequence[Pose], ports: Sequence[Port], step_s: float) -> list
     return found
 
 
-def _linear(pose: Pose, ports: Sequence[Port], step_s: float) -> _Linear:
+def _linear(pose: StruckPose, ports: Sequence[Port], step_s: float) -> _Linear:
     truth, forces, axes = pose.truth, pose.forces_n, list(pose.axes)
     poles, shapes, entry, hit, sensor = truth.modal(pose.q)
     one = poles.imag >= 0  # the other of a pair adds the conjugate
@@ -126,9 +126,9 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
     gives = np.real(np.einsum("kph,kqh->pqh", felt, newer))
     slopes = np.array([port.law.slope for port in ports])
     contraction = float(np.max(np.einsum("pqh,q->ph", np.abs(gives), slopes)))
-    if contraction > CONTRACTION:
+    if contraction > MOST_CONTRACTION:
         raise InputError("A nonlinear joint is too stiff for the time step; shorten the step.")
-    iterations = max(2, int(np.ceil(np.log(ACCURACY) / np.log(contraction))))
+    iterations = max(2, int(np.ceil(np.log(TORQUE_ACCURACY) / np.log(contraction))))
 
     steps = np.moveaxis(np.concatenate([pose.angles for pose in linear], axis=1), 2, 0).copy()
     torques = np.zeros_like(steps)
@@ -140,23 +140,23 @@ def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) ->
         torque, after, now = torques[i - 1], states, before
         for _ in range(iterations):
             now = free - (gives * torque).sum(axis=1)
-            told = [
+            torques_after = [
                 p.law.torque(s, b, t) for p, s, b, t in zip(ports, states, before, now, strict=True)
             ]
-            torque, after = (np.array(part) for part in zip(*told, strict=True))
+            torque, after = (np.array(part) for part in zip(*torques_after, strict=True))
         y -= (newer * torque).sum(axis=1)
         torques[i], before, states = torque, now, after
     return np.split(np.moveaxis(torques, 0, 2), np.cumsum(hits)[:-1], axis=1)
 
 
-def structural(pose: Pose, loss_factor: float, step_s: float) -> np.ndarray:
+def structural(pose: StruckPose, loss_factor: float, step_s: float) -> np.ndarray:
     """As `respond`, with K(1 + iη) instead of viscous damping: from the spectrum of the force."""
     n = pose.forces_n.shape[1]
-    frequency = np.fft.rfftfreq(PADDING * n, step_s)
+    frequency = np.fft.rfftfreq(FFT_PADDING * n, step_s)
     accelerance = structural_accelerance(pose.truth, loss_factor, pose.q, frequency)
-    spectrum = np.fft.rfft(pose.forces_n, PADDING * n, axis=1)
+    spectrum = np.fft.rfft(pose.forces_n, FFT_PADDING * n, axis=1)
     response = np.moveaxis(accelerance[:, list(pose.axes)], 1, 0) * spectrum[:, None]
-    return np.fft.irfft(response, PADDING * n, axis=2)[:, :, :n]
+    return np.fft.irfft(response, FFT_PADDING * n, axis=2)[:, :, :n]
 
 
 def structural_accelerance(

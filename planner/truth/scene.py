@@ -10,7 +10,7 @@ from planner.truth.deviation import Spring
 from planner.truth.model import Truth
 from planner.truth.secret import Secret
 
-PULSE_S = 0.008
+PULSE_S = 0.008  # duration of a middling hit
 
 Parameters = dict[str, float | str | list[float]]
 
@@ -51,7 +51,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Drawn:
-    """An effect of a case: name and place as in the contract, and true parameters (SI)."""
+    """An effect of a case: name and place as a diagnosis states them, true parameters in SI."""
 
     effect: str
     at: str | None

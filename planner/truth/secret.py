@@ -9,11 +9,11 @@ from planner.errors import InputError
 from planner.truth.deviation import Deviation
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, SimulatedHit, pulse, sampled
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, Pose, respond, structural
+from planner.truth.nonlinear import Port, StruckPose, respond, structural
 
 
 @dataclass(frozen=True)
-class Drift:
+class StiffnessDrift:
     """All stiffnesses times 1 + change · course(progress), progress 0 to 1 over the campaign.
 
     course: "linear", "warming" (1 - exp(-4 p), nearly done at the end) or "step" (at half).
@@ -63,13 +63,13 @@ class Secret:
     deviation: Deviation
     ports: tuple[Port, ...] = ()
     loss_factor: float | None = None
-    drift: Drift | None = None
+    drift: StiffnessDrift | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class HitVisit:
     """Hits (axis "+x", peak in N) at a pose q (rad); progress 0 to 1 through the campaign."""
 
     q: np.ndarray
@@ -80,7 +80,7 @@ class Visit:
 def hit_poses(
     truth: Truth,
     secret: Secret,
-    visits: Sequence[Visit],
+    visits: Sequence[HitVisit],
     hammer: Hammer,
     rng: np.random.Generator,
 ) -> list[list[SimulatedHit]]:
@@ -91,20 +91,20 @@ def hit_poses(
         for visit in visits
     ]
     responses = _responses(truth, secret, visits, pulses, step_s, rng)
-    found = []
+    recorded = []
     for visit, forces, response in zip(visits, pulses, responses, strict=True):
         hits = [
             sampled(axis, force, _heard(secret.artefact, a, step_s), hammer, rng)
             for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
         ]
-        found.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
-    return found
+        recorded.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
+    return recorded
 
 
 def _responses(
     truth: Truth,
     secret: Secret,
-    visits: Sequence[Visit],
+    visits: Sequence[HitVisit],
     pulses: Sequence[np.ndarray],
     step_s: float,
     rng: np.random.Generator,
@@ -115,7 +115,7 @@ def _responses(
         now = truth if secret.drift is None else truth.changed(secret.drift.factor(visit.progress))
         senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
         axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
-        poses.append(Pose(now, visit.q, senses[:, None] * forces, axes))
+        poses.append(StruckPose(now, visit.q, senses[:, None] * forces, axes))
     if secret.loss_factor is None:
         responses = respond(poses, secret.ports, step_s)
     elif not secret.ports:
@@ -130,7 +130,7 @@ def _responses(
     ]
 
 
-def _hum(pose: Pose, tone: Tone, phases: np.ndarray, step_s: float) -> np.ndarray:
+def _hum(pose: StruckPose, tone: Tone, phases: np.ndarray, step_s: float) -> np.ndarray:
     """Steady accelerations (h, 3, n) that a tone gives."""
     poles, shapes, entry, _, sensor = pose.truth.modal(pose.q)
     at = pose.truth.along(pose.q, tone.link, np.zeros(3), np.array(tone.direction))
@@ -155,23 +155,23 @@ def _windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> Simulate
 def frfs(
     truth: Truth,
     secret: Secret,
-    visits: Sequence[Visit],
+    visits: Sequence[HitVisit],
     hammer: Hammer,
     band_hz: tuple[float, float],
     seed: int = 0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies (F,) in Hz and FRFs (visit, 3, 3, F) in m/s²/N of visits from `once`."""
-    found = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
-    n = found[0][0].force_n.size
+    recorded = hit_poses(truth, secret, visits, hammer, np.random.default_rng(seed))
+    n = recorded[0][0].force_n.size
     frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
     used = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
     columns = [
         [np.fft.rfft(h.acceleration_m_s2)[:, used] / np.fft.rfft(h.force_n)[used] for h in hits]
-        for hits in found
+        for hits in recorded
     ]
     return frequency[used], np.moveaxis(np.array(columns), 1, 2)
 
 
-def once(q: np.ndarray, peak_n: float, progress: float = 0.0) -> Visit:
+def once(q: np.ndarray, peak_n: float, progress: float = 0.0) -> HitVisit:
     """One hit along each axis."""
-    return Visit(q, [(f"+{axis}", peak_n) for axis in AXES], progress)
+    return HitVisit(q, [(f"+{axis}", peak_n) for axis in AXES], progress)

@@ -12,9 +12,9 @@ from planner.design.mixed import mixed
 from planner.design.mutual_information import mutual_information
 from planner.design.parameter_information import (
     SUBSETS,
-    by_axes,
     d_information,
     parameter_information,
+    parameter_reduction,
 )
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import ACQUISITIONS, Travel, propose
@@ -88,8 +88,8 @@ def test_parameters_are_refitted_as_foretold(surrogate):
 def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
     outputs, poses = over(surrogate, X, 30)
     exact = reduction(outputs, poses, outputs.workspace)
-    monkeypatch.setattr(module, "LARGE", 10)
-    monkeypatch.setattr(module, "EXACT", 20)
+    monkeypatch.setattr(module, "MANY_CANDIDATES", 10)
+    monkeypatch.setattr(module, "BEST_CANDIDATES", 20)
     screened = reduction(outputs, poses, outputs.workspace)
     best = np.argsort(exact)[-15:]
     np.testing.assert_allclose(screened[best], exact[best], rtol=1e-12)
@@ -99,7 +99,8 @@ def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
 
 def test_more_axes_tell_more(surrogate):
     outputs, poses = with_parameters(surrogate, X)
-    gain = by_axes(outputs, poses.one(3), outputs.workspace)
+    pose = poses.one(3)
+    gain = [parameter_reduction(outputs, pose, outputs.workspace, axes)[0] for axes in SUBSETS]
     for i, a in enumerate(SUBSETS):
         for j, b in enumerate(SUBSETS):
             if set(a) < set(b):

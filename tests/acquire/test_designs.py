@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 
 
 @pytest.mark.parametrize("name", NESTED)

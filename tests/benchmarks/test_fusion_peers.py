@@ -20,11 +20,12 @@ import numpy as np
 import pytest
 
 from planner.studies.models.fidelity_levels import Samples
-from planner.studies.models.fused import fit_fused, fit_low
 from planner.studies.models.recursive_ar1 import fit_recursive
 from planner.surrogate.predictive import Predictive
 from tests.support import fusion_peers
+from tests.support.fused import fit_fused, fit_low
 from tests.support.fusion_problems import PROBLEMS, Design, design
+from tests.support.mixture import log_density
 from tests.support.robot_problems import ROBOT_PROBLEMS
 
 COUNTS = (3, 5, 8, 11, 15)
@@ -77,7 +78,7 @@ def score(d: Design, found: Predictive, seconds):
     least, size = SD_FLOOR * d.y_test.std(), d.y_test.std()
     found = Predictive(found.weights, found.means, np.maximum(found.sds, least))
     inside = np.mean(np.abs(found.below(d.y_test) - 0.5) < 0.475)
-    nlpd = -np.mean(found.log_density(d.y_test)) - np.log(size)
+    nlpd = -np.mean(log_density(found, d.y_test)) - np.log(size)
     return inside, nlpd, np.sqrt(np.mean((found.median - d.y_test) ** 2)) / size, float(seconds)
 
 

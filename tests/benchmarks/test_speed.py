@@ -9,13 +9,13 @@ from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.demo import Pool, shipped
-from planner.dynamics.vibration import direct_accelerance
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, track
 from planner.surrogate.modal_surrogate import fit_surrogate
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
 from planner.truth.model import load_truth
+from tests.support.direct_solution import direct_accelerance
 from tests.support.surrogates import observed, simulated
 from tests.support.timing import seconds
 

@@ -11,7 +11,7 @@ from planner.identification.feasible_inertias import pseudo_inertia
 from planner.identification.frequency_uncertainty import frequency_sd, frequency_sensitivity
 from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
-from planner.truth.deviation import Deviation, Resonator
+from planner.truth.deviation import AttachedResonator, Deviation
 from planner.truth.hits import Hammer
 from planner.truth.model import load_truth
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
@@ -21,7 +21,7 @@ HAMMER = Hammer(peak_n=60.0, duration_s=0.004, sampling_rate_hz=640.0, record_s=
 COUNT = 4
 
 
-def measured(path, n: int = 4, resonators: tuple[Resonator, ...] = ()):
+def measured(path, n: int = 4, resonators: tuple[AttachedResonator, ...] = ()):
     """FRFs at n poses and true frequencies at 20 others."""
     truth = load_truth(path, Deviation(7, 0.15, 0.15, 0.03, 0.003, resonators=resonators))
     rng = np.random.default_rng(0)
@@ -106,7 +106,7 @@ def test_springs_that_the_description_lacks_are_found_and_named(tmp_path):
 
 
 def test_physics_that_no_joint_has_is_noticed_and_said(tmp_path):
-    hose = Resonator("link_4", (0.0, 0.0, 0.1), (0.0, 1.0, 0.0), 6.0, 18.0, 0.02)
+    hose = AttachedResonator("link_4", (0.0, 0.0, 0.1), (0.0, 1.0, 0.0), 6.0, 18.0, 0.02)
     path = make_arm(tmp_path)
     frfs, q, _, _ = measured(path, 3, resonators=(hose,))
     after = learn(LowFidelity(COUNT, Simulation(Robot.load(path))), frfs, q, BAND_HZ)

@@ -45,7 +45,7 @@ def done(cell, tmp_path_factory):
     return answer, out
 
 
-def test_the_answer_has_what_the_contract_names(done):
+def test_the_answer_has_every_documented_key(done):
     answer, _ = done
     assert {"parameters", "fit", "held_out", "seconds"} <= set(answer)
     for entry in answer["parameters"]:

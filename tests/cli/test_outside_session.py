@@ -1,4 +1,4 @@
-"""A whole session by the contract on a robot that is not the shipped one."""
+"""A whole session by commands on a robot that is not the shipped one."""
 
 import csv
 from pathlib import Path

@@ -57,7 +57,7 @@ def first(pool, out):
     return json.loads(planner(*command(pool, out, "--rrd", str(rrd), "--json")).stdout)
 
 
-def test_the_answer_has_what_the_contract_names(first):
+def test_the_answer_has_every_documented_key(first):
     assert set(first["strategies"]) == {"maximin_lhs", "random", "default"}
     for curve in first["strategies"].values():
         assert curve["n"] == [2, 3, 4]

@@ -6,14 +6,14 @@ from planner.diagnosis.effects import library
 from planner.diagnosis.linear.fit import Problem
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear_diagnosis import diagnose
-from planner.truth.deviation import AddedMass, Resonator, Spring
+from planner.truth.deviation import AttachedMass, AttachedResonator, Spring
 from tests.support.concealed import hidden
 from tests.support.known_robots import IRB6640
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TILTS = Spring("base", X, 2.4e6, 1.2e3), Spring("base", Y, 1.6e6, 8e2)
-PAYLOAD = AddedMass("link_6", (0.05, 0.02, 0.1), 60.0)
-HOSE = Resonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
+PAYLOAD = AttachedMass("link_6", (0.05, 0.02, 0.1), 60.0)
+HOSE = AttachedResonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
 BOTH = {("base_compliance", "base"), ("added_mass", "link_6")}
 
 

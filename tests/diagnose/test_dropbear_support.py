@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from planner.diagnosis.effects.effect import Quantity
-from planner.diagnosis.frequencies import Change, explain
-from planner.modal.ringdown import ringdown
 from planner.recording.read import read
 from tests.support.beam import first_hz
+from tests.support.decays import ringdown
 from tests.support.dropbear import FIRST_MODE, dwells
+from tests.support.frequency_changes import Change, explain
 
 pytestmark = pytest.mark.slow
 

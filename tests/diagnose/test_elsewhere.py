@@ -7,11 +7,11 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Problem, fit, settle
 from planner.diagnosis.linear.other_places import elsewhere
 from planner.diagnosis.linear_diagnosis import again, diagnose
-from planner.truth.deviation import Resonator
+from planner.truth.deviation import AttachedResonator
 from tests.support.concealed import hidden
 from tests.support.known_robots import IRB6640
 
-LOOSE = Resonator("link_3", (0.2, 0.05, 0.1), (0.0, 0.0, 1.0), 14.0, 22.0, 0.02)
+LOOSE = AttachedResonator("link_3", (0.2, 0.05, 0.1), (0.0, 0.0, 1.0), 14.0, 22.0, 0.02)
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.diagnosis.effects.effect import Quantity
-from planner.diagnosis.frequencies import Change, explain
+from tests.support.frequency_changes import Change, explain
 
 PLACES = np.linspace(0.2, 0.8, 7)
 NUISANCE = Quantity("stiffness of all", "1", 0.0, 0.02, logarithmic=True)

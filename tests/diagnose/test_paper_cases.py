@@ -22,8 +22,7 @@ from planner.truth.laws import Hardening
 from planner.truth.model import load_truth
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene, across, triple
-from planner.truth.secret import Secret, hit_poses
-from planner.truth.secret import Visit as Planned
+from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import birk_folder, measured_frfs
 
@@ -31,7 +30,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])
-def test_seed_001_the_third_mode_appears_beyond_what_was_recorded(seed):
+def test_busch2020_the_third_mode_appears_beyond_what_was_recorded(seed):
     """Three modes are measured up to 105° of joint 3, the simulation has two; told to 120°."""
     seen = sweep(seed).every(2)
     q = poses(seen.angles_deg)
@@ -51,7 +50,7 @@ def test_seed_001_the_third_mode_appears_beyond_what_was_recorded(seed):
     assert r2["refitted"] < 0.9
 
 
-def test_seed_004_a_simulation_of_12_parameters_lacks_what_24_have(tmp_path):
+def test_birk2025_a_simulation_of_12_parameters_lacks_what_24_have(tmp_path):
     truth = load_truth(birk_folder(tmp_path / "24"), Deviation(1))
     simulation = Simulation(Robot.load(birk_folder(tmp_path / "12", transverse=False)))
     q, lines = KR10.poses(9, seed=1), np.arange(5.0, 200.0, 1 / 0.64)
@@ -64,7 +63,7 @@ def test_seed_004_a_simulation_of_12_parameters_lacks_what_24_have(tmp_path):
     assert found.best.per_value < 1.1 < found.refitted.per_value
 
 
-def test_seed_004_a_link_that_bends(tmp_path):
+def test_birk2025_a_link_that_bends(tmp_path):
     """24 parameters, and link 2 bends about both axes across it."""
     toml = birk_folder(tmp_path / "24")
     simulation = Simulation(Robot.load(toml))
@@ -84,7 +83,7 @@ def test_seed_004_a_link_that_bends(tmp_path):
 
 
 @pytest.mark.parametrize("drives", [(2,), (1, 2, 3, 4, 5, 6)], ids=["one drive", "all drives"])
-def test_seed_004_harmonic_drives_that_harden(tmp_path, drives):
+def test_birk2025_harmonic_drives_that_harden(tmp_path, drives):
     """To about twice the stiffness, each at an angle of its own."""
     toml = birk_folder(tmp_path / "24")
     simulation = Simulation(Robot.load(toml))
@@ -101,7 +100,7 @@ def test_seed_004_harmonic_drives_that_harden(tmp_path, drives):
     secret = Secret(Deviation(1), tuple(Port(law, joint=joint) for joint, law in laws.items()))
     shots = [("+" + axis, share * hammer.peak_n) for axis in "xyz" for share in (0.4, 1.0, 2.5)]
     made = hit_poses(
-        truth, secret, [Planned(row, shots) for row in q], hammer, np.random.default_rng(4)
+        truth, secret, [HitVisit(row, shots) for row in q], hammer, np.random.default_rng(4)
     )
     visits = []
     for i, (row, hits) in enumerate(zip(q, made, strict=True)):

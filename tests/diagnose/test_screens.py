@@ -15,7 +15,6 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import Grade, fit
-from planner.diagnosis.locate import locate
 from planner.diagnosis.screens import artefacts, drift, force_levels
 from planner.diagnosis.screens import screen as screens
 from planner.diagnosis.screens.exponential_window import screen_window
@@ -172,18 +171,3 @@ def test_equivalent_stiffness_is_that_of_the_joint_that_changed(simulation):
     expected = -0.2 * simulation.elasticity.stiffness[2]
     assert delta.real == pytest.approx(expected, rel=0.1)
     assert abs(delta.imag) < 0.1 * abs(expected)
-
-
-def test_where_names_the_pose_that_differs(simulation):
-    q = KR210.poses(6, 6)
-    data = recorded(simulation, q, lambda i, _: 0.7 if i == 2 else 1.0)
-    problem = problem_of(data, simulation)
-    found = fit(problem, Effect(""))
-    same = replace(found, x=found.misfit.mean)
-    told = locate(same, [v.pose for v in data.visits])
-    assert told.where["poses"] == ["P3"]
-    assert told.where["directions"]
-    low, high = simulation.robot.config.band_hz
-    assert all(low - 1 <= a < b <= high + 1 for a, b in told.bands_hz)
-    assert told.by_visit[2] > 5 * np.median(told.by_visit)
-    assert told.frac[2].mean() < told.frac[0].mean()

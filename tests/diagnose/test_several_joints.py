@@ -23,8 +23,7 @@ from planner.truth.laws import Friction, Hardening
 from planner.truth.model import load_truth
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene
-from planner.truth.secret import Secret, hit_poses
-from planner.truth.secret import Visit as Planned
+from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
 from tests.support.struck import VISITS, struck_robot
 
@@ -115,7 +114,7 @@ def recorded(folder: Path, drives: tuple[int, ...], law: str, poses: int) -> tup
         laws[joint] = Hardening(k, 0.6 * a) if law == "hardening" else Friction(k, k * a / 3)
     ports = tuple(Port(one, joint=joint) for joint, one in laws.items())
     shots = [("+" + axis, share * hammer.peak_n) for axis in "xyz" for share in (0.4, 1.0, 2.5)]
-    planned, rng = [Planned(row, shots) for row in q], np.random.default_rng(5)
+    planned, rng = [HitVisit(row, shots) for row in q], np.random.default_rng(5)
     made = hit_poses(truth, Secret(Deviation(3, inertia=0.03), ports), planned, hammer, rng)
     visits = []
     for i, (row, hits) in enumerate(zip(q, made, strict=True)):

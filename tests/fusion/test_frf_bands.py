@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from planner.frf import synthesis
-from planner.surrogate.frf_bands import ModalPrediction, frf_band, frf_moments
+from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 from planner.surrogate.modal_surrogate import fit_surrogate
+from tests.support.frf_samples import frf_band
 from tests.support.surrogates import observed, simulated
 
 LINES = np.linspace(4, 50, 60)

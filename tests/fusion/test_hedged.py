@@ -5,7 +5,7 @@ import pytest
 
 from planner.surrogate.ar1 import fit_ar1
 from planner.surrogate.hedged import fit_hedged
-from planner.surrogate.modal_surrogate import FREQUENCY, FREQUENCY_ALONE
+from planner.surrogate.modal_surrogate import FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
 from planner.surrogate.training_data import TrainingData
 from tests.support.fusion_problems import arm_hz
 
@@ -40,7 +40,7 @@ def errors(simulation, n, seed):
     x = rng.random((n, 3))
     y = truth(x) + 1e-3 * rng.standard_normal((n, 2))
     sd, low, grid_low = np.full((n, 2), 1e-3), simulation(x), simulation(GRID)
-    priors, centre = ((FREQUENCY,) * 2, (FREQUENCY_ALONE,) * 2), low.mean(axis=0)
+    priors, centre = ((FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2), low.mean(axis=0)
     data, nothing = TrainingData(x, y, sd, low), np.full((n, 2), np.nan)
     models = [
         fit_ar1(data, *priors, centre),
@@ -73,7 +73,9 @@ def test_outputs_are_weighed_one_by_one():
     x = rng.random((12, 3))
     low = np.stack([SIMULATIONS["right"](x)[:, 0], SIMULATIONS["irrelevant"](x)[:, 1]], axis=1)
     data = TrainingData(x, truth(x), np.full((12, 2), 1e-3), low)
-    fitted = fit_hedged(data, (FREQUENCY,) * 2, (FREQUENCY_ALONE,) * 2, low.mean(axis=0))
+    fitted = fit_hedged(
+        data, (FREQUENCY_PRIOR,) * 2, (FREQUENCY_PRIOR_ALONE,) * 2, low.mean(axis=0)
+    )
     assert fitted.uses_low.tolist() == [True, False]
     assert (fitted.weight > 0.9).all()
 
@@ -82,7 +84,9 @@ def test_before_a_measurement_the_simulation_is_believed():
     none = np.zeros((0, 2))
     nowhere = np.zeros((0, 3))
     fitted = fit_hedged(
-        TrainingData(nowhere, none, none, none), (FREQUENCY,) * 2, (FREQUENCY_ALONE,) * 2,
+        TrainingData(nowhere, none, none, none),
+        (FREQUENCY_PRIOR,) * 2,
+        (FREQUENCY_PRIOR_ALONE,) * 2,
         np.array([2.0, 2.5]),
     )  # fmt: skip
     mean, _ = fitted.predict(GRID[:4], np.full((4, 2), 2.2))

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from planner.surrogate.importance import sample
-from planner.surrogate.quasi_random import normal_points
+from planner.surrogate.importance import normal_points, sample
 
 CENTRES = np.array([[0.5, -0.3, 0.2], [-1.0, 1.5, 0.8]])
 WIDTHS = np.array([[0.5, 0.7, 2.0], [0.15, 0.3, 0.6]])

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.studies.models.fidelity_levels import LowLevel, Samples
-from planner.studies.models.joint_ar1 import Hyperparameters, condition_joint
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.recursive_ar1 import RecursiveAR1
 from planner.studies.models.single_output_gp import SingleGP
 from planner.surrogate.ar1 import AR1
 from planner.surrogate.gp import Posterior, Prior
 from planner.surrogate.gp import fit as fit_posterior
 from planner.surrogate.training_data import TrainingData, pad
+from tests.support.joint_ar1 import Hyperparameters, condition_joint
 
 RNG = np.random.default_rng(4)
 LOW, HIGH, GRID = RNG.random((30, 2)), 8, RNG.random((50, 2))
@@ -51,7 +51,7 @@ def recursive(h: Hyperparameters) -> RecursiveAR1:
     return RecursiveAR1(Scaled(below, h.slope), model, 0.0, 1.0, 0.0, 1.0, 0.0)
 
 
-class Scaled(LowLevel):
+class Scaled(FidelityLevel):
     """ρ times a level."""
 
     def __init__(self, level, slope):

@@ -103,13 +103,6 @@ def test_residues_of_an_axis_that_was_not_hit_are_the_simulations():
     np.testing.assert_allclose(p.residue[..., 2], simulated(X).residue[..., 2], atol=1e-12)
 
 
-def test_before_any_measurement_residues_are_of_the_size_that_the_simulation_says():
-    p = fit_surrogate(observed(0, 0), reference=simulated(X)).predict(X, simulated(X))
-    np.testing.assert_allclose(p.residue, simulated(X).residue, atol=1e-12)
-    assert (p.residue_sd > 0.1e-6).all()
-    assert (p.residue_sd < 2e-6).all()
-
-
 @pytest.mark.parametrize("blocked", ["planner", "planner/jax"])
 def test_a_cache_that_cannot_be_kept_is_no_trouble(tmp_path, blocked):
     place = tmp_path / blocked

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.studies.models import single_output_gp
 from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.fused import fit_fused
-from planner.studies.models.mixture import mix
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import PRIOR, fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
+from tests.support.fused import GRID_PRIOR, fit_fused
+from tests.support.mixture import mix
 
 GRID = np.random.default_rng(8).random((40, 2))
 SPREAD = 0.5
@@ -33,11 +32,11 @@ MODELS = {
     "GP": lambda s: fit_gp(s),
     "AR1": lambda s: fit_recursive(s, exact_low(), SPREAD),
     "AR1 on samples": lambda s: fit_recursive(
-        s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", single_output_gp.GRID_PRIOR), SPREAD
+        s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", GRID_PRIOR), SPREAD
     ),
     "NARGP": lambda s: fit_nargp(s, exact_low(), SPREAD),
     "NARGP on samples": lambda s: fit_nargp(
-        s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", single_output_gp.GRID_PRIOR), SPREAD
+        s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", GRID_PRIOR), SPREAD
     ),
     "mixture": lambda s: fit_fused(s, exact_low(), SPREAD),
 }
@@ -118,7 +117,7 @@ def test_intervals_hold(fit):
 def test_ar1_on_a_sampled_simulation_is_ar1_on_the_simulation_itself_once_that_is_known():
     x = np.random.default_rng(1).random((120, 2))
     s = samples(8)
-    learned = fit_gp(Samples.of(x, low(x)), "rbf", single_output_gp.GRID_PRIOR)
+    learned = fit_gp(Samples.of(x, low(x)), "rbf", GRID_PRIOR)
     a = fit_recursive(s, learned, SPREAD).predict(GRID)
     b = fit_recursive(s, exact_low(), SPREAD).predict(GRID)
     np.testing.assert_allclose(a[0], b[0], atol=0.01)

@@ -6,16 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import norm
 
-from planner.surrogate.predictive import Predictive, together
+from planner.surrogate.predictive import Predictive
+from tests.support.mixture import log_density, together
 
 ONE = Predictive(np.ones(1), np.array([[0.3, -2.0]]), np.array([[0.5, 2.0]]))
 
 
 def test_of_one_gaussian_all_is_the_gaussian():
     y = np.array([0.1, 1.0])
-    np.testing.assert_allclose(ONE.log_density(y), norm.logpdf(y, ONE.means[0], ONE.sds[0]))
+    np.testing.assert_allclose(log_density(ONE, y), norm.logpdf(y, ONE.means[0], ONE.sds[0]))
     np.testing.assert_allclose(ONE.below(y), norm.cdf(y, ONE.means[0], ONE.sds[0]))
-    low, high = ONE.interval(0.95)
+    low, high = ONE.quantile(0.025), ONE.quantile(0.975)
     np.testing.assert_allclose(low, ONE.mean - 1.959964 * ONE.sd, atol=1e-5)
     np.testing.assert_allclose(high, ONE.mean + 1.959964 * ONE.sd, atol=1e-5)
 
@@ -33,7 +34,7 @@ def test_density_is_the_slope_of_the_probability_and_integrates_to_the_moments()
     rng = np.random.default_rng(0)
     found = Predictive(np.array([0.2, 0.8]), rng.standard_normal((2, 1)), np.array([[0.3], [1.2]]))
     grid = np.linspace(-9, 9, 4001)
-    density = np.exp([found.log_density(np.array([v]))[0] for v in grid])
+    density = np.exp([log_density(found, np.array([v]))[0] for v in grid])
     slope = np.gradient([found.below(np.array([v]))[0] for v in grid], grid)
     np.testing.assert_allclose(density[1:-1], slope[1:-1], atol=1e-4)
     mean = np.trapezoid(density * grid, grid)

@@ -96,7 +96,8 @@ def test_a_deep_gp_follows_a_bent_relation_and_its_low_level():
         return np.tanh(2 * wave(x)) + 0.3 * x[:, 0]
 
     low = rng.random((150, 2))
-    deep = fit_mfdgp(Samples.of(x, bent(x)), Samples.of(low, wave(low)), 80)
+    below = fit_sparse(Samples.of(low, wave(low)), "rbf", 80)
+    deep = fit_mfdgp(Samples.of(x, bent(x)), below, 80)
     plain = fit_sparse(Samples.of(x, bent(x)), "rbf", 25)
     off = [np.sqrt(np.mean((m.predict(GRID)[0] - bent(GRID)) ** 2)) for m in (deep, plain)]
     assert off[0] < 0.6 * off[1]

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from planner.modal.ringdown import ringdown
 from planner.recording.read import read
 from planner.recording.records import TimeRecord
+from tests.support.decays import ringdown
 from tests.support.dropbear import FIRST_MODE, dwells
 
 

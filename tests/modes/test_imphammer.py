@@ -2,7 +2,7 @@
 
 import pytest
 
-from planner.modal.free_decays import modes_from_record
+from planner.modal.free_decays import analyse_record
 from planner.recording.read import read
 from planner.recording.records import TimeRecord
 
@@ -14,7 +14,7 @@ FILES = ("imp_ham_set1_nomass.CSV", "imp_ham_set2_nomass.CSV", "imp_ham_set3_no_
 def test_three_modes_and_the_faults(shared_data, name):
     (record,) = read(shared_data / "imphammer_mit" / name)
     assert isinstance(record, TimeRecord)
-    model = modes_from_record(record)
+    model, _ = analyse_record(record)
     found = [mode.frequency_hz for mode in model.modes]
     for frequency in REPORTED_HZ:
         assert min(abs(f / frequency - 1) for f in found) < 0.02

@@ -1,4 +1,4 @@
-"""LSFD residues, out-of-band terms, rank one, collinearity, and the gradient of the fit."""
+"""LSFD residues, out-of-band terms, rank one, and the gradient of the fit."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from planner.modal.residues import (
     Residues,
     basis,
     basis_slope,
-    collinearity,
     laplace,
     lsfd,
     rank_one,
@@ -126,13 +125,6 @@ def test_realigned_shape_is_as_real_as_possible():
     turned = shape * realign(shape)
     assert np.max(np.abs(turned.imag)) < 1e-12
     assert turned.real[np.argmax(np.abs(turned))] > 0
-
-
-def test_collinearity_of_real_and_circular_shapes():
-    rng = np.random.default_rng(7)
-    assert collinearity(rng.normal(size=3) * np.exp(0.7j)) == pytest.approx(1.0)
-    assert collinearity(np.array([1.0, 1j])) == pytest.approx(0.0)
-    assert collinearity(np.zeros(3)) == 0.0
 
 
 def test_errors_that_lines_share_are_those_of_refitted_data():

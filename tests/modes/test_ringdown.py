@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError, RefusedError
-from planner.modal.free_decays import modes_from_record
-from planner.modal.ringdown import ringdown
+from planner.modal.free_decays import analyse_record
 from planner.recording.records import Channel, TimeRecord
+from tests.support.decays import ringdown
 
 RATE = 500.0
 
@@ -67,7 +67,7 @@ def struck(hits: tuple[int, ...] = (100, 2600), n: int = 5200, dead: bool = Fals
 
 @pytest.mark.parametrize("hits", [(100,), (100, 2600)])
 def test_modes_after_hits(hits):
-    model = modes_from_record(struck(hits), band_hz=(3.0, 50.0))
+    model, _ = analyse_record(struck(hits), band_hz=(3.0, 50.0))
     assert [m.frequency_hz for m in model.modes] == pytest.approx([8.0, 21.0], rel=1e-3)
     assert [m.damping_ratio for m in model.modes] == pytest.approx([0.01, 0.006], rel=0.05)
     for mode, shape in zip(model.modes, ([1.0, 0.7, -0.4], [0.5, -1.0, 0.8]), strict=True):
@@ -78,7 +78,7 @@ def test_modes_after_hits(hits):
 
 
 def test_dead_sensor_is_named_and_left_out():
-    model = modes_from_record(struck(dead=True), band_hz=(3.0, 50.0))
+    model, _ = analyse_record(struck(dead=True), band_hz=(3.0, 50.0))
     assert [m.frequency_hz for m in model.modes] == pytest.approx([8.0, 21.0], rel=1e-3)
     assert any("Sensor A1" in remark for remark in model.remarks)
     assert all(mode.shape.shape == (2,) for mode in model.modes)
@@ -86,14 +86,14 @@ def test_dead_sensor_is_named_and_left_out():
 
 def test_unknown_force_channel_is_an_input_error():
     with pytest.raises(InputError, match="no channel 'X'"):
-        modes_from_record(struck(), force_channel="X")
+        analyse_record(struck(), force_channel="X")
 
 
 def test_record_without_oscillation_is_refused():
     rng = np.random.default_rng(2)
     channel = Channel("A", "acceleration", "m/s^2", 0, rng.normal(size=3000))
     with pytest.raises(RefusedError, match="no decaying oscillation"):
-        modes_from_record(TimeRecord(Path("noise.csv"), RATE, (channel,)))
+        analyse_record(TimeRecord(Path("noise.csv"), RATE, (channel,)))
 
 
 def test_mode_that_changes_with_amplitude_is_one_mode():
@@ -105,7 +105,7 @@ def test_mode_that_changes_with_amplitude_is_one_mode():
     wave = np.exp(-np.cumsum(rate) / RATE) * np.cos(phase)
     x = np.outer([1.0, 0.6, -0.5], wave) + 0.002 * rng.normal(size=(3, t.size))
     channels = tuple(Channel(f"A{k}", "acceleration", "m/s^2", 0, x[k]) for k in range(3))
-    model = modes_from_record(TimeRecord(Path("friction.csv"), RATE, channels), band_hz=(4, 20))
+    model, _ = analyse_record(TimeRecord(Path("friction.csv"), RATE, channels), band_hz=(4, 20))
     assert len(model.modes) == 1
     assert model.modes[0].frequency_hz == pytest.approx(9.0, rel=0.02)
     assert any("depends on amplitude" in remark for remark in model.remarks)

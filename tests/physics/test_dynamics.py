@@ -9,6 +9,7 @@ from planner.dynamics import vibration
 from planner.dynamics.simulation import Simulation
 from planner.frf import synthesis
 from planner.robot.robot import Robot
+from tests.support.direct_solution import direct_accelerance
 from tests.support.robots import make_arm
 
 LINES = np.linspace(2, 90, 60)
@@ -30,7 +31,7 @@ def test_modal_sum_is_the_direct_solution(overdamped, proportional):
     damping = 1e-3 * stiffness if proportional else damping
     solved = vibration.solve_poles(mass, damping, stiffness, hit, sensor)
     ours = vibration.accelerance(solved, LINES)[0]
-    direct = vibration.direct_accelerance(mass[0], damping, stiffness, hit[0], sensor[0], LINES)
+    direct = direct_accelerance(mass[0], damping, stiffness, hit[0], sensor[0], LINES)
     assert np.abs(ours - direct).max() < 1e-9 * np.abs(direct).max()
 
 

@@ -12,8 +12,9 @@ from planner.dynamics import vibration
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
-from planner.truth.deviation import AddedMass, Deviation, Spring
+from planner.truth.deviation import AttachedMass, Deviation, Spring
 from planner.truth.model import load_truth
+from tests.support.direct_solution import direct_accelerance
 from tests.support.known_robots import KR10
 from tests.support.pendulums import pendulum_urdf
 
@@ -59,7 +60,7 @@ def test_a_payload_is_the_mass_that_the_other_engine_adds(tmp_path):
         f"inertia = [2.5e-4, 2.5e-4, 2.5e-4, 0, 0, 0]\n"
     )
     loaded = edited(KR10.write(tmp_path / "loaded", 2), more=more)
-    assert_same_frfs(loaded, plain, Deviation(added=(AddedMass("spindle", place, 2.5),)))
+    assert_same_frfs(loaded, plain, Deviation(added=(AttachedMass("spindle", place, 2.5),)))
 
 
 def test_an_elastic_base_is_the_one_of_the_other_engine(tmp_path):
@@ -82,7 +83,7 @@ def test_loss_factors_against_a_direct_solution(tmp_path):
     for i in range(2):
         stiffness = simulation.stiffness + m.geometric[i]
         matrices = m.mass[i], simulation.damping, stiffness, m.hit[i], m.sensor[i]
-        direct = vibration.direct_accelerance(*matrices, LINES)
+        direct = direct_accelerance(*matrices, LINES)
         found = simulation.accelerance(q, LINES)[i]
         assert np.abs(found - direct).max() < 1e-9 * np.abs(direct).max()
 

@@ -7,7 +7,7 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
-from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
+from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.truth.model import load_truth
 
 LINES = np.linspace(4.0, 60.0, 40)
@@ -26,10 +26,14 @@ BEND = (
 )
 SAME = {
     # Lumps are small spheres there (1e-4 m² times their mass), points here.
-    "added_mass": (LUMP, {"added": (AddedMass("link_4", (0.1, 0.05, -0.2), 30.0),)}, 5e-4),
+    "added_mass": (LUMP, {"added": (AttachedMass("link_4", (0.1, 0.05, -0.2), 30.0),)}, 5e-4),
     "local_resonator": (
         SMALL,
-        {"resonators": (Resonator("link_3", (0.1, 0, 0.2), (0, 0.6, 0.8), 14.0, 17.0, 0.03),)},
+        {
+            "resonators": (
+                AttachedResonator("link_3", (0.1, 0, 0.2), (0, 0.6, 0.8), 14.0, 17.0, 0.03),
+            )
+        },
         5e-4,
     ),
     "base_compliance": (SHIFT, {"extra": (Spring("base", (0, 0, 1.0), 3e6, 1e3, True),)}, 1e-6),

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.config import CostTable
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 from tests.support.acquisition_cases import CELLS, campaign, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]

@@ -14,7 +14,7 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import GoalTable
-from planner.design.pool_designs import NESTED
+from planner.design.space_filling import NESTED
 from tests.support.acquisition_cases import CELLS, OF_FRFS, Case, campaign, make
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(0)]

@@ -41,9 +41,9 @@ def holds(report, part):
     return found
 
 
-@pytest.mark.parametrize("report", ["seed-000"], indirect=True)
-def test_seed_000(report):
-    seven = report.table("seed_000_figure_7_r2")
+@pytest.mark.parametrize("report", ["busch2022"], indirect=True)
+def test_busch2022(report):
+    seven = report.table("busch2022_figure_7_r2")
     r2 = dict(zip(seven.columns[1:], np.median(numbers(report, seven.name), axis=0), strict=True))
     assert min(r2[n] for n in ("rbf", "AR1", "NARGP")) > 0.9
     assert r2["rbf"] > r2["linear"]
@@ -54,34 +54,34 @@ def test_seed_000(report):
     assert holds(report, "Residues are best modelled with RBF")
     # Not as in the paper, and said so: damping follows the pose here (C = βK), NARGP is steady.
     assert not holds(report, "No kernel follows the damping ratios")
-    pictures = {f"seed_000_figure_{n}" for n in (7, 8, 10, 11, 12)}
+    pictures = {f"busch2022_figure_{n}" for n in (7, 8, 10, 11, 12)}
     assert pictures <= set(report.figures)
 
 
-@pytest.mark.parametrize("report", ["seed-001"], indirect=True)
-def test_seed_001(report):
-    table = report.table("seed_001_r2")
+@pytest.mark.parametrize("report", ["busch2020"], indirect=True)
+def test_busch2020(report):
+    table = report.table("busch2020_r2")
     r2 = {row[0]: row[1] for row in table.rows}
     assert r2["simulation"] < 0.5
     assert r2["ours"] > max(value for name, value in r2.items() if name != "ours")
-    robots = numbers(report, "seed_001_robots")
+    robots = numbers(report, "busch2020_robots")
     assert np.all(robots[:, :4] >= 0.985)  # every, every 2nd, 3rd, 4th experiment
     assert np.all(robots[:, 4] > 85)
     assert holds(report, "every third experiment")
 
 
-@pytest.mark.parametrize("report", ["seed-002"], indirect=True)
-def test_seed_002(report):
-    errors = numbers(report, "seed_002_errors")
+@pytest.mark.parametrize("report", ["seyedhosseini2025"], indirect=True)
+def test_seyedhosseini2025(report):
+    errors = numbers(report, "seyedhosseini2025_errors")
     assert errors[:, 0].mean() < 2.0
     assert errors[:, 4].mean() > 75
-    assert np.all(numbers(report, "seed_002_frfs") > 0.9)
+    assert np.all(numbers(report, "seyedhosseini2025_frfs") > 0.9)
     assert all(finding.holds for finding in report.findings)
 
 
-@pytest.mark.parametrize("report", ["seed-003"], indirect=True)
-def test_seed_003(report):
+@pytest.mark.parametrize("report", ["lei2023"], indirect=True)
+def test_lei2023(report):
     assert holds(report, "train in less time than the paper's group of three")
-    frequencies = numbers(report, "seed_003_kinds")[0]
+    frequencies = numbers(report, "lei2023_kinds")[0]
     assert frequencies[0] > 0.95  # together, 5-fold mean
     assert frequencies[1] < 0.05  # its spread

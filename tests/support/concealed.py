@@ -11,7 +11,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
+from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.model import load_truth
 from tests.support.known_robots import KnownRobot
@@ -24,8 +24,8 @@ def hidden(
     folder: Path,
     seed: int,
     extra: tuple[Spring, ...] = (),
-    added: tuple[AddedMass, ...] = (),
-    loose: tuple[Resonator, ...] = (),
+    added: tuple[AttachedMass, ...] = (),
+    loose: tuple[AttachedResonator, ...] = (),
     channel: Callable[[np.ndarray], np.ndarray] = lambda a: a,
     poses: int = 8,
 ) -> tuple[list[Frf], np.ndarray, Simulation]:

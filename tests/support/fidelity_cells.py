@@ -19,7 +19,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.robot.robot import Robot
-from planner.truth.deviation import AddedMass, Deviation, Resonator, Spring
+from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.truth.hits import Hammer
 from planner.truth.model import Truth, load_truth
 from tests.support.known_robots import IRB6640, KR10, KR210, KnownRobot
@@ -131,8 +131,8 @@ def foreign(robot: KnownRobot, directory: Path, seed: int) -> MeasuredCell:
     slides = tuple(
         Spring("base", a, stiff, 3e-4 * stiff, slide=True) for a in ((1.0, 0, 0), (0, 1.0, 0))
     )
-    lump = AddedMass("link_3", (0.1, 0.1, -0.1), 0.06 * mass)
-    hose = Resonator("link_4", (0.05, 0.05, -0.1), (0.6, 0.8, 0.0), 0.03 * mass, 20.0, 0.02)
+    lump = AttachedMass("link_3", (0.1, 0.1, -0.1), 0.06 * mass)
+    hose = AttachedResonator("link_4", (0.05, 0.05, -0.1), (0.6, 0.8, 0.0), 0.03 * mass, 20.0, 0.02)
     left_out = scatter(seed, extra=(*bend, *slides), added=(lump,), resonators=(hose,))
     return box(robot, directory, seed, left_out, 1)
 

@@ -1,4 +1,4 @@
-"""Driving the program from outside: commands, files and JSON only."""
+"""Driving the program from outside: by commands, files and JSON only."""
 
 import contextlib
 import io

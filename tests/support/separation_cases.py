@@ -33,8 +33,7 @@ from planner.truth.effects import LINEAR, NONLINEAR
 from planner.truth.hits import Hammer
 from planner.truth.model import load_truth
 from planner.truth.scene import Drawn, Scene
-from planner.truth.secret import Secret, hit_poses
-from planner.truth.secret import Visit as Planned
+from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.acquisition_cases import LINES, MODES, ROBOTS, Case
 
 KINDS = ("transverse_compliance", "link_flexibility", "added_mass")
@@ -154,7 +153,7 @@ class OfLaws(Campaign):
         usual = tuple(level * self.peak_n for level in LEVELS)
         name = "+" + "xyz"[axis]
         shots = [(name, peak) for peak in force_n or usual for _ in range(REPEATS)]
-        (made,) = hit_poses(self.case.truth, self.secret, [Planned(q, shots)], hammer, rng)
+        (made,) = hit_poses(self.case.truth, self.secret, [HitVisit(q, shots)], hammer, rng)
         rate = hammer.sampling_rate_hz
         hits = tuple(
             Hit(Path("hit"), name, rate, one.force_n, one.acceleration_m_s2, simulated=True)

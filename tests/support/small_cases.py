@@ -8,7 +8,7 @@ import numpy as np
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.model import load_truth
-from planner.truth.secret import Artefact, Secret, Visit, hit_poses
+from planner.truth.secret import Artefact, HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
 
 # Springs, dampers and bodies never are as stated; nobody is to call that a finding.
@@ -40,7 +40,7 @@ def small_case(
     truth = load_truth(robot_toml, deviation)
     angles_deg = np.round(np.rad2deg(KR10.poses(POSES + 1, SEED)), 4)
     shots = [(f"+{axis}", HAMMER.peak_n) for axis in "xyz"]
-    visits = [Visit(np.deg2rad(q), shots, i / POSES) for i, q in enumerate(angles_deg[:POSES])]
+    visits = [HitVisit(np.deg2rad(q), shots, i / POSES) for i, q in enumerate(angles_deg[:POSES])]
     secret = Secret(deviation, artefact=artefact or Artefact())
     found = hit_poses(truth, secret, visits, HAMMER, np.random.default_rng(SEED))
     rows = [

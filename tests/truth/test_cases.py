@@ -13,13 +13,13 @@ from planner.recording.read import read
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import DRIVES, EFFECTS, KINDS, Case, make_case
-from planner.truth.deviation import Deviation, Harmonic, Scaled
+from planner.truth.deviation import Deviation, ScaledJoint, StiffnessRipple
 from planner.truth.laws import Backlash, Hardening
 from planner.truth.model import load_truth
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret
 
-CONTRACT = {
+PLACES = {
     "joint_stiffness": "joint_", "transverse_compliance": "joint_", "friction": "joint_",
     "nonlinear_stiffness": "joint_", "backlash": "joint_", "angle_dependent_stiffness": "joint_",
     "base_compliance": "base", "link_flexibility": "link_", "added_mass": "link_",
@@ -34,7 +34,7 @@ def case(tmp_path_factory) -> Case:
     return make_case("added_mass", "kr210", 3, tmp_path_factory.mktemp("one"))
 
 
-def test_every_effect_of_the_contract_can_be_concealed(tmp_path):
+def test_every_effect_can_be_concealed(tmp_path):
     arm = ARMS["kr210"]
     truth = load_truth(arm.write(tmp_path))
     scene = Scene(arm, truth, 1, arm.poses(4), 1000.0)
@@ -42,14 +42,14 @@ def test_every_effect_of_the_contract_can_be_concealed(tmp_path):
         for seed in range(5):
             drawn = draw(scene, Secret(Deviation()), np.random.default_rng(seed))
             load_truth(tmp_path / "robot.toml", drawn.secret.deviation)  # its places exist
-            if name in CONTRACT:
+            if name in PLACES:
                 assert drawn.effect == name
                 assert drawn.at is not None
-                assert drawn.at.startswith(CONTRACT[name])
+                assert drawn.at.startswith(PLACES[name])
             else:
                 assert (drawn.effect, drawn.at) == ("unknown", None)
             json.dumps(drawn.parameters)
-    assert CONTRACT.keys() <= EFFECTS.keys()
+    assert PLACES.keys() <= EFFECTS.keys()
     assert {"null", "pair"} <= set(KINDS)
 
 
@@ -76,8 +76,8 @@ def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law,
     scene = Scene(arm, load_truth(arm.write(tmp_path)), 1, arm.poses(2), 1000.0)
     joints = [f"joint_{n}" for n in range(1, 7)]
     soft = Deviation(
-        scaled=tuple(Scaled(j, 0.4) for j in joints),
-        harmonics=tuple(Harmonic(j, 1, 0.3, 0.4) for j in joints),
+        scaled=tuple(ScaledJoint(j, 0.4) for j in joints),
+        harmonics=tuple(StiffnessRipple(j, 1, 0.3, 0.4) for j in joints),
     )
     for seed in range(20):
         drawn = EFFECTS[law](scene, Secret(soft), np.random.default_rng(seed))
@@ -88,7 +88,7 @@ def test_a_law_leaves_stiffness_in_a_joint_that_an_earlier_effect_made_soft(law,
         assert taken < 0.2 * scene.stiffness(str(drawn.at))
 
 
-def test_the_folder_is_what_the_contract_says(case):
+def test_the_folder_has_what_a_diagnosis_needs(case):
     robot = Robot.load(case.robot_toml)
     rows = read_recordings(case.recordings, robot.joint_names).rows
     first = {row.pose for row in rows}

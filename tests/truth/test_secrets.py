@@ -5,12 +5,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.truth.deviation import Deviation, Feedback, Harmonic, Resonator, Scaled, Spring
+from planner.truth.deviation import (
+    AttachedResonator,
+    Deviation,
+    Feedback,
+    ScaledJoint,
+    Spring,
+    StiffnessRipple,
+)
 from planner.truth.hits import Hammer
 from planner.truth.laws import Contact
 from planner.truth.model import Truth, load_truth
 from planner.truth.nonlinear import Port, structural_accelerance
-from planner.truth.secret import Artefact, Drift, Secret, Tone, Visit, frfs, hit_poses, once
+from planner.truth.secret import (
+    Artefact,
+    HitVisit,
+    Secret,
+    StiffnessDrift,
+    Tone,
+    frfs,
+    hit_poses,
+    once,
+)
 from tests.support.known_robots import KR10, KR210
 
 Q = KR210.poses(1)[0]
@@ -75,7 +91,7 @@ def test_a_base_that_shifts_lowers_frequencies(path):
 def test_a_resonator_splits_a_mode_and_absorbs_at_its_own_frequency(path):
     plain = load_truth(path)
     first = float(plain.modes(Q, 1)[0][0])
-    small = Resonator("link_6", tuple(KR210.tcp), (1.0, 0.0, 0.0), 20.0, first, 1e-4)  # type: ignore
+    small = AttachedResonator("link_6", tuple(KR210.tcp), (1.0, 0.0, 0.0), 20.0, first, 1e-4)  # type: ignore
     with_it = load_truth(path, Deviation(resonators=(small,)))
     pair = with_it.modes(Q, 2)[0]
     assert pair[0] < first < pair[1]
@@ -87,10 +103,10 @@ def test_scaling_and_harmonics_change_the_stiffness_of_one_joint(path):
         return np.diag(truth.matrices(q)[2] - truth.gravity_stiffness(q))
 
     K = springs(load_truth(path), Q)
-    soft = load_truth(path, Deviation(scaled=(Scaled("joint_2", 0.4),)))
+    soft = load_truth(path, Deviation(scaled=(ScaledJoint("joint_2", 0.4),)))
     assert springs(soft, Q) / K == pytest.approx([1, 0.4, 1, 1, 1, 1])
     assert soft.modes(Q, 1)[0] < load_truth(path).modes(Q, 1)[0]
-    waves = Deviation(harmonics=(Harmonic("joint_3", 2, 0.3, -0.1),))
+    waves = Deviation(harmonics=(StiffnessRipple("joint_3", 2, 0.3, -0.1),))
     for q in KR210.poses(3):
         expected = 1 + 0.3 * np.cos(2 * q[2]) - 0.1 * np.sin(2 * q[2])
         ratio = springs(load_truth(path, waves), q) / K
@@ -107,7 +123,7 @@ def test_feedback_breaks_reciprocity_and_nothing_else_does(tmp_path):
         return float(np.max(np.abs(H - H.transpose(1, 0, 2))) / np.max(np.abs(H)))
 
     flexible = Spring("link_2", (0.0, 1.0, 0.0), 5e4, 10.0)
-    small = Resonator("link_4", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 1.0, 20.0, 0.02)
+    small = AttachedResonator("link_4", (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), 1.0, 20.0, 0.02)
     assert asymmetry(Deviation(extra=(flexible,), resonators=(small,))) < 1e-8
     assert asymmetry(Deviation(feedback=(Feedback("joint_1", "joint_2", 3e4),))) > 0.05
 
@@ -181,10 +197,10 @@ def test_an_uncorrected_window_adds_the_same_decay_to_every_mode(path):
 def test_drift_follows_its_course(path):
     truth = load_truth(path)
     for course, expected in (("linear", 0.85), ("step", 0.7), ("warming", 1 - 0.3 * 0.8646647)):
-        drift = Drift(-0.3, course)
+        drift = StiffnessDrift(-0.3, course)
         assert drift.factor(0.0) == 1.0
         assert drift.factor(0.5) == pytest.approx(expected)
-    secret = Secret(Deviation(), drift=Drift(-0.3))
+    secret = Secret(Deviation(), drift=StiffnessDrift(-0.3))
     visits = [once(Q, 1e3), once(Q, 1e3, 1.0)]
     start, end = frfs(truth, secret, visits, QUIET, BAND)[1]
     assert start == pytest.approx(measured(truth), rel=0.02, abs=1e-4)
@@ -196,7 +212,7 @@ def test_drift_follows_its_course(path):
 def test_a_tone_hums_before_the_hit_and_at_its_frequency_only(path):
     truth = load_truth(path)
     secret = Secret(Deviation(), tone=Tone("link_3", (0.0, 0.6, 0.8), 25.0, 100.0))
-    silent = Visit(Q, [("+x", 0.0), ("+x", 0.0)])
+    silent = HitVisit(Q, [("+x", 0.0), ("+x", 0.0)])
     one, two = hit_poses(truth, secret, [silent], QUIET, np.random.default_rng(3))[0]
     spectrum = np.abs(np.fft.rfft(one.acceleration_m_s2[:, 24:]))
     f = np.fft.rfftfreq(1000, 1 / 400)

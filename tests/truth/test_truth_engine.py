@@ -12,7 +12,7 @@ from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth import inverse
-from planner.truth.deviation import AddedMass, Deviation, Spring
+from planner.truth.deviation import AttachedMass, Deviation, Spring
 from planner.truth.model import load_truth
 from tests.support.known_robots import KNOWN_ROBOTS, KR10
 from tests.support.pendulums import pendulum_urdf
@@ -130,7 +130,7 @@ def test_an_added_mass_enters_the_mass_matrix_where_it_sits(tmp_path):
     path.write_text("geometric_stiffness = false\n" + path.read_text())  # the same posture
     q = KNOWN_ROBOTS["kr210"].poses(1)[0]
     plain = load_truth(path)
-    loaded = load_truth(path, Deviation(added=(AddedMass("link_6", tuple(place), 12.0),)))
+    loaded = load_truth(path, Deviation(added=(AttachedMass("link_6", tuple(place), 12.0),)))
     hit = plain.matrices(q)[3]
     difference = loaded.matrices(q)[0] - plain.matrices(q)[0]
     # The lump has a gyration radius of 1 cm beside being a point.
@@ -196,7 +196,7 @@ def test_what_cannot_be_built_is_said_in_words(pendulum, monkeypatch):
     with pytest.raises(InputError, match=r"no joint or link elbow"):
         load_truth(pendulum, Deviation(extra=(Spring("elbow", (1.0, 0, 0), 1e6, 1.0),)))
     with pytest.raises(InputError, match=r"no joint or link hose"):
-        load_truth(pendulum, Deviation(added=(AddedMass("hose", (0.0, 0, 0), 1.0),)))
+        load_truth(pendulum, Deviation(added=(AttachedMass("hose", (0.0, 0, 0), 1.0),)))
     text = pendulum.read_text()
     pendulum.write_text(text.replace('tcp_frame = "tip"', 'tcp_frame = "tap"'))
     with pytest.raises(InputError, match=r"no joint or link tap"):

@@ -140,7 +140,7 @@ def test_the_same_seed_gives_the_same_folder(kr10, tmp_path):
     assert all((a / n).read_bytes() != (c / n).read_bytes() for n in names)
 
 
-def test_wanted_poses_are_written_as_the_contract_says(tmp_path):
+def test_wanted_poses_are_written_as_predict_csv(tmp_path):
     q = KR10.poses(2)
     names = [f"joint_{i}" for i in range(1, 7)]
     path = write_predict(tmp_path, names, [("H1", q[0]), ("H2", q[1])], peak_force_n=500)

@@ -57,7 +57,7 @@ class Transfer:
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect at a place (contract section 6). Each kind overrides what it changes.
+    """An effect at a place. Each kind overrides what it changes.
 
     `springs` names the parameters of `priors` that belong to the effect: they are reported with
     `quantities`, the ones that it adds.

@@ -1,4 +1,4 @@
-"""A link that bends or twists (seed 004, section 2.3: elasticity of the structure)."""
+"""A link that bends or twists (Birk et al. 2025, section 2.3: elasticity of the structure)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Bearings that give across a joint's own axis (seed 004, section 2.2)."""
+"""Bearings that give across a joint's own axis (Birk et al. 2025, section 2.2)."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Two levels of fidelity of one output: cheap values, or a function, and expensive samples."""
+"""Two levels of fidelity of one output: a cheap one, known everywhere, and expensive samples."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,38 +30,17 @@ class Samples:
         return cls(x[known], y[known], sd[known])
 
 
-class Model(Protocol):
-    """A fitted model of one output."""
-
-    @property
-    def log_evidence(self) -> float:
-        """log p(y | model) of the expensive samples, hyperparameters averaged out."""
-        ...
+class FidelityLevel(Protocol):
+    """What predicts one output with its uncertainty: a simulation or a fitted model."""
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Best estimate and sd (q,) of the noise-free output at x (q, d)."""
         ...
 
 
-class Averaged(Model, Protocol):
-    """A model whose hyperparameters are averaged: it predicts a mixture."""
-
-    def predictive(self, x: np.ndarray) -> Predictive:
-        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
-        ...
-
-
-class LowLevel(Protocol):
-    """What the cheap level says, and how sure it is."""
-
-    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q,) at x (q, d)."""
-        ...
-
-
 @dataclass(frozen=True)
 class Exact:
-    """A simulation that can be evaluated at every pose."""
+    """A simulation that can be evaluated at every pose: values (q,) of x (q, d)."""
 
     function: Callable[[np.ndarray], np.ndarray]
 
@@ -71,8 +50,26 @@ class Exact:
         return value, np.zeros_like(value)
 
 
+class AveragedModel:
+    """A fitted model of one output whose hyperparameters are averaged.
+
+    `log_evidence` is log p(y | model) of the expensive samples.
+    """
+
+    log_evidence: float
+
+    def predictive(self, x: np.ndarray) -> Predictive:
+        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
+        raise NotImplementedError
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Median and sd (q,) of the noise-free output at x (q, d)."""
+        mixture = self.predictive(x)
+        return mixture.median, mixture.sd
+
+
 def spread(y: np.ndarray) -> float:
-    """Sd of y, 1 where that says nothing (fewer than two values, a constant)."""
+    """Sd of y, 1 where it is unknown (fewer than two values) or 0."""
     sd = float(np.std(y)) if len(y) > 1 else 0.0
     size = float(np.max(np.abs(y), initial=0.0))
     return sd if sd > 1e-12 * max(size, 1e-300) else 1.0

@@ -1,10 +1,10 @@
-"""FRF-level fusion: amplitude over (frequency, pose coordinate), as in seed 001.
+"""FRF-level fusion: amplitude over (frequency, pose coordinate), as in Busch et al. 2020.
 
 The logarithm of the amplitude is modelled, so that it stays positive. The simulated surface is a
-complete grid (`grid`); measured on top of it: nothing of it (GP), a discrepancy (AR1), a smooth
-function of it (NARGP) or a deep GP (MFDGP). Extrapolation over the pose is what none of these is
-good at where resonances move, for to a surface a moving peak is one that ends and one that
-begins; fusing the modes (`surrogate`) is.
+complete grid (`grid_gp`). The measured surface ignores it (GP), adds a discrepancy to it (AR1), is
+a smooth function of it (NARGP) or of its distribution (MFDGP). None of them extrapolates well over
+the pose where resonances move: a peak that moves is, to a surface, one that ends and another that
+begins. Fusing the modes (`planner.surrogate`) does.
 """
 
 from collections.abc import Callable
@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError
-from planner.studies.models.fidelity_levels import Model, Samples
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.grid_gp import GridGP, fit_grid
 from planner.studies.models.mfdgp import MFDGP, fit_mfdgp
 from planner.studies.models.sparse_gp import SparseGP, fit_sparse
 
-INDUCING = 300
+INDUCING = 300  # points of the sparse models, of 2,622
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Frame:
 class Surface:
     """Fitted; `model` gives the log amplitude over scaled coordinates."""
 
-    model: Model
+    model: FidelityLevel
     frame: Frame
 
     def predict(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,11 +73,6 @@ class Discrepancy:
     delta: GridGP
     slope: float
 
-    @property
-    def log_evidence(self) -> float:
-        """Of δ."""
-        return self.delta.log_evidence
-
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the log amplitude at x (q, 2)."""
         (low, low_sd), (mean, sd) = self.low.predict(x), self.delta.predict(x)
@@ -90,11 +85,6 @@ class Bent:
 
     low: GridGP
     high: SparseGP
-
-    @property
-    def log_evidence(self) -> float:
-        """Bound below it."""
-        return self.high.log_evidence
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the log amplitude at x (q, 2)."""
@@ -151,7 +141,7 @@ def _mfdgp(frame: Frame, measured: Grid, simulated: Grid) -> MFDGP:
     return fit_mfdgp(_samples(frame, measured), low, INDUCING)
 
 
-SURFACES: dict[str, Callable[[Frame, Grid, Grid], Model]] = {
+SURFACES: dict[str, Callable[[Frame, Grid, Grid], FidelityLevel]] = {
     "GP": _gp,
     "AR1": _ar1,
     "NARGP": _nargp,

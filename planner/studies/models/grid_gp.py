@@ -8,15 +8,17 @@ most probable ones, for thousands of points leave little doubt about them.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
+from planner.inference.quasi_newton import maximise
 from planner.studies.models.fidelity_levels import spread
 from planner.studies.models.multitask import Solved, pull, solve_kronecker
 from planner.surrogate.kernels import parse
 
 NOISE, NOISE_SPREAD = 0.03, 2.0  # median sd of the noise over the output's, its log-sd
 LENGTH, LENGTH_SPREAD = 0.3, 1.5  # of the scales, and of the amplitude's logarithm
-JITTER = 1e-9
+SHORT = -1.5  # sds of the prior by which the second start's length scales are shorter
+REACH = 5.0  # sds of the prior beyond which nothing is looked for
+JITTER = 1e-9  # added to the covariances' diagonals
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,21 +73,17 @@ def fit_grid(
         noise = np.full(len(b), np.exp(2 * theta_a[1]))
         return solve_kronecker(y, ka, kb, noise), theta_a, theta_b
 
-    def negative(z: np.ndarray) -> tuple[float, np.ndarray]:
+    def posterior(z: np.ndarray) -> tuple[float, np.ndarray]:
         solved, theta_a, theta_b = solve(mean + width * z)
         slope_a = np.array(pull(kernels[0], theta_a, a, solved.slope_k))
         slope_b = np.array(pull(kernels[1], theta_b, b, solved.slope_b))
         slope_a[1] += np.sum(solved.slope_log_noise)
         slope = np.concatenate([slope_a, slope_b]) * width
-        return -solved.value + 0.5 * float(z @ z), -slope + z
+        return solved.value - 0.5 * float(z @ z), slope - z
 
-    best: tuple[float, np.ndarray] = np.inf, np.zeros(len(mean))
-    for length in (0.0, -1.5):
-        start = np.zeros(len(mean))
-        start[2 : sizes[0]] = start[sizes[0] + 2 :] = length
-        done = minimize(negative, start, jac=True, method="L-BFGS-B", bounds=[(-5, 5)] * len(mean))
-        if done.fun < best[0]:
-            best = float(done.fun), done.x
-    solved, theta_a, theta_b = solve(mean + width * best[1])
+    starts = np.zeros((2, len(mean)))
+    starts[1, 2 : sizes[0]] = starts[1, sizes[0] + 2 :] = SHORT
+    best = maximise(posterior, list(starts), -REACH, REACH).x
+    solved, theta_a, theta_b = solve(mean + width * best)
     evidence = solved.value - y.size * np.log(scale)
     return GridGP(a, b, kernels, theta_a, theta_b, solved, centre, scale, evidence)

@@ -1,4 +1,6 @@
-"""MFDGP: a deep GP over fidelities (Cutajar et al. 2019; seed 001, section 4), sparse variational.
+"""MFDGP: a sparse variational deep GP over fidelities (Cutajar et al. 2019).
+
+As used by Busch et al. 2020, section 4.
 
 Layer 1 is a sparse GP of the cheap samples, layer 2 one of (x, f_1(x)) with the kernel
 k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) (eq. 8 of the former). f_1 enters layer 2 with its whole
@@ -12,13 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from planner.studies.models.fidelity_levels import LowLevel, Samples
-from planner.studies.models.mixture import Mixture
-from planner.studies.models.sparse_gp import SparseGP, average_sparse, fit_sparse
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
+from planner.studies.models.sparse_gp import SparseGP, fit_sparse
 
-COUNT = 5
-FEW = 100  # measurements that leave the hyperparameters in doubt
-NODES = norm.ppf((np.arange(COUNT) + 0.5) / COUNT)
+NODE_COUNT = 5  # of the quadrature over f_1
+NODES = norm.ppf((np.arange(NODE_COUNT) + 0.5) / NODE_COUNT)
 NODES = NODES / np.std(NODES)
 
 
@@ -26,20 +26,15 @@ NODES = NODES / np.std(NODES)
 class MFDGP:
     """Fitted layers; the first one's output is centred and scaled for the second."""
 
-    low: LowLevel
-    high: SparseGP | Mixture
+    low: FidelityLevel
+    high: SparseGP
     centre: float
     scale: float
-
-    @property
-    def log_evidence(self) -> float:
-        """Bound of layer 2, below its evidence."""
-        return self.high.log_evidence
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q,) of the noise-free output at x (q, d)."""
         wide = _spread(self.low, x, self.centre, self.scale)
-        mean, sd = (a.reshape(COUNT, -1) for a in self.high.predict(wide))
+        mean, sd = (a.reshape(NODE_COUNT, -1) for a in self.high.predict(wide))
         total = np.sqrt(np.mean(sd**2, axis=0) + np.var(mean, axis=0))
         return np.mean(mean, axis=0), total
 
@@ -51,26 +46,24 @@ def cutajar(d: int, shape: str = "rbf") -> str:
 
 
 def fit_mfdgp(
-    measured: Samples, low: LowLevel | Samples, inducing: int = 200, kernel: str | None = None
+    measured: Samples, low: FidelityLevel, inducing: int = 200, kernel: str | None = None
 ) -> MFDGP:
-    """Both layers; `low` may be a fitted (or exact) level, which is then layer 1.
+    """Fit layer 2 to the measured samples; `low`, fitted or exact, is layer 1.
 
-    Of few measurements, layer 2's hyperparameters are averaged (`sparse.average_sparse`).
+    `kernel` is an expression over (x_1 … x_d, f_1), default `cutajar`.
     """
-    level = fit_sparse(low, "rbf", inducing) if isinstance(low, Samples) else low
-    value, _ = level.predict(measured.x)
+    value, _ = low.predict(measured.x)
     centre, scale = float(np.mean(value)), float(np.std(value)) or 1.0
-    wide = _spread(level, measured.x, centre, scale)
-    tiled = Samples(wide, np.tile(measured.y, COUNT), np.tile(measured.sd, COUNT))
-    weights = np.full(len(wide), 1 / COUNT)
+    wide = _spread(low, measured.x, centre, scale)
+    tiled = Samples(wide, np.tile(measured.y, NODE_COUNT), np.tile(measured.sd, NODE_COUNT))
+    weights = np.full(len(wide), 1 / NODE_COUNT)
     expression = kernel or cutajar(measured.x.shape[1])
     high = fit_sparse(tiled, expression, inducing, weights)
-    few = len(measured.y) <= FEW
-    return MFDGP(level, average_sparse(high, tiled, weights) if few else high, centre, scale)
+    return MFDGP(low, high, centre, scale)
 
 
-def _spread(low: LowLevel, x: np.ndarray, centre: float, scale: float) -> np.ndarray:
-    """x (q, d) with the low level's value at each node: (COUNT·q, d + 1)."""
+def _spread(low: FidelityLevel, x: np.ndarray, centre: float, scale: float) -> np.ndarray:
+    """x (q, d) with the low level's value at each node: (NODE_COUNT·q, d + 1)."""
     value, sd = low.predict(x)
     nodes = (value[None, :] + NODES[:, None] * sd[None, :] - centre) / scale
-    return np.column_stack([np.tile(x, (COUNT, 1)), nodes.reshape(-1)])
+    return np.column_stack([np.tile(x, (NODE_COUNT, 1)), nodes.reshape(-1)])

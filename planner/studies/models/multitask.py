@@ -1,13 +1,11 @@
-"""Multi-task GP: t outputs that share what they learn about the poses (seed 003, section 2.3).
+"""Multi-task GP: t outputs share what they learn about poses (Lei et al. 2023, section 2.3).
 
 cov(f_a(x), f_b(x')) = B_ab k(x, x') (intrinsic coregionalisation, Bonilla et al. 2008), with
-B = L Lᵀ free and a noise per task. Where every output is observed at every pose, K is B ⊗ K_x + D
-and two small eigendecompositions do what one large Cholesky factor would (Rakitsch et al. 2013);
-with gaps the observed entries are taken as they are. Hyperparameters: the most probable ones, or a
-Laplace mixture around them (`task_average`).
+B = L Lᵀ free and a noise per task. Every output is observed at every pose, so that K is
+B ⊗ K_x + D and two small eigendecompositions do what one large Cholesky factor would (Rakitsch et
+al. 2013). Hyperparameters: the most probable ones.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -15,10 +13,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
 
 from planner.errors import InputError
+from planner.inference.quasi_newton import maximise
 from planner.surrogate.kernels import parse
 
 NOISE, NOISE_SPREAD = 0.1, 1.5  # median sd of a task's noise over its scale, its log-sd
@@ -31,16 +28,11 @@ RELATIVE_JITTER = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Tasks:
-    """What is to be fitted: x (n, d), y (n, t) scaled, NaN where missing, kernel expression."""
+    """What is to be fitted: x (n, d), y (n, t) scaled, kernel expression."""
 
     x: np.ndarray
     y: np.ndarray
     kernel: str
-
-    @property
-    def complete(self) -> bool:
-        """Whether every output is known everywhere."""
-        return bool(np.isfinite(self.y).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,25 +96,22 @@ class MultiTaskGP:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """log-likelihood, α = K⁻¹y (n, t) and its slopes in B, K_x and log D; dense or Kronecker."""
+    """log-likelihood, α = K⁻¹y (n, t) and its slopes in B, K_x and log D.
+
+    `rotation` holds eigenvectors (n, n), eigenvalues (n, t) of K over D, and task vectors (t, t).
+    """
 
     value: float
     alpha: np.ndarray
     slope_b: np.ndarray
     slope_k: np.ndarray
     slope_log_noise: np.ndarray
-    rotation: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-    inverse: np.ndarray | None = None  # (n, t, n, t), zero where missing
+    rotation: tuple[np.ndarray, np.ndarray, np.ndarray]
 
     def explained(self, cross: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Variance (q, t) that the data take away; cross (q, n) of the poses' kernel."""
-        if self.rotation is not None:
-            v, w, u = self.rotation
-            return ((cross @ v) ** 2 @ (1 / w)) @ ((b @ u) ** 2).T
-        assert self.inverse is not None
-        return np.einsum(
-            "qi,ta,iajb,qj,tb->qt", cross, b, self.inverse, cross, b, optimize="optimal"
-        )
+        v, w, u = self.rotation
+        return ((cross @ v) ** 2 @ (1 / w)) @ ((b @ u) ** 2).T
 
 
 def solve_kronecker(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarray) -> Solved:
@@ -155,89 +144,38 @@ def solve_kronecker(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarr
     )
 
 
-def solve_dense(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarray) -> Solved:
-    """For y (n, t) with NaN where missing: O((n t)³)."""
-    n, t = y.shape
-    pose, task = np.nonzero(np.isfinite(y))
-    seen = y[pose, task]
-    full = b[np.ix_(task, task)] * k[np.ix_(pose, pose)] + np.diag(noise[task])
-    factor = cho_factor(full, lower=True)
-    alpha, inverse = cho_solve(factor, seen), cho_solve(factor, np.eye(len(seen)))
-    log_det = 2 * np.sum(np.log(np.diag(factor[0])))
-    slope = 0.5 * (np.outer(alpha, alpha) - inverse)
-    wide, kept = np.zeros((2, n, t, n, t))
-    place = np.ix_(*[range(len(seen))] * 2)
-    rows, columns = (pose[:, None], task[:, None]), (pose[None, :], task[None, :])
-    wide[rows[0], rows[1], columns[0], columns[1]] = slope[place]
-    kept[rows[0], rows[1], columns[0], columns[1]] = inverse[place]
-    laid = np.zeros((n, t))
-    laid[pose, task] = alpha
-    diagonal = np.bincount(task, weights=np.diag(slope), minlength=t)
-    return Solved(
-        -0.5 * (seen @ alpha + log_det + len(seen) * np.log(2 * np.pi)),
-        laid,
-        np.einsum("iajb,ij->ab", wide, k),
-        np.einsum("iajb,ab->ij", wide, b),
-        2 * noise * diagonal,
-        None,
-        kept,
-    )
-
-
 def fit_multitask(
     x: np.ndarray, y: np.ndarray, kernel: str = "rbf", iterations: int = 200
 ) -> MultiTaskGP:
-    """Fit y (n, t), NaN where missing, at x (n, d) scaled to about [0, 1].
+    """Fit y (n, t) at x (n, d) scaled to about [0, 1], of at most `iterations` steps.
 
-    InputError where an output is nowhere known, for then nothing can be said of it.
+    InputError where a value is missing.
     """
-    known = np.isfinite(y)
-    if not known.any(axis=0).all():
-        which = int(np.argmin(known.any(axis=0))) + 1
-        raise InputError(f"Output {which} has no value at any pose: leave it out.")
-    count = known.sum(axis=0)
-    centre = np.where(known, y, 0.0).sum(axis=0) / count
-    apart = np.where(known, y - centre, 0.0)
-    scale = np.sqrt(np.sum(apart**2, axis=0) / count)
+    if not np.isfinite(y).all():
+        which = int(np.argmin(np.isfinite(y).all(axis=0))) + 1
+        raise InputError(f"Output {which} has no value at some pose: leave it or the pose out.")
+    centre, scale = y.mean(axis=0), y.std(axis=0)
     scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
-    tasks = Tasks(x, np.where(known, (y - centre) / scale, np.nan), kernel)
-    start = first_guess(tasks)
-    middle, width = start.flat(), prior_sds(start)
+    tasks = Tasks(x, (y - centre) / scale, kernel)
+    guess = first_guess(tasks)
+    middle, width = guess.flat(), prior_sds(guess)
 
-    def negative(vector: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = log_density(tasks, start.like(vector))
-        off = (vector - middle) / width
-        return -value + 0.5 * float(off @ off), -slope + off / width
+    # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
+    def posterior(z: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = log_density(tasks, guess.like(middle + width * z))
+        return value - 0.5 * float(z @ z), width * slope - z
 
-    found = _climb(negative, middle, REACH * width, middle, iterations)
-    if np.any(start.like(found).noise > 1):
+    def climb(z: np.ndarray, reach: float | np.ndarray, steps: int) -> np.ndarray:
+        return maximise(posterior, [z], -reach, reach, steps, FTOL).x
+
+    z = climb(np.zeros(len(middle)), REACH, iterations)
+    if np.any(guess.like(middle + width * z).noise > 1):
         # More noise than the output varies at all: a long first step has ended where an output
         # is given up. So first the poses' kernel and the noise, then the rest.
-        tasks_only = np.arange(len(middle)) < len(_lower(start.root)[0])
-        found = _climb(negative, middle, np.where(tasks_only, 0.0, REACH * width), middle, 20)
-        found = _climb(negative, middle, REACH * width, found, iterations)
-    h = start.like(found)
+        others = np.arange(len(middle)) >= len(_lower(guess.root)[0])
+        z = climb(climb(np.zeros(len(middle)), REACH * others, 20), REACH, iterations)
+    h = guess.like(middle + width * z)
     return MultiTaskGP(tasks, h, solve(tasks, h), centre, scale)
-
-
-def _climb(
-    negative: Callable[[np.ndarray], tuple[float, np.ndarray]], middle: np.ndarray,
-    reach: np.ndarray, start: np.ndarray, iterations: int,
-) -> np.ndarray:  # fmt: skip
-    # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
-    unit = np.where(reach > 0, reach / REACH, 1.0)
-
-    def scaled(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = negative(start + unit * z)
-        return value, slope * unit
-
-    lower, upper = (middle - reach - start) / unit, (middle + reach - start) / unit
-    done = minimize(
-        scaled, np.zeros_like(start), jac=True, method="L-BFGS-B",
-        bounds=list(zip(lower, upper, strict=True)),
-        options={"maxiter": iterations, "ftol": FTOL},
-    )  # fmt: skip
-    return start + unit * done.x
 
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
@@ -253,9 +191,7 @@ def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
 def solve(tasks: Tasks, h: Hyperparameters) -> Solved:
     k = parse(tasks.kernel, tasks.x.shape[1]).covariance(np, h.theta, tasks.x, tasks.x)
     k = k + RELATIVE_JITTER * np.mean(np.diag(k)) * np.eye(len(k))
-    return (solve_kronecker if tasks.complete else solve_dense)(
-        tasks.y, k, h.task_covariance, h.noise
-    )
+    return solve_kronecker(tasks.y, k, h.task_covariance, h.noise)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -266,11 +202,9 @@ def pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
 
 
 def first_guess(tasks: Tasks) -> Hyperparameters:
-    # Over the poses that two outputs share; made positive definite after that.
-    filled, known = np.nan_to_num(tasks.y), np.isfinite(tasks.y).astype(float)
-    t = filled.shape[1]
-    values, vectors = np.linalg.eigh(filled.T @ filled / np.maximum(known.T @ known, 1.0))
-    covariance = (vectors * np.maximum(values, 0.0)) @ vectors.T + 0.1 * np.eye(t)
+    """Hyperparameters to start from: B is the outputs' own covariance, made positive definite."""
+    n, t = tasks.y.shape
+    covariance = tasks.y.T @ tasks.y / n + 0.1 * np.eye(t)
     theta, _ = parse(tasks.kernel, tasks.x.shape[1]).prior(1.0, NOISE, LENGTH, 0.0, 1.0)
     return Hyperparameters(np.linalg.cholesky(covariance), np.full(t, np.log(NOISE)), theta)
 

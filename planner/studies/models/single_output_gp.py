@@ -1,10 +1,10 @@
 """Exact GP of one output: any kernel expression, a noise per point, hyperparameters averaged."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from planner.studies.models.fidelity_levels import Samples, spread
+from planner.studies.models.fidelity_levels import AveragedModel, Samples, spread
 from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.gp import Posterior, Prior, fit
 from planner.surrogate.kernels import parse
@@ -13,14 +13,11 @@ from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import TrainingData, pad
 
 PRIOR = OutputPrior(bias_sd=1.0, slope_sd=0.0, amplitude=1.0, nugget=1e-3)  # of y scaled to sd 1
-# A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to
-# tell an input that hardly matters. The spread is the likeliest on the development problems.
-GRID_PRIOR = replace(PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
 MANY = 64  # points; above, samples are fewer, for the hyperparameters are then well determined
 
 
 @dataclass(frozen=True, eq=False)
-class SingleGP:
+class SingleGP(AveragedModel):
     """A GP averaged over hyperparameters, of y = centre + scale·(…)."""
 
     posterior: Posterior
@@ -28,13 +25,8 @@ class SingleGP:
     scale: float
     log_evidence: float
 
-    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Median and sd (q,) of the noise-free output at x (q, d)."""
-        found = self.predictive(x)
-        return found.median, found.sd
-
     def predictive(self, x: np.ndarray) -> Predictive:
-        """The same, one Gaussian per sample of the hyperparameters."""
+        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
         return self.posterior.predictive(0, x, np.zeros(len(x))).scaled(self.centre, self.scale)
 
 
@@ -44,16 +36,14 @@ def fit_gp(
 ) -> SingleGP:  # fmt: skip
     """GP of `samples`, x scaled to about [0, 1].
 
-    `prior` is in units of `scale`, which is the sd of y unless said otherwise.
+    `prior` is in units of `scale`, by default the sd of y.
     """
     n = len(samples.y)
     centre = float(np.mean(samples.y)) if n else 0.0
     scale = scale or spread(samples.y)
     y, sd = (samples.y - centre) / scale, samples.sd / scale
     data = TrainingData(samples.x, y[:, None], sd[:, None], np.full((n, 1), np.nan))
-    mean, width = parse(kernel, samples.x.shape[1]).prior(
-        prior.amplitude, prior.nugget, prior.length, prior.spread, prior.length_spread
-    )
+    mean, width = prior.of_theta(parse(kernel, samples.x.shape[1]))
     bias = np.full(1, prior.bias_sd)
     stacked = Prior(np.zeros(1), bias, np.zeros(1), mean[None, :], width[None, :])
     padded = pad(data, np.zeros(1, bool))

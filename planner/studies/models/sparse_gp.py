@@ -16,16 +16,14 @@ import numpy as np
 from jax import Array
 from jax.scipy.linalg import solve_triangular
 from scipy.linalg import solve_triangular as solve_lower
-from scipy.optimize import minimize
 
-from planner.studies.models import laplace
+from planner.inference.quasi_newton import Peak, maximise
 from planner.studies.models.fidelity_levels import Samples, spread
-from planner.studies.models.mixture import Mixture
 from planner.surrogate.ar1 import OutputPrior
 from planner.surrogate.kernels import parse
-from planner.surrogate.predictive import Predictive
 
 PRIOR = OutputPrior(bias_sd=1.0, slope_sd=0.0, amplitude=1.0, nugget=0.03, length_spread=1.5)
+REACH = 4.0  # sds of the prior beyond which nothing is looked for
 JITTER = 1e-7  # relative to the prior variance, of the inducing points' covariance
 ROUNDS = (15, 60)  # steps of L-BFGS before and after the inducing points are chosen anew
 
@@ -55,64 +53,28 @@ class SparseGP:
         sd = np.sqrt(np.maximum(variance, 0.0))
         return self.centre + self.scale * (self.projected @ second), self.scale * sd
 
-    def predictive(self, x: np.ndarray) -> Predictive:
-        """The same, which is one Gaussian."""
-        mean, sd = self.predict(x)
-        return Predictive(np.ones(1), mean[None], sd[None])
-
 
 def fit_sparse(
-    samples: Samples, kernel: str = "rbf", inducing: int = 200, weights: np.ndarray | None = None,
-    prior: OutputPrior = PRIOR,
-) -> SparseGP:  # fmt: skip
+    samples: Samples, kernel: str = "rbf", inducing: int = 200, weights: np.ndarray | None = None
+) -> SparseGP:
     """Sparse GP of `samples`, x scaled to about [0, 1]; `weights` (n,) of the points, default 1."""
     x = samples.x
     w = np.ones(len(x)) if weights is None else weights
     centre, scale = float(np.mean(samples.y)), spread(samples.y)
     y, variance = (samples.y - centre) / scale, (samples.sd / scale) ** 2
-    k = parse(kernel, x.shape[1])
-    mean, sd = k.prior(
-        prior.amplitude, prior.nugget, prior.length, prior.spread, prior.length_spread
-    )
-    z, value = np.zeros(k.size), -np.inf
-    u = x[:1]
+    mean, sd = PRIOR.of_theta(parse(kernel, x.shape[1]))
+    peak, u = Peak(np.zeros(len(mean)), -np.inf), x[:1]
     for steps in ROUNDS:
-        u = choose_inducing(kernel, mean + sd * z, x, inducing)
-        z, value = _climb(kernel, z, (x, y, variance, w, u, mean, sd), steps)
-    evidence = value + 0.5 * float(z @ z) - float(w.sum()) * np.log(scale)
-    return _build(kernel, mean + sd * z, (x, y, variance, w, u), centre, scale, evidence)
-
-
-def _build(
-    kernel: str, theta: np.ndarray, data: tuple[np.ndarray, ...], centre: float, scale: float,
-    evidence: float,
-) -> SparseGP:  # fmt: skip
-    root, inner, projected = (np.array(a) for a in _solve(kernel, theta, *data)[:3])
-    return SparseGP(kernel, theta, data[-1], root, inner, projected, centre, scale, evidence)
-
-
-def average_sparse(
-    fitted: SparseGP, samples: Samples, weights: np.ndarray | None = None,
-    prior: OutputPrior = PRIOR, count: int = laplace.COUNT,
-) -> Mixture:  # fmt: skip
-    """Laplace mixture over the hyperparameters of what `fit_sparse` made of the same samples."""
-    x, kernel = samples.x, fitted.kernel
-    w = np.ones(len(x)) if weights is None else weights
-    y = (samples.y - fitted.centre) / fitted.scale
-    data = (x, y, (samples.sd / fitted.scale) ** 2, w, fitted.inducing)
-    mean, sd = parse(kernel, x.shape[1]).prior(
-        prior.amplitude, prior.nugget, prior.length, prior.spread, prior.length_spread
-    )
-    peak = (fitted.theta - mean) / sd
-    points, volume = laplace.draws(
-        lambda z: -np.array(bound(kernel, z, *data, mean, sd)[1]), peak, count
-    )
-    evidence = fitted.log_evidence - 0.5 * float(peak @ peak) + volume
-    parts = {
-        str(i): _build(kernel, mean + sd * z, data, fitted.centre, fitted.scale, evidence)
-        for i, z in enumerate(points)
-    }
-    return Mixture(parts, dict.fromkeys(parts, 1 / count), evidence)
+        u = choose_inducing(kernel, mean + sd * peak.x, x, inducing)
+        data = x, y, variance, w, u, mean, sd
+        peak = maximise(
+            lambda z, data=data: bound(kernel, z, *data), [peak.x], -REACH, REACH, steps
+        )
+    z = peak.x
+    evidence = peak.log_density + 0.5 * float(z @ z) - float(w.sum()) * np.log(scale)
+    theta = mean + sd * z
+    root, inner, projected = (np.array(a) for a in _solve(kernel, theta, x, y, variance, w, u)[:3])
+    return SparseGP(kernel, theta, u, root, inner, projected, centre, scale, evidence)
 
 
 def choose_inducing(kernel: str, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
@@ -131,22 +93,6 @@ def choose_inducing(kernel: str, theta: np.ndarray, x: np.ndarray, count: int) -
         left = np.maximum(left - factor[i] ** 2, 0.0)
         rows.append(pick)
     return x[rows]
-
-
-def _climb(
-    kernel: str, z: np.ndarray, data: tuple[np.ndarray, ...], steps: int
-) -> tuple[np.ndarray, float]:
-    def negative(z: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = bound(kernel, z, *data)
-        if not (np.isfinite(value) and np.isfinite(slope).all()):
-            return 1e10, np.zeros(len(z))
-        return -float(value), -np.array(slope)
-
-    done = minimize(
-        negative, z, jac=True, method="L-BFGS-B", bounds=[(-4.0, 4.0)] * len(z),
-        options={"maxiter": steps},
-    )  # fmt: skip
-    return done.x, -float(done.fun)
 
 
 @partial(jax.jit, static_argnums=0)

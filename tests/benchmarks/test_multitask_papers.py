@@ -1,7 +1,7 @@
-"""Seeds 003 and 002: many modal parameters over joint space, fitted together or one by one.
+"""Lei 2023 and Seyed Hosseini 2025: many modal parameters over joint space, fitted jointly or not.
 
-`pytest -m slow -s tests/benchmarks/test_seeds_002_003.py` prints the tables. Recordings of either
-are not public: postures of a KR210-like robot as MuJoCo has it, with EMA's scatter.
+`pytest -m slow -s tests/benchmarks/test_multitask_papers.py` prints the tables. Recordings of
+either are not public: postures of a KR210-like robot as MuJoCo has it, with EMA's scatter.
 """
 
 import time
@@ -61,7 +61,7 @@ def r2(told, measured):
     return 1 - np.mean((told - measured) ** 2, axis=0) / np.var(measured, axis=0)
 
 
-def test_seed_003_together_and_one_by_one(tmp_path):
+def test_lei2023_together_and_one_by_one(tmp_path):
     q, x = postures(POSTURES)
     y = parameters(truth_of(tmp_path), q)
     fold = np.random.default_rng(2).permutation(POSTURES) % FOLDS
@@ -91,7 +91,7 @@ def test_seed_003_together_and_one_by_one(tmp_path):
     assert together.mean() > alone.mean()
 
 
-def test_seed_002_last_fifteen_of_254_postures(tmp_path):
+def test_seyedhosseini2025_last_fifteen_of_254_postures(tmp_path):
     """A trajectory through joint space, its end told from its beginning."""
     t = np.linspace(0, 1, 254)
     turns = np.array([1.0, 1.7, 2.3, 0.7, 1.3, 2.9])

@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from planner.studies.models import recursive_ar1, single_output_gp
-from planner.studies.models.fidelity_levels import Averaged, LowLevel, Samples
-from planner.studies.models.mixture import Mixture, mix
+from planner.studies.models.fidelity_levels import AveragedModel, FidelityLevel, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive, scales
-from planner.studies.models.single_output_gp import GRID_PRIOR, fit_gp
+from planner.studies.models.single_output_gp import fit_gp
 from planner.surrogate.ar1 import OutputPrior
+from tests.support.mixture import Mixture, mix
 
+# A simulation's grid: no noise, but perhaps what the kernel cannot follow, and enough points to
+# tell an input that hardly matters. The spread is the likeliest on the development problems.
+GRID_PRIOR = replace(single_output_gp.PRIOR, nugget=1e-5, length=1.0, length_spread=2.0, spread=3.0)
 SHAPES = ("rbf", "matern52")
 GRID_SHAPES = (*SHAPES, "rbf+linear", "rbf+quadratic")  # many samples can tell a trend
 SOME = 64
@@ -38,7 +41,9 @@ def fit_low(samples: Samples) -> Mixture:
     return mix({shape: fit_gp(samples, shape, GRID_PRIOR) for shape in shapes})
 
 
-def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float = 1e-3) -> Mixture:
+def fit_fused(
+    measured: Samples, low: FidelityLevel, low_spread: float, nugget: float = 1e-3
+) -> Mixture:
     """Mixture of AR1, NARGP and a GP that ignores the simulation.
 
     `low_spread` is the sd of the low level over the workspace, `nugget` the median prior of noise
@@ -48,7 +53,7 @@ def fit_fused(measured: Samples, low: LowLevel, low_spread: float, nugget: float
         replace(p, nugget=nugget) for p in (recursive_ar1.PRIOR, single_output_gp.PRIOR)
     )
     _, scale = scales(measured.y, low.predict(measured.x)[0], low_spread)
-    families: dict[str, dict[str, Averaged]] = {
+    families: dict[str, dict[str, AveragedModel]] = {
         "AR1": {
             name: fit_recursive(measured, low, low_spread, kernel, prior)
             for name, (kernel, prior) in _discrepancies(fused, measured.x.shape[1]).items()
