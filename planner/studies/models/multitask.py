@@ -9,7 +9,6 @@ Laplace mixture around them (`task_average`).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +17,7 @@ from jax import Array
 from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 
+from planner import jax_setup
 from planner.errors import InputError
 from planner.surrogate.kernels import parse
 
@@ -258,7 +258,7 @@ def solve(tasks: Tasks, h: Hyperparameters) -> Solved:
     )
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
     """Slope in θ from the slope (n, n) in the kernel's matrix."""
     k = parse(kernel, x.shape[1])

@@ -8,7 +8,6 @@ the other (Burt et al. 2020).
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +17,7 @@ from jax.scipy.linalg import solve_triangular
 from scipy.linalg import solve_triangular as solve_lower
 from scipy.optimize import minimize
 
+from planner import jax_setup
 from planner.studies.models import laplace
 from planner.studies.models.fidelity_levels import Samples, spread
 from planner.studies.models.mixture import Mixture
@@ -149,7 +149,7 @@ def _climb(
     return done.x, -float(done.fun)
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def bound(
     kernel: str, z: Array, x: Array, y: Array, variance: Array, w: Array, u: Array, mean: Array,
     sd: Array,
@@ -162,7 +162,7 @@ def bound(
     return jax.value_and_grad(value)(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def _solve(
     kernel: str, theta: Array, x: Array, y: Array, variance: Array, w: Array, u: Array
 ) -> tuple[Array, Array, Array, Array]:
