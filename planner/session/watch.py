@@ -20,6 +20,7 @@ from planner.errors import InputError, NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report import session_text
+from planner.report.answer import Answer
 from planner.report.rerun_story import Story
 from planner.session.diagnosis_process import LEAST, Explaining
 from planner.session.inbox import Inbox
@@ -29,7 +30,7 @@ POLL_S = 0.2
 
 
 @dataclass(frozen=True)
-class SessionSummary:
+class SessionSummary(Answer):
     """How a session ended."""
 
     measured: tuple[str, ...]

@@ -1,6 +1,5 @@
 """Marginal likelihood with its own derivative, and the most probable hyperparameters (MAP)."""
 
-
 import jax
 import jax.numpy as jnp
 import numpy as np
