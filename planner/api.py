@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import measure
 from planner.design.next_hit import next_hit
@@ -181,6 +182,25 @@ def diagnose(
         hit = next_hit(explained, visits, offered or {})
         made = diagnosis_report(explained)
     return replace(made, next=hit, seconds=time.perf_counter() - started)
+
+
+def diagnose_material(
+    given: Material, robot: Robot | None = None, progress: Tell = quietly
+) -> DiagnosisReport:
+    """As `diagnose`, of what a folder of recordings or a campaign holds.
+
+    `robot` is the one of `given`, where it was loaded already.
+    """
+    robot = robot or Robot.load(given.robot)
+    dataset = Dataset.read(
+        given.recordings,
+        robot.joint_names,
+        robot.config.band_hz,
+        window_rate_1_s=given.window_rate_1_s,
+        progress=lambda text: progress(text, 0.0),
+    )
+    offered = dict(zip(given.names, given.offered, strict=True))
+    return diagnose(dataset, robot, offered=offered, progress=progress)
 
 
 def _frf_of(dataset: Dataset, pose: str | None) -> Frf:

@@ -34,10 +34,9 @@ def diagnose(
     """Locate where simulation and recordings differ, name the missing physics, show the fit."""
     import numpy as np
 
-    from planner.api import diagnose as locate
-    from planner.cli.material import material
+    from planner.api import diagnose_material
+    from planner.campaign.material import material
     from planner.cli.progress import counting
-    from planner.dataset.dataset import Dataset
     from planner.recording.folder import read_poses
     from planner.report.modal_analysis import check_options
     from planner.robot.robot import Robot
@@ -46,19 +45,9 @@ def diagnose(
     check_options(window_rate_1_s=window_rate_1_s)
     given = material(recordings, robot, window_rate_1_s)
     nominal = Robot.load(given.robot)
-    joints = nominal.joint_names
-    wanted = read_poses(predict, joints) if predict else ()
-    given = given.with_poses(wanted)
-    offered = dict(zip(given.names, given.offered, strict=True))
+    wanted = read_poses(predict, nominal.joint_names) if predict else ()
     with counting(quiet=as_json) as tell:
-        dataset = Dataset.read(
-            given.recordings,
-            joints,
-            nominal.config.band_hz,
-            window_rate_1_s=given.window_rate_1_s,
-            progress=lambda text: tell(text, 0.0),
-        )
-        answer = locate(dataset, nominal, offered=offered, progress=tell)
+        answer = diagnose_material(given.with_poses(wanted), nominal, tell)
         if predict:
             angles = np.array([row.joints_deg for row in wanted])
             npz = _target(out, predict, given.recordings)

@@ -11,7 +11,7 @@ from planner.cli.render_diagnosis import _next
 from scipy.stats import spearmanr
 
 from known_robots import KR210
-from planner.cli.material import Material
+from planner.campaign.material import Material
 from planner.dataset.level_columns import column
 from planner.dataset.visits import Recorded, Visit
 from planner.design.law_discrimination import accelerance, forces_n, law_separation
