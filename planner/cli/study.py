@@ -10,7 +10,7 @@ from planner.cli.answer import AsJson, respond
 
 
 def study(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="seed-000 to seed-003.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Paper, such as busch2022.")],
     out: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Write tables (CSV) and pictures here.")
     ] = None,
