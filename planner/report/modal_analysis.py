@@ -64,7 +64,7 @@ class IdentifiedMode:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ModalReport(Answer):
     """Answer of `modes`; `hits` are how many were averaged per axis.
 
@@ -77,11 +77,11 @@ class ModalReport(Answer):
     order: int
     refused: tuple[RefusedFile, ...]
     accepted: tuple[str, ...]
-    remarks: tuple[str, ...]
-    simulated: bool
     hits: tuple[int, int, int] | msgspec.UnsetType = UNSET
     usable_band_hz: tuple[float, float] | msgspec.UnsetType = UNSET
+    remarks: tuple[str, ...]
     amplitude: Amplitude | msgspec.UnsetType | None = UNSET
+    simulated: bool
     plots: tuple[str, ...] = ()
     rrd: str | None = None
 
@@ -95,7 +95,7 @@ class ModalReport(Answer):
             "refused": (),
             "remarks": modal.remarks,
         }
-        return cls(tuple(map(IdentifiedMode.of, modal.modes)), **(own | others))
+        return cls(modes=tuple(map(IdentifiedMode.of, modal.modes)), **(own | others))
 
     def text(self) -> Group:
         """The modes as a table."""
