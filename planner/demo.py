@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from planner.dataset.screened_files import Source
 from planner.errors import InputError, NoPoseLeftError
 from planner.recording.folder import read_recordings
 from planner.recording.records import PoseRow
+from planner.report.demonstration import DemonstrationReport, DemonstrationStep
 from planner.report.rerun_story import Story
 
 NAME = "kr240_plane"
@@ -65,7 +65,7 @@ class Pool:
 
 def play(
     directory: Path | None, measurements: int, viewer: bool, progress: Callable[[str], None]
-) -> dict[str, Any]:
+) -> DemonstrationReport:
     """Play a campaign until its target, `measurements`, or the pool's end; returns the summary."""
     source = shipped(NAME)
     directory = directory or Path(tempfile.mkdtemp(prefix="planner-demo-")) / NAME
@@ -73,13 +73,13 @@ def play(
     pool = Pool.load(source / "recordings", campaign.cell.robot.joint_names)
     rrd = campaign.directory / "demo.rrd"
     used: list[str] = []
-    steps: list[dict[str, Any]] = []
+    steps: list[DemonstrationStep] = []
     started = time.perf_counter()
     with Story(campaign.cell, rrd, viewer, simulated=True) as story:
         story.tell(campaign.entries[0], campaign.state, campaign.model)
         proposal = campaign.next()[0]
         story.tell(campaign.entries[-1], campaign.state, campaign.model)
-        while len(used) < min(measurements, len(pool.rows)) and not _done(campaign):
+        while len(used) < min(measurements, len(pool.rows)) and not campaign.model.done:
             pose = pool.nearest(campaign.cell, proposal, used)
             progress(f"measurement {len(used) + 1}: pose {pose}")
             if used:
@@ -98,32 +98,22 @@ def play(
     return _summary(campaign, pool, used, steps, rrd, progress)
 
 
-def _done(campaign: Campaign) -> bool:
-    return campaign.model.done
-
-
-def _step(report: ImportReport, proposal: Proposal, seconds: float) -> dict[str, Any]:
-    return {
-        "pose": report.pose,
-        "proposed": proposal.pose,
-        "frequency_hz": [m.frequency_hz for m in report.measurement.modes if m.likely]
-        if report.measurement
-        else [],
-        "refused": len(report.refused),
-        "frequency_sd_percent": report.model.frequency_sd_percent,
-        "refit_seconds": report.refit_seconds,
-        "seconds": seconds,
-    }
+def _step(report: ImportReport, proposal: Proposal, seconds: float) -> DemonstrationStep:
+    modes = report.measurement.modes if report.measurement else ()
+    return DemonstrationStep(
+        report.pose, proposal.pose, tuple(m.frequency_hz for m in modes if m.likely),
+        len(report.refused), report.model.frequency_sd_percent, report.refit_seconds, seconds,
+    )  # fmt: skip
 
 
 def _summary(
     campaign: Campaign,
     pool: Pool,
     used: list[str],
-    steps: list[dict[str, Any]],
+    steps: list[DemonstrationStep],
     rrd: Path,
     progress: Callable[[str], None],
-) -> dict[str, Any]:
+) -> DemonstrationReport:
     cell = campaign.cell
     unused = [pose for pose in pool.rows if pose not in used]
     truth = _measured_hz(cell, pool, unused, progress)
@@ -131,29 +121,29 @@ def _summary(
     simulated = cell.simulate(pool.q(unused)).frequency_hz
     inside = np.abs(truth - prediction.frequency_hz) <= Z_95 * prediction.frequency_sd_hz
     known = np.isfinite(truth)
-    return {
-        "campaign": str(campaign.directory),
-        "robot": cell.robot.name,
-        "simulated": True,
-        "pool": len(pool.rows),
-        "measurements": len(used),
-        "used": used,
-        "unused": len(unused),
-        "modes_compared": int(known.sum()),
-        "frequency_rmse_percent": rmse_percent(prediction.frequency_hz, truth),
-        "simulation_rmse_percent": rmse_percent(simulated, truth),
-        "frequency_rmse_percent_per_mode": _per_mode(prediction.frequency_hz, truth),
-        "simulation_rmse_percent_per_mode": _per_mode(simulated, truth),
-        "coverage95": float(np.mean(inside[known])) if known.any() else float("nan"),
-        "coverage95_per_mode": [
+    return DemonstrationReport(
+        campaign=str(campaign.directory),
+        robot=cell.robot.name,
+        simulated=True,
+        pool=len(pool.rows),
+        measurements=len(used),
+        used=tuple(used),
+        unused=len(unused),
+        modes_compared=int(known.sum()),
+        frequency_rmse_percent=rmse_percent(prediction.frequency_hz, truth),
+        simulation_rmse_percent=rmse_percent(simulated, truth),
+        frequency_rmse_percent_per_mode=_per_mode(prediction.frequency_hz, truth),
+        simulation_rmse_percent_per_mode=_per_mode(simulated, truth),
+        coverage95=float(np.mean(inside[known])) if known.any() else float("nan"),
+        coverage95_per_mode=tuple(
             float(np.mean(inside[known[:, k], k])) if known[:, k].any() else float("nan")
             for k in range(truth.shape[1])
-        ],
-        "remarks": list(campaign.model.remarks),
-        "step_seconds": [step["seconds"] for step in steps],
-        "steps": steps,
-        "rrd": str(rrd),
-    }
+        ),
+        remarks=campaign.model.remarks,
+        step_seconds=tuple(step.seconds for step in steps),
+        steps=tuple(steps),
+        rrd=str(rrd),
+    )
 
 
 def _measured_hz(
@@ -178,5 +168,5 @@ def rmse_percent(predicted: np.ndarray, truth: np.ndarray) -> float:
     return float(100 * np.sqrt(np.nanmean((predicted / truth - 1) ** 2)))
 
 
-def _per_mode(predicted: np.ndarray, truth: np.ndarray) -> list[float]:
-    return [rmse_percent(predicted[:, k], truth[:, k]) for k in range(truth.shape[1])]
+def _per_mode(predicted: np.ndarray, truth: np.ndarray) -> tuple[float, ...]:
+    return tuple(rmse_percent(predicted[:, k], truth[:, k]) for k in range(truth.shape[1]))

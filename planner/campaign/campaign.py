@@ -7,7 +7,6 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from planner import __version__
 from planner.campaign import store
 from planner.campaign.cell import Cell
 from planner.campaign.config import (
@@ -53,7 +52,10 @@ from planner.dataset.dataset import Dataset, Progress, Recording
 from planner.dataset.measure import frf_of
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
+from planner.frf.frequency_lines import frequency_lines
 from planner.frf.frf import Frf
+from planner.surrogate.frf_bands import ModalPrediction
+from planner.version import __version__
 
 
 class Campaign:
@@ -166,6 +168,33 @@ class Campaign:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         return Configured(_as_logged(config), hashes, __version__)
+
+    # -- what is expected ----------------------------------------------------------------------
+
+    def predict(self, q_rad: np.ndarray) -> ModalPrediction:
+        """Frequencies (Hz) and damping ratios (n, count), with sds, at poses q (n, dof) in rad."""
+        return self.model.predict(np.atleast_2d(q_rad))
+
+    def frf(
+        self, q_rad: np.ndarray, frequency_hz: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """FRFs at poses, with their uncertainty.
+
+        Args:
+            q_rad: Joint angles (n, dof) in rad, in the order of the robot's joints.
+            frequency_hz: Lines (F,) in Hz; by default `frequency_lines`.
+
+        Returns:
+            Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N: response
+            axis, then hit axis.
+        """
+        lines = self.frequency_lines if frequency_hz is None else frequency_hz
+        return self.model.frf(np.atleast_2d(q_rad), lines)
+
+    @property
+    def frequency_lines(self) -> np.ndarray:
+        """Lines (F,) in Hz over campaign.toml's band."""
+        return frequency_lines(self.cell.config.modes.band_hz)
 
     # -- acts ----------------------------------------------------------------------------------
 

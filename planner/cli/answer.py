@@ -1,30 +1,30 @@
 """How a command answers: one JSON document, or text for the engineer."""
 
-import math
 import sys
-from collections.abc import Callable
-from typing import Annotated, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import typer
+
+if TYPE_CHECKING:
+    from planner.report.answer import Answer, RefusedFile
 
 AsJson = Annotated[bool, typer.Option("--json", help="Answer with one JSON document.")]
 
 
-def respond(
-    answer: dict[str, Any], as_json: bool, render: Callable[[dict[str, Any]], Any], code: int = 0
-) -> int:
-    """Print the answer and return the exit code. Numbers that are not finite become null."""
+def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:
+    """Print the answer and return the exit code."""
     if as_json:
-        text = msgspec.json.format(msgspec.json.encode(plain(answer)), indent=2)
-        sys.stdout.write(text.decode() + "\n")
+        from planner.report.answer import encoded
+
+        sys.stdout.write(encoded(answer).decode() + "\n")
         sys.stdout.flush()
     else:
         from rich.console import Console
 
-        rendered = render(answer)
-        if rendered is not None:
-            Console().print(rendered)
+        text = answer.text()
+        if text is not None:
+            Console().print(text)
     return code
 
 
@@ -33,16 +33,13 @@ def warn(sentence: str) -> None:
     print(" ".join(sentence.split()), file=sys.stderr)
 
 
-def plain(value: Any) -> Any:
-    """NumPy to builtins; not-a-number to null."""
-    if hasattr(value, "tolist"):
-        value = value.tolist()
-    if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | set | frozenset):
-        return [plain(item) for item in value]
-    if isinstance(value, complex):
-        return [plain(value.real), plain(value.imag)]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+def refusals(files: "Iterable[RefusedFile]", questions: Iterable[str] = ()) -> int:
+    """Say on stderr what was refused, and what is asked; the exit code that goes with it."""
+    refused, asked = list(files), list(questions)
+    for file in refused:
+        # What is held is said once, with the question, not hit by hit.
+        if not any(question.startswith(file.reason) for question in asked):
+            warn(f"Refused {file.file}: {file.reason}")
+    for question in asked:
+        warn(question)
+    return 3 if refused or asked else 0

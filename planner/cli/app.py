@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, respond, warn
+from planner.cli.answer import AsJson, refusals, respond, warn
 from planner.cli.comparison import compare
 from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
@@ -32,7 +32,7 @@ def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        from planner import __version__
+        from planner.version import __version__
 
         print(f"planner {__version__}")
 
@@ -48,10 +48,9 @@ def new(
 ) -> int:
     """Start a campaign."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
+    from planner.report.campaign_acts import NewCampaign
 
-    made = Campaign.new(directory, robot, campaign)
-    return respond(answers.created(made), as_json, render.created)
+    return respond(NewCampaign.of(Campaign.new(directory, robot, campaign)), as_json)
 
 
 @app.command(name="next")
@@ -65,11 +64,10 @@ def next_(
 ) -> int:
     """Propose the next pose or poses to measure."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
+    from planner.report.proposals import proposals
 
-    opened = Campaign(directory)
-    proposals = opened.next(count, acquisition)
-    return respond(answers.proposals(opened, proposals), as_json, render.proposals)
+    campaign = Campaign(directory)
+    return respond(proposals(campaign, campaign.next(count, acquisition)), as_json)
 
 
 @app.command(name="import")
@@ -81,21 +79,13 @@ def import_(
 ) -> int:
     """Import hits, refit, and say what changed."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
     from planner.cli.progress import reporting
+    from planner.report.imports import ImportedPoses
 
     with reporting("importing", quiet=as_json) as progress:
         reports = Campaign(directory).import_paths(tuple(paths), pose, progress)
-    answer, code = answers.imported(reports), 0
-    for report in answer["poses"]:
-        asked = report["question"]
-        for hit in report["refused"]:
-            if asked is None or hit["reason"] != asked["text"]:
-                warn(f"Refused {hit['file']}: {hit['reason']}")
-        if asked is not None:
-            warn(answers.what_to_say(directory, asked["pose"], asked["text"]))
-        code = 3 if asked or report["refused"] else code
-    return respond(answer, as_json, render.imported, code)
+    answer = ImportedPoses.of(reports)
+    return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
 
 @app.command()
@@ -109,21 +99,19 @@ def confirm(
 ) -> int:
     """Use the held hits of a pose: they are from there indeed, or from another pose."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
+    from planner.report.campaign_acts import ConfirmedPose
+    from planner.report.imports import ImportedPoses
 
     campaign = Campaign(directory)
     if at is None:
         campaign.confirm(pose)
-        answer = {"confirmed": pose, "frequency_sd_percent": campaign.model.frequency_sd_percent}
-        return respond(answer, as_json, render.confirmed)
-    answer = answers.imported((campaign.move(pose, at),))
-    if answer["question"]:
-        warn(answers.what_to_say(directory, at, answer["question"]["text"]))
-    return respond(answer, as_json, render.imported, 3 if answer["refused"] else 0)
+        return respond(ConfirmedPose(pose, campaign.model.frequency_sd_percent), as_json)
+    answer = ImportedPoses.of((campaign.move(pose, at),))
+    return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
 
-@app.command()
-def status(
+@app.command(name="status")
+def status_(
     directory: Directory,
     plot: Annotated[
         Path | None,
@@ -136,23 +124,21 @@ def status(
 ) -> int:
     """What has been measured, what is open, how sure the model is and whether it may be."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
-    from planner.cli.left_out import left_out
     from planner.report.plot_files import Pictures
+    from planner.report.status import status
 
     campaign, pictures = Campaign(directory), Pictures(plot, format_)
-    answer = answers.status(campaign) | left_out(campaign, pictures)
-    return respond(answer, as_json, render.status)
+    answer = status(campaign).with_pictures(pictures, campaign.directory.name)
+    return respond(answer, as_json)
 
 
 @app.command()
 def undo(directory: Directory, as_json: AsJson = False) -> int:
     """Take back the last act."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
+    from planner.report.campaign_acts import UndoneAct
 
-    entry = Campaign(directory).undo()
-    return respond(answers.undone(entry), as_json, render.undone)
+    return respond(UndoneAct.of(Campaign(directory).undo()), as_json)
 
 
 @app.command()
@@ -164,10 +150,10 @@ def withdraw(
 ) -> int:
     """Set a measured pose aside; its recordings stay."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import render
+    from planner.report.campaign_acts import WithdrawnPose
 
     Campaign(directory).withdraw(pose, reason)
-    return respond({"withdrawn": pose, "reason": reason}, as_json, render.withdrawn)
+    return respond(WithdrawnPose(pose, reason), as_json)
 
 
 @app.command()
@@ -183,10 +169,10 @@ def skip(
     around it too.
     """
     from planner.campaign.campaign import Campaign
-    from planner.cli import render
+    from planner.report.campaign_acts import SkippedPose
 
     Campaign(directory).skip(pose, reason, neighbours=bool(reason))
-    return respond({"skipped": pose, "reason": reason}, as_json, render.skipped)
+    return respond(SkippedPose(pose, reason), as_json)
 
 
 @app.command()
@@ -204,8 +190,8 @@ def watch(
 ) -> int:
     """Interactive session: propose, wait for the analyser's export, import, refit."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
     from planner.cli.progress import console
+    from planner.report.imports import how_to_answer
     from planner.session.watch import watch as run
 
     summary = run(
@@ -218,10 +204,8 @@ def watch(
         viewer=viewer,
         explain=explain,
     )
-    for pose, text in summary.questions.items():
-        warn(answers.what_to_say(directory, pose, text))
-    code = 3 if summary.questions else 0
-    return respond(answers.session(summary), as_json, render.session, code)
+    asked = [how_to_answer(directory, pose, text) for pose, text in summary.questions.items()]
+    return respond(summary, as_json, refusals((), asked))
 
 
 @app.command()
@@ -233,9 +217,14 @@ def predict(
 ) -> int:
     """Modes and FRFs, with uncertainty, at given poses."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
+    from planner.recording.folder import read_poses
+    from planner.report.predictions import predictions
 
-    return respond(answers.predicted(Campaign(directory), poses, out), as_json, render.predicted)
+    campaign = Campaign(directory)
+    cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joint_names)
+    q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
+    npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
+    return respond(predictions(campaign, [row.pose for row in rows], q, npz), as_json)
 
 
 @app.command()
@@ -251,14 +240,14 @@ def replay(
 ) -> int:
     """Rebuild the campaign from its log, step by step, and check each step."""
     from planner.campaign.campaign import Campaign
-    from planner.cli import answers, render
     from planner.cli.progress import reporting
+    from planner.report.replayed import replayed
 
     with reporting("replaying", quiet=as_json) as progress:
-        answer = answers.replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
-    if not answer["reproduced"]:
+        answer = replayed(Campaign(directory), until, rrd, viewer, progress, acquisition)
+    if not answer.reproduced:
         warn("The log was not reproduced; see the steps that differ.")
-    return respond(answer, as_json, render.replayed, 0 if answer["reproduced"] else 1)
+    return respond(answer, as_json, 0 if answer.reproduced else 1)
 
 
 @app.command()
@@ -293,28 +282,19 @@ def modes(
     as_json: AsJson = False,
 ) -> int:
     """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv."""
-    from planner.cli import modal, render, survey
     from planner.cli.progress import reporting
+    from planner.report.modal_analysis import modal_report
     from planner.report.plot_files import Pictures
+    from planner.report.survey import several_poses, survey
 
     pictures = Pictures(plot, format_, rrd)
-    if modal.several_poses(paths):
-        modal.check(band_hz, estimator, quantity, window_rate_1_s)
-        band = band_hz or modal.DEFAULT_BAND_HZ
+    if several_poses(paths):
+        given = paths[0], band_hz, robot, estimator, quantity, window_rate_1_s
         with reporting("identifying", quiet=as_json) as progress:
-            answer = survey.analyse(
-                paths[0], band, robot, estimator, window_rate_1_s, pictures, progress
-            )
-        for entry in answer["refused"]:
-            warn(f"Refused {entry['file']}: {entry['reason']}")
-        return respond(answer, as_json, render.survey, 3 if answer["refused"] else 0)
-    answer = modal.analyse(
-        tuple(paths), band_hz, force, estimator, pictures, quantity, window_rate_1_s
-    )
-    refused = answer["refused"]
-    for entry in refused:
-        warn(f"Refused {entry['file']}: {entry['reason']}")
-    return respond(answer, as_json, render.modes, 3 if refused else 0)
+            answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
+    else:
+        answer = modal_report(paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s)
+    return respond(answer, as_json, refusals(answer.refused))
 
 
 app.command()(identify)
@@ -334,10 +314,9 @@ def demo(
     as_json: AsJson = False,
 ) -> int:
     """Play a whole campaign on recordings shipped with the project (simulated)."""
-    from planner.cli import render
     from planner.cli.progress import reporting
     from planner.demo import play
 
     with reporting("playing", quiet=as_json) as progress:
         answer = play(directory, measurements, viewer, progress)
-    return respond(answer, as_json, render.demo)
+    return respond(answer, as_json)

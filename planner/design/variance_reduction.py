@@ -85,7 +85,7 @@ def _label(
     return np.mean(done[:, :n] / scale, axis=0), np.mean(scale, axis=0)
 
 
-@partial(jax_setup.widely_compiled, static_argnums=0)
+@jax_setup.compiled("wide", static_argnums=0)
 def _squares(
     kernel: str, theta: Array, x: Array, a: Array, xu: Array, b: Array, weight: Array
 ) -> Array:

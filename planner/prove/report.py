@@ -1,30 +1,58 @@
 """The report of a proof: report.json, report.md and two pictures."""
 
 import json
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from planner.prove.run import Proof
-from planner.prove.score import BINS, Scored, summary
+from planner.prove.run import Proof, told, unseal
+from planner.prove.score import BINS, Scored, score, summary
+from planner.report.answer import Answer, plain
 
 
-def write(proof: Proof, scored: Sequence[Scored]) -> dict[str, Any]:
-    """Write all files into the proof's folder; returns the figures and the files' names."""
+@dataclass(frozen=True)
+class ProofReport(Answer):
+    """Answer of `prove`; `seal` is the hash of all sealed answers, `figures` as in `summary`."""
+
+    seal: str
+    cases: int
+    figures: Mapping[str, Any]
+    misses: tuple[Scored, ...]
+    report: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The figures are keys of their own."""
+        found = super().to_json()
+        figures = found.pop("figures")
+        return {"seal": found.pop("seal"), "cases": found.pop("cases"), **figures, **found}
+
+    def text(self) -> str:
+        """The written report."""
+        return Path(self.report).read_text(encoding="utf-8")
+
+
+def prove_report(proof: Proof) -> ProofReport:
+    """Unseal and score every case of a proof that was diagnosed, and write all files."""
+    scored = []
+    for name in sorted(proof.seals):
+        found = json.loads(told(proof, name).read_text(encoding="utf-8"))
+        scored.append(score(name, unseal(proof, name), found))
+    return write(proof, scored)
+
+
+def write(proof: Proof, scored: Sequence[Scored]) -> ProofReport:
+    """Write all files into the proof's folder."""
     figures = summary(scored)
-    answer = {
-        "seal": proof.whole,
-        "cases": len(scored),
-        **figures,
-        "misses": [asdict(s) for s in scored if not s.right],
-        "report": str(proof.folder / "report.md"),
-    }
-    whole = answer | {"scored": [asdict(s) for s in scored], "seals": proof.seals}
-    text = json.dumps(whole, indent=1, default=float)
+    misses = tuple(s for s in scored if not s.right)
+    report = str(proof.folder / "report.md")
+    answer = ProofReport(proof.whole, len(scored), figures, misses, report)
+    whole = answer.to_json() | {"scored": plain(scored), "seals": proof.seals}
+    text = json.dumps(whole, indent=1)
     (proof.folder / "report.json").write_text(text, encoding="utf-8")
     _confusion(scored).savefig(proof.folder / "confusion.png", dpi=110)
     _calibration(scored).savefig(proof.folder / "calibration.png", dpi=110)

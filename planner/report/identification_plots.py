@@ -17,7 +17,7 @@ BEFORE, AFTER = ("tab:blue", "--"), ("tab:red", "-")
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class ShownPose:
     """A measured pose, q (dof,) in rad, and the simulation to show there."""
 
     name: str
@@ -28,7 +28,7 @@ class Pose:
 
 
 def identification_figures(
-    poses: Sequence[Pose],
+    poses: Sequence[ShownPose],
     nominal: Simulation,
     band_hz: tuple[float, float],
     mark: str = "",
@@ -60,7 +60,7 @@ def identification_figures(
 
 
 def direct_figure(
-    pose: Pose, nominal: Simulation, band_hz: tuple[float, float], mark: str = ""
+    pose: ShownPose, nominal: Simulation, band_hz: tuple[float, float], mark: str = ""
 ) -> Figure:
     """Direct FRFs xx, yy, zz of a pose: measured, nominal and identified, in m/s²/N."""
     lines = _inside(pose.frf, band_hz)

@@ -1,26 +1,31 @@
 """The diagnosis beside a session: in a process of its own, so that nobody waits for it."""
 
-import json
 import os
-import subprocess
-import tempfile
+from concurrent.futures import CancelledError, Future
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
-from typing import IO
 
-from planner import program
+from loky import ProcessPoolExecutor
+
+from planner.errors import PlannerError
+from planner.inference import parallel
+from planner.report.diagnosis import DiagnosisReport
 
 LEAST = 3  # measured poses from which a diagnosis is asked for
 NICE = 10  # the session goes first
 CONSISTENT = "The simulation, once refitted, explains the recordings to within their noise."
 UNEXPLAINED = "Simulation and recordings differ, and no effect known here explains it."
+FAILED = "The diagnosis did not end; ask planner diagnose for its reason."
 
 
-class Explaining:
-    """Runs `planner diagnose` on a campaign, once at a time, on what is there when it starts."""
+class DiagnosisProcess:
+    """Diagnoses a campaign, once at a time, on what is there when it starts."""
 
     def __init__(self, directory: Path):
-        self._command = program.command("diagnose", str(directory), "--json")
-        self._running: tuple[subprocess.Popen[bytes], IO[bytes]] | None = None
+        self._directory = directory
+        self._pool: ProcessPoolExecutor | None = None
+        self._running: Future[DiagnosisReport] | None = None
         self._due = False
         self._said = ""
 
@@ -31,16 +36,9 @@ class Explaining:
 
     def told(self, wait: bool = False) -> str | None:
         """What a diagnosis that has ended says, if it is not what the last one said."""
-        if self._running is None:
+        if self._running is None or not (wait or self._running.done()):
             return None
-        process, answer = self._running
-        if wait:
-            process.wait()
-        elif process.poll() is None:
-            return None
-        answer.seek(0)
-        text = _text(process.returncode, answer.read().decode())
-        answer.close()
+        text = self._text(self._running)
         self._running = None
         self._start()
         if self._running is not None and wait:
@@ -50,29 +48,43 @@ class Explaining:
 
     def close(self) -> None:
         """End what still runs."""
-        if self._running is not None:
-            self._running[0].kill()
-            self._running[0].wait()
-            self._running[1].close()
-            self._running = None
+        if self._pool is not None:
+            self._pool.shutdown(kill_workers=True)
+        self._pool = self._running = None
 
     def _start(self) -> None:
         if not self._due or self._running is not None:
             return
         self._due = False
-        answer = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
-        process = subprocess.Popen(
-            self._command, stdout=answer, stderr=subprocess.DEVNULL, stdin=subprocess.DEVNULL
-        )
-        os.setpriority(os.PRIO_PROCESS, process.pid, NICE)
-        self._running = process, answer
+        if self._pool is None:
+            # Of loky: others run a script that has no guard for its main part once more.
+            self._pool = ProcessPoolExecutor(1, timeout=None, initializer=_begin)
+        self._running = self._pool.submit(diagnose_measured, self._directory)
+
+    def _text(self, ended: "Future[DiagnosisReport]") -> str:
+        try:
+            found = ended.result()
+        except PlannerError as error:
+            return f"{error}"
+        except (BrokenProcessPool, CancelledError):
+            self.close()
+            return FAILED
+        except Exception:
+            return FAILED
+        said = " ".join(finding.text for finding in found.findings)
+        if found.verdict == "consistent":
+            return CONSISTENT
+        return f"{UNEXPLAINED} {said}".strip() if found.verdict == "unexplained" else said
 
 
-def _text(code: int, answer: str) -> str:
-    if code not in (0, 3):
-        return "The diagnosis did not end; ask planner diagnose for its reason."
-    found = json.loads(answer)
-    said = " ".join(finding["text"] for finding in found["findings"])
-    if found["verdict"] == "consistent":
-        return CONSISTENT
-    return f"{UNEXPLAINED} {said}".strip() if found["verdict"] == "unexplained" else said
+def diagnose_measured(directory: Path) -> DiagnosisReport:
+    """The diagnosis of a campaign as it stands, without its fits: those stay in the process."""
+    from planner.api import diagnose_material
+    from planner.campaign.material import material
+
+    return replace(diagnose_material(material(directory, None, 0.0)), explained=None)
+
+
+def _begin() -> None:
+    os.nice(NICE)
+    parallel._begin()

@@ -20,8 +20,9 @@ from planner.errors import InputError, NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
 from planner.replay import replay
 from planner.report import session_text
+from planner.report.answer import Answer
 from planner.report.rerun_story import Story
-from planner.session.diagnosis_process import LEAST, Explaining
+from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 
@@ -29,7 +30,7 @@ POLL_S = 0.2
 
 
 @dataclass(frozen=True)
-class SessionSummary:
+class SessionSummary(Answer):
     """How a session ended."""
 
     measured: tuple[str, ...]
@@ -66,7 +67,7 @@ def watch(
         if rrd is not None or viewer:  # a resumed session shows what went before, too
             for step in replay(campaign):
                 story.tell(step.entry, step.state, step.model, step.measured)
-        explaining = Explaining(campaign.directory) if explain else None
+        explaining = DiagnosisProcess(campaign.directory) if explain else None
         if explaining is not None:
             stack.callback(explaining.close)
         session = _Session(
@@ -79,7 +80,7 @@ def watch(
 class _Session:
     def __init__(
         self, campaign: Campaign, inbox: Inbox, console: Console, keys: Keys, story: Story,
-        auto: bool, hits_per_pose: int, limit_s: float | None, explaining: Explaining | None,
+        auto: bool, hits_per_pose: int, limit_s: float | None, explaining: DiagnosisProcess | None,
     ):  # fmt: skip
         self.campaign, self.inbox, self.console, self.keys = campaign, inbox, console, keys
         self.story, self.auto, self.hits_per_pose = story, auto, hits_per_pose

@@ -7,7 +7,6 @@ averaged (see `importance`).
 """
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import jax
@@ -200,15 +199,13 @@ def _log_likelihoods(
     kernel: str, data: Padded, y: np.ndarray, prior: Prior, jitter: float, theta: np.ndarray
 ) -> np.ndarray:
     """(m, s) of y (m, c) at θ (m, s, p), without the constant; −∞ where there is none."""
-    return np.asarray(
-        _compiled(
-            kernel, data.x, y, data.low, data.mask, data.variance, prior.bias_sd, prior.slope_sd,
-            jitter, theta,
-        )
+    return _compiled(
+        kernel, data.x, y, data.low, data.mask, data.variance, prior.bias_sd, prior.slope_sd,
+        jitter, theta,
     )  # fmt: skip
 
 
-@partial(jax_setup.quickly_compiled, static_argnums=0)
+@jax_setup.compiled("quick", static_argnums=0)
 def _compiled(
     kernel: str, x: Array, y: Array, low: Array, mask: Array, variance: Array, bias: Array,
     slope: Array, jitter: Array, theta: Array,

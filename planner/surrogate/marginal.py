@@ -1,13 +1,12 @@
 """Marginal likelihood with its own derivative, and the most probable hyperparameters (MAP)."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.scipy.linalg import cho_solve
 
+from planner import jax_setup
 from planner.inference.quasi_newton import maximise
 from planner.surrogate.gp import Prior
 from planner.surrogate.kernels import parse
@@ -57,7 +56,7 @@ def _covariance(
     return k * mask[:, None] * mask[None, :] + jnp.diag(jnp.where(mask > 0, noise, 1.0))
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def _objective(kernel: str, y: Array, z: Array, *data: Array) -> tuple[Array, Array]:
     def density(z: Array) -> Array:
         return log_marginal(_covariance(kernel, z, *data), y) - 0.5 * jnp.sum(z**2)
@@ -65,7 +64,7 @@ def _objective(kernel: str, y: Array, z: Array, *data: Array) -> tuple[Array, Ar
     return jax.value_and_grad(density)(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def _precision(kernel: str, z: Array, *data: Array) -> Array:
     """Fisher information (p, p) of z, the prior's included: ½ tr(K⁻¹ ∂K K⁻¹ ∂K) + 1."""
     factor = jnp.linalg.cholesky(_covariance(kernel, z, *data))
@@ -101,7 +100,7 @@ def laplace(kernel: str, padded: Padded, prior: Prior) -> tuple[np.ndarray, np.n
     for j in range(len(padded.y)):
         z = most_probable(kernel, padded, prior, j)
         _, data = _data(padded, prior, j)
-        covariance = np.linalg.inv(np.array(_precision(kernel, z, *data)))
+        covariance = np.linalg.inv(_precision(kernel, z, *data))
         centres.append(z)
         roots.append(np.linalg.cholesky((covariance + covariance.T) / 2))
     return np.array(centres), np.array(roots)

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from scipy.stats import spearmanr
 
-from planner.cli.material import Material
-from planner.cli.next_hit import next_hit
-from planner.cli.render_diagnosis import _next
 from planner.dataset.dataset import Dataset, Visit
 from planner.dataset.level_columns import column
 from planner.design.law_discrimination import accelerance, forces_n, law_separation
+from planner.design.next_hit import next_hit
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import receptances, system_of
 from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit, Laws
@@ -165,12 +163,13 @@ def test_the_command_names_the_force(cell):
     established = SimpleNamespace(established=((finding, 0.5),))
     explained = SimpleNamespace(whole=established, recorded=cell[0])
     q = KR210.poses(3, 9)
-    given = Material(Path(), Path(), 0.0, q, ("A", "B", "C"))
-    told = next_hit(explained, given)
-    assert told["pose"] in given.names
-    assert told["hit"] in "xyz"
-    assert told["force_n"][1] == pytest.approx(300.0, rel=0.1)  # all hits were of 300 N
-    assert told["force_n"][0] < told["force_n"][1] <= 300.5
-    assert told["between"] == ["friction at joint_3 (50 %)", "backlash at joint_3 (50 %)"]
-    assert " N along " in _next(told)
-    assert next_hit(explained, replace(given, offered=q[:0])) is None
+    offered = dict(zip("ABC", q, strict=True))
+    told = next_hit(explained, offered)
+    assert told is not None
+    np.testing.assert_allclose(np.deg2rad(told.joints_deg), offered[told.pose], atol=1e-4)
+    assert told.hit in "xyz"
+    assert told.force_n[1] == pytest.approx(300.0, rel=0.1)  # all hits were of 300 N
+    assert told.force_n[0] < told.force_n[1] <= 300.5
+    assert told.between == ("friction at joint_3 (50 %)", "backlash at joint_3 (50 %)")
+    assert " N along " in told.sentence
+    assert next_hit(explained, {}) is None

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from planner import jax_setup
 from planner.errors import InputError
 from planner.surrogate import marginal
 from planner.surrogate.kernels import KERNELS, parse
@@ -18,6 +19,12 @@ EXPRESSIONS = [
     "matern52[:1]+cubic[1:]*bias",
     "quadratic*matern52+rbf[2:]",
 ]
+
+
+@pytest.fixture(autouse=True)
+def _as_compiled():
+    with jax_setup.numerics():
+        yield
 
 
 def random_theta(kernel, rng):

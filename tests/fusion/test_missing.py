@@ -109,9 +109,9 @@ def test_a_cache_that_cannot_be_kept_is_no_trouble(tmp_path, blocked):
     place.parent.mkdir(exist_ok=True)
     place.write_text("")  # a file where the folder should be
     code = (
-        "from planner import jaxsetup; import jax; "
-        "jax.config.update('jax_persistent_cache_min_compile_time_secs', 0); "
-        "print(jax.jit(lambda a: a + 1.0)(1.0), jax.config.jax_compilation_cache_dir)"
+        "from planner import jax_setup; "
+        "jax_setup.KEEP['jax_persistent_cache_min_compile_time_secs'] = 0; "
+        "print(jax_setup.compiled()(lambda a: a + 1.0)(1.0), jax_setup._folder())"
     )
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", code],

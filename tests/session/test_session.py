@@ -1,10 +1,11 @@
 """The terminal session with a fake analyser that writes slowly and a scripted engineer."""
 
 import io
+import os
 import shutil
-import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,10 +13,9 @@ from msgspec.structs import replace
 from rerun.chunk import RrdReader
 from rich.console import Console
 
-from planner import program
 from planner.campaign.campaign import Campaign
 from planner.report.rerun_story import Story
-from planner.session.diagnosis_process import Explaining
+from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.watch import watch
 from tests.support.outside import make_cell, record
 
@@ -250,24 +250,26 @@ def test_pictures_that_are_interrupted_are_made_at_the_end(cell, monkeypatch):
     assert begun == ["Imported", "Imported", "Proposed"]
 
 
+def stand_in(*answers):
+    """A diagnosis that says (verdict, text) by how many poses are measured."""
+
+    def diagnose(directory):
+        from types import SimpleNamespace
+
+        from planner.campaign.campaign import Campaign
+
+        verdict, text = answers[len(Campaign(directory).state.used) - 1]
+        findings = [SimpleNamespace(text=text)] if text else []
+        return SimpleNamespace(verdict=verdict, findings=findings)
+
+    return diagnose
+
+
 def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(cell, monkeypatch):
-    """Its process is a stand-in: what a diagnosis finds is tested where it is made."""
+    """What it runs is a stand-in: what a diagnosis finds is tested where it is made."""
     campaign, truth, tmp_path = cell
-    answers = [
-        {"verdict": "consistent", "findings": []},
-        {"verdict": "explained", "findings": [{"text": "The floor gives way."}]},
-    ]
-    counter = tmp_path / "counter"
-    counter.write_text("0")
-    script = (
-        "import json, pathlib, sys\n"
-        "path = pathlib.Path(sys.argv[1])\n"
-        "asked = int(path.read_text())\n"
-        "path.write_text(str(asked + 1))\n"
-        f"print(json.dumps({answers!r}[min(asked, 1)]))\n"
-    )
-    stand_in = [sys.executable, "-c", script, str(counter)]
-    monkeypatch.setattr(program, "command", lambda *arguments: stand_in)
+    made = stand_in(("consistent", ""), ("explained", "The floor gives way."))
+    monkeypatch.setattr("planner.session.diagnosis_process.diagnose_measured", made)
     monkeypatch.setattr("planner.session.watch.LEAST", 1)
     inbox = tmp_path / "inbox"
     console = screen()
@@ -284,16 +286,56 @@ def test_the_diagnosis_runs_beside_the_session_and_is_said_when_it_is_through(ce
 def test_a_diagnosis_that_was_asked_for_meanwhile_follows_and_says_only_what_is_new(
     tmp_path, monkeypatch
 ):
-    said = {"verdict": "unexplained", "findings": [{"text": "At 20 Hz."}]}
-    stand_in = [sys.executable, "-c", f"import json; print(json.dumps({said!r}))"]
-    monkeypatch.setattr(program, "command", lambda *arguments: stand_in)
-    explaining = Explaining(tmp_path)
-    assert explaining.told() is None
-    explaining.ask()
-    explaining.ask()
-    assert (explaining.told(wait=True) or "").endswith("At 20 Hz.")
-    explaining.ask()
-    assert explaining.told(wait=True) is None  # nothing new
-    explaining.ask()
-    explaining.close()
-    assert explaining.told() is None
+    found = SimpleNamespace(verdict="unexplained", findings=[SimpleNamespace(text="At 20 Hz.")])
+    monkeypatch.setattr(
+        "planner.session.diagnosis_process.diagnose_measured", lambda directory: found
+    )
+    beside = DiagnosisProcess(tmp_path)
+    assert beside.told() is None
+    beside.ask()
+    beside.ask()
+    assert (beside.told(wait=True) or "").endswith("At 20 Hz.")
+    beside.ask()
+    assert beside.told(wait=True) is None  # nothing new
+    beside.ask()
+    beside.close()
+    assert beside.told() is None
+
+
+def test_a_diagnosis_goes_at_low_priority_and_ends_with_the_session(tmp_path, monkeypatch):
+    note = tmp_path / "note"
+
+    def endless(directory):
+        import os
+        import time
+
+        note.with_suffix(".part").write_text(f"{os.getpid()} {os.getpriority(os.PRIO_PROCESS, 0)}")
+        note.with_suffix(".part").rename(note)
+        time.sleep(600)
+
+    monkeypatch.setattr("planner.session.diagnosis_process.diagnose_measured", endless)
+    beside = DiagnosisProcess(tmp_path)
+    beside.ask()
+    while not note.is_file():
+        time.sleep(0.05)
+    process, priority = map(int, note.read_text().split())
+    assert priority > os.getpriority(os.PRIO_PROCESS, 0)
+    assert beside.told() is None  # nobody waits for it
+    beside.close()
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+
+
+def test_a_diagnosis_that_fails_is_said_and_the_next_one_runs(tmp_path, monkeypatch):
+    where = "planner.session.diagnosis_process.diagnose_measured"
+    beside = DiagnosisProcess(tmp_path)
+    for fault, said in (
+        (lambda directory: 1 / 0, "did not end"),
+        (lambda directory: os._exit(1), None),  # the same again is not said again
+        (diagnose_measured, "no campaign"),
+    ):
+        monkeypatch.setattr(where, fault)
+        beside.ask()
+        told = beside.told(wait=True)
+        assert told is None if said is None else said in (told or "")
+    beside.close()

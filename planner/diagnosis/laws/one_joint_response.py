@@ -7,7 +7,6 @@ torque, so that only the joint itself is integrated.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -189,7 +188,7 @@ def torques(
             numbers = [_filled(v[some], 1.0) for v in (k, a, extra, port.gives)]
             poles = [_filled(v[:, some]) for v in (port.grow, port.drive)]
             free = _filled(port.free[:, some], sizes=(STEPS, COLUMNS))
-            torque = np.asarray(_torques(law.step, *numbers, *poles, free))
+            torque = _torques(law.step, *numbers, *poles, free)
             out[:, some] = torque[:n, : some.stop - first]
     return out
 
@@ -202,7 +201,7 @@ def _filled(
     return np.pad(values, more, constant_values=value)
 
 
-@partial(jax_setup.quickly_compiled, static_argnums=0)
+@jax_setup.compiled("quick", static_argnums=0)
 def _torques(
     step: Step,
     k: Array,

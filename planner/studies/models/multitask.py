@@ -7,13 +7,13 @@ al. 2013). Hyperparameters: the most probable ones.
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from planner import jax_setup
 from planner.errors import InputError
 from planner.inference.quasi_newton import maximise
 from planner.surrogate.kernels import parse
@@ -194,7 +194,7 @@ def solve(tasks: Tasks, h: Hyperparameters) -> Solved:
     return solve_kronecker(tasks.y, k, h.task_covariance, h.noise)
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def pull(kernel: str, theta: Array, x: Array, slope: Array) -> Array:
     """Slope in θ from the slope (n, n) in the kernel's matrix."""
     k = parse(kernel, x.shape[1])

@@ -8,7 +8,6 @@ the other (Burt et al. 2020).
 """
 
 from dataclasses import dataclass
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +16,7 @@ from jax import Array
 from jax.scipy.linalg import solve_triangular
 from scipy.linalg import solve_triangular as solve_lower
 
+from planner import jax_setup
 from planner.inference.quasi_newton import Peak, maximise
 from planner.studies.models.fidelity_levels import Samples, spread
 from planner.surrogate.ar1 import OutputPrior
@@ -95,7 +95,7 @@ def choose_inducing(kernel: str, theta: np.ndarray, x: np.ndarray, count: int) -
     return x[rows]
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def bound(
     kernel: str, z: Array, x: Array, y: Array, variance: Array, w: Array, u: Array, mean: Array,
     sd: Array,
@@ -108,7 +108,7 @@ def bound(
     return jax.value_and_grad(value)(z)
 
 
-@partial(jax.jit, static_argnums=0)
+@jax_setup.compiled(static_argnums=0)
 def _solve(
     kernel: str, theta: Array, x: Array, y: Array, variance: Array, w: Array, u: Array
 ) -> tuple[Array, Array, Array, Array]:

@@ -1,0 +1,211 @@
+"""What scripts call: modal analysis, identification and diagnosis as functions of typed values."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from planner.campaign.material import Material
+from planner.dataset.dataset import Dataset
+from planner.dataset.measure import measure
+from planner.design.next_hit import next_hit
+from planner.diagnosis.diagnose import explain
+from planner.dynamics.simulation import Simulation
+from planner.errors import InputError, RefusedError
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.identification.extended_structure import Structure, extended
+from planner.identification.held_out import identify_judged
+from planner.identification.parameters import Priors
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.modes import ModalModel
+from planner.progress import Tell, quietly
+from planner.recording.records import Hit
+from planner.report.diagnosis import DiagnosisReport, diagnosis_report
+from planner.report.identification import (
+    IdentificationBasis,
+    IdentificationReport,
+    identification_report,
+)
+from planner.report.modal_analysis import DEFAULT_BAND_HZ, check_options, sources_of
+from planner.robot.robot import Robot
+
+if TYPE_CHECKING:
+    from planner.identification.identify import Progress
+
+# What the inertial parameters of a CAD model err by (relative sds, and metres).
+INERTIAS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
+
+
+def analyse(
+    source: "Frf | Dataset | Path | str | Sequence[Hit] | Sequence[Path | str]",
+    *,
+    pose: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+    estimator: str = "h1",
+    window_rate_1_s: float = 0.0,
+) -> ModalModel:
+    """Experimental modal analysis of one pose.
+
+    Args:
+        source: An FRF matrix, hits, files or folders of recordings of one pose, or a dataset.
+        pose: Which pose of a dataset.
+        band_hz: In which modes are looked for; by default the dataset's, else 4 to 60 Hz.
+        estimator: "h1", "h2" or "hv", for hits and files.
+        window_rate_1_s: Of an exponential window e^(−rate·t), in 1/s, that the analyser laid over
+            all channels of hits and files; damping comes out without it.
+
+    Returns:
+        The modes, increasing in frequency, with standard deviations: frequencies in Hz, damping
+        ratios, shapes (3,), residues (3, 3) in m/(N·s).
+
+    Raises:
+        InputError: The source or an option makes no sense.
+        RefusedError: No recording can be used, or no mode is found.
+    """
+    check_options(band_hz, estimator, None, window_rate_1_s)
+    band = band_hz or (source.band_hz if isinstance(source, Dataset) else DEFAULT_BAND_HZ)
+    with threadpool_limits(1):
+        if isinstance(source, Dataset):
+            return estimate_modes(_frf_of(source, pose), band)
+        if pose is not None:
+            raise InputError("A pose is named, but only a Dataset has several.")
+        if isinstance(source, Frf):
+            return estimate_modes(source, band)
+        given = [source] if isinstance(source, Path | str) else list(source)
+        if not given:
+            raise InputError("There is nothing to analyse; give hits or files of one pose.")
+        hits = [one for one in given if isinstance(one, Hit)]
+        if len(hits) == len(given):
+            frf = replace(
+                estimate(tuple(hits), band, estimator), exponential_rate_1_s=window_rate_1_s
+            )
+            return estimate_modes(frf, band)
+        paths = [Path(one) for one in given if isinstance(one, Path | str)]
+        if len(paths) < len(given):
+            raise InputError("Hits and files are mixed; give one kind.")
+        measured = measure(sources_of(paths), band, estimator, window_rate_1_s)
+        if measured.modal is None:
+            reasons = [v.reason for v in measured.verdicts if not v.accepted]
+            reason = (reasons or list(measured.remarks))[0]
+            raise RefusedError(f"No modes could be identified: {reason}")
+        return measured.modal
+
+
+def identify(
+    dataset: Dataset,
+    robot: Robot,
+    *,
+    band_hz: tuple[float, float] | None = None,
+    inertias: bool = True,
+    extend: bool = False,
+    held_out: int | None = None,
+    starts: int = 8,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda text: None,
+) -> IdentificationReport:
+    """Fit the elastic parameters of a robot's simulation to recorded FRFs of several poses.
+
+    The fit is judged at poses held out, and then done again with all of them.
+
+    Args:
+        dataset: FRFs at q (n, dof) in rad.
+        robot: The robot whose [[compliance]] blocks are fitted.
+        band_hz: Which part of the FRFs is fitted; by default robot.toml's.
+        inertias: Whether masses and inertias may err by 5 %, centres of mass by 1 cm.
+        extend: Whether tilts of joints and floor that robot.toml leaves out are added.
+        held_out: How many poses to judge by; by default one of four.
+        starts: Starting points at most.
+        seed: Of the starting points.
+        progress: Is told what is being done.
+
+    Returns:
+        Stiffness in N·m/rad and damping in N·m·s/rad with standard deviations, the agreement
+        before and after, and the identified `simulation`; `write` makes a robot.toml of it.
+
+    Raises:
+        InputError: Nothing of the FRFs lies in the band, or no pose is left to fit.
+        RefusedError: No pose of the dataset has a hit that can be used.
+    """
+    started, band = time.perf_counter(), band_hz or robot.config.band_hz
+    check_options(band_hz)
+    nominal, priors = Simulation(robot), INERTIAS if inertias else Priors()
+    with threadpool_limits(1):
+        fitted = extended(nominal, priors) if extend else Structure(nominal, priors)
+        judged = identify_judged(
+            dataset.frfs,
+            dataset.q,
+            fitted.simulation,
+            fitted.priors,
+            held_out,
+            band_hz=band,
+            starts=starts,
+            seed=seed,
+            progress=_told(progress),
+        )
+        basis = IdentificationBasis(dataset, judged, nominal, fitted.simulation)
+        made = identification_report(basis, band, inertias, fitted.added)
+    return replace(made, seconds=time.perf_counter() - started)
+
+
+def diagnose(
+    dataset: Dataset,
+    robot: Robot,
+    *,
+    offered: Mapping[str, np.ndarray] | None = None,
+    progress: Tell = quietly,
+) -> DiagnosisReport:
+    """Locate where a robot's simulation and recordings differ, and name the missing physics.
+
+    Args:
+        dataset: FRFs at q (n, dof) in rad, and the hits themselves where there are any.
+        robot: The robot as stated; its own parameters are refitted under every hypothesis.
+        offered: Poses that could be measured next, by name: joint angles (dof,) in rad.
+        progress: Is told what is being done, and which share (0 to 1) of the whole is.
+
+    Returns:
+        The verdict, findings with probabilities and parameters, the agreement at poses held out,
+        and the next hit that would tell apart what is tied; `predict` gives FRFs.
+
+    Raises:
+        InputError: Nothing of the FRFs lies in robot.toml's band.
+        RefusedError: No pose of the dataset has a hit that can be used.
+    """
+    started = time.perf_counter()
+    with threadpool_limits(1):
+        explained = explain(dataset, Simulation(robot), progress)
+        hit = next_hit(explained, offered or {})
+        made = diagnosis_report(explained)
+    return replace(made, next=hit, seconds=time.perf_counter() - started)
+
+
+def diagnose_material(
+    given: Material, robot: Robot | None = None, progress: Tell = quietly
+) -> DiagnosisReport:
+    """As `diagnose`, of what a folder of recordings or a campaign holds.
+
+    `robot` is the one of `given`, where it was loaded already.
+    """
+    robot = robot or Robot.load(given.robot)
+    dataset = given.read(robot.joint_names, robot.config.band_hz, lambda text: progress(text, 0.0))
+    offered = dict(zip(given.names, given.offered, strict=True))
+    return diagnose(dataset, robot, offered=offered, progress=progress)
+
+
+def _frf_of(dataset: Dataset, pose: str | None) -> Frf:
+    if pose not in dataset.poses:
+        known = ", ".join(dataset.poses)
+        raise InputError(f"Pose {pose} is not among those of the dataset; name one of {known}.")
+    return dataset.frfs[dataset.poses.index(pose)]
+
+
+def _told(progress: Callable[[str], None]) -> "Callable[[Progress], None]":
+    def tell(at: "Progress") -> None:
+        where = f"start {at.start}, " if at.start else ""
+        progress(f"{where}{at.stage}, step {at.iteration}, misfit {at.misfit:.3g}")
+
+    return tell

@@ -1,0 +1,65 @@
+"""What every command answers with: a typed value that is also one JSON document and a text."""
+
+import dataclasses
+import math
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+# Metadata of a field for what an answer was made of; None where it came from another process.
+NOT_IN_JSON = {"json": False}
+
+
+class Answer:
+    """Base of the frozen dataclasses whose fields are the keys of a JSON answer, in its order.
+
+    A field that is msgspec.UNSET does not appear; one with the metadata NOT_IN_JSON never does.
+    """
+
+    def to_json(self) -> dict[str, Any]:
+        """Builtin values only. NumPy arrays become lists, numbers that are not finite None."""
+        fields = dataclasses.fields(self)  # pyright: ignore[reportArgumentType]
+        values = {f.name: getattr(self, f.name) for f in fields if f.metadata.get("json", True)}
+        return {name: plain(v) for name, v in values.items() if v is not msgspec.UNSET}
+
+    def text(self) -> "RenderableType | None":
+        """For the engineer, units in every column; None where there is nothing to say."""
+        return None
+
+
+def plain(value: Any) -> Any:
+    """Builtin values of anything that an answer holds."""
+    if isinstance(value, Answer):
+        return value.to_json()
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, msgspec.Struct):
+        value = msgspec.to_builtins(value)
+    if hasattr(value, "tolist"):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [plain(item) for item in value]
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def encoded(answer: Answer) -> bytes:
+    """The JSON document, indented."""
+    return msgspec.json.format(msgspec.json.encode(answer.to_json()), indent=2)
+
+
+@dataclasses.dataclass(frozen=True)
+class RefusedFile:
+    """A recording that could not be used, and why."""
+
+    file: str
+    reason: str

@@ -1,0 +1,95 @@
+"""Answers of the acts on a campaign: `new`, `undo`, `withdraw`, `skip`, `confirm`."""
+
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from rich.markup import escape
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import Entry
+from planner.report.answer import Answer
+
+
+@dataclass(frozen=True)
+class NewCampaign(Answer):
+    """Answer of `new`: `campaign` is the folder, `modes` how many of them are modelled."""
+
+    campaign: str
+    robot: str
+    joints: tuple[str, ...]
+    modes: int
+    acquisition: str
+    remarks: tuple[str, ...]
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> "NewCampaign":
+        """Of a campaign that was just started."""
+        config, robot = campaign.cell.config, campaign.cell.robot
+        return cls(
+            str(campaign.directory), robot.name, tuple(robot.joint_names), config.modes.count,
+            config.acquisition.name, tuple(campaign.cell.remarks),
+        )  # fmt: skip
+
+    def text(self) -> str:
+        """What was started, and how it goes on."""
+        remarks = "".join(f"{escape(remark)}\n" for remark in self.remarks)
+        return (
+            f"Campaign in {escape(self.campaign)}: robot {escape(self.robot)}, "
+            f"{self.modes} modes, chosen by {self.acquisition}.\n"
+            f"{remarks}Next: planner next {escape(self.campaign)}"
+        )
+
+
+@dataclass(frozen=True)
+class UndoneAct(Answer):
+    """Answer of `undo`: number and kind of the log's entry that was taken back."""
+
+    undone: int
+    event: str
+
+    @classmethod
+    def of(cls, entry: Entry) -> "UndoneAct":
+        """Of the entry that was taken back."""
+        return cls(entry.seq, msgspec.to_builtins(entry.event)["kind"])
+
+    def text(self) -> str:
+        """One sentence."""
+        return f"Took back entry {self.undone} ({self.event})."
+
+
+@dataclass(frozen=True)
+class WithdrawnPose(Answer):
+    """Answer of `withdraw`."""
+
+    withdrawn: str
+    reason: str
+
+    def text(self) -> str:
+        """One sentence."""
+        return f"Pose {escape(self.withdrawn)} is set aside; its recordings are kept."
+
+
+@dataclass(frozen=True)
+class SkippedPose(Answer):
+    """Answer of `skip`."""
+
+    skipped: str
+    reason: str
+
+    def text(self) -> str:
+        """One sentence."""
+        return f"Pose {escape(self.skipped)} will not be offered again."
+
+
+@dataclass(frozen=True, eq=False)
+class ConfirmedPose(Answer):
+    """Answer of `confirm`: the held hits of a pose are used; sds (count,) in % thereafter."""
+
+    confirmed: str
+    frequency_sd_percent: np.ndarray
+
+    def text(self) -> str:
+        """One sentence."""
+        sd = ", ".join(f"{v:.1f} %" for v in self.frequency_sd_percent)
+        return f"The hits of pose {escape(self.confirmed)} are used; sd of frequencies: {sd}."

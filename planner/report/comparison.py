@@ -1,0 +1,282 @@
+"""Answer of `compare`: learning curves of sampling strategies, and how they differ."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planner.compare.bench import Bench
+from planner.compare.curves import Curves, Paired, baseline_of, paired
+from planner.compare.pool import PoolPose
+from planner.compare.processes import Failure
+from planner.compare.tasks import Run, Study, Task
+from planner.errors import InputError
+from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
+from planner.report.text import SIMULATED, SIMULATED_TITLE, table
+
+if TYPE_CHECKING:
+    from planner.report.learning_curves import Learning
+
+PICTURE, TABLE = "learning_curves.png", "comparison.json"
+SHOWN = 8  # columns of measurements that fit
+
+
+@dataclass(frozen=True, eq=False)
+class StrategyCurve:
+    """Medians over runs, on poses not used, after n (t,) measurements; quartiles (2, t).
+
+    `minutes` (t,) of robot time; the seconds are of all runs together.
+    """
+
+    n: np.ndarray
+    frequency_rmse_percent: np.ndarray
+    frequency_rmse_percent_quartiles: np.ndarray
+    frequency_rmse_percent_worst: np.ndarray
+    r2: np.ndarray
+    coverage95: np.ndarray
+    coverage95_mean: np.ndarray
+    minutes: np.ndarray
+    wall_seconds: float
+    process_seconds: float
+    runs: int
+
+    @classmethod
+    def of(cls, curve: Curves) -> "StrategyCurve":
+        """Of one strategy's runs."""
+        rmse = curve.frequency_rmse_percent
+        low, middle, high = np.percentile(rmse, (25, 50, 75), axis=0)
+        return cls(
+            n=curve.n,
+            frequency_rmse_percent=middle,
+            frequency_rmse_percent_quartiles=np.array([low, high]),
+            frequency_rmse_percent_worst=rmse.max(axis=0),
+            r2=np.median(curve.r2, axis=0),
+            coverage95=np.median(curve.coverage95, axis=0),
+            coverage95_mean=np.mean(curve.coverage95, axis=0),
+            minutes=np.median(curve.minutes, axis=0),
+            wall_seconds=float(curve.wall_seconds.sum()),
+            process_seconds=float(curve.process_seconds.sum()),
+            runs=len(curve.seeds),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class StrategyDifference:
+    """A strategy less the baseline over the seeds of both; see `compare.curves.Paired`."""
+
+    seeds: int
+    difference_percent: np.ndarray
+    difference_percent_interval95: np.ndarray
+    measurements_to_one_percent: float
+    measurements_to_one_percent_interval95: np.ndarray
+
+    @classmethod
+    def of(cls, found: Paired | None) -> "StrategyDifference | None":
+        """None where the two share no seed."""
+        if found is None:
+            return None
+        return cls(
+            found.seeds, found.difference, found.interval, found.to_goal, found.to_goal_interval
+        )
+
+
+@dataclass(frozen=True)
+class PairedStrategies:
+    """All strategies but one held against that one."""
+
+    baseline: str
+    against: Mapping[str, StrategyDifference | None]
+
+
+@dataclass(frozen=True)
+class FailedRun:
+    """A run that ended in an error."""
+
+    strategy: str
+    seed: int
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class ComparisonReport(Answer):
+    """Answer of `compare`; `acquisitions` says which one each strategy is."""
+
+    strategies: Mapping[str, StrategyCurve]
+    measurements_to_one_percent: Mapping[str, int | None]
+    minutes_to_one_percent: Mapping[str, float | None]
+    paired: PairedStrategies
+    acquisitions: Mapping[str, str]
+    robot: str
+    pool: int
+    repeats: int
+    initial: int
+    budget: int
+    simulation: str
+    failed: tuple[FailedRun, ...]
+    refused: tuple[RefusedFile, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    out: str | None = None
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    seconds: float = 0.0
+    curves: Mapping[str, Curves] | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+
+    def with_pictures(self, out: Path | None, rrd: Path | None, key: str) -> "ComparisonReport":
+        """The same with the picture in `out` and the Rerun file, where they are wanted.
+
+        `key` is the pool's content hash.
+        """
+        if self.curves is None or (out is None and rrd is None):
+            return self
+        from planner.report.learning_curves import learning_figure
+
+        learned = {name: _learning(curve) for name, curve in self.curves.items()}
+        title = (
+            f"{SIMULATED_TITLE if self.simulated else ''}{self.robot}: pool of {self.pool} poses, "
+            f"{self.repeats} repeats, simulation {self.simulation}"
+        )
+        figure, shown = learning_figure(learned, title), self
+        if out is not None:
+            from planner.report.frf_plots import save
+
+            plots = (str(out.absolute() / PICTURE),)
+            shown = replace(shown, out=str(out.absolute()), plots=plots)
+            save(figure, out / PICTURE)
+        if rrd is not None:
+            from planner.report.rerun_learning import write
+
+            shown = replace(shown, rrd=str(rrd.absolute()))
+            write(learned, figure, rrd, key, title)
+        return shown
+
+    def write(self, folder: Path) -> None:
+        """The JSON answer as a file of the folder."""
+        from planner.campaign.journal import write_synced
+
+        write_synced(folder / TABLE, encoded(self))
+
+    def text(self) -> Group:
+        """Curves as tables, then what each strategy needs to reach 1 %."""
+        columns = _spread(len(next(iter(self.strategies.values())).n))
+        parts: list[RenderableType] = [SIMULATED] if self.simulated else []
+        parts.append(
+            Text(
+                f"{self.robot}: pool of {self.pool} poses, {self.repeats} repeats from "
+                f"{self.initial} to {self.budget} measurements, simulation "
+                f"{self.simulation}; medians, on poses not used."
+            )
+        )
+        parts += [
+            self._curves("frequency_rmse_percent", "Frequency RMSE (%)", ".2f", columns),
+            self._curves("r2", "R²", ".3f", columns),
+            self._curves("coverage95", "Share in 95 % interval", ".2f", columns),
+            self._goals(),
+            *map(Text, self.remarks),
+        ]
+        written = (*self.plots[:1], *((self.rrd,) if self.rrd else ()))
+        return Group(*parts, *(Text(f"Written: {path}") for path in written))
+
+    def _curves(self, name: str, title: str, form: str, columns: list[int]) -> RenderableType:
+        n = next(iter(self.strategies.values())).n
+        made = table(f"{title} by measurements", "strategy", *(str(n[i]) for i in columns))
+        for strategy, curve in self.strategies.items():
+            values = getattr(curve, name)
+            made.add_row(strategy, *(format(float(values[i]), form) for i in columns))
+        return made
+
+    def _goals(self) -> RenderableType:
+        made = table(
+            f"To 1 %, and compared with {self.paired.baseline} from the same initial poses "
+            f"(95 % interval)",
+            "strategy", "to 1 %", "robot (min)", "measurements more",
+            f"RMSE more after {self.budget} (points)", "wall (s)",
+        )  # fmt: skip
+        for name, curve in self.strategies.items():
+            d = self.paired.against.get(name)
+            reached = self.measurements_to_one_percent[name], self.minutes_to_one_percent[name]
+            goal = after = "–"
+            if d is not None:
+                to_goal = d.measurements_to_one_percent, d.measurements_to_one_percent_interval95
+                goal = _interval(*to_goal, "+.1f")
+                last = d.difference_percent[-1], d.difference_percent_interval95[-1]
+                after = _interval(*last, "+.3f")
+            cells = ("–" if v is None else f"{v:.0f}" for v in reached)
+            made.add_row(name, *cells, goal, after, f"{curve.wall_seconds:.1f}")
+        return made
+
+
+def comparison(
+    bench: Bench,
+    study: Study,
+    found: Mapping[Task, Run | Failure],
+    poses: Sequence[PoolPose],
+    remarks: tuple[str, ...],
+) -> ComparisonReport:
+    """Of all runs of a study; InputError where every run of a strategy failed."""
+    failed = tuple(
+        FailedRun(task.strategy, task.seed, answer.reason)
+        for task, answer in found.items()
+        if isinstance(answer, Failure)
+    )
+    curves = _by_name(study, found, failed)
+    baseline = baseline_of(list(curves))
+    against = {
+        name: StrategyDifference.of(paired(curve, curves[baseline]))
+        for name, curve in curves.items()
+        if name != baseline
+    }
+    return ComparisonReport(
+        strategies={name: StrategyCurve.of(curve) for name, curve in curves.items()},
+        measurements_to_one_percent={name: curve.to_goal for name, curve in curves.items()},
+        minutes_to_one_percent={name: curve.minutes_to_goal for name, curve in curves.items()},
+        paired=PairedStrategies(baseline, against),
+        acquisitions=study.strategies,
+        robot=bench.robot.name,
+        pool=len(bench.measurements),
+        repeats=study.repeats,
+        initial=study.initial,
+        budget=study.budget,
+        simulation=bench.config.fidelity.simulation,
+        failed=failed,
+        refused=tuple(RefusedFile(r.file, r.reason) for p in poses for r in p.refused),
+        remarks=remarks,
+        simulated=any(p.simulated for p in poses),
+        curves=curves,
+    )
+
+
+def _by_name(
+    study: Study, found: Mapping[Task, Run | Failure], failed: Sequence[FailedRun]
+) -> dict[str, Curves]:
+    """Curves by the names that the user gave."""
+    curves = {}
+    for name, strategy in study.strategies.items():
+        runs = [r for r in found.values() if isinstance(r, Run) and r.strategy == strategy]
+        if not runs:
+            raise InputError(f"Every run of {name} failed: {failed[0].reason}")
+        curves[name] = Curves.of(runs)
+    return curves
+
+
+def _learning(curve: Curves) -> "Learning":
+    from planner.report.learning_curves import Band, Learning
+
+    parts = (curve.frequency_rmse_percent, curve.r2, curve.coverage95)
+    return Learning(curve.n, *(Band.of(part) for part in parts))
+
+
+def _interval(value: float, interval: np.ndarray, form: str) -> str:
+    low, high = interval
+    return f"{value:{form}} ({low:{form}}, {high:{form}})"
+
+
+def _spread(count: int) -> list[int]:
+    """Up to SHOWN places of `count`, first and last among them."""
+    if count <= SHOWN:
+        return list(range(count))
+    return sorted({round(i * (count - 1) / (SHOWN - 1)) for i in range(SHOWN)})

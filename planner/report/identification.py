@@ -1,0 +1,261 @@
+"""Answer of `identify`: elastic parameters, what they are worth, and what stays open."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planner.report.agreement import FrfSimilarity, HeldOutChange, SimilarityChange
+from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.plot_files import Pictures
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+
+if TYPE_CHECKING:
+    from planner.dataset.dataset import Dataset
+    from planner.dynamics.simulation import Simulation
+    from planner.identification.held_out import Judged
+    from planner.identification.result import Identification
+    from planner.robot.robot import Robot
+
+LARGE = 2.0  # misfit that noise and calibration do not explain
+
+
+@dataclass(frozen=True)
+class StatedSpring:
+    """Stiffness (N·m/rad) and damping (N·m·s/rad) as robot.toml states them."""
+
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class IdentifiedSpring:
+    """A [[compliance]] block with its identified values; `identifiable` is the stiffness's.
+
+    A value whose sd is None was not fitted.
+    """
+
+    joint: str
+    axis: tuple[float, ...]
+    stiffness: float
+    stiffness_sd: float | None
+    identifiable: bool
+    damping: float
+    damping_sd: float | None
+    damping_identifiable: bool
+    loss_factor: float
+    loss_factor_sd: float | None
+    loss_factor_identifiable: bool
+    nominal: StatedSpring
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of the table."""
+        letters = [letter for a, letter in zip(self.axis, "xyz", strict=True) if abs(a) == 1]
+        axis = letters[0] if letters else " ".join(f"{a:.3g}" for a in self.axis)
+        return (
+            f"{self.joint} {axis}",
+            _with_sd(self.stiffness, self.stiffness_sd),
+            "yes" if self.identifiable else "no",
+            _with_sd(self.damping, self.damping_sd),
+            "yes" if self.damping_identifiable else "no",
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class IdentificationBasis:
+    """What an identification was made of, and all that it found; `structure` is what was fitted."""
+
+    dataset: "Dataset"
+    judged: "Judged"
+    nominal: "Simulation"
+    structure: "Simulation"
+
+
+@dataclass(frozen=True, eq=False)
+class IdentificationReport(Answer):
+    """Answer of `identify`; `misfit` is χ² per value, 1 at the noise.
+
+    `added` are the springs that robot.toml did not have; `basis` holds the fits themselves.
+    """
+
+    parameters: tuple[IdentifiedSpring, ...]
+    fit: SimilarityChange
+    held_out: HeldOutChange
+    undetermined: tuple[str, ...]
+    misfit: float
+    misfit_by_pose: Mapping[str, float]
+    converged: bool
+    refused: tuple[RefusedFile, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    band_hz: tuple[float, float]
+    inertias: bool
+    added: int
+    out: str | None = None
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    urdf: str | msgspec.UnsetType = msgspec.UNSET
+    written: FrfSimilarity | msgspec.UnsetType = msgspec.UNSET
+    seconds: float = 0.0
+    basis: IdentificationBasis | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+
+    @property
+    def simulation(self) -> "Simulation":
+        """The identified simulation."""
+        assert self.basis is not None
+        return self.basis.judged.final.simulation
+
+    def with_pictures(self, pictures: Pictures) -> "IdentificationReport":
+        """The same once FRFs before and after are drawn, where that is wanted."""
+        if not pictures.wanted or self.basis is None:
+            return self
+        from planner.report.identification_plots import ShownPose, identification_figures
+
+        dataset, judged = self.basis.dataset, self.basis.judged
+        poses = []
+        for i, name in enumerate(dataset.poses):
+            aside = i in judged.held_out
+            shown = judged.trial if aside and judged.trial else judged.final
+            poses.append(ShownPose(name, dataset.q[i], dataset.frfs[i], shown.simulation, aside))
+        mark = SIMULATED_TITLE if self.simulated else ""
+        nominal = self.basis.nominal
+        figures = identification_figures(poses, nominal, self.band_hz, mark)
+        return replace(self, **pictures.write(figures, nominal.robot.name))
+
+    def write(self, robot_toml: Path) -> "IdentificationReport":
+        """Write the identified robot, read it again, and say how well that one agrees.
+
+        Raises InputError where the files cannot be written.
+        """
+        from planner.dynamics.simulation import Simulation
+        from planner.identification.agreement import fit_similarity
+        from planner.identification.write_robot import write_robot
+        from planner.robot.robot import Robot
+
+        assert self.basis is not None
+        basis = self.basis
+        made = write_robot(robot_toml, basis.structure.robot, basis.judged.final)
+        again = Simulation(Robot.load(made.robot_toml))
+        fit = fit_similarity(again, basis.dataset.frfs, basis.dataset.q, self.band_hz)
+        return replace(
+            self,
+            remarks=(*self.remarks, *made.remarks),
+            out=str(made.robot_toml),
+            urdf=str(made.urdf),
+            written=FrfSimilarity.of(fit),
+        )
+
+    def text(self) -> Group:
+        """Parameters, what stays open, and the agreement."""
+        low, high = self.band_hz
+        made = table(
+            f"Elastic parameters from {len(self.misfit_by_pose)} poses, {low:g} to {high:g} Hz",
+            *("joint and axis", "stiffness (N·m/rad)", "told", "damping (N·m·s/rad)", "told"),
+        )
+        for spring in self.parameters:
+            made.add_row(*spring.cells)
+        parts: list[RenderableType] = [made, Text("  told: identified by the data.")]
+        if self.undetermined:
+            parts.append(Text("What these recordings cannot tell:"))
+            parts += [Text(f"  {text}") for text in self.undetermined]
+        parts += [self._agreement(), *remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        if self.out and isinstance(self.written, FrfSimilarity):
+            frac = 100 * (self.written.frac or math.nan)
+            parts.append(Text(f"Written: {self.out} (FRAC {frac:.2f} %), {self.urdf}"))
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+    def _agreement(self) -> RenderableType:
+        aside = self.held_out
+        made = table(
+            f"Agreement of simulated with measured FRFs (misfit {self.misfit:.2f}, 1 at the "
+            f"noise; {self.seconds:.1f} s)",
+            *("poses", "FRAC before", "FRAC after", "Frobenius before", "Frobenius after"),
+        )
+        rows: list[tuple[str, SimilarityChange]] = [("all", self.fit)]
+        if aside.poses:
+            rows.append((f"held out: {', '.join(aside.poses)}", aside))
+        for name, of in rows:
+            values = (of.before.frac, of.frac, of.before.frobenius, of.frobenius)
+            made.add_row(name, *("–" if v is None else f"{100 * v:.2f} %" for v in values))
+        return made
+
+
+def identification_report(
+    basis: IdentificationBasis, band_hz: tuple[float, float], inertias: bool, added: int
+) -> IdentificationReport:
+    """Of an identification that was judged at poses held out."""
+    dataset, judged = basis.dataset, basis.judged
+    final, names = judged.final, dataset.poses
+    after, aside = FrfSimilarity.of(final.fit), FrfSimilarity.of(judged.held_out_after)
+    held_out = HeldOutChange(
+        aside.frac,
+        aside.frobenius,
+        FrfSimilarity.of(judged.held_out_before),
+        tuple(names[i] for i in judged.held_out),
+    )
+    return IdentificationReport(
+        parameters=identified_springs(basis.structure.robot, final),
+        fit=SimilarityChange(after.frac, after.frobenius, FrfSimilarity.of(judged.before)),
+        held_out=held_out,
+        undetermined=tuple(direction.text for direction in final.undetermined),
+        misfit=final.misfit,
+        misfit_by_pose=dict(zip(names, final.misfit_by_pose, strict=True)),
+        converged=final.converged,
+        refused=tuple(RefusedFile(*entry) for entry in dataset.refused),
+        remarks=(*dataset.remarks, *final.remarks, *_doubts(judged)),
+        simulated=dataset.simulated,
+        band_hz=band_hz,
+        inertias=inertias,
+        added=added,
+        basis=basis,
+    )
+
+
+def _doubts(judged: "Judged") -> list[str]:
+    final, said = judged.final, []
+    if final.misfit > LARGE:
+        said.append(
+            f"The misfit is {final.misfit:.1f}, 1 being the noise: the simulation lacks more than "
+            f"springs can make up for, and what it lacks is hidden in them; try --extend."
+        )
+    if not final.converged:
+        said.append("The last fit had not come to rest; try more --starts.")
+    if not judged.held_out:
+        said.append(
+            "No pose was held out, so nothing says how good the simulation is elsewhere; record "
+            "three poses or more."
+        )
+    return said
+
+
+def identified_springs(robot: "Robot", found: "Identification") -> tuple[IdentifiedSpring, ...]:
+    """One entry per [[compliance]] block, in its order."""
+    by_block = {(e.kind, number): e for e in found.estimates for number in e.blocks}
+    springs = []
+    for number, block in enumerate(robot.config.compliance):
+        values: dict[str, Any] = {}
+        for kind in ("stiffness", "damping", "loss_factor"):
+            estimate = by_block.get((kind, number))
+            values[kind] = getattr(block, kind) if estimate is None else estimate.value
+            values[f"{kind}_sd"] = None if estimate is None else estimate.sd
+            told = estimate is not None and estimate.identifiable
+            values["identifiable" if kind == "stiffness" else f"{kind}_identifiable"] = told
+        stated = StatedSpring(block.stiffness, block.damping)
+        axis = tuple(block.axis)
+        springs.append(IdentifiedSpring(block.joint, axis, nominal=stated, **values))
+    return tuple(springs)
+
+
+def _with_sd(value: float, sd: float | None) -> str:
+    """Both with the exponent of the value."""
+    exponent = 0 if 0.1 <= value < 1000 or value == 0 else math.floor(math.log10(value))
+    power = f"e{exponent}" if exponent else ""
+    if sd is None:
+        return f"{value / 10**exponent:.3f}{power} (kept)"
+    return f"{value / 10**exponent:.3f} ± {sd / 10**exponent:.3f}{power}"

@@ -1,0 +1,189 @@
+"""Answer of `import`: which hits were accepted, the modes they give, and what changed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planner.campaign.events import Amplitude, MeasuredMode, Question
+from planner.campaign.importing import ImportReport
+from planner.report.answer import Answer, RefusedFile, plain
+from planner.report.predictions import ExpectedMode
+from planner.report.text import SIMULATED, remarks, table, with_sd
+
+
+@dataclass(frozen=True)
+class ImportedMode:
+    """A measured mode; `label` counts the modelled ones from 1, None if it is none of them.
+
+    `shape` is [re, im] per response, `expected` what the model said before the import.
+    """
+
+    label: int | None
+    label_probability: float | None
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: tuple[tuple[float, float], ...]
+    probability: float
+    expected: ExpectedMode | None
+
+    @classmethod
+    def of(
+        cls, mode: MeasuredMode, k: int | None, sure: float | None, expected: ExpectedMode | None
+    ) -> "ImportedMode":
+        """`k` is the index of its label among the modelled modes."""
+        return cls(
+            None if k is None else k + 1, sure, mode.frequency_hz, mode.frequency_sd_hz,
+            mode.damping_ratio, mode.damping_sd, mode.shape, mode.probability, expected,
+        )  # fmt: skip
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of the table."""
+        expected = self.expected
+        return (
+            "–" if self.label is None else str(self.label),
+            with_sd(self.frequency_hz, self.frequency_sd_hz, ".3f"),
+            with_sd(expected.frequency_hz, expected.sd_hz) if expected else with_sd(None, None),
+            with_sd(100 * self.damping_ratio, 100 * self.damping_sd),
+        )
+
+
+@dataclass(frozen=True)
+class AskedOfPose(Answer):
+    """A question of hits that are held at `pose`, as the log keeps it."""
+
+    pose: str
+    question: Question
+
+    @classmethod
+    def of(cls, question: Question | None, pose: str) -> "AskedOfPose | None":
+        """None where nothing is asked."""
+        return None if question is None else cls(pose, question)
+
+    def to_json(self) -> dict[str, Any]:
+        """The pose, then the question's own keys."""
+        return {"pose": self.pose, **plain(self.question)}
+
+    @property
+    def text(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The sentence."""
+        return self.question.text
+
+
+@dataclass(frozen=True, eq=False)
+class PoseImport(Answer):
+    """What one pose's hits gave; sds (count,) in % are over the workspace, before and after."""
+
+    pose: str
+    accepted: tuple[str, ...]
+    refused: tuple[RefusedFile, ...]
+    already_imported: tuple[str, ...]
+    modes: tuple[ImportedMode, ...]
+    refit_seconds: float
+    frequency_sd_percent_before: np.ndarray
+    frequency_sd_percent: np.ndarray
+    remarks: tuple[str, ...]
+    amplitude: Amplitude | None
+    simulated: bool
+    question: "AskedOfPose | None" = None
+
+    @classmethod
+    def of(cls, report: ImportReport) -> "PoseImport":
+        """Of what the campaign says of one pose."""
+        measurement = report.measurement
+        return cls(
+            pose=report.pose,
+            accepted=tuple(hit.file for hit in report.accepted),
+            refused=tuple(
+                RefusedFile(hit.file, hit.reason) for hit in (*report.refused, *report.left_out)
+            ),
+            already_imported=report.already,
+            modes=_labelled_modes(report),
+            refit_seconds=report.refit_seconds,
+            frequency_sd_percent_before=report.model_before.frequency_sd_percent,
+            frequency_sd_percent=report.model.frequency_sd_percent,
+            remarks=report.remarks,
+            amplitude=measurement.amplitude if measurement else None,
+            simulated=bool(measurement and measurement.simulated),
+            question=AskedOfPose.of(report.question, report.pose),
+        )
+
+    def parts(self) -> list[RenderableType]:
+        """Modes beside what was expected, remarks, and the change of the model."""
+        made = table(
+            f"Pose {self.pose}: {len(self.accepted)} hits accepted, "
+            f"{len(self.refused)} refused, {len(self.already_imported)} known before",
+            *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
+        )
+        for mode in self.modes:
+            made.add_row(*mode.cells)
+        both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
+        change = ", ".join(f"{before:.1f} → {after:.1f} %" for before, after in both)
+        said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
+        asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
+        return [made, *remarks(self.remarks), said, *asked]
+
+
+@dataclass(frozen=True)
+class ImportedPoses(Answer):
+    """Answer of `import`, one entry a pose in recording order."""
+
+    poses: tuple[PoseImport, ...]
+
+    @classmethod
+    def of(cls, reports: tuple[ImportReport, ...]) -> "ImportedPoses":
+        """Of what `Campaign.import_paths` gave."""
+        return cls(tuple(PoseImport.of(report) for report in reports))
+
+    def to_json(self) -> dict[str, Any]:
+        """The top-level keys speak of the last pose, "poses" of each."""
+        return {**self.poses[-1].to_json(), "poses": plain(self.poses)}
+
+    @property
+    def refused(self) -> tuple[RefusedFile, ...]:
+        """Of all poses."""
+        return tuple(file for pose in self.poses for file in pose.refused)
+
+    def to_be_answered(self, directory: Path) -> list[str]:
+        """What is asked of held hits, with the commands that answer it, a line each."""
+        asked = [pose.question for pose in self.poses if pose.question is not None]
+        return [how_to_answer(directory, one.pose, one.text) for one in asked]
+
+    def text(self) -> Group:
+        """Pose by pose."""
+        parts = [part for pose in self.poses for part in pose.parts()]
+        return Group(*parts, SIMULATED) if self.poses[-1].simulated else Group(*parts)
+
+
+def how_to_answer(directory: Path, pose: str, asked: str) -> str:
+    """What is asked of held hits, and the commands that answer it, in one line."""
+    return (
+        f"{asked} They are held, not used. If it is: planner confirm {directory} {pose}; if it is "
+        f"at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
+        f"{directory} {pose}."
+    )
+
+
+def _labelled_modes(report: ImportReport) -> tuple[ImportedMode, ...]:
+    """Modes of the pose with their label and expectation; unlikely ones only where labelled."""
+    if report.measurement is None:
+        return ()
+    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    before = report.model_before.predict(np.deg2rad([report.measurement.joints_deg]))
+    expected = ExpectedMode.all_of(before, 0)
+    labels = {m.frequency_hz: k for k, m in enumerate(labelled.modes) if m} if labelled else {}
+    sure = labelled.probability if labelled else ()
+    found = []
+    for mode in report.measurement.modes:
+        k = labels.get(mode.frequency_hz)
+        if k is not None:
+            found.append(ImportedMode.of(mode, k, float(sure[k]), expected[k]))
+        elif mode.likely:
+            found.append(ImportedMode.of(mode, None, None, None))
+    return tuple(found)

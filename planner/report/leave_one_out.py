@@ -1,0 +1,70 @@
+"""What the model would have said of each measured pose without it: a part of `status`."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.campaign.labels import frequencies
+from planner.campaign.model import Model
+from planner.surrogate.leave_one_out import LEVELS, LeaveOneOut, leave_one_out, report
+
+
+@dataclass(frozen=True)
+class LeftOutFrequency:
+    """A measured frequency beside its prediction without that pose.
+
+    `sd_hz` holds the noise too; `below` is the share of the prediction below what was measured.
+    """
+
+    pose: str
+    mode: int
+    measured_hz: float
+    predicted_hz: float
+    sd_hz: float
+    below: float
+
+
+@dataclass(frozen=True)
+class LeftOutValues:
+    """All `values` left out one by one; `coverage` is their share in the intervals by level.
+
+    `worst` are the poses off by most, for what was expected of them; `text` says all this.
+    """
+
+    values: int
+    coverage: dict[str, float] | None
+    worst: tuple[str, ...]
+    frequencies: tuple[LeftOutFrequency, ...]
+    text: tuple[str, ...]
+
+
+def found_without(model: Model) -> tuple[LeaveOneOut, tuple[str, ...]]:
+    """Errors of ln f (n, count), by the likelier of the two models of each mode; pose names."""
+    found = leave_one_out(model.surrogate.primary.posterior, len(model.labelled))
+    return found, tuple(pose.pose for pose in model.labelled)
+
+
+def left_out(model: Model) -> LeftOutValues:
+    """Of a campaign's model."""
+    found, poses = found_without(model)
+    modes = tuple(f"the frequency of mode {k + 1}" for k in range(model.surrogate.count))
+    values, said = int(np.isfinite(found.rank).sum()), tuple(report(found, poses, modes))
+    if not values:
+        return LeftOutValues(0, None, (), (), said)
+    coverage = dict(zip(map(str, LEVELS), found.coverage().tolist(), strict=True))
+    worst = tuple(poses[i] for i in found.worst())
+    rows = _rows(found, poses, frequencies(model.labelled))
+    return LeftOutValues(values, coverage, worst, rows, said)
+
+
+def _rows(
+    found: LeaveOneOut, poses: tuple[str, ...], measured_hz: np.ndarray
+) -> tuple[LeftOutFrequency, ...]:
+    predicted = measured_hz * np.exp(-found.error)
+    sd = predicted * found.sd
+    return tuple(
+        LeftOutFrequency(
+            poses[i], k + 1, *(float(a[i, k]) for a in (measured_hz, predicted, sd, found.rank))
+        )
+        for i, k in np.argwhere(np.isfinite(found.rank)).tolist()
+    )

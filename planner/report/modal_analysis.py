@@ -1,0 +1,267 @@
+"""Answer of `modes` for the recordings of one pose, which belong to no campaign."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from rich.console import Group
+
+from planner.campaign.events import Amplitude
+from planner.campaign.log_conversion import from_homogeneity
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
+from planner.errors import InputError, PlannerError, RefusedError
+from planner.frf.frf import Frf
+from planner.frf.quantities import DERIVATIVE
+from planner.modal.estimate_modes import identification
+from planner.modal.modes import ModalModel, Mode
+from planner.modal.pole_identification import Identification
+from planner.recording.folder import files_in
+from planner.recording.records import FrfRecord
+from planner.report.answer import Answer, RefusedFile
+from planner.report.plot_files import Pictures
+from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
+
+DEFAULT_BAND_HZ = (4.0, 60.0)
+ESTIMATORS = ("h1", "h2", "hv")
+LONGEST_NAME = 40  # characters of a file's name in a title
+NO_PICTURES = Pictures()
+NOT_DRAWN: dict[str, Any] = {"plots": (), "rrd": None}
+UNSET = msgspec.UNSET
+
+
+@dataclass(frozen=True)
+class IdentifiedMode:
+    """A mode with its sds; `shape` is [re, im] per response, `probability` that it is physical."""
+
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: tuple[tuple[float, float], ...]
+    probability: float
+
+    @classmethod
+    def of(cls, mode: Mode) -> "IdentifiedMode":
+        """Of a mode of a modal model."""
+        shape = tuple((float(s.real), float(s.imag)) for s in mode.shape)
+        return cls(
+            mode.frequency_hz, mode.frequency_sd_hz, mode.damping_ratio, mode.damping_sd, shape,
+            mode.probability,
+        )  # fmt: skip
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of the table."""
+        parts = [f"{re:+.2f}{im:+.2f}i" for re, im in self.shape]
+        more = f"  and {len(parts) - 3} more" if len(parts) > 4 else ""
+        return (
+            with_sd(self.frequency_hz, self.frequency_sd_hz, ".3f"),
+            with_sd(100 * self.damping_ratio, 100 * self.damping_sd),
+            "  ".join(parts[:3] if more else parts) + more,
+            f"{100 * self.probability:.0f}",
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ModalReport(Answer):
+    """Answer of `modes`; `hits` are how many were averaged per axis.
+
+    `fit_error` is ‖H − fit‖/‖H‖, None where the modes were fitted to unscaled FRFs.
+    """
+
+    modes: tuple[IdentifiedMode, ...]
+    band_hz: tuple[float, float]
+    fit_error: float | None
+    order: int
+    refused: tuple[RefusedFile, ...]
+    accepted: tuple[str, ...]
+    hits: tuple[int, int, int] | msgspec.UnsetType = UNSET
+    usable_band_hz: tuple[float, float] | msgspec.UnsetType = UNSET
+    remarks: tuple[str, ...]
+    amplitude: Amplitude | msgspec.UnsetType | None = UNSET
+    simulated: bool
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+
+    @classmethod
+    def of(cls, modal: ModalModel, **others: Any) -> "ModalReport":
+        """Of a modal model and the other fields."""
+        own = {
+            "band_hz": modal.band_hz,
+            "fit_error": modal.fit_error,
+            "order": modal.order,
+            "refused": (),
+            "remarks": modal.remarks,
+        }
+        return cls(modes=tuple(map(IdentifiedMode.of, modal.modes)), **(own | others))
+
+    def text(self) -> Group:
+        """The modes as a table."""
+        low, high = self.band_hz
+        error = self.fit_error
+        fitted = "" if error is None else f" (fit error {100 * error:.1f} %)"
+        made = table(
+            f"Modes between {low:g} and {high:g} Hz{fitted}",
+            *("mode", "frequency (Hz)", "damping (%)", "shape x, y, z", "physical (%)"),
+        )
+        for k, mode in enumerate(self.modes):
+            made.add_row(str(k + 1), *mode.cells)
+        parts = [made, *remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+
+def check_options(
+    band_hz: tuple[float, float] | None = None,
+    estimator: str = "h1",
+    quantity: str | None = None,
+    window_rate_1_s: float = 0.0,
+) -> None:
+    """InputError for options that make no sense."""
+    if estimator not in ESTIMATORS:
+        raise InputError(f"--estimator {estimator} is not known; give h1, h2 or hv.")
+    if quantity is not None and quantity not in DERIVATIVE:
+        raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
+    if not 0 <= window_rate_1_s < 1e3:
+        raise InputError(f"--window-rate {window_rate_1_s:g}: give a rate in 1/s, 0 for none.")
+    if band_hz is not None and not 0 <= band_hz[0] < band_hz[1]:
+        raise InputError(f"--band-hz {band_hz[0]} {band_hz[1]}: give a lower and a higher Hz.")
+
+
+def modal_report(
+    paths: Sequence[Path],
+    band_hz: tuple[float, float] | None = None,
+    force: str | None = None,
+    estimator: str = "h1",
+    pictures: Pictures = NO_PICTURES,
+    quantity: str | None = None,
+    window_rate_1_s: float = 0.0,
+) -> ModalReport:
+    """Analyse files, or folders of files, of one pose.
+
+    `force` names the force channel of a long record whose channels are not labelled, `quantity`
+    what unlabelled FRFs are. Raises RefusedError if no file could be used.
+    """
+    check_options(band_hz, estimator, quantity, window_rate_1_s)
+    sources = sources_of(paths)
+    if force is not None:
+        return _by_channel(sources, band_hz, force, pictures)
+    unlabelled = _unlabelled(sources)
+    if unlabelled is not None:
+        return _by_transfer(unlabelled, band_hz, quantity, pictures)
+    band = band_hz or DEFAULT_BAND_HZ
+    measured = measure(sources, band, estimator, window_rate_1_s)
+    refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
+    if measured.modal is None:
+        reasons = [file.reason for file in refused] or list(measured.remarks)
+        raise RefusedError(f"No modes could be identified: {reasons[0]}")
+    assert measured.frf is not None
+    simulated = any(v.simulated for v in measured.verdicts)
+    accepted = tuple(v.source.name for v in measured.verdicts if v.accepted)
+    found = identification(measured.frf, band) if pictures.wanted else None
+    return ModalReport.of(
+        measured.modal,
+        refused=tuple(refused),
+        accepted=accepted,
+        hits=measured.frf.hits,
+        usable_band_hz=measured.frf.usable_band_hz,
+        remarks=measured.remarks,
+        amplitude=from_homogeneity(measured.homogeneity),
+        simulated=simulated,
+        **_draw(pictures, measured.frf, found, measured.modal, accepted, simulated),
+    )
+
+
+def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
+    """All recordings that files and folders hold; InputError for what does not exist."""
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            found += files_in(path)
+        elif path.is_file():
+            found.append(path)
+        else:
+            raise InputError(f"{path} does not exist; name the recordings of one pose.")
+    return tuple(Source(path, str(path)) for path in found)
+
+
+def _draw(
+    pictures: Pictures,
+    frf: Frf | None,
+    found: Identification | None,
+    modal: ModalModel,
+    accepted: Sequence[str],
+    simulated: bool,
+) -> dict[str, Any]:
+    """Draw what is wanted; where it is."""
+    if found is None or not pictures.wanted:
+        return NOT_DRAWN
+    from planner.report.modal_plots import modal_figures
+
+    more = f" and {len(accepted) - 1} more" if len(accepted) > 1 else ""
+    name = f"{Path(accepted[0]).name[-LONGEST_NAME:]}{more}"
+    return pictures.write(modal_figures(frf, found, modal, name, simulated), name)
+
+
+def _by_channel(
+    sources: tuple[Source, ...],
+    band_hz: tuple[float, float] | None,
+    force: str,
+    pictures: Pictures,
+) -> ModalReport:
+    """Long records with unlabelled channels: the user names the force channel."""
+    from planner.modal.free_decays import analyse_record
+    from planner.recording.read import read
+    from planner.recording.records import TimeRecord
+
+    if len(sources) != 1:
+        raise InputError("--force analyses one long record at a time; name one file.")
+    records = [r for r in read(sources[0].path) if isinstance(r, TimeRecord)]
+    if not records:
+        raise InputError(f"{sources[0].name} holds no time histories; leave out --force.")
+    modal, found = analyse_record(records[0], force_channel=force, band_hz=band_hz)
+    accepted, simulated = (sources[0].name,), records[0].simulated
+    plots = _draw(pictures, None, found, modal, accepted, simulated)
+    return ModalReport.of(modal, accepted=accepted, simulated=simulated, **plots)
+
+
+def _unlabelled(sources: tuple[Source, ...]) -> FrfRecord | None:
+    """The FRFs of a single file that states no directions."""
+    from planner.recording.read import read
+
+    if len(sources) != 1:
+        return None
+    try:
+        records = read(sources[0].path)
+    except PlannerError:
+        return None  # said again, with the file's name, where it is read in earnest
+    frfs = [r for r in records if isinstance(r, FrfRecord) and not any(r.response_direction)]
+    return frfs[0] if frfs else None
+
+
+def _by_transfer(
+    record: FrfRecord,
+    band_hz: tuple[float, float] | None,
+    quantity: str | None,
+    pictures: Pictures,
+) -> ModalReport:
+    """FRFs without directions: poles and unscaled shapes."""
+    from planner.modal.transfer_functions import modes_from_transfer_functions
+
+    modal = modes_from_transfer_functions(record, quantity, band_hz)
+    plots = NOT_DRAWN
+    if pictures.wanted:
+        from planner.report.modal_plots import cmif_figure, mac_figure
+
+        name = record.source.name[-LONGEST_NAME:]
+        figures = {
+            "cmif": cmif_figure(record.frequency_hz, record.values, modal, f"CMIF · {name}"),
+            "mac": mac_figure(modal, f"AutoMAC · {name}"),
+        }
+        plots = pictures.write(figures, name)
+    accepted = (str(record.source),)
+    return ModalReport.of(
+        modal, fit_error=None, accepted=accepted, simulated=record.simulated, **plots
+    )

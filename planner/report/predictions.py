@@ -1,0 +1,101 @@
+"""Answer of `predict`: modes and FRFs with their uncertainty at given poses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.campaign.campaign import Campaign
+from planner.errors import InputError
+from planner.report.answer import Answer
+from planner.report.text import table, with_sd
+from planner.surrogate.frf_bands import ModalPrediction
+
+
+@dataclass(frozen=True)
+class ExpectedMode:
+    """A mode as the model predicts it."""
+
+    frequency_hz: float
+    sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+
+    @classmethod
+    def all_of(cls, prediction: ModalPrediction, i: int) -> "tuple[ExpectedMode, ...]":
+        """All modes of the i-th pose of a prediction."""
+        p = prediction
+        columns = p.frequency_hz[i], p.frequency_sd_hz[i], p.damping_ratio[i], p.damping_sd[i]
+        return tuple(cls(*map(float, numbers)) for numbers in zip(*columns, strict=True))
+
+    @property
+    def cells(self) -> tuple[str, str]:
+        """Frequency (Hz) and damping (%) as a table shows them."""
+        damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd)
+        return with_sd(self.frequency_hz, self.sd_hz), damping
+
+
+@dataclass(frozen=True)
+class PosePrediction:
+    """The modes expected at a pose, from the lowest."""
+
+    pose: str
+    modes: tuple[ExpectedMode, ...]
+
+
+@dataclass(frozen=True)
+class PredictionReport(Answer):
+    """Answer of `predict`; `npz` is the file with the FRFs, `measurements` how many poses count."""
+
+    poses: tuple[PosePrediction, ...]
+    npz: str
+    measurements: int
+
+    def text(self) -> Group:
+        """A table of modes."""
+        made = table(
+            f"After {self.measurements} measured poses",
+            *("pose", "mode", "frequency (Hz)", "damping (%)"),
+        )
+        for pose in self.poses:
+            for k, mode in enumerate(pose.modes):
+                made.add_row(pose.pose if k == 0 else "", str(k + 1), *mode.cells)
+        return Group(made, Text(f"FRFs (m/s²/N) with sd: {self.npz}"))
+
+
+def predictions(
+    campaign: Campaign, names: Sequence[str], q: Sequence[np.ndarray], npz: Path
+) -> PredictionReport:
+    """Predict at n poses q, (dof,) in rad each; FRFs go to the npz file.
+
+    Raises InputError where that cannot be written.
+    """
+    angles, lines = np.array(q), campaign.frequency_lines
+    prediction, (mean, sd) = campaign.predict(angles), campaign.frf(angles)
+    save_frfs(npz, lines, mean, sd, names, np.rad2deg(angles))
+    poses = (
+        PosePrediction(name, ExpectedMode.all_of(prediction, i)) for i, name in enumerate(names)
+    )
+    return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.model.labelled))
+
+
+def save_frfs(
+    path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray,
+    poses: Sequence[str], joints_deg: np.ndarray,
+) -> None:  # fmt: skip
+    """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) to exactly this npz file.
+
+    Raises InputError where that cannot be done.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "wb") as file:
+            np.savez_compressed(
+                file, allow_pickle=False, frequency_hz=frequency_hz, frf_mean=mean, frf_sd=sd,
+                pose=np.array(poses), joints_deg=joints_deg,
+            )  # fmt: skip
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

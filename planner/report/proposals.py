@@ -1,0 +1,104 @@
+"""Answer of `next`: where to measure, and what to expect there."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import Proposal
+from planner.campaign.model import Model
+from planner.design.stopping import Forecast
+from planner.report.answer import Answer, plain
+from planner.report.predictions import ExpectedMode
+from planner.report.text import table
+
+
+@dataclass(frozen=True)
+class ProposedPose(Answer):
+    """A proposal, and the modes that the model expects there."""
+
+    proposal: Proposal
+    expected: tuple[ExpectedMode, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The proposal's own keys, and "expected"."""
+        return {**plain(self.proposal), "expected": plain(self.expected)}
+
+    def parts(self, joint_names: tuple[str, ...]) -> list[RenderableType]:
+        """Angles, place and expected modes as text."""
+        proposal = self.proposal
+        angles = table(f"Pose {proposal.pose}", *(f"{name} (°)" for name in joint_names))
+        angles.add_row(*(f"{value:.3f}" for value in proposal.joints_deg))
+        expected = table("expected there", "mode", "frequency (Hz)", "damping (%)")
+        for k, mode in enumerate(self.expected):
+            expected.add_row(str(k + 1), *mode.cells)
+        x, y, z = proposal.position_m
+        hits = f"hit along {', '.join(proposal.hits)}"
+        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal.reason}"
+        return [angles, Text(place), expected]
+
+
+@dataclass(frozen=True)
+class RepeatedPose:
+    """The measured pose whose repetition gains more than any new one.
+
+    Gains are reductions of the mean relative variance.
+    """
+
+    pose: str
+    gain: float
+    gain_of_a_new_pose: float
+    text: str
+
+    @classmethod
+    def of(cls, model: Model) -> "RepeatedPose | None":
+        """None where a new pose gains more."""
+        found = model.repeat()
+        if found is None or found[1] <= found[2]:
+            return None
+        return cls(
+            *found, f"Noise dominates: hitting {found[0]} again tells more than any new pose."
+        )
+
+
+@dataclass(frozen=True)
+class ProposalsReport(Answer):
+    """Answer of `next`."""
+
+    proposals: tuple[ProposedPose, ...]
+    joint_names: tuple[str, ...]
+    forecast: Forecast
+    repeat: RepeatedPose | None
+    remarks: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """With the forecast's sentence."""
+        return super().to_json() | {"forecast": forecast_json(self.forecast)}
+
+    def text(self) -> Group:
+        """Each pose, then what one more measurement is worth."""
+        parts = [part for one in self.proposals for part in one.parts(self.joint_names)]
+        said = [self.forecast.text, self.repeat.text if self.repeat else ""]
+        remarks = [Text(remark, style="yellow") for remark in self.remarks]
+        return Group(*parts, Text(" ".join(filter(None, said))), *remarks)
+
+
+def forecast_json(forecast: Forecast) -> dict[str, Any]:
+    """Its numbers and its sentence."""
+    return {**plain(forecast), "text": forecast.text}
+
+
+def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsReport:
+    """Of the poses that `Campaign.next` gave."""
+    expected = campaign.predict(np.deg2rad(np.array([p.joints_deg for p in found])))
+    model = campaign.model
+    return ProposalsReport(
+        tuple(ProposedPose(p, ExpectedMode.all_of(expected, i)) for i, p in enumerate(found)),
+        tuple(campaign.cell.robot.joint_names),
+        model.forecast,
+        RepeatedPose.of(model),
+        tuple(campaign.cell.remarks),
+    )

@@ -1,0 +1,157 @@
+"""Answer of `replay`: each step of the log and whether computing it again gave the same."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.campaign.campaign import Campaign
+from planner.compare.counterfactual import otherwise
+from planner.compare.tasks import Run
+from planner.replay import Step, replay
+from planner.report.answer import Answer
+from planner.report.text import table
+
+
+@dataclass(frozen=True)
+class OtherPose:
+    """A pose that another acquisition would have proposed."""
+
+    joints_deg: tuple[float, ...]
+    position_m: tuple[float, float, float]
+    hits: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayedStep:
+    """An entry of the log; `check` is "identical", "close" (rounding), "differs" or "kept"."""
+
+    seq: int
+    time: str
+    event: str
+    check: str
+    detail: str
+    measurements: int
+    frequency_sd_percent: np.ndarray
+    instead: tuple[OtherPose, ...]
+
+    @classmethod
+    def of(cls, step: Step) -> "ReplayedStep":
+        """Of a step of `planner.replay`."""
+        entry = step.entry
+        return cls(
+            entry.seq, entry.time, msgspec.to_builtins(entry.event)["kind"], step.check,
+            step.detail, len(step.model.labelled), step.model.frequency_sd_percent,
+            tuple(OtherPose(p.joints_deg, p.position_m, p.hits) for p in step.instead),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LearningRun:
+    """One order of the measured poses: RMSE and robot time after n measurements each."""
+
+    poses: tuple[str, ...]
+    n: tuple[int, ...]
+    frequency_rmse_percent: tuple[float, ...]
+    minutes: tuple[float, ...]
+
+    @classmethod
+    def of(cls, run: Run) -> "LearningRun":
+        """Of a run of a comparison."""
+        return cls(run.poses, run.n, run.frequency_rmse_percent, run.minutes)
+
+
+@dataclass(frozen=True)
+class OtherAcquisition:
+    """What another acquisition would have saved among the poses measured; `runs` by name."""
+
+    acquisition: str
+    text: str
+    runs: dict[str, LearningRun]
+
+    @classmethod
+    def of(cls, campaign: Campaign, acquisition: str) -> "OtherAcquisition | None":
+        """None with too few measured poses to tell."""
+        found = otherwise(campaign, acquisition)
+        if found is None:
+            return None
+        runs = {"campaign": found.measured, found.acquisition: found.instead}
+        return cls(
+            found.acquisition, found.text, {name: LearningRun.of(r) for name, r in runs.items()}
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayReport(Answer):
+    """Answer of `replay`."""
+
+    campaign: str
+    steps: tuple[ReplayedStep, ...]
+    reproduced: bool
+    rrd: str | None
+    frequency_sd_percent: np.ndarray | None
+    otherwise: OtherAcquisition | None
+
+    def text(self) -> Group:
+        """The steps, the verdict, and what another acquisition would have saved."""
+        asked = any(step.instead for step in self.steps)
+        more = ["instead (deg)"] if asked else []
+        made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
+        for step in self.steps:
+            sd = "  ".join(f"{v:.2f}" for v in step.frequency_sd_percent)
+            poses = [" ".join(f"{v:.0f}" for v in p.joints_deg) for p in step.instead]
+            made.add_row(
+                str(step.seq), step.event, step.check, step.detail, sd,
+                *(["\n".join(poses)] if asked else []),
+                style="red" if step.check == "differs" else None,
+            )  # fmt: skip
+        lines = [f"The log was {'' if self.reproduced else 'NOT '}reproduced."]
+        if self.rrd:
+            lines.append(f"Rerun recording: {self.rrd}")
+        other = self.otherwise
+        if other is None:
+            return Group(made, Text("\n".join(lines)))
+        counts = next(iter(other.runs.values())).n
+        curves = table("Frequency RMSE (%) on poses not yet used, by measurements", "order",
+                       *map(str, counts))  # fmt: skip
+        for name, run in other.runs.items():
+            curves.add_row(name, *(f"{v:.2f}" for v in run.frequency_rmse_percent))
+        return Group(made, curves, Text("\n".join([*lines, other.text])))
+
+
+def replayed(
+    campaign: Campaign,
+    until: int | None,
+    rrd: Path | None,
+    viewer: bool,
+    progress: Callable[[str], None],
+    acquisition: str | None = None,
+) -> ReplayReport:
+    """Compute every step of the log again, up to entry `until`, and show it in Rerun.
+
+    With an `acquisition` also what that would have proposed, and saved. Raises InputError where
+    a recording is missing or changed.
+    """
+    from planner.report.rerun_story import Story
+
+    steps = []
+    simulated = any(m.simulated for m in campaign.state.recorded)
+    with Story(campaign.cell, rrd, viewer, simulated) as story:
+        for step in replay(campaign, until, acquisition):
+            progress(f"{step.entry.seq} of {len(campaign.entries)} {step.detail}")
+            story.tell(step.entry, step.state, step.model, step.measured)
+            steps.append(ReplayedStep.of(step))
+    if acquisition is not None:
+        progress(f"playing {acquisition} on what was measured")
+    return ReplayReport(
+        campaign=str(campaign.directory),
+        steps=tuple(steps),
+        reproduced=all(step.check != "differs" for step in steps),
+        rrd=str(rrd.resolve()) if rrd else None,
+        frequency_sd_percent=steps[-1].frequency_sd_percent if steps else None,
+        otherwise=OtherAcquisition.of(campaign, acquisition) if acquisition else None,
+    )

@@ -1,0 +1,202 @@
+"""Answer of `status`: what was measured, what is open, how sure the model is."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import Proposal
+from planner.campaign.model import Model
+from planner.campaign.state import Measurement
+from planner.design.stopping import Forecast
+from planner.report.answer import NOT_IN_JSON, Answer, plain
+from planner.report.imports import AskedOfPose
+from planner.report.leave_one_out import LeftOutValues, found_without, left_out
+from planner.report.plot_files import Pictures
+from planner.report.proposals import forecast_json
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+
+
+@dataclass(frozen=True)
+class MeasuredPoseStatus:
+    """A measured pose: how many hits are in use and refused, frequencies of its modes."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    hits: int
+    refused: int
+    frequency_hz: tuple[float, ...]
+    withdrawn: bool
+    starred: bool
+    simulated: bool
+    time: str
+    remarks: tuple[str, ...]
+
+    @classmethod
+    def of(cls, m: Measurement, starred: bool) -> "MeasuredPoseStatus":
+        """Of a measurement."""
+        used = len(m.accepted)
+        found = tuple(mode.frequency_hz for mode in m.modes if mode.likely)
+        return cls(
+            m.pose, m.joints_deg, used, len(m.hits) - used, found, m.withdrawn, starred,
+            m.simulated, m.time, m.remarks,
+        )  # fmt: skip
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """A row of the table."""
+        mark = (" ★" if self.starred else "") + (" withdrawn" if self.withdrawn else "")
+        found = "  ".join(f"{f:.2f}" for f in self.frequency_hz) or "none"
+        return self.pose + mark, str(self.hits), str(self.refused), found, self.time[:19]
+
+
+@dataclass(frozen=True)
+class HeldPose(Answer):
+    """A pose whose hits are not used until a question is answered."""
+
+    measured: MeasuredPoseStatus
+    question: AskedOfPose
+
+    @classmethod
+    def of(cls, m: Measurement, starred: bool) -> "HeldPose":
+        """Of a held measurement."""
+        assert m.question is not None
+        return cls(MeasuredPoseStatus.of(m, starred), AskedOfPose(m.pose, m.question))
+
+    def to_json(self) -> dict[str, Any]:
+        """The keys of a measured pose, and "question"."""
+        return {**plain(self.measured), "question": plain(self.question)}
+
+
+@dataclass(frozen=True)
+class SkippedProposal:
+    """A proposed pose that shall not be measured."""
+
+    pose: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class RefusedHit:
+    """A recording of a measured pose that is not used, and why."""
+
+    pose: str
+    file: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class LogStatus:
+    """Length of the log; bytes of a last line that a crash has torn."""
+
+    entries: int
+    torn_bytes: int
+
+
+@dataclass(frozen=True, eq=False)
+class StatusReport(Answer):
+    """Answer of `status`; sds (count,) in % are over the workspace, mode by mode."""
+
+    campaign: str
+    robot: str
+    simulated: bool
+    measurements: tuple[MeasuredPoseStatus, ...]
+    open: tuple[Proposal, ...]
+    skipped: tuple[SkippedProposal, ...]
+    refused: tuple[RefusedHit, ...]
+    frequency_sd_percent: np.ndarray
+    target_frequency_sd_percent: float
+    done: bool
+    forecast: Forecast
+    remarks: tuple[str, ...]
+    log: LogStatus
+    joint_names: tuple[str, ...]
+    stored_but_not_imported: tuple[str, ...]
+    leave_one_out: LeftOutValues
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    held: tuple["HeldPose", ...] = ()
+    model: Model | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+
+    def to_json(self) -> dict[str, Any]:
+        """With the forecast's sentence."""
+        return super().to_json() | {"forecast": forecast_json(self.forecast)}
+
+    def with_pictures(self, pictures: Pictures, name: str) -> "StatusReport":
+        """The same once each pose is drawn as predicted without it, where that is wanted."""
+        if not pictures.wanted or not self.leave_one_out.values or self.model is None:
+            return self
+        from planner.report.leave_one_out_plots import left_out_figure
+
+        mark = SIMULATED_TITLE if self.simulated else ""
+        title = f"{mark}Each measured pose, predicted without it"
+        figure = left_out_figure(*found_without(self.model), title)
+        return replace(self, **pictures.write({"leave_one_out": figure}, name))
+
+    def text(self) -> Group:
+        """Measured poses as a table, then all else line by line."""
+        measured = table(
+            f"{self.campaign}: {len(self.measurements)} poses measured",
+            *("pose", "hits", "refused", "frequencies (Hz)", "time (UTC)"),
+        )
+        for pose in self.measurements:
+            measured.add_row(*pose.cells)
+        parts = [measured, Text("\n".join(self._lines())), *drawn(self.plots)]
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+    def _lines(self) -> list[str]:
+        each = enumerate(self.frequency_sd_percent, 1)
+        lines = [
+            "open: " + (", ".join(p.pose for p in self.open) or "none"),
+            "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
+            "sd of frequencies over the workspace: "
+            + ", ".join(f"mode {k} {v:.2f} %" for k, v in each)
+            + f" (target {self.target_frequency_sd_percent:g} %)",
+            self.forecast.text + (" The target is reached." if self.done else ""),
+            f"log: {self.log.entries} entries",
+        ]
+        if self.log.torn_bytes:
+            lines.append("The log's last line was torn by a crash; the next act sets it aside.")
+        if self.stored_but_not_imported:
+            lines.append(
+                f"{len(self.stored_but_not_imported)} recordings were stored, but the program "
+                f"stopped before they were imported: import them again."
+            )
+        lines += [
+            f"Held, not used: {h.question.text} Answer with planner confirm, or withdraw."
+            for h in self.held
+        ]
+        lines += [*self.remarks, *self.leave_one_out.text]
+        return lines + [f"refused {r.file}: {r.reason}" for r in self.refused]
+
+
+def status(campaign: Campaign) -> StatusReport:
+    """Of a campaign as it is now."""
+    state, model, cell = campaign.state, campaign.model, campaign.cell
+    measured = tuple(state.measurements.values())
+    refused = [RefusedHit(m.pose, h.file, h.reason) for m in state.recorded for h in m.hits
+               if not h.accepted]  # fmt: skip
+    refused += [RefusedHit(pose, h.file, h.reason) for pose, h in state.refused.values()]
+    return StatusReport(
+        campaign=str(campaign.directory),
+        robot=cell.robot.name,
+        simulated=any(m.simulated for m in state.recorded),
+        measurements=tuple(MeasuredPoseStatus.of(m, m.pose in state.starred) for m in measured),
+        open=tuple(state.proposals[pose] for pose in state.open),
+        skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),
+        refused=tuple(refused),
+        frequency_sd_percent=model.frequency_sd_percent,
+        target_frequency_sd_percent=cell.config.stop.frequency_sd_percent,
+        done=bool(model.done),
+        forecast=model.forecast,
+        remarks=model.remarks,
+        log=LogStatus(state.events, campaign.torn_bytes),
+        joint_names=tuple(cell.robot.joint_names),
+        stored_but_not_imported=tuple(campaign.orphans()),
+        leave_one_out=left_out(model),
+        held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
+        model=model,
+    )

@@ -1,0 +1,198 @@
+"""Answer of `modes` for a recordings folder with several poses: which modes are the same."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
+from planner.errors import RefusedError
+from planner.modal.modes import Mode
+from planner.modal.tracking import Guide, Tracks, track
+from planner.recording.folder import TABLE, joint_columns, read_recordings
+from planner.recording.records import PoseRow, RecordingsFolder
+from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode, check_options
+from planner.report.plot_files import Pictures
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+
+ABOVE = 2  # labels of the simulation above the modes of the pose that has most
+SURE = 0.9  # probability of a label below which the text marks it as doubtful
+
+
+@dataclass(frozen=True)
+class SurveyedMode:
+    """A mode of a pose; `label` counts the modes of all poses from 1, None where it has none."""
+
+    label: int | None
+    label_probability: float | None
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: tuple[tuple[float, float], ...]
+    probability: float
+
+    @classmethod
+    def of(cls, mode: Mode, label: int | None = None, sure: float | None = None) -> "SurveyedMode":
+        """Of a mode of a modal model."""
+        return cls(label, sure, **vars(IdentifiedMode.of(mode)))
+
+    @property
+    def cell(self) -> str:
+        """Frequency (Hz) as the table shows it."""
+        doubt = "" if self.label_probability is None or self.label_probability >= SURE else " ?"
+        return f"{self.frequency_hz:.2f}{doubt}"
+
+
+@dataclass(frozen=True)
+class SurveyedPose:
+    """The modes of a pose, by label, and those without."""
+
+    pose: str
+    modes: tuple[SurveyedMode, ...]
+    unlabelled: tuple[SurveyedMode, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class SurveyReport(Answer):
+    """Answer of `modes` of a folder; `modes` are those of the first pose."""
+
+    poses: tuple[SurveyedPose, ...]
+    modes: tuple[SurveyedMode, ...]
+    band_hz: tuple[float, float]
+    refused: tuple[RefusedFile, ...]
+    remarks: tuple[str, ...]
+    simulated: bool
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    tracks: Tracks | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+    simulated_hz: np.ndarray | None = field(
+        default=None, repr=False, metadata=NOT_IN_JSON
+    )  # (n, k), None without a robot
+
+    def with_pictures(self, pictures: Pictures, name: str) -> "SurveyReport":
+        """The same once frequencies are drawn pose by pose, where that is wanted."""
+        if not pictures.wanted or self.tracks is None:
+            return self
+        from planner.report.modal_plots import frequency_figure
+
+        tracks, expected = self.tracks, self.simulated_hz
+        rows = [[m.frequency_sd_hz if m else np.nan for m in row] for row in tracks.modes]
+        sd = np.array(rows, dtype=float).reshape(tracks.probability.shape)
+        seen = np.any(np.isfinite(tracks.frequency_hz), axis=0)
+        mark = SIMULATED_TITLE if self.simulated else ""
+        figure = frequency_figure(
+            tuple(pose.pose for pose in self.poses),
+            tracks.frequency_hz[:, seen],
+            sd[:, seen],
+            None if expected is None else expected[:, seen],
+            title=f"{mark}Campbell diagram · {name}",
+        )
+        return replace(self, **pictures.write({"campbell": figure}, name))
+
+    def text(self) -> Group:
+        """Frequencies by pose and label."""
+        labels = sorted({mode.label for pose in self.poses for mode in pose.modes if mode.label})
+        low, high = self.band_hz
+        made = table(
+            f"Modes of {len(self.poses)} poses between {low:g} and {high:g} Hz",
+            *("pose", *(f"mode {label} (Hz)" for label in labels), "without label (Hz)"),
+        )
+        for pose in self.poses:
+            by_label = {mode.label: mode.cell for mode in pose.modes}
+            others = "  ".join(mode.cell for mode in pose.unlabelled)
+            made.add_row(pose.pose, *(by_label.get(label, "–") for label in labels), others)
+        parts = [made, Text("  ?: the label is less than 90 % sure."), *drawn(self.plots)]
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+
+def several_poses(paths: list[Path]) -> bool:
+    """Whether a single folder with recordings.csv is named."""
+    return len(paths) == 1 and (paths[0] / TABLE).is_file()
+
+
+def survey(
+    folder: Path,
+    band_hz: tuple[float, float] | None,
+    robot_toml: Path | None,
+    estimator: str,
+    quantity: str | None,
+    window_rate_1_s: float,
+    progress: Callable[[str], None],
+) -> SurveyReport:
+    """Analyse each pose; labels follow the simulation's families if a robot is named.
+
+    Raises RefusedError where no pose gives a mode.
+    """
+    check_options(band_hz, estimator, quantity, window_rate_1_s)
+    band = band_hz or DEFAULT_BAND_HZ
+    table = _table(folder, robot_toml)
+    names = tuple(dict.fromkeys(row.pose for row in table.rows))
+    found, refused, simulated = [], [], False
+    for number, name in enumerate(names):
+        progress(f"pose {name}, {number} of {len(names)} done")
+        rows = [row for row in table.rows if row.pose == name]
+        measured = measure(_sources(rows), band, estimator, window_rate_1_s)
+        refused += [
+            RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted
+        ]
+        simulated |= any(v.simulated for v in measured.verdicts)
+        found.append(measured.modal.modes if measured.modal else ())
+    if not any(found):
+        raise RefusedError(
+            f"{folder}: no pose gives a mode between {band[0]:g} and "
+            f"{band[1]:g} Hz; see `planner modes` of one pose's files."
+        )
+    first = {row.pose: row for row in reversed(table.rows)}
+    q = np.deg2rad(np.array([first[name].joints_deg for name in names]))
+    tracks, expected = _labelled(found, q, robot_toml)
+    poses = tuple(_pose(name, tracks, i) for i, name in enumerate(names))
+    return SurveyReport(
+        poses, poses[0].modes, band, tuple(refused), (), simulated, tracks=tracks,
+        simulated_hz=expected,
+    )  # fmt: skip
+
+
+def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
+    if robot_toml is None:
+        return read_recordings(folder, joint_columns(folder))
+    from planner.robot.robot import Robot
+
+    return read_recordings(folder, Robot.load(robot_toml).joint_names)
+
+
+def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
+    return tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in rows if r.file)
+
+
+def _labelled(
+    found: list[tuple[Mode, ...]], q: np.ndarray, robot_toml: Path | None
+) -> tuple[Tracks, np.ndarray | None]:
+    span = np.ptp(q, axis=0)
+    x = ((q - q.min(axis=0)) / np.where(span > 0, span, 1.0))[:, span > 0]
+    labels = max(map(len, found))
+    if robot_toml is None:
+        return track(found, Guide.by_example(found), x), None
+    from planner.dynamics.simulation import Simulation
+    from planner.robot.robot import Robot
+
+    simulation = Simulation(Robot.load(robot_toml))
+    middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
+    count = min(labels + ABOVE, simulation.elastic.size)
+    modes = simulation.followed(q, count, simulation.families(q[middle], q))
+    tracks = track(found, Guide(modes.frequency_hz, modes.shape, middle), x)
+    return tracks, modes.frequency_hz
+
+
+def _pose(name: str, tracks: Tracks, i: int) -> SurveyedPose:
+    modes = tuple(
+        SurveyedMode.of(mode, k + 1, float(tracks.probability[i, k]))
+        for k, mode in enumerate(tracks.modes[i])
+        if mode is not None
+    )
+    return SurveyedPose(name, modes, tuple(map(SurveyedMode.of, tracks.unexpected[i])))

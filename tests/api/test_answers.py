@@ -1,0 +1,39 @@
+"""JSON and text of answers: what every one of them has in common."""
+
+import json
+from dataclasses import dataclass, field
+
+import msgspec
+import numpy as np
+
+from planner.report.answer import NOT_IN_JSON, Answer, encoded
+
+
+@dataclass(frozen=True)
+class Part:
+    value: float
+
+
+@dataclass(frozen=True)
+class Whole(Answer):
+    numbers: np.ndarray
+    parts: tuple[Part, ...]
+    shape: complex
+    left_out: int | msgspec.UnsetType = msgspec.UNSET
+    fits: object = field(default=None, metadata=NOT_IN_JSON)
+
+
+def test_an_answer_is_json_that_every_reader_takes():
+    whole = Whole(np.array([1.0, np.nan, np.inf]), (Part(float("nan")), Part(2.0)), 1 + 2j, fits=1)
+    told = json.loads(encoded(whole))
+    assert told == {
+        "numbers": [1.0, None, None],
+        "parts": [{"value": None}, {"value": 2.0}],
+        "shape": [1.0, 2.0],
+    }
+    assert whole.to_json() == told
+    assert whole.text() is None
+
+
+def test_a_key_appears_once_it_is_set():
+    assert Whole(np.zeros(0), (), 0j, left_out=3).to_json()["left_out"] == 3
