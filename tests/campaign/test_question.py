@@ -12,11 +12,11 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import MeasuredMode, Proposed
 from planner.campaign.question import compare
 from planner.campaign.state import fold
-from planner.cli import answers
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.replay import replay
+from planner.report.status import status
 from tests.support.outside import planner
 
 MEASURED = ("A11", "A33", "A57", "A17")
@@ -77,7 +77,7 @@ def test_hits_of_another_pose_are_held_until_confirmed(campaign, pool, tmp_path)
     assert again.state.held["X1"].question == asked
     assert not again.orphans()
     np.testing.assert_array_equal(again.model.frequency_sd_percent, before)
-    (held,) = answers.status(again)["held"]
+    (held,) = status(again).to_json()["held"]
     assert held["question"]["text"] == asked.text
     (once_more,) = again.import_paths((tmp_path / "wrong",))
     assert once_more.question == asked
@@ -165,7 +165,7 @@ def test_refused_files_stay_out_unless_they_are_named(campaign, pool):
     version = campaign.state.model_version
     campaign.refuse("A46", files[:3])
     again = Campaign(campaign.directory)
-    listed = [r for r in answers.status(again)["refused"] if r["pose"] == "A46"]
+    listed = [r for r in status(again).to_json()["refused"] if r["pose"] == "A46"]
     assert [r["file"] for r in listed] == [str(path) for path in files[:3]]
     assert {r["reason"] for r in listed} == {"refused by the engineer"}
     assert again.state.model_version == version

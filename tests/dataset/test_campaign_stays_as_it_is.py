@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.cli.material import material
+from planner.campaign.material import material
 from planner.cli.run import run
 from planner.demo import NAME, Pool, shipped
 from planner.errors import InputError

@@ -12,8 +12,16 @@ from tests.support.known_robots import IRB6640
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TILTS = Spring("base", X, 2.4e6, 1.2e3), Spring("base", Y, 1.6e6, 8e2)
+<<<<<<< HEAD
 PAYLOAD = AttachedMass("link_6", (0.05, 0.02, 0.1), 60.0)
 HOSE = AttachedResonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
+=======
+PAYLOAD = AddedMass("link_6", (0.05, 0.02, 0.1), 60.0)
+HOSE = Resonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
+# Where a rough fit lands, the right place or one beside it, hangs on details: these are cases in
+# which it is the right one. The whole diagnosis, which goes on from there, has to find it anyway.
+WEIGHTLESS = "geometric_stiffness = false"
+>>>>>>> robot
 BOTH = {("base_compliance", "base"), ("added_mass", "link_6")}
 
 
@@ -24,7 +32,7 @@ def places(effect) -> set[tuple[str, str]]:
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cell")
-    return hidden(IRB6640, folder, 75, TILTS, (PAYLOAD,), poses=6)
+    return hidden(IRB6640, folder, 75, TILTS, (PAYLOAD,), poses=6, said=WEIGHTLESS)
 
 
 def problem(frfs, q, simulation) -> Problem:
@@ -41,7 +49,7 @@ def test_what_gives_and_what_is_carried_are_among_the_first_suspects(recorded):
 
 
 def test_a_resonator_is_found_beside_the_soft_places_not_instead_of_them(tmp_path):
-    recorded = hidden(IRB6640, tmp_path, 77, TILTS, loose=(HOSE,), poses=6)
+    recorded = hidden(IRB6640, tmp_path, 77, TILTS, loose=(HOSE,), poses=6, said=WEIGHTLESS)
     alike, effects = problem(*recorded), library(recorded[2])
     rough = suspects(alike, effects)
     soft = next(f for f in rough if ("base_compliance", "base") in places(f.effect))
@@ -56,7 +64,8 @@ def test_a_library_without_soft_places_and_masses_has_no_suspects(recorded):
 
 
 @pytest.mark.slow
-def test_both_are_named(recorded):
-    found = diagnose(*recorded)
+@pytest.mark.parametrize("said", ["", WEIGHTLESS])
+def test_both_are_named(said, tmp_path):
+    found = diagnose(*hidden(IRB6640, tmp_path, 75, TILTS, (PAYLOAD,), poses=6, said=said))
     assert set(found.candidates[0].places) == BOTH
     assert found.candidates[0].probability > 0.8

@@ -28,9 +28,14 @@ def hidden(
     loose: tuple[AttachedResonator, ...] = (),
     channel: Callable[[np.ndarray], np.ndarray] = lambda a: a,
     poses: int = 8,
+    said: str = "",
 ) -> tuple[list[Frf], np.ndarray, Simulation]:
-    """FRFs of 9 hits a pose, poses (n, 6) in rad, and the simulation that knows of nothing."""
+    """FRFs of 9 hits a pose, poses (n, 6) in rad, and the simulation that knows of nothing.
+
+    Both engines read robot.toml, which begins with what is `said`.
+    """
     path = robot.write(folder / "robot")
+    path.write_text(f"{said}\n{path.read_text()}")
     scatter = Deviation(seed, stiffness=0.1, damping=0.2, inertia=0.04, com_m=0.005)
     truth = load_truth(path, replace(scatter, extra=extra, added=added, resonators=loose))
     hammer, q, out = Hammer(), robot.poses(poses, seed), []
