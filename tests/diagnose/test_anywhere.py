@@ -12,16 +12,11 @@ from tests.support.known_robots import IRB6640
 
 X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TILTS = Spring("base", X, 2.4e6, 1.2e3), Spring("base", Y, 1.6e6, 8e2)
-<<<<<<< HEAD
 PAYLOAD = AttachedMass("link_6", (0.05, 0.02, 0.1), 60.0)
 HOSE = AttachedResonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
-=======
-PAYLOAD = AddedMass("link_6", (0.05, 0.02, 0.1), 60.0)
-HOSE = Resonator("link_2", (0.3, 0.0, 0.0), (0.6, 0.0, 0.8), 30.0, 14.0, 0.03)
 # Where a rough fit lands, the right place or one beside it, hangs on details: these are cases in
 # which it is the right one. The whole diagnosis, which goes on from there, has to find it anyway.
 WEIGHTLESS = "geometric_stiffness = false"
->>>>>>> robot
 BOTH = {("base_compliance", "base"), ("added_mass", "link_6")}
 
 
