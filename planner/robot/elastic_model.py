@@ -25,7 +25,8 @@ class Matrices:
     """Of n poses and e elastic degrees of freedom: M (n, e, e) in kg·m²; Jacobians in m/rad.
 
     `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
-    s sensors; unless others were named, that is the tcp and the sensor. `geometric` (n, e, e) in
+    s sensors; unless others were named, that is the tcp and the sensor. `hit_turn` and
+    `sensor_turn`, of the same shapes in rad/rad, turn them. `geometric` (n, e, e) in
     N·m/rad is the stiffness that goes with the pose: gravity's own, harmonics of joint angles; 0
     unless robot.toml asks for it.
     """
@@ -34,6 +35,12 @@ class Matrices:
     hit: np.ndarray
     sensor: np.ndarray
     geometric: np.ndarray
+    hit_turn: np.ndarray
+    sensor_turn: np.ndarray
+
+    def at(self, poses: slice) -> "Matrices":
+        """Of some of the poses."""
+        return Matrices(*(getattr(self, name)[poses] for name in self.__dataclass_fields__))
 
 
 class ElasticModel:
@@ -121,7 +128,7 @@ class ElasticModel:
         ids += [[robot.frame_id("sensor frame", name) for name in sensors] or [robot.sensor_id]]
         data = self._model.createData()  # one for each call, so that threads do not meet in it
         mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
-        out = [np.empty((n, len(group), 3, e)) for group in ids]
+        out = [np.empty((n, len(group), 6, e)) for group in ids]
         for i, row in enumerate(q):
             full = self._standing(row, data)
             if robot.config.geometric_stiffness:
@@ -138,9 +145,10 @@ class ElasticModel:
                     frame = self._virtual.frames[number]
                     jacobians[i, k] = pin.computeFrameJacobian(
                         self._model, data, full, frame, pin.LOCAL
-                    )[:3, self._elastic]
-        hit, sensor = (jacobians.reshape(n, -1, e) for jacobians in out)
-        return Matrices(mass, hit, sensor, geometric)
+                    )[:, self._elastic]
+        hit, sensor = (jacobians[:, :, :3].reshape(n, -1, e) for jacobians in out)
+        hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
+        return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
