@@ -75,7 +75,30 @@ def response(
     matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
 ) -> np.ndarray:
     """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
-    return _synthesis(matrices, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
+    return _synthesis(matrices.sensor, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """What goes with accelerances (n, 3, 3, F): responses to moments, and how the sensor turns.
+
+    `moment` (n, 3s, 3, F) in m/s² per N·m at the hit point, `turning` (n, 3, 3h, F) in rad/s² per N
+    at the sensor.
+    """
+
+    moment: np.ndarray
+    turning: np.ndarray
+
+
+def response_turned(
+    matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
+) -> tuple[np.ndarray, Turned]:
+    """Accelerance (n, 3s, 3h, F) at s (n, F), and what goes with it."""
+    points = matrices.hit.shape[1]
+    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
+    x = _solutions(matrices, elasticity, s, mass, both)
+    x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
+    return _synthesis(matrices.sensor, x_hit, s), _turned(matrices, x_hit, x_sensor, s)
 
 
 def response_gradient(
@@ -86,7 +109,19 @@ def response_gradient(
     inertias: Inertias | None = None,
     added: Sequence[Impedance] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerance (n, 3s, 3h, F) at s (n, F), and its derivatives (n, P, 3s, 3h, F).
+    """The first two of `response_parts`."""
+    return response_parts(matrices, elasticity, s, mass, inertias, added)[:2]
+
+
+def response_parts(
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None = None,
+    inertias: Inertias | None = None,
+    added: Sequence[Impedance] = (),
+) -> tuple[np.ndarray, np.ndarray, Turned]:
+    """Accelerance (n, 3s, 3h, F) at s (n, F), its derivatives (n, P, 3s, 3h, F), and `Turned`.
 
     The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
     those of `inertias` (B · p, only if given), and those of all that is `added` to Z.
@@ -120,13 +155,21 @@ def response_gradient(
         part = out[:, place : place + len(one.slope)]
         one.gradient(x_hit * minus[:, 0], x_sensor, part)
         place += len(one.slope)
-    return _synthesis(matrices, x_hit, s), out
+    return _synthesis(matrices.sensor, x_hit, s), out, _turned(matrices, x_hit, x_sensor, s)
 
 
-def _synthesis(matrices: Matrices, x_hit: np.ndarray, s: np.ndarray) -> np.ndarray:
-    n, e, points, lines = x_hit.shape
-    flat = np.ascontiguousarray(x_hit).reshape(n, e, -1).view(float)
-    receptance = (matrices.sensor @ flat).view(complex).reshape(n, -1, points, lines)
+def _turned(matrices: Matrices, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray) -> Turned:
+    # Z is symmetric: what a moment at the hit point does to the sensor, a force at the sensor does
+    # to the turning of the hit point.
+    moment = np.swapaxes(_synthesis(matrices.hit_turn, x_sensor, s), 1, 2)
+    return Turned(moment, _synthesis(matrices.sensor_turn, x_hit, s))
+
+
+def _synthesis(rows: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
+    """Accelerations (n, r, points, F) along rows (n, r, e) of motions x (n, e, points, F)."""
+    n, e, points, lines = x.shape
+    flat = np.ascontiguousarray(x).reshape(n, e, -1).view(float)
+    receptance = (rows @ flat).view(complex).reshape(n, -1, points, lines)
     return (s**2)[:, None, None] * receptance
 
 

@@ -26,7 +26,8 @@ class Matrices:
     """Of n poses and e elastic degrees of freedom: M (n, e, e) in kg·m²; Jacobians in m/rad.
 
     `hit` (n, 3h, e) moves the h hit points, each in its own frame, and `sensor` (n, 3s, e) the
-    s sensors; unless others were named, that is the tcp and the sensor. `geometric` (n, e, e) in
+    s sensors; unless others were named, that is the tcp and the sensor. `hit_turn` and
+    `sensor_turn`, of the same shapes in rad/rad, turn them. `geometric` (n, e, e) in
     N·m/rad is the stiffness that goes with the pose: gravity's own, harmonics of joint angles; 0
     where robot.toml leaves both out.
     """
@@ -35,6 +36,12 @@ class Matrices:
     hit: np.ndarray
     sensor: np.ndarray
     geometric: np.ndarray
+    hit_turn: np.ndarray
+    sensor_turn: np.ndarray
+
+    def at(self, poses: slice) -> "Matrices":
+        """Of some of the poses."""
+        return Matrices(*(getattr(self, name)[poses] for name in self.__dataclass_fields__))
 
 
 class ElasticModel:
@@ -133,7 +140,7 @@ class ElasticModel:
         # One for each call, so that threads do not meet in it.
         data, weight = self._model.createData(), self._weighed.createData()
         mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
-        out = [np.empty((n, len(group), 3, e)) for group in ids]
+        out = [np.empty((n, len(group), 6, e)) for group in ids]
         for i, row in enumerate(q):
             full = self._standing(row, weight)
             if robot.config.geometric_stiffness:
@@ -147,9 +154,10 @@ class ElasticModel:
                     frame = self._virtual.frames[number]
                     jacobians[i, k] = pin.computeFrameJacobian(
                         self._model, data, full, frame, pin.LOCAL
-                    )[:3, self._elastic]
-        hit, sensor = (jacobians.reshape(n, -1, e) for jacobians in out)
-        return Matrices(mass, hit, sensor, geometric)
+                    )[:, self._elastic]
+        hit, sensor = (jacobians[:, :, :3].reshape(n, -1, e) for jacobians in out)
+        hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
+        return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.

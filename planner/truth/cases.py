@@ -21,7 +21,8 @@ from planner.truth.arms import ARMS, Arm
 from planner.truth.detect import Detectability, detectability
 from planner.truth.deviation import Deviation
 from planner.truth.effects import LINEAR, NONLINEAR, OTHER
-from planner.truth.hits import Hammer, write_predict, write_recordings
+from planner.truth.handling import EVERYDAY, LABORATORY, Handling, together
+from planner.truth.hits import AXES, Hammer, write_predict, write_recordings
 from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
 from planner.truth.model import Truth, load_truth
 from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
@@ -54,8 +55,12 @@ class Case:
     seal: str
 
 
-def make_case(kind: str, robot: str, seed: int, folder: Path) -> Case:
+def make_case(
+    kind: str, robot: str, seed: int, folder: Path, handling: Handling = LABORATORY
+) -> Case:
     """Write folder/robot and folder/recordings of a kind of KINDS and a robot of ARMS.
+
+    `handling`: how hits and measuring chain err.
 
     Raises InputError for an unknown kind or robot.
     """
@@ -74,7 +79,9 @@ def make_case(kind: str, robot: str, seed: int, folder: Path) -> Case:
     concealed, measures = _conceal(kind, scene, plain, robot_toml, hammer, rng)
     secret = concealed[-1].secret if concealed else plain
     truth = load_truth(robot_toml, secret.deviation)
-    _record(truth, secret, poses[:POSES], folder / "recordings", hammer, rng)
+    own = np.random.default_rng([seed, zlib.crc32(b"handling")])
+    measured = replace(secret, chain=handling.chain(own))
+    _record(truth, measured, poses[:POSES], folder / "recordings", hammer, rng, handling, own)
     held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
     write_predict(folder / "recordings", truth.joint_names, held_out, hammer.peak_n)
     answer = json.dumps(
@@ -159,15 +166,26 @@ def _record(
     folder: Path,
     hammer: Hammer,
     rng: np.random.Generator,
+    handling: Handling,
+    own: np.random.Generator,
 ) -> None:
-    """Three axes and three force levels a pose; the first pose is often hit again at the end."""
+    """Three axes and three force levels a pose; the first pose is often hit again at the end.
+
+    `own` draws what `handling` leaves open, so that all else is the same in the laboratory.
+    """
     visits = list(range(len(poses))) + ([0] if rng.random() < 0.5 else [])
     shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
     planned, readbacks = [], []
+    common, axes = handling.common(own), [AXES.index(axis[1]) for axis, _ in shots]
     for number, index in enumerate(visits):
         scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
         readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-        planned.append(HitVisit(np.deg2rad(readbacks[-1]), shots, number / (len(visits) - 1)))
+        off = np.deg2rad(handling.readback_deg) * own.standard_normal(6)
+        aims = [
+            together(common[a], aim) for a, aim in zip(axes, handling.aims(axes, own), strict=True)
+        ]
+        there = np.deg2rad(readbacks[-1]) + off
+        planned.append(HitVisit(there, shots, number / (len(visits) - 1), aims))
     rows = []
     counts: dict[tuple[int, str], int] = {}
     recorded = hit_poses(truth, secret, planned, hammer, rng)
@@ -197,11 +215,11 @@ def _held_out(
     }
 
 
-def _made(kind: str, robot: str, seed: int, folder: Path) -> Case:
+def _made(kind: str, robot: str, seed: int, folder: Path, handling: Handling) -> Case:
     """A case; of another scene where nothing drawn for this one shows in its noise."""
     for attempt in range(SCENES):
         try:
-            return make_case(kind, robot, seed + attempt * 1_000_003, folder)
+            return make_case(kind, robot, seed + attempt * 1_000_003, folder, handling)
         except NothingShowsError:
             if attempt == SCENES - 1:
                 raise
@@ -214,14 +232,16 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--cases", type=int, default=len(MIX))
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
     options = parser.parse_args()
     answers = options.folder / "answers"
     answers.mkdir(parents=True, exist_ok=True)
+    handling = LABORATORY if options.laboratory else EVERYDAY
     order = np.random.default_rng(options.seed).permutation(options.cases)
     for number, kind in enumerate(order):
         name, robot = f"case_{number + 1:03d}", sorted(ARMS)[number % len(ARMS)]
         wanted = MIX[kind % len(MIX)], robot
-        case = _made(*wanted, options.seed + number, options.folder / name)
+        case = _made(*wanted, options.seed + number, options.folder / name, handling)
         (answers / f"{name}.json").write_text(case.answer, encoding="utf-8")
         print(f"{name} {case.seal}", flush=True)
 

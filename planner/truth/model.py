@@ -40,6 +40,7 @@ class Truth:
     _elastic: np.ndarray = field(repr=False)
     _own: dict[str, int] = field(repr=False)  # joint: its spring about its own axis
     _weighs: bool = field(repr=False)  # whether gravity is part of the model
+    sensor_offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from where it is stated
 
     def matrices(
         self, q: np.ndarray
@@ -54,14 +55,11 @@ class Truth:
         mujoco.mj_crb(model, data)
         full = _full_mass(model, data)
         grid = np.ix_(self._elastic, self._elastic)
-        jacobians = []
-        for site in ("tcp", "sensor"):
-            jacobian = np.zeros((3, model.nv))
-            mujoco.mj_jacSite(model, data, jacobian, None, model.site(site).id)
-            rotation = data.site(site).xmat.reshape(3, 3)
-            jacobians.append((rotation.T @ jacobian)[:, self._elastic])
+        hit, _ = self._site(model, data, "tcp")
+        sensor, sensor_turn = self._site(model, data, "sensor")
+        sensor = sensor - _cross(self.sensor_offset_m) @ sensor_turn
         damping = np.diag(self._factors(q) * [s.damping for s in self.springs])
-        return full[grid], damping, stiffness + gravity, jacobians[0], jacobians[1]
+        return full[grid], damping, stiffness + gravity, hit, sensor
 
     def gravity_stiffness(self, q: np.ndarray) -> np.ndarray:
         """Gravity's part (e, e) of K: how the weight's torques change with the springs' angles."""
@@ -98,6 +96,20 @@ class Truth:
         torque = np.zeros(model.nv)
         mujoco.mj_rne(model, data, 0, torque)
         return torque[self._elastic]
+
+    def turning(self, q: np.ndarray) -> np.ndarray:
+        """Angular Jacobian (3, e) of the hit point, in its frame: what a moment there acts on."""
+        model, data = self._posed(q, self._sag(q, self._springs(q)))
+        return self._site(model, data, "tcp")[1]
+
+    def _site(self, model: object, data: object, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Linear and angular Jacobian (3, e) of a site, in its own frame."""
+        import mujoco
+
+        linear, angular = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        mujoco.mj_jacSite(model, data, linear, angular, model.site(name).id)
+        rotation = data.site(name).xmat.reshape(3, 3)
+        return (rotation.T @ linear)[:, self._elastic], (rotation.T @ angular)[:, self._elastic]
 
     def _factors(self, q: np.ndarray) -> np.ndarray:
         """What the stiffness of each spring (e,) is multiplied by at this pose."""
@@ -163,7 +175,7 @@ class Truth:
     def modal(
         self, q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Poles (p,) in rad/s, shapes V (e, p), participations W (p, e), and both Jacobians (3, e).
+        """Poles (p,) in rad/s, shapes V (e, p), participations W (p, e), and both Jacobians.
 
         x = V y and y' = λ y + W f for generalised forces f (e,).
         """
@@ -264,6 +276,12 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         own,
         bool(table.get("geometric_stiffness", True)),
     )
+
+
+def _cross(vector: tuple[float, float, float]) -> np.ndarray:
+    """(3, 3): what turns ω into v × ω."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _read(robot_toml: Path) -> tuple[dict, ElementTree.Element]:

@@ -42,12 +42,21 @@ class Port:
 
 @dataclass(frozen=True, eq=False)
 class StruckPose:
-    """A robot at a pose q (rad), and forces (h, n) in N along tcp axes 0..2 (h,) that hit it."""
+    """A robot at a pose q (rad), and forces (h, n) in N that hit it.
+
+    `wrench` (h, 6) is what a unit of each force does at the tcp, in its frame: the force's
+    direction, and the moment in m about the tcp of one that lands beside it.
+    """
 
     truth: Truth
     q: np.ndarray
     forces_n: np.ndarray
-    axes: Sequence[int]
+    wrench: np.ndarray
+
+
+def along(axes: Sequence[int]) -> np.ndarray:
+    """Wrenches (h, 6) of hits exactly along tcp axes 0..2 (h,) and exactly at the tcp."""
+    return np.eye(6)[list(axes)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,18 +93,19 @@ def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -
 
 
 def _linear(pose: StruckPose, ports: Sequence[Port], step_s: float) -> _Linear:
-    truth, forces, axes = pose.truth, pose.forces_n, list(pose.axes)
+    truth, forces = pose.truth, pose.forces_n
     poles, shapes, entry, hit, sensor = truth.modal(pose.q)
     one = poles.imag >= 0  # the other of a pair adds the conjugate
     poles, entry = poles[one], entry[one]
     shapes = shapes[:, one] * np.where(poles.imag > 0, 2.0, 1.0)
     at = np.array([port.vector(truth, pose.q) for port in ports]).reshape(len(ports), len(shapes))
-    inputs, outputs = entry @ hit.T, at @ shapes
+    drive = np.vstack([hit, truth.turning(pose.q)]).T @ pose.wrench.T  # (e, h)
+    inputs, outputs = entry @ drive, at @ shapes
     sensed, direct = sensor @ shapes * poles**2, sensor @ np.linalg.inv(truth.matrices(pose.q)[0])
-    out = np.einsum("sh,hn->hsn", (direct @ hit.T)[:, axes], forces)
+    out = np.einsum("sh,hn->hsn", direct @ drive, forces)
     angles = np.zeros((len(ports), *forces.shape))
     for k, pole in enumerate(poles):
-        y = driven(pole, forces, step_s) * inputs[k, axes][:, None]
+        y = driven(pole, forces, step_s) * inputs[k][:, None]
         out += np.einsum("s,hn->hsn", sensed[:, k], y).real
         angles += np.einsum("p,hn->phn", outputs[:, k], y).real
     return _Linear(poles, entry @ at.T, outputs, sensed, direct @ at.T, out, angles)
@@ -153,20 +163,27 @@ def structural(pose: StruckPose, loss_factor: float, step_s: float) -> np.ndarra
     """As `respond`, with K(1 + iη) instead of viscous damping: from the spectrum of the force."""
     n = pose.forces_n.shape[1]
     frequency = np.fft.rfftfreq(FFT_PADDING * n, step_s)
-    accelerance = structural_accelerance(pose.truth, loss_factor, pose.q, frequency)
+    accelerance = structural_accelerance(pose.truth, loss_factor, pose.q, frequency, pose.wrench)
     spectrum = np.fft.rfft(pose.forces_n, FFT_PADDING * n, axis=1)
-    response = np.moveaxis(accelerance[:, list(pose.axes)], 1, 0) * spectrum[:, None]
+    response = np.moveaxis(accelerance, 1, 0) * spectrum[:, None]
     return np.fft.irfft(response, FFT_PADDING * n, axis=2)[:, :, :n]
 
 
 def structural_accelerance(
-    truth: Truth, loss_factor: float, q: np.ndarray, frequency_hz: np.ndarray
+    truth: Truth,
+    loss_factor: float,
+    q: np.ndarray,
+    frequency_hz: np.ndarray,
+    wrench: np.ndarray | None = None,
 ) -> np.ndarray:
-    """Accelerance (3, 3, F) in m/s²/N: -ω² Σ φφᵀ / (μ - ω²) of K (1 + iη) + G.
+    """Accelerance (3, h, F) in m/s²/N: -ω² Σ φφᵀ / (μ - ω²) of K (1 + iη) + G.
 
-    μ are the complex eigenvalues of that matrix and M, G is gravity's part, which has no loss.
+    μ are the complex eigenvalues of that matrix and M, G is gravity's part, which has no loss. Of
+    hits `wrench` (h, 6) as in `StruckPose`, or of those along the three axes.
     """
     mass, _, stiffness, hit, sensor = truth.matrices(q)
+    if wrench is not None:
+        hit = wrench @ np.vstack([hit, truth.turning(q)])
     gravity = truth.gravity_stiffness(q)
     springs = (stiffness + stiffness.T) / 2 - gravity
     squares, shapes = scipy.linalg.eig(springs * (1 + 1j * loss_factor) + gravity, mass)[:2]

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy import ndimage
 
 from planner.errors import InputError
 from planner.truth.deviation import Deviation
+from planner.truth.handling import Aim, Chain
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, SimulatedHit, pulse, sampled
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, respond, structural
@@ -58,7 +60,10 @@ class Artefact:
 
 @dataclass(frozen=True)
 class Secret:
-    """What is concealed: physics of the robot, disturbances, and artefacts of the measurement."""
+    """What is concealed: physics of the robot, disturbances, and artefacts of the measurement.
+
+    `chain` is what is no artefact: a measuring chain within its tolerances.
+    """
 
     deviation: Deviation
     ports: tuple[Port, ...] = ()
@@ -66,15 +71,20 @@ class Secret:
     drift: StiffnessDrift | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)
+    chain: Chain = field(default_factory=Chain)
 
 
 @dataclass(frozen=True, eq=False)
 class HitVisit:
-    """Hits (axis "+x", peak in N) at a pose q (rad); progress 0 to 1 through the campaign."""
+    """Hits (axis "+x", peak in N) at a pose q (rad); progress 0 to 1 through the campaign.
+
+    `aims`, one a hit, say how each misses its axis and the tcp; none: all are exact.
+    """
 
     q: np.ndarray
     shots: Sequence[tuple[str, float]]
     progress: float = 0.0
+    aims: Sequence[Aim] = ()
 
 
 def hit_poses(
@@ -85,6 +95,7 @@ def hit_poses(
     rng: np.random.Generator,
 ) -> list[list[SimulatedHit]]:
     """All hits of all visits; `truth` has the secret's deviation."""
+    truth = replace(truth, sensor_offset_m=secret.chain.offset_m)
     step_s = 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
     pulses = [
         np.array([pulse(replace(hammer, peak_n=peak), rng) for _, peak in visit.shots])
@@ -94,7 +105,7 @@ def hit_poses(
     recorded = []
     for visit, forces, response in zip(visits, pulses, responses, strict=True):
         hits = [
-            sampled(axis, force, _heard(secret.artefact, a, step_s), hammer, rng)
+            sampled(axis, secret.chain.force_gain * force, _heard(secret, a, step_s), hammer, rng)
             for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
         ]
         recorded.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
@@ -115,7 +126,9 @@ def _responses(
         now = truth if secret.drift is None else truth.changed(secret.drift.factor(visit.progress))
         senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
         axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
-        poses.append(StruckPose(now, visit.q, senses[:, None] * forces, axes))
+        aims = visit.aims or [Aim()] * len(axes)
+        wrench = np.array([a.wrench(axis) for a, axis in zip(aims, axes, strict=True)])
+        poses.append(StruckPose(now, visit.q, senses[:, None] * forces, wrench))
     if secret.loss_factor is None:
         responses = respond(poses, secret.ports, step_s)
     elif not secret.ports:
@@ -140,10 +153,11 @@ def _hum(pose: StruckPose, tone: Tone, phases: np.ndarray, step_s: float) -> np.
     return np.real(steady[None, :, None] * turning[:, None, :])
 
 
-def _heard(artefact: Artefact, response: np.ndarray, step_s: float) -> np.ndarray:
-    late = round(artefact.delay_s / step_s)
-    mixed = np.array(artefact.gain)[:, None] * (artefact.rotation @ response)
-    return np.pad(mixed, ((0, 0), (late, 0)))[:, : response.shape[1]]
+def _heard(secret: Secret, response: np.ndarray, step_s: float) -> np.ndarray:
+    artefact, chain = secret.artefact, secret.chain
+    mixed = np.array(artefact.gain)[:, None] * (artefact.rotation @ chain.matrix @ response)
+    late = round(artefact.delay_s / step_s) + chain.delay_s / step_s
+    return mixed if late == 0 else ndimage.shift(mixed, (0, late), order=3)
 
 
 def _windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> SimulatedHit:

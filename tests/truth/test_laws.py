@@ -13,7 +13,7 @@ from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
 from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
 from planner.truth.model import Truth, load_truth
-from planner.truth.nonlinear import Port, StruckPose, respond
+from planner.truth.nonlinear import Port, StruckPose, along, respond
 from planner.truth.secret import Secret, frfs, once
 from tests.support.known_robots import KR10
 
@@ -51,7 +51,7 @@ def loop(law: JointLaw, angles: np.ndarray) -> np.ndarray:
 
 def test_without_laws_it_is_the_linear_truth(truth):
     forces, axes = pulses([100.0, 30.0, 60.0]), [0, 1, 2]
-    ours = respond([StruckPose(truth, Q, forces, axes)], (), STEP)[0]
+    ours = respond([StruckPose(truth, Q, forces, along(axes))], (), STEP)[0]
     theirs = [truth.respond(Q, f, a, STEP) for f, a in zip(forces, axes, strict=True)]
     assert np.max(np.abs(ours - theirs)) < 1e-9 * np.max(np.abs(ours))
 
@@ -60,7 +60,7 @@ def test_without_laws_it_is_the_linear_truth(truth):
 def test_response_is_that_of_an_ode_solver(truth, law):
     force = pulses([300.0])
     port = Port(law, joint="joint_2")
-    response = respond([StruckPose(truth, Q, force, [1])], [port], STEP)[0][0]
+    response = respond([StruckPose(truth, Q, force, along([1]))], [port], STEP)[0][0]
     linear = truth.respond(Q, force[0], 1, STEP)
     mass, damping, stiffness, hit, sensor = truth.matrices(Q)
     own, e, t = truth.own("joint_2"), len(mass), np.arange(N) * STEP
@@ -93,7 +93,9 @@ def test_response_is_that_of_an_ode_solver(truth, law):
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_hits_die_out(truth, law):
     force = np.pad(pulses([300.0]), ((0, 0), (0, 5 * N)))
-    response = respond([StruckPose(truth, Q, force, [0])], [Port(law, joint="joint_1")], STEP)[0][0]
+    response = respond(
+        [StruckPose(truth, Q, force, along([0]))], [Port(law, joint="joint_1")], STEP
+    )[0][0]
     blocks = np.sqrt(np.mean(response[:, N:].reshape(3, 5, -1) ** 2, axis=(0, 2)))
     assert np.all(blocks[1:] < blocks[:-1])
 
@@ -101,8 +103,8 @@ def test_hits_die_out(truth, law):
 def test_poses_integrated_together_do_not_meet(truth):
     port, other = Port(LAWS["friction"], joint="joint_2"), KR10.poses(2, seed=3)[1]
     poses = [
-        StruckPose(truth, Q, pulses([300.0, 40.0]), [0, 2]),
-        StruckPose(truth, other, pulses([99.0]), [1]),
+        StruckPose(truth, Q, pulses([300.0, 40.0]), along([0, 2])),
+        StruckPose(truth, other, pulses([99.0]), along([1])),
     ]
     together = respond(poses, [port], STEP)
     alone = [respond([pose], [port], STEP)[0] for pose in poses]
@@ -182,4 +184,4 @@ def test_slopes_are_bounds():
 def test_a_step_too_long_is_refused(truth):
     port = Port(Hardening(1e9, ANGLE), joint="joint_6")
     with pytest.raises(InputError, match="shorten the step"):
-        respond([StruckPose(truth, Q, pulses([1.0]), [0])], [port], STEP)
+        respond([StruckPose(truth, Q, pulses([1.0]), along([0]))], [port], STEP)

@@ -12,7 +12,6 @@ from planner.diagnosis.linear.objective import Misfit
 from planner.dynamics.gradient import Inertias, response_gradient
 from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band
-from planner.robot.elastic_model import Matrices
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +32,7 @@ class DriftMisfit(Misfit):
             now = replace(elasticity, stiffness=elasticity.stiffness * np.exp(psi[i]))
             one = slice(i, i + 1)
             m = self.matrices
-            matrices = Matrices(m.mass[one], m.hit[one], m.sensor[one], m.geometric[one])
+            matrices = m.at(one)
             inertias = None
             if self.inertial:
                 inertias = Inertias(self.inertias.jacobians[one], self.inertias.basis)

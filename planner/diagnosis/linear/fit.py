@@ -20,6 +20,7 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.identify import QUICK, STAGES, Effort, identify
 from planner.identification.measured_frfs import Measured, stack
+from planner.identification.measurement_model import EVERYDAY, Tolerances
 from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
@@ -64,13 +65,14 @@ class Problem:
     simulation: Simulation
     band_hz: tuple[float, float]
     priors: Priors = PRIORS
+    tolerances: Tolerances | None = EVERYDAY
 
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
         body, measured = _prepared(self, effect), _measured(self, grade)
         setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
         inertias, p = body.inertias, body.parametrisation
-        kind = grade.logarithmic, grade.inertial
+        kind = grade.logarithmic, grade.inertial, self.tolerances
         return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
 
     def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:

@@ -6,8 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.dynamics.gradient import Impedance, Inertias, response_gradient
+from planner.dynamics.gradient import Impedance, Inertias, Turned, response_parts
 from planner.identification.measured_frfs import Measured
+from planner.identification.measurement_model import Tolerances, basis, marginal
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
@@ -59,6 +60,7 @@ class Misfit:
     effect: Effect
     logarithmic: bool = False
     inertial: bool = True
+    tolerances: Tolerances | None = None  # of hits and chain, integrated out; None: all are exact
 
     @cached_property
     def split(self) -> tuple[int, int]:
@@ -112,6 +114,9 @@ class Misfit:
 
     def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs as they would be measured (n, 3, 3, F), and derivatives (n, free, 3, 3, F)."""
+        return self._parts(x)[:2]
+
+    def _parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
         p, (a, b), s = self.parametrisation, self.split, self.setting.s
         psi = x[b:]
         rate = self.effect.rate(psi)
@@ -121,7 +126,9 @@ class Misfit:
         added = self.effect.impedance(setting, psi)
         added = added if rate is None else (*added, _weight(self.matrices, s.shape[1]))
         inertias = self.inertias if self.inertial else None
-        h, full = response_gradient(self.matrices, p.elasticity(x[:a]), s, mass, inertias, added)
+        h, full, turned = response_parts(
+            self.matrices, p.elasticity(x[:a]), s, mass, inertias, added
+        )
         by_weight = full[:, -1]
         if rate is not None:
             full = full[:, :-1]
@@ -141,12 +148,14 @@ class Misfit:
             slope = np.einsum("nijf,npjkf->npikf", seen.left, slope, optimize=True)
             slope = np.concatenate([slope, own], axis=1)
             h = np.einsum("nijf,njkf->nikf", seen.left, h)
-        return h, slope
+        return h, slope, turned
 
     def by_pose(self, x: np.ndarray) -> ByPose:
         """Misfit of each pose at x."""
-        h, slope = self.response(x)
+        h, slope, turned = self._parts(x)
         residual, slope = self._residual(h, slope)
+        if self.tolerances is not None and not self.logarithmic:
+            return self._marginal(x, h, turned, residual, slope)
         n, d = slope.shape[:2]
         j = np.ascontiguousarray(slope).reshape(n, d, -1).view(float)
         r = np.ascontiguousarray(residual).reshape(n, -1).view(float)
@@ -155,6 +164,26 @@ class Misfit:
         gradient[:, free] = (j @ r[..., None])[..., 0]
         normal[:, free[:, None], free] = j @ np.swapaxes(j, 1, 2)
         return ByPose(np.sum(r**2, axis=1), gradient, normal)
+
+    def _marginal(
+        self, x: np.ndarray, h: np.ndarray, turned: Turned, residual: np.ndarray, slope: np.ndarray
+    ) -> ByPose:
+        """Misfit of each pose, what hits and chain leave open being integrated out."""
+        assert self.tolerances is not None
+        n, d = slope.shape[:2]
+        open_ = self.weight[:, None] * basis(h, turned, self.setting.s, self.tolerances)
+        free, size = np.flatnonzero(self.free), len(x)
+        chi2, gradient = np.empty(n), np.zeros((n, size))
+        normal = np.zeros((n, size, size))
+        for i in range(n):
+            j = np.ascontiguousarray(slope[i]).reshape(d, -1).view(float)
+            r = np.ascontiguousarray(residual[i]).reshape(-1).view(float)
+            b = np.ascontiguousarray(open_[i]).reshape(open_.shape[1], -1).view(float)
+            found = marginal(r, j, b)
+            chi2[i] = found.chi2
+            gradient[i, free] = found.gradient
+            normal[i][np.ix_(free, free)] = found.normal
+        return ByPose(chi2, gradient, normal)
 
     def possible(self, x: np.ndarray) -> bool:
         """Whether a robot may be so at x, and nothing is farther off than is looked for.

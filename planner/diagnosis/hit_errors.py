@@ -1,0 +1,141 @@
+"""How each hit missed its axis and its point, told from the hits of the same pose and axis.
+
+What hits along one axis have in common is the structure's (or the aim's, which the fits integrate
+out); by what they differ, each one's own miss shows: four numbers a hit against some hundred
+complex values.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dataset.dataset import LAID, Dataset, Visit
+from planner.dataset.level_columns import Column, column
+from planner.diagnosis.linear.fit import Fit
+from planner.dynamics.gradient import response_turned
+from planner.identification.measurement_model import Tolerances, hit_basis
+from planner.recording.records import Hit
+
+LINES = 96  # at most, of each hit
+RELATIVE = 0.01  # of an FRF: what the simulation, whose columns are used, is not right to
+PADDING = 4  # records' lengths over which responses die away
+
+
+@dataclass(frozen=True, eq=False)
+class HitError:
+    """δ (2,) in rad and o (2,) in m of a hit, across its axis in cyclic order, with their sds.
+
+    Relative to what the hits of its pose and axis have in common.
+    """
+
+    tilt_rad: np.ndarray
+    offset_m: np.ndarray
+    tilt_sd_rad: np.ndarray
+    offset_sd_m: np.ndarray
+
+
+def hit_errors(
+    recorded: Dataset, plain: Fit, tolerances: Tolerances
+) -> tuple[tuple[HitError, ...], ...]:
+    """Of every hit of every visit; `plain` is a simulation fitted to the visits."""
+    length = max(len(hit.force_n) for visit in recorded.visits for hit in visit.hits)
+    out = []
+    for number, visit in enumerate(recorded.visits):
+        columns = [
+            column((hit,), hit.axis_index, 0, length, recorded.band_hz, LAID,
+                   recorded.window_rate_1_s)
+            for hit in visit.hits
+        ]  # fmt: skip
+        out.append(_of_visit(columns, number, plain, tolerances))
+    return tuple(out)
+
+
+def _of_visit(
+    columns: list[Column], number: int, plain: Fit, tolerances: Tolerances
+) -> tuple[HitError, ...]:
+    frequency = columns[0].frequency_hz
+    lines = np.unique(np.linspace(0, len(frequency) - 1, LINES).round().astype(int))
+    s = 2j * np.pi * frequency[lines] + columns[0].rate_1_s
+    basis = _basis(plain, number, s, tolerances)
+    scale = np.repeat([tolerances.angle_rad, tolerances.offset_m], 2)
+    out: list[HitError] = [HitError(*np.zeros((4, 2)))] * len(columns)
+    for axis in range(3):
+        group = [i for i, c in enumerate(columns) if c.axis == axis]
+        if len(group) < 2:
+            continue
+        h = np.array([columns[i].accelerance[:, lines] for i in group])
+        variance = np.array([columns[i].variance[:, lines] for i in group])
+        variance = variance + (RELATIVE * np.abs(h)) ** 2
+        weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
+        eta, sd = _solved(h, weight, basis[axis])
+        for i, e, own in zip(group, eta * scale, sd * scale, strict=True):
+            out[i] = HitError(e[:2], e[2:], own[:2], own[2:])
+    return tuple(out)
+
+
+def _basis(plain: Fit, number: int, s: np.ndarray, tolerances: Tolerances) -> np.ndarray:
+    """(3, 4, 3, F) at s (F,) in rad/s of a visit, by the fitted simulation."""
+    misfit, (a, b) = plain.misfit, plain.misfit.split
+    one = slice(number, number + 1)
+    mass = misfit.matrices.mass + misfit.inertias.mass_change(plain.x[a:b])
+    springs = misfit.parametrisation.elasticity(plain.x[:a])
+    h, turned = response_turned(misfit.matrices.at(one), springs, s[None], mass[one])
+    return hit_basis(h, turned.moment, tolerances)[0]
+
+
+def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """η and its sd (n, 4) of n columns h (n, 3, F), in sds, and Σ η = 0.
+
+    Least squares with prior N(0, 1) of h = common + B η, `common` being free at every line.
+    """
+    n = len(h)
+    total = weight.sum(axis=0)
+    share = weight / np.where(total > 0, total, 1.0)
+    normal = np.zeros((4 * n, 4 * n))
+    right = np.zeros(4 * n)
+    mean = np.sum(share * h, axis=0)
+    for i in range(n):
+        right[4 * i : 4 * i + 4] = _inner(basis, weight[i] * (h[i] - mean))
+        for k in range(n):
+            w = weight[i] * ((i == k) - share[k])
+            normal[4 * i : 4 * i + 4, 4 * k : 4 * k + 4] = _inner(basis, w * basis)
+    covariance = np.linalg.inv(normal + np.eye(4 * n))
+    apart = np.kron(np.eye(n) - 1 / n, np.eye(4))
+    covariance, eta = apart @ covariance @ apart, apart @ covariance @ right
+    return eta.reshape(n, 4), np.sqrt(np.diagonal(covariance)).reshape(n, 4)
+
+
+def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Re B* v of basis (4, 3, F) and values (3, F) or (4, 3, F)."""
+    return np.tensordot(basis.conj(), values, axes=([-2, -1], [-2, -1])).real
+
+
+def corrected(recorded: Dataset, plain: Fit, errors: tuple[tuple[HitError, ...], ...]) -> Dataset:
+    """Hits as they would have been answered without their own misses."""
+    visits = tuple(
+        _corrected(visit, number, plain, own)
+        for number, (visit, own) in enumerate(zip(recorded.visits, errors, strict=True))
+    )
+    return recorded.corrected(visits)
+
+
+def _corrected(visit: Visit, number: int, plain: Fit, errors: tuple[HitError, ...]) -> Visit:
+    rate = visit.hits[0].sampling_rate_hz
+    length = PADDING * max(len(hit.force_n) for hit in visit.hits)
+    s = 2j * np.pi * np.fft.rfftfreq(length, 1 / rate)[1:]
+    unit = Tolerances(angle_rad=1.0, offset_m=1.0)
+    basis = _basis(plain, number, s, unit)
+    hits = tuple(
+        _one(hit, basis[hit.axis_index], error, length)
+        for hit, error in zip(visit.hits, errors, strict=True)
+    )
+    return replace(visit, hits=hits)
+
+
+def _one(hit: Hit, basis: np.ndarray, error: HitError, length: int) -> Hit:
+    eta = np.concatenate([error.tilt_rad, error.offset_m])
+    force = hit.sign * (hit.force_n - np.median(hit.force_n))
+    change = np.zeros((3, length // 2 + 1), dtype=complex)
+    change[:, 1:] = np.einsum("k,kif->if", eta, basis) * np.fft.rfft(force, length)[1:]
+    extra = np.fft.irfft(change, length, axis=1)[:, : len(hit.force_n)]
+    return replace(hit, acceleration_m_s2=hit.acceleration_m_s2 - extra)

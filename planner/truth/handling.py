@@ -1,0 +1,101 @@
+"""What every measurement in a cell has: hits beside their axis and point, a chain within tolerance.
+
+Nothing of it is an artefact: each number is what a careful hand, a good sensor and a taught pose
+leave. All are drawn anew for each case, from ranges of their own.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """How a hit misses: by which vector its unit force errs, and where it lands beside the tcp.
+
+    `direction` (3,) is added to the axis, `offset_m` (3,) is from the tcp; both in its frame.
+    """
+
+    direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    offset_m: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def wrench(self, axis: int) -> np.ndarray:
+        """(6,): force and moment about the tcp in m of a unit hit along axis 0, 1 or 2."""
+        force = np.eye(3)[axis] + self.direction
+        return np.concatenate([force, np.cross(self.offset_m, np.eye(3)[axis])])
+
+
+@dataclass(frozen=True)
+class Handling:
+    """Root mean squares of what varies; angles and offsets are those of each of two directions.
+
+    `angle_deg`, `offset_m`: of each hit by itself; `aim_deg`, `aim_m`: common to all hits along an
+    axis in the campaign. `readback_deg`: of each joint at each pose. `gain`, `cross_axis`: of the
+    sensor's channels and of what each feels of the others. `mounting_deg`, `position_m`: of the
+    sensor. `force_gain`: of the hammer. `delay_s`: between force and accelerations.
+    """
+
+    angle_deg: float = 0.0
+    offset_m: float = 0.0
+    aim_deg: float = 0.0
+    aim_m: float = 0.0
+    readback_deg: float = 0.0
+    gain: float = 0.0
+    cross_axis: float = 0.0
+    mounting_deg: float = 0.0
+    position_m: float = 0.0
+    force_gain: float = 0.0
+    delay_s: float = 0.0
+
+    def aims(self, axes: list[int], rng: np.random.Generator) -> list[Aim]:
+        """Of hits along axes 0..2; call `common` first where they share an aim."""
+        return [self._one(axis, self.angle_deg, self.offset_m, rng) for axis in axes]
+
+    def common(self, rng: np.random.Generator) -> list[Aim]:
+        """What all hits along x, y and z of a campaign have in common, three aims."""
+        return [self._one(axis, self.aim_deg, self.aim_m, rng) for axis in range(3)]
+
+    def _one(self, axis: int, angle_deg: float, offset_m: float, rng: np.random.Generator) -> Aim:
+        across = 1.0 - np.eye(3)[axis]
+        direction = np.deg2rad(angle_deg) * across * rng.standard_normal(3)
+        return Aim(direction, offset_m * across * rng.standard_normal(3))
+
+    def chain(self, rng: np.random.Generator) -> "Chain":
+        """A measuring chain within its tolerances."""
+        turn = Rotation.from_rotvec(np.deg2rad(self.mounting_deg) * rng.standard_normal(3))
+        cross = self.cross_axis * rng.standard_normal((3, 3)) * (1 - np.eye(3))
+        matrix = (np.diag(1 + self.gain * rng.standard_normal(3)) + cross) @ turn.as_matrix()
+        x, y, z = self.position_m * rng.standard_normal(3)
+        force = 1 + self.force_gain * float(rng.standard_normal())
+        delay = abs(self.delay_s * float(rng.standard_normal()))
+        return Chain(matrix, (float(x), float(y), float(z)), force, delay)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """x' = matrix · x of the accelerations; the sensor sits `offset_m` beside where it is stated.
+
+    The force is shown `force_gain` times as large as it is, accelerations come `delay_s` late.
+    """
+
+    matrix: np.ndarray = field(default_factory=lambda: np.eye(3))
+    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    force_gain: float = 1.0
+    delay_s: float = 0.0
+
+
+def together(common: Aim, own: Aim) -> Aim:
+    """Both misses of one hit."""
+    return replace(
+        own,
+        direction=common.direction + own.direction,
+        offset_m=common.offset_m + own.offset_m,
+    )
+
+
+LABORATORY = Handling()
+EVERYDAY = Handling(
+    angle_deg=1.5, offset_m=0.004, aim_deg=0.7, aim_m=0.002, readback_deg=0.05, gain=0.015,
+    cross_axis=0.01, mounting_deg=1.0, position_m=0.004, force_gain=0.015, delay_s=3e-5,
+)  # fmt: skip

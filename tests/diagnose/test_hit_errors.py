@@ -1,0 +1,149 @@
+"""Hits that miss axis and point: what they do, by another engine; how it is told and taken out."""
+
+import numpy as np
+import pytest
+
+from planner.dataset.dataset import Dataset
+from planner.diagnosis.hit_errors import corrected, hit_errors
+from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
+from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.screens.force_levels import PROPORTIONAL, disproportion
+from planner.dynamics.gradient import response_turned
+from planner.dynamics.simulation import Simulation
+from planner.identification.measurement_model import (
+    Tolerances,
+    basis,
+    chain_basis,
+    hit_basis,
+    marginal,
+)
+from planner.robot.robot import Robot
+from planner.truth.deviation import Deviation
+from planner.truth.handling import Aim, Chain
+from planner.truth.hits import Hammer, write_recordings
+from planner.truth.model import load_truth
+from planner.truth.secret import HitVisit, Secret, hit_poses
+from tests.support.known_robots import KR10
+
+HZ = np.linspace(6.0, 60.0, 40)
+S = 2j * np.pi * HZ[None]
+UNIT = Tolerances(*[1.0] * 8)
+
+
+@pytest.fixture(scope="module")
+def robot_toml(tmp_path_factory):
+    return KR10.write(tmp_path_factory.mktemp("kr10"))
+
+
+def answered(truth, q, wrench):
+    """Accelerance (3, F) to a unit wrench (6,), by the other engine."""
+    poles, shapes, entry, hit, sensor = truth.modal(q)
+    drive = np.vstack([hit, truth.turning(q)]).T @ wrench
+    iw = 2j * np.pi * HZ
+    return iw**2 * ((sensor @ shapes) @ ((entry @ drive)[:, None] / (iw - poles[:, None])))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_hit_that_misses_is_answered_as_the_other_engine_says(robot_toml, axis):
+    simulation, truth = Simulation(Robot.load(robot_toml)), load_truth(robot_toml)
+    q = KR10.poses(1, 5)[0]
+    h, turned = response_turned(simulation.elastic.matrices(q), simulation.elasticity, S)
+    across = [(axis + 1) % 3, (axis + 2) % 3]
+    eta = np.array([0.03, -0.02, 0.004, 0.007])
+    direction, offset = np.zeros(3), np.zeros(3)
+    direction[across], offset[across] = eta[:2], eta[2:]
+    wrong = answered(truth, q, Aim(direction, offset).wrench(axis))
+    right = answered(truth, q, Aim().wrench(axis))
+    change = np.einsum("k,kif->if", eta, hit_basis(h, turned.moment, UNIT)[0, axis])
+    assert change == pytest.approx(wrong - right, abs=2e-6 * np.abs(right).max())
+
+
+def test_a_sensor_beside_its_place_shows_what_the_other_engine_says(robot_toml):
+    simulation, truth = Simulation(Robot.load(robot_toml)), load_truth(robot_toml)
+    q, place = KR10.poses(1, 6)[0], (0.004, -0.01, 0.007)
+    h, turned = response_turned(simulation.elastic.matrices(q), simulation.elasticity, S)
+    from dataclasses import replace
+
+    moved = replace(truth, sensor_offset_m=place).accelerance(q, HZ)
+    change = chain_basis(h, turned.turning, S, UNIT)[0, 9:12]
+    expected = moved - truth.accelerance(q, HZ)
+    assert np.einsum("k,kijf->ijf", place, change) == pytest.approx(
+        expected, abs=2e-6 * np.abs(h).max()
+    )
+
+
+def test_integrating_out_is_the_dense_gaussian():
+    rng = np.random.default_rng(0)
+    r, j, b = rng.standard_normal(30), rng.standard_normal((4, 30)), rng.standard_normal((5, 30))
+    covariance = np.eye(30) + b.T @ b
+    found = marginal(r, j, b)
+    assert found.chi2 == pytest.approx(r @ np.linalg.solve(covariance, r))
+    assert found.gradient == pytest.approx(j @ np.linalg.solve(covariance, r))
+    assert found.normal == pytest.approx(j @ np.linalg.solve(covariance, j.T))
+    assert found.log_volume == pytest.approx(np.linalg.slogdet(covariance)[1])
+    assert found.eta == pytest.approx(b @ np.linalg.solve(covariance, r))
+
+
+def test_all_of_them_are_of_the_poses_and_scale_with_their_sds(robot_toml):
+    simulation = Simulation(Robot.load(robot_toml))
+    q = KR10.poses(2, 7)
+    s = np.repeat(S, 2, axis=0)
+    h, turned = response_turned(simulation.elastic.matrices(q), simulation.elasticity, s)
+    assert basis(h, turned, s, UNIT).shape == (2, 26, 3, 3, HZ.size)
+    half = Tolerances(*[0.5] * 8)
+    assert basis(h, turned, s, half) == pytest.approx(basis(h, turned, s, UNIT) / 2)
+
+
+@pytest.fixture(scope="module")
+def missed(robot_toml, tmp_path_factory):
+    """Visits of a linear robot hit at three force levels, each hit off by 2° and 5 mm."""
+    rng = np.random.default_rng(3)
+    truth = load_truth(robot_toml, Deviation(stiffness=0.1, damping=0.1, seed=4))
+    secret = Secret(truth.deviation, chain=Chain())
+    hammer, shots = Hammer(150.0, 0.006, noise=0.01), []
+    shots = [(f"+{a}", 150.0 * k) for a in "xyz" for k in (0.4, 1.0, 2.5)]
+    visits, aims = [], []
+    for q in KR10.poses(3, 8):
+        own = []
+        for axis, _ in shots:
+            across = 1.0 - np.eye(3)["xyz".index(axis[1])]
+            own.append(
+                Aim(np.deg2rad(2.0) * across * rng.standard_normal(3),
+                    0.005 * across * rng.standard_normal(3))
+            )  # fmt: skip
+        aims.append(own)
+        visits.append(HitVisit(q, shots, 0.0, own))
+    found = hit_poses(truth, secret, visits, hammer, rng)
+    rows = [
+        (f"P{i}", np.rad2deg(visit.q), k, hit)
+        for i, (visit, hits) in enumerate(zip(visits, found, strict=True))
+        for k, hit in enumerate(hits, 1)
+    ]
+    folder = tmp_path_factory.mktemp("missed")
+    write_recordings(folder, truth.joint_names, rows, hammer, "test")
+    robot = Robot.load(robot_toml)
+    return Dataset.read(folder, robot.joint_names, robot.config.band_hz), Simulation(robot), aims
+
+
+def test_misses_are_told_with_their_uncertainty_and_taken_out(missed):
+    visits, simulation, aims = missed
+    plain = base(visits, simulation)
+    errors = hit_errors(visits, plain, Tolerances())
+    told, true, sd = [], [], []
+    for visit, own, truth in zip(visits.visits, errors, aims, strict=True):
+        for axis in range(3):
+            group = [i for i, hit in enumerate(visit.hits) if hit.axis_index == axis]
+            across = [(axis + 1) % 3, (axis + 2) % 3]
+            real = np.array(
+                [[*truth[i].direction[across], *truth[i].offset_m[across]] for i in group]
+            )
+            true += list(real - real.mean(axis=0))
+            told += [[*own[i].tilt_rad, *own[i].offset_m] for i in group]
+            sd += [[*own[i].tilt_sd_rad, *own[i].offset_sd_m] for i in group]
+    told, true, sd = np.array(told), np.array(true), np.array(sd)
+    for part in (slice(0, 2), slice(2, 4)):
+        assert np.corrcoef(told[:, part].ravel(), true[:, part].ravel())[0, 1] > 0.9
+    assert np.mean(np.abs(told - true) < 1.96 * sd) > 0.8
+    system = system_of(plain)
+    assert disproportion(equivalent(visits, system)) > 10
+    assert disproportion(equivalent(corrected(visits, plain, errors), system)) < PROPORTIONAL
