@@ -8,6 +8,7 @@ from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import beside_another, diagnose
 from planner.diagnosis.revoked_artefacts import taken_back
+from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
 from planner.diagnosis.thresholds import ARTEFACTS
 from planner.diagnosis.verdict import Together, linear_effects_apply, together
@@ -68,7 +69,9 @@ def _screened(
     """Recordings corrected for artefacts, and what the hits themselves say."""
     found = screen(recorded, simulation, tell)
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
-    if not artefacts:
+    said = [f"The recordings were corrected for: {', '.join(artefacts)}."] if artefacts else []
+    if found.hit_errors:
+        said.append(describe(recorded, found.hit_errors))
+    if not said:
         return recorded, found.findings
-    said = f"The recordings were corrected for: {', '.join(artefacts)}."
-    return replace(found.clean, remarks=(*recorded.remarks, said)), found.findings
+    return replace(found.clean, remarks=(*recorded.remarks, *said)), found.findings

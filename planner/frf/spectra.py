@@ -38,7 +38,8 @@ class HitSpectra:
     """Transforms of one hit: force (F,) in N and responses (3, F) in m/s², summed over samples.
 
     `force_noise` and `noise` (3,) are the powers of the noise in them; `noise_known` is False where
-    nothing was recorded before the pulse and `noise` is no more than a bound.
+    nothing was recorded before the pulse and `noise` is no more than a bound. `doubtful` (3, F) is
+    the uncertain share of what was taken out of the responses (see `Hit`), None where nothing was.
     """
 
     axis: int
@@ -48,6 +49,7 @@ class HitSpectra:
     force_window_s: float
     noise: np.ndarray
     noise_known: bool
+    doubtful: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +126,10 @@ def _transform(
     aside = (force / np.maximum(carried, FADED))[(near == 0) & (carried > FADED)]
     force_noise = float(np.var(aside, ddof=1)) if aside.size >= LEAST_QUIET else 0.0
     window = near * laid
+    doubtful = None
+    if hit.taken_out_m_s2 is not None:
+        whole = np.fft.rfft((hit.taken_out_m_s2 * laid)[:, used], length, axis=1)
+        doubtful = hit.taken_out_sd * whole[:, chosen]
     return HitSpectra(
         hit.axis_index,
         np.fft.rfft((hit.sign * force * window)[used], length)[chosen],
@@ -132,6 +138,7 @@ def _transform(
         float(np.sum(near)) / hit.sampling_rate_hz,
         noise * float(np.sum((laid * carried)[used] ** 2)),
         known,
+        doubtful,
     )
 
 

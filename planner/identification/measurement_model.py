@@ -31,7 +31,12 @@ class Tolerances:
     mounting_rad: float = np.deg2rad(2.0)
     position_m: float = 0.01
     force_gain: float = 0.03
-    delay_s: float = 3e-5
+    delay_s: float = 6e-5
+
+    @property
+    def across(self) -> float:
+        """Of what a channel shows of another: its sensitivity across, and how the sensor sits."""
+        return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
 EVERYDAY = Tolerances()
@@ -56,10 +61,9 @@ def hit_basis(h: np.ndarray, moment: np.ndarray, t: Tolerances) -> np.ndarray:
 def chain_basis(h: np.ndarray, turning: np.ndarray, s: np.ndarray, t: Tolerances) -> np.ndarray:
     """Changes (n, 14, 3, 3, F) of FRFs per sd: of E (9), the sensor's place (3), scale, delay."""
     out = np.zeros((h.shape[0], 14, *h.shape[1:]), dtype=complex)
-    across = np.hypot(t.cross_axis, t.mounting_rad)
     for i in range(3):
         for j in range(3):
-            out[:, 3 * i + j, i] = (t.gain if i == j else across) * h[:, j]
+            out[:, 3 * i + j, i] = (t.gain if i == j else t.across) * h[:, j]
     for axis, (first, second) in enumerate(ACROSS):
         # α × e_axis, α being the sensor's angular acceleration.
         out[:, 9 + axis, first] = t.position_m * turning[:, second]

@@ -72,7 +72,8 @@ class Hit:
     and `sensor` name the nodes where it was hit and where the sensor sits: files name none, and
     all hits of a pose are then at the tcp. `direction_sd_rad` is how far the hand may have missed
     the axis (sd of the angle), `gain_sd` the relative sd of the force's calibration: 0 where
-    nothing is known of it.
+    nothing is known of it. `taken_out_m_s2` (3, n) is what was taken out of the accelerations as
+    the answer to the hit's own miss, and `taken_out_sd` which share of that is uncertain.
     """
 
     source: Path
@@ -87,6 +88,8 @@ class Hit:
     sensor: str = "tcp"
     direction_sd_rad: float = 0.0
     gain_sd: float = 0.0
+    taken_out_m_s2: np.ndarray | None = None
+    taken_out_sd: float = 0.0
 
     @cached_property
     def pulse(self) -> Pulse:

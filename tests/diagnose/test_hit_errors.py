@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset
-from planner.diagnosis.hit_errors import corrected, hit_errors
 from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.screens.force_levels import PROPORTIONAL, disproportion
+from planner.diagnosis.screens.hit_errors import taken_out
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import (
@@ -127,8 +127,7 @@ def missed(robot_toml, tmp_path_factory):
 
 def test_misses_are_told_with_their_uncertainty_and_taken_out(missed):
     visits, simulation, aims = missed
-    plain = base(visits, simulation)
-    errors = hit_errors(visits, plain, Tolerances())
+    clean, errors = taken_out(visits, simulation, Tolerances())
     told, true, sd = [], [], []
     for visit, own, truth in zip(visits.visits, errors, aims, strict=True):
         for axis in range(3):
@@ -144,6 +143,6 @@ def test_misses_are_told_with_their_uncertainty_and_taken_out(missed):
     for part in (slice(0, 2), slice(2, 4)):
         assert np.corrcoef(told[:, part].ravel(), true[:, part].ravel())[0, 1] > 0.9
     assert np.mean(np.abs(told - true) < 1.96 * sd) > 0.8
-    system = system_of(plain)
+    system = system_of(base(clean, simulation))
     assert disproportion(equivalent(visits, system)) > 10
-    assert disproportion(equivalent(corrected(visits, plain, errors), system)) < PROPORTIONAL
+    assert disproportion(equivalent(clean, system)) < PROPORTIONAL

@@ -9,7 +9,7 @@ from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Grade, Problem
 from planner.diagnosis.linear.objective import Misfit
-from planner.dynamics.gradient import Inertias, response_gradient
+from planner.dynamics.gradient import Inertias, Turned, response_parts
 from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band
 
@@ -20,14 +20,13 @@ class DriftMisfit(Misfit):
 
     order: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See `Misfit.response`."""
+    def _parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
         assert isinstance(self.effect, Drift)
         p, (a, b) = self.parametrisation, self.split
         elasticity = p.elasticity(x[:a])
         psi, slope = self.effect.log_factor(self.order, x[b:])
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        values, slopes = [], []
+        values, slopes, turns = [], [], []
         for i in range(len(self.order)):
             now = replace(elasticity, stiffness=elasticity.stiffness * np.exp(psi[i]))
             one = slice(i, i + 1)
@@ -36,14 +35,18 @@ class DriftMisfit(Misfit):
             inertias = None
             if self.inertial:
                 inertias = Inertias(self.inertias.jacobians[one], self.inertias.basis)
-            h, full = response_gradient(matrices, now, self.setting.s[one], mass[one], inertias)
+            h, full, turned = response_parts(
+                matrices, now, self.setting.s[one], mass[one], inertias
+            )
             e, springs = p.size, len(p.held)
             theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
             along = full[:, :e].sum(axis=1)
             own = slope[i][None, :, None, None, None] * along[:, None]
             values.append(h)
+            turns.append(turned)
             slopes.append(np.concatenate([theta, full[:, springs:], own], axis=1))
-        return np.concatenate(values), np.concatenate(slopes)
+        both = (np.concatenate([getattr(t, k) for t in turns]) for k in ("moment", "turning"))
+        return np.concatenate(values), np.concatenate(slopes), Turned(*both)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,6 +33,7 @@ from planner.diagnosis.thresholds import (
 )
 from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band
+from planner.identification.measurement_model import EVERYDAY
 from planner.inference.evidence import laplace, savage_dickey, temper
 from planner.recording.records import AXES, Hit
 
@@ -131,7 +132,8 @@ def _off(chain: Chain, bounds: tuple[float, float]) -> float:
 
 
 def _delay(chain: Chain) -> Finding | None:
-    sd = float(np.hypot(chain.delay_sd_s, _off(chain, DELAY_OFF_S)))
+    # What every chain has is no artefact.
+    sd = float(np.hypot(np.hypot(chain.delay_sd_s, EVERYDAY.delay_s), _off(chain, DELAY_OFF_S)))
     evidence = min(savage_dickey(chain.delay_s, sd, DELAY_SD_S), chain.gain)
     text = (
         f"All responses come {1e3 * chain.delay_s:.3g} ± {1e3 * sd:.1g} ms after the force: the "
@@ -141,7 +143,8 @@ def _delay(chain: Chain) -> Finding | None:
 
 
 def _matrix(chain: Chain) -> Finding | None:
-    covariance = chain.covariance + _off(chain, MATRIX_OFF) ** 2 * np.eye(9)
+    usual = np.where(np.eye(3), EVERYDAY.gain, EVERYDAY.across).ravel()
+    covariance = chain.covariance + _off(chain, MATRIX_OFF) ** 2 * np.eye(9) + np.diag(usual**2)
     weight = np.linalg.cholesky(np.linalg.inv(covariance)).T
     read = [_read(kind, chain.matrix, weight) for kind in KINDS]
     best = int(np.argmax([evidence for evidence, *_ in read]))

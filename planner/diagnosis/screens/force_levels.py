@@ -133,6 +133,14 @@ def screen(
     )
 
 
+def differ(recorded: Dataset, nominal: Simulation) -> bool:
+    """Whether FRFs of different force levels differ by more than noise, hits being exact."""
+    if len(recorded.level_n) < 2:
+        return False
+    found = equivalent(recorded, system_of(base(recorded, nominal)))
+    return bool(len(found.count)) and disproportion(found) >= PROPORTIONAL
+
+
 def _unknown(found: Equivalent, how: str) -> Finding:
     text = (
         "The response is not proportional to the force, and neither a single joint nor one law at "

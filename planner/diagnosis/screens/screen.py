@@ -4,23 +4,33 @@ from dataclasses import dataclass
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.linear.fit import Problem
 from planner.diagnosis.screens import artefacts, drift, force_levels
+from planner.diagnosis.screens.hit_errors import HitErrors, taken_out
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, quietly
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """What was found, artefacts first, and the recordings without the artefacts."""
+    """What was found, artefacts first, and the recordings without artefacts and misses of hits.
+
+    `hit_errors` are empty where the hits of a pose agree without looking for their misses.
+    """
 
     findings: tuple[Finding, ...]
     clean: Dataset
+    hit_errors: HitErrors = ()
 
 
 def screen(recorded: Dataset, nominal: Simulation, tell: Tell = quietly) -> Screened:
     """Find artefacts first, so that they are not called physics, then the rest in clean data."""
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)
+    errors: HitErrors = ()
+    if Problem.tolerances is not None and force_levels.differ(clean, nominal):
+        tell("telling how each hit missed its axis and point", 0.3)
+        clean, errors = taken_out(clean, nominal, Problem.tolerances)
     by_level = force_levels.screen(clean, nominal, tell=tell)
     by_time = () if by_level else drift.screen(clean, nominal)
-    return Screened((*found, *by_level, *by_time), clean)
+    return Screened((*found, *by_level, *by_time), clean, errors)

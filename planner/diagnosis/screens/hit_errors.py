@@ -11,8 +11,12 @@ import numpy as np
 
 from planner.dataset.dataset import LAID, Dataset, Visit
 from planner.dataset.level_columns import Column, column
-from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.linear.drift_fit import problem_of
+from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.dynamics.gradient import response_turned
+from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances, hit_basis
 from planner.recording.records import Hit
 
@@ -34,9 +38,26 @@ class HitError:
     offset_sd_m: np.ndarray
 
 
-def hit_errors(
-    recorded: Dataset, plain: Fit, tolerances: Tolerances
-) -> tuple[tuple[HitError, ...], ...]:
+HitErrors = tuple[tuple[HitError, ...], ...]  # of every hit of every visit
+
+
+def taken_out(
+    recorded: Dataset, nominal: Simulation, tolerances: Tolerances
+) -> tuple[Dataset, HitErrors]:
+    """The recordings as they would be had every hit missed like the others, and the misses.
+
+    A rough fit of the simulation tells the misses roughly, and a close one to hits without them
+    tells them again.
+    """
+    rough = base(recorded, nominal)
+    first = corrected(recorded, rough, hit_errors(recorded, rough, tolerances))
+    problem = problem_of(first, nominal)
+    plain = settle(problem, fit(problem, Effect("")))
+    errors = hit_errors(recorded, plain, tolerances)
+    return corrected(recorded, plain, errors), errors
+
+
+def hit_errors(recorded: Dataset, plain: Fit, tolerances: Tolerances) -> HitErrors:
     """Of every hit of every visit; `plain` is a simulation fitted to the visits."""
     length = max(len(hit.force_n) for visit in recorded.visits for hit in visit.hits)
     out = []
@@ -110,32 +131,55 @@ def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.tensordot(basis.conj(), values, axes=([-2, -1], [-2, -1])).real
 
 
-def corrected(recorded: Dataset, plain: Fit, errors: tuple[tuple[HitError, ...], ...]) -> Dataset:
+def corrected(recorded: Dataset, plain: Fit, errors: HitErrors) -> Dataset:
     """Hits as they would have been answered without their own misses."""
+    off = _relative_misfit(plain)
     visits = tuple(
-        _corrected(visit, number, plain, own)
+        _corrected(visit, number, plain, own, float(off[number]))
         for number, (visit, own) in enumerate(zip(recorded.visits, errors, strict=True))
     )
     return recorded.corrected(visits)
 
 
-def _corrected(visit: Visit, number: int, plain: Fit, errors: tuple[HitError, ...]) -> Visit:
+def _relative_misfit(plain: Fit) -> np.ndarray:
+    """(n,): by which share the fitted simulation misses the FRFs of each visit."""
+    measured, h = plain.misfit.measured, plain.misfit.response(plain.x)[0]
+    off = np.where(measured.used, np.abs(h - measured.accelerance) ** 2, 0.0)
+    size = np.where(measured.used, np.abs(measured.accelerance) ** 2, 0.0)
+    return np.sqrt(off.sum(axis=(1, 2, 3)) / size.sum(axis=(1, 2, 3)))
+
+
+def _corrected(
+    visit: Visit, number: int, plain: Fit, errors: tuple[HitError, ...], off: float
+) -> Visit:
     rate = visit.hits[0].sampling_rate_hz
     length = PADDING * max(len(hit.force_n) for hit in visit.hits)
     s = 2j * np.pi * np.fft.rfftfreq(length, 1 / rate)[1:]
     unit = Tolerances(angle_rad=1.0, offset_m=1.0)
     basis = _basis(plain, number, s, unit)
     hits = tuple(
-        _one(hit, basis[hit.axis_index], error, length)
+        _one(hit, basis[hit.axis_index], error, length, off)
         for hit, error in zip(visit.hits, errors, strict=True)
     )
     return replace(visit, hits=hits)
 
 
-def _one(hit: Hit, basis: np.ndarray, error: HitError, length: int) -> Hit:
+def _one(hit: Hit, basis: np.ndarray, error: HitError, length: int, off: float) -> Hit:
     eta = np.concatenate([error.tilt_rad, error.offset_m])
     force = hit.sign * (hit.force_n - np.median(hit.force_n))
     change = np.zeros((3, length // 2 + 1), dtype=complex)
     change[:, 1:] = np.einsum("k,kif->if", eta, basis) * np.fft.rfft(force, length)[1:]
     extra = np.fft.irfft(change, length, axis=1)[:, : len(hit.force_n)]
-    return replace(hit, acceleration_m_s2=hit.acceleration_m_s2 - extra)
+    rest = hit.acceleration_m_s2 - extra
+    return replace(hit, acceleration_m_s2=rest, taken_out_m_s2=extra, taken_out_sd=off)
+
+
+def describe(recorded: Dataset, errors: HitErrors) -> str:
+    """One sentence on how the hits scatter about their axes and the point."""
+    each = [error for visit in errors for error in visit]
+    tilt = float(np.rad2deg(np.sqrt(np.mean([e.tilt_rad**2 for e in each]))))
+    offset = 1e3 * float(np.sqrt(np.mean([e.offset_m**2 for e in each])))
+    return (
+        f"Hits of a pose and axis differ as hand-held ones do, by {tilt:.1f}° in each direction "
+        f"and {offset:.1f} mm beside the point (rms): that was taken out of the recordings."
+    )
