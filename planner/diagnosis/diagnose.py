@@ -7,6 +7,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import beside_another, diagnose
+from planner.diagnosis.misses_again import asked_again
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
@@ -29,9 +30,9 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
     """What `simulation` lacks; hits are screened unless a window is stated that they carry."""
     tell("looking at the measuring chain, the order in time and the force levels", 0.02)
     screened = bool(recorded.visits) and not recorded.window_rate_1_s
-    findings = ()
+    findings, missed = (), recorded
     if screened:
-        recorded, findings = _screened(recorded, simulation, within(tell, 0.02, 0.2))
+        recorded, missed, findings = _screened(recorded, simulation, within(tell, 0.02, 0.2))
     linear = linear_effects_apply(findings)
     found = diagnose(
         recorded.ended_frfs,
@@ -45,14 +46,18 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
         found = beside_another(found)
     tell("looking for a nonlinear joint beside it", 0.85)
     closer = within(tell, 0.85, 0.95)
-    both = beside(recorded, findings, found, closer) if screened else None
+    again = asked_again(missed, findings, found, closer) if screened else None
+    if again is not None:
+        findings, recorded = again[0], replace(again[1], remarks=recorded.remarks)
+        linear = linear_effects_apply(findings)
+    both = beside(recorded, findings, found, closer) if screened and again is None else None
     if both is not None:
         findings, found = both
     elif not linear:
         found = replace(found, best=found.refitted)
     tell("judging at poses set aside", 0.95)
     judged = judge(found)
-    counts = linear or both is not None
+    counts = linear or both is not None or again is not None
     if counts:
         kept, found = taken_back(findings, judged.diagnosis)
         if len(kept) < len(findings):
@@ -65,13 +70,14 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
 
 def _screened(
     recorded: Dataset, simulation: Simulation, tell: Tell
-) -> tuple[Dataset, tuple[Finding, ...]]:
-    """Recordings corrected for artefacts, and what the hits themselves say."""
+) -> tuple[Dataset, Dataset, tuple[Finding, ...]]:
+    """Recordings corrected for artefacts and misses, for artefacts alone, and what hits say."""
     found = screen(recorded, simulation, tell)
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
     said = [f"The recordings were corrected for: {', '.join(artefacts)}."] if artefacts else []
     if found.hit_errors:
         said.append(describe(recorded, found.hit_errors))
     if not said:
-        return recorded, found.findings
-    return replace(found.clean, remarks=(*recorded.remarks, *said)), found.findings
+        return recorded, recorded, found.findings
+    clean = replace(found.clean, remarks=(*recorded.remarks, *said))
+    return clean, found.missed, found.findings

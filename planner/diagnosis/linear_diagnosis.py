@@ -136,6 +136,13 @@ def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
     return out
 
 
+def _told_of(found: Fit, temper: float) -> tuple[Effect, ...]:
+    """The effects of a fit without artefacts as small as every measuring chain has them."""
+    parts = found.effect.parts()
+    kept = tuple(p for p in parts if not (p.artefact and p.usual(found.parameters(temper, p))))
+    return kept or (Effect(""),)
+
+
 def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
     shares = list(weights.probabilities[:-1])
@@ -151,12 +158,13 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
         since = max(behind, half * (left.per_value - best.per_value))
         shares.append(shares[leader] * float(np.exp(-since)) * prior / own)
     total = sum(shares) + unknown
+    parts = [_told_of(f, weights.temper) for f in fits]
     groups: dict[tuple, list[int]] = {}
-    for i, f in enumerate(fits):
-        groups.setdefault(tuple(sorted((p.name, p.at) for p in f.effect.parts())), []).append(i)
+    for i, own in enumerate(parts):
+        groups.setdefault(tuple(sorted((p.name, p.at) for p in own)), []).append(i)
     out = [Candidate((), unknown / total, None)]
     for members in groups.values():
-        leader = fits[max(members, key=lambda i: shares[i])]
+        leader = max(members, key=lambda i: shares[i])
         share = sum(shares[i] for i in members) / total
-        out.append(Candidate(leader.effect.parts(), float(share), leader))
+        out.append(Candidate(parts[leader], float(share), fits[leader]))
     return tuple(sorted(out, key=lambda c: -c.probability))

@@ -102,6 +102,10 @@ class Effect:
         """ψ (k, p) from which it is fitted."""
         return np.array([[q.mean for q in self.quantities]])
 
+    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
+        """Whether an artefact of these parameters is as small as every measuring chain has it."""
+        return False
+
     def parts(self) -> "tuple[Effect, ...]":
         """The effects that act together; itself where it is one."""
         return (self,)

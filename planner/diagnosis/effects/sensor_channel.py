@@ -5,7 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
+from planner.diagnosis.thresholds import USUAL
 from planner.dynamics.simulation import Simulation
+from planner.identification.measurement_model import EVERYDAY
 
 AXES = "xyz"
 
@@ -35,6 +37,10 @@ class SensorGain(Effect):
         """See `Effect.text`."""
         value, sd, _ = values["gain"]
         return f"Channel {self.at} shows {value:.3g} ± {sd:.1g} times too much: check calibration."
+
+    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
+        """See `Effect.usual`."""
+        return abs(np.log(values["gain"][0])) < USUAL * EVERYDAY.gain
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,10 @@ class ChannelDelay(Effect):
             f"The responses come {1e3 * value:.3g} ± {1e3 * sd:.1g} ms after the force: check "
             f"filters and sampling of the channels."
         )
+
+    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
+        """See `Effect.usual`."""
+        return abs(values["delay"][0]) < USUAL * EVERYDAY.delay_s
 
 
 def _ones(s: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ class Screened:
 
     findings: tuple[Finding, ...]
     clean: Dataset
+    missed: Dataset  # as `clean`, with the misses of hits
     hit_errors: HitErrors = ()
 
 
@@ -27,10 +28,10 @@ def screen(recorded: Dataset, nominal: Simulation, tell: Tell = quietly) -> Scre
     """Find artefacts first, so that they are not called physics, then the rest in clean data."""
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)
-    errors: HitErrors = ()
+    missed, errors = clean, ()
     if Problem.tolerances is not None and force_levels.differ(clean, nominal):
         tell("telling how each hit missed its axis and point", 0.3)
         clean, errors = taken_out(clean, nominal, Problem.tolerances)
     by_level = force_levels.screen(clean, nominal, tell=tell)
     by_time = () if by_level else drift.screen(clean, nominal)
-    return Screened((*found, *by_level, *by_time), clean, errors)
+    return Screened((*found, *by_level, *by_time), clean, missed, errors)
