@@ -110,6 +110,11 @@ class Campaign:
         return self._cells[key]
 
     @property
+    def robot_toml(self) -> Path:
+        """The robot's robot.toml in the campaign's folder."""
+        return self.directory / self.cell.config.robot
+
+    @property
     def model(self) -> Model:
         """The model after all measurements; fitted once per state."""
         state = self.state

@@ -1,9 +1,10 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
 from planner.campaign.config import CampaignConfig
@@ -43,7 +44,7 @@ class Cell:
         where robot.toml does not say.
         """
         check_name(config.acquisition.name)
-        robot = robot or Robot.load(robot_toml, geometric_stiffness)
+        robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
         return cls(config, robot, simulation, workspace)
@@ -137,3 +138,10 @@ class Cell:
                 f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
             )
         return q
+
+
+def _handled(robot: Robot, config: CampaignConfig) -> Robot:
+    """The robot with what campaign.toml says of hits and sensor."""
+    stated = {"hits": config.hits, "sensor": config.sensor}
+    given = {name: table for name, table in stated.items() if table is not msgspec.UNSET}
+    return replace(robot, config=msgspec.structs.replace(robot.config, **given)) if given else robot

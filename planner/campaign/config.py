@@ -6,6 +6,7 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
+from planner.robot.config import HitsTable, SensorTable, check_sds
 from planner.toml_file import load_toml
 
 
@@ -92,7 +93,7 @@ class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of campaign.toml."""
+    """The whole of campaign.toml; [hits] and [sensor] go before those of robot.toml."""
 
     workspace: WorkspaceTable
     robot: str = "robot/robot.toml"
@@ -103,6 +104,8 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     goal: GoalTable = GoalTable()
     cost: CostTable = CostTable()
     forbidden: list[ForbiddenTable] = []
+    hits: HitsTable | msgspec.UnsetType = msgspec.UNSET
+    sensor: SensorTable | msgspec.UnsetType = msgspec.UNSET
 
 
 def load_campaign_config(path: Path) -> CampaignConfig:
@@ -140,6 +143,9 @@ def _check(config: CampaignConfig, path: Path) -> None:
     if not 0 < band[0] < band[1]:
         raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
     _check_choices(config, path)
+    for name, table in (("hits", config.hits), ("sensor", config.sensor)):
+        if table is not msgspec.UNSET:
+            check_sds(table, f"{path}: [{name}]")
     limits = [
         ("[cost] speed_share", config.cost.speed_share, 1e-3, 1.0),
         ("[cost] minutes_per_pose", config.cost.minutes_per_pose, 0.0, 1e3),

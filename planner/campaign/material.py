@@ -10,6 +10,7 @@ from planner.campaign.campaign import Campaign
 from planner.dataset.dataset import Dataset, Progress
 from planner.errors import InputError
 from planner.recording.records import PoseRow
+from planner.robot.robot import Robot
 
 OFFERED = 200  # of a campaign's candidates, evenly spread, that are looked at
 
@@ -28,6 +29,12 @@ class Material:
     offered: np.ndarray
     names: tuple[str, ...]
     campaign: Campaign | None = None
+
+    @property
+    def nominal(self) -> Robot:
+        """The robot as stated, a campaign's with what campaign.toml adds."""
+        own = self.campaign is not None and self.robot == self.campaign.robot_toml
+        return self.campaign.cell.robot if self.campaign and own else Robot.load(self.robot)
 
     def read(
         self, joint_names: tuple[str, ...], band_hz: tuple[float, float], progress: Progress
@@ -62,7 +69,7 @@ def material(folder: Path, robot: Path | None, window_rate_1_s: float) -> Materi
     cell = campaign.cell
     chosen = np.flatnonzero(cell.allowed)[:OFFERED]
     names = tuple(f"candidate {i + 1}" for i in chosen)
-    path = robot or campaign.directory / cell.config.robot
+    path = robot or campaign.robot_toml
     rate = window_rate_1_s or cell.config.modes.window_rate_1_s
     recordings = campaign.directory / store.RECORDINGS
     return Material(recordings, path, rate, cell.candidates.q[chosen], names, campaign)

@@ -39,12 +39,11 @@ def diagnose(
     from planner.cli.progress import counting
     from planner.recording.folder import read_poses
     from planner.report.modal_analysis import check_options
-    from planner.robot.robot import Robot
 
     started = time.perf_counter()
     check_options(window_rate_1_s=window_rate_1_s)
     given = material(recordings, robot, window_rate_1_s)
-    nominal = Robot.load(given.robot)
+    nominal = given.nominal
     wanted = read_poses(predict, nominal.joint_names) if predict else ()
     with counting(quiet=as_json) as tell:
         answer = diagnose_material(given.with_poses(wanted), nominal, tell)

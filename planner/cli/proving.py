@@ -16,6 +16,9 @@ def prove(
         Path | None, typer.Option(metavar="FOLDER", help="Where all goes; resumed if it is there.")
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, max=64, help="Diagnoses at a time.")] = 1,
+    laboratory: Annotated[
+        bool, typer.Option("--laboratory", help="No hit misses, and no sensor errs.")
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
     """Make concealed cases with another engine, seal, diagnose, unseal and score them."""
@@ -25,7 +28,7 @@ def prove(
 
     folder = out or Path(f"proof-{cases}-{seed}")
     with counting(quiet=as_json) as tell:
-        proof = make(folder, cases, seed, tell)
+        proof = make(folder, cases, seed, tell, laboratory)
         print(f"Sealed answers: {proof.whole}", file=sys.stderr, flush=True)
         diagnose_all(proof, jobs, tell)
     return respond(prove_report(proof), as_json)

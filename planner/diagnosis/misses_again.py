@@ -12,7 +12,6 @@ from planner.diagnosis.screens import force_levels
 from planner.diagnosis.screens.hit_errors import taken_out
 from planner.diagnosis.thresholds import AT_NOISE, UNKNOWN
 from planner.diagnosis.write_explained import explained_simulation
-from planner.identification.measurement_model import EVERYDAY
 from planner.progress import Tell, quietly
 
 
@@ -31,7 +30,7 @@ def asked_again(
     if found.verdict != "explained" or first.fit.per_value > AT_NOISE:
         return None
     simulation = explained_simulation(found, first)
-    clean, _ = taken_out(hits, simulation, EVERYDAY)
+    clean, _ = taken_out(hits, simulation)
     again = force_levels.screen(clean, simulation, single=True, tell=tell)
     if any(f.effect == UNKNOWN for f in again):
         return None

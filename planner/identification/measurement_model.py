@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.gradient import Turned
+from planner.robot.config import HitsTable, SensorTable
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
 
@@ -32,6 +33,15 @@ class Tolerances:
     position_m: float = 0.01
     force_gain: float = 0.03
     delay_s: float = 6e-5
+
+    @classmethod
+    def of(cls, hits: HitsTable, sensor: SensorTable) -> "Tolerances":
+        """As robot.toml or campaign.toml state them."""
+        return cls(
+            np.deg2rad(hits.angle_sd_deg), 1e-3 * hits.offset_sd_mm, sensor.gain_sd_percent / 100,
+            sensor.cross_axis_sd_percent / 100, np.deg2rad(sensor.mounting_sd_deg),
+            1e-3 * sensor.position_sd_mm,
+        )  # fmt: skip
 
     @property
     def across(self) -> float:

@@ -26,21 +26,29 @@ class Proof:
     whole: str  # hash of all hashes
 
 
-def make(folder: Path, cases: int, seed: int, tell: Callable[[str, float], None]) -> Proof:
+def make(
+    folder: Path,
+    cases: int,
+    seed: int,
+    tell: Callable[[str, float], None],
+    laboratory: bool = False,
+) -> Proof:
     """Make the cases in a process of their own, unless the folder holds these very ones.
 
+    In the `laboratory` hits are exact and the measuring chain is perfect; else both are everyday's.
     Raises InputError where it holds others, or where they cannot be made.
     """
-    folder, stated = folder.absolute(), {"cases": cases, "seed": seed}
+    folder, stated = folder.absolute(), {"cases": cases, "seed": seed, "laboratory": laboratory}
     path = folder / SEALS
     if path.is_file():
         known = json.loads(path.read_text(encoding="utf-8"))
-        if {k: known[k] for k in stated} != stated:
+        if {k: known.get(k) for k in stated} != stated:
             raise InputError(f"{folder} holds other cases; name another folder with --out.")
         return _proof(folder, known["seals"])
     folder.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "planner.truth.cases", str(folder)]
     command += ["--cases", str(cases), "--seed", str(seed)]
+    command += ["--laboratory"] if laboratory else []
     seals: dict[str, str] = {}
     with (
         open(folder / "making.log", "w", encoding="utf-8") as log,

@@ -105,6 +105,22 @@ class CollisionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     margin_m: float = 0.0
 
 
+class HitsTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How a hand hits: sds of a hit's direction and of its place beside the point."""
+
+    angle_sd_deg: float = 2.0
+    offset_sd_mm: float = 5.0
+
+
+class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a sensor is specified to, and how well it is known how it sits: sds."""
+
+    gain_sd_percent: float = 2.0
+    cross_axis_sd_percent: float = 3.0
+    mounting_sd_deg: float = 2.0
+    position_sd_mm: float = 10.0
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
@@ -127,6 +143,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     effects: tuple[EffectTable, ...] = ()
     resonator: tuple[Resonator, ...] = ()
     harmonic: tuple[Harmonic, ...] = ()
+    hits: HitsTable = HitsTable()
+    sensor: SensorTable = SensorTable()
 
 
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
@@ -171,10 +189,20 @@ def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
     return whole
 
 
+def check_sds(table: HitsTable | SensorTable, where: str) -> None:
+    """Raise InputError where an sd of a table is no number from 0 to 100."""
+    for name in table.__struct_fields__:
+        value = getattr(table, name)
+        if not 0 <= value <= 100:
+            raise InputError(f"{where} {name} is {value}; it must lie between 0 and 100.")
+
+
 def _check(config: RobotConfig, path: Path) -> None:
     _check_compliances(config, path)
     _check_payloads(config, path)
     _check_obstacles(config, path)
+    check_sds(config.hits, f"{path}: [hits]")
+    check_sds(config.sensor, f"{path}: [sensor]")
     margin = config.collision.margin_m
     if not 0 <= margin < 1:
         raise InputError(

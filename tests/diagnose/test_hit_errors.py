@@ -127,7 +127,7 @@ def missed(robot_toml, tmp_path_factory):
 
 def test_misses_are_told_with_their_uncertainty_and_taken_out(missed):
     visits, simulation, aims = missed
-    clean, errors = taken_out(visits, simulation, Tolerances())
+    clean, errors = taken_out(visits, simulation)
     told, true, sd = [], [], []
     for visit, own, truth in zip(visits.visits, errors, aims, strict=True):
         for axis in range(3):

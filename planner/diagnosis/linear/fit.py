@@ -20,7 +20,7 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.identify import QUICK, STAGES, Effort, identify
 from planner.identification.measured_frfs import Measured, stack
-from planner.identification.measurement_model import EVERYDAY, Tolerances
+from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
@@ -56,6 +56,12 @@ PATIENT = replace(QUICK, stages=STAGES, log_steps=40)
 KEPT = 2  # starts that are followed
 
 
+def tolerances_of(simulation: Simulation) -> Tolerances:
+    """What the simulation's robot.toml says of hits and sensor."""
+    config = simulation.robot.config
+    return Tolerances.of(config.hits, config.sensor)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation."""
@@ -65,14 +71,13 @@ class Problem:
     simulation: Simulation
     band_hz: tuple[float, float]
     priors: Priors = PRIORS
-    tolerances: Tolerances | None = EVERYDAY
 
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
         body, measured = _prepared(self, effect), _measured(self, grade)
         setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
         inertias, p = body.inertias, body.parametrisation
-        kind = grade.logarithmic, grade.inertial, self.tolerances
+        kind = grade.logarithmic, grade.inertial, tolerances_of(self.simulation)
         return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
 
     def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:

@@ -14,7 +14,7 @@ from planner.dataset.level_columns import Column, column
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.linear.fit import Fit, fit, settle, tolerances_of
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances, hit_basis
@@ -41,15 +41,13 @@ class HitError:
 HitErrors = tuple[tuple[HitError, ...], ...]  # of every hit of every visit
 
 
-def taken_out(
-    recorded: Dataset, nominal: Simulation, tolerances: Tolerances
-) -> tuple[Dataset, HitErrors]:
+def taken_out(recorded: Dataset, nominal: Simulation) -> tuple[Dataset, HitErrors]:
     """The recordings as they would be had every hit missed like the others, and the misses.
 
     A rough fit of the simulation tells the misses roughly, and a close one to hits without them
     tells them again.
     """
-    rough = base(recorded, nominal)
+    rough, tolerances = base(recorded, nominal), tolerances_of(nominal)
     first = corrected(recorded, rough, hit_errors(recorded, rough, tolerances))
     problem = problem_of(first, nominal)
     plain = settle(problem, fit(problem, Effect("")))

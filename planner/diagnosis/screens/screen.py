@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.fit import Problem
 from planner.diagnosis.screens import artefacts, drift, force_levels
 from planner.diagnosis.screens.hit_errors import HitErrors, taken_out
 from planner.dynamics.simulation import Simulation
@@ -29,9 +28,9 @@ def screen(recorded: Dataset, nominal: Simulation, tell: Tell = quietly) -> Scre
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)
     missed, errors = clean, ()
-    if Problem.tolerances is not None and force_levels.differ(clean, nominal):
+    if force_levels.differ(clean, nominal):
         tell("telling how each hit missed its axis and point", 0.3)
-        clean, errors = taken_out(clean, nominal, Problem.tolerances)
+        clean, errors = taken_out(clean, nominal)
     by_level = force_levels.screen(clean, nominal, tell=tell)
     by_time = () if by_level else drift.screen(clean, nominal)
     return Screened((*found, *by_level, *by_time), clean, missed, errors)
