@@ -114,7 +114,7 @@ def test_a_helper_ends_with_a_process_that_is_killed(tmp_path):
     script = tmp_path / "unguarded.py"  # as users write them; it must not run twice either
     script.write_text(
         "import os, time\n"
-        "from planner import side_by_side as module\n"
+        "from planner.inference import parallel as module\n"
         "def who(x):\n"
         "    time.sleep(0.01)\n"
         "    return os.getpid()\n"

@@ -106,7 +106,11 @@ class Campaign:
         key = msgspec.json.encode(configured).decode()
         if key not in self._cells:
             config = config_from_builtins(configured.config)
-            self._cells[key] = Cell.load(self.directory / config.robot, config)
+            self._cells[key] = Cell.load(
+                self.directory / config.robot,
+                config,
+                geometric_stiffness=configured.geometric_stiffness,
+            )
         return self._cells[key]
 
     @property
@@ -172,7 +176,8 @@ class Campaign:
         """What campaign.toml and the robot folder say now (the log follows with the next act)."""
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
-        return Configured(_as_logged(config), hashes, __version__)
+        begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
+        return Configured(_as_logged(config), hashes, __version__, begun.geometric_stiffness)
 
     # -- what is expected ----------------------------------------------------------------------
 
@@ -438,5 +443,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(_as_logged(config), hashes, __version__)
+    event = Configured(_as_logged(config), hashes, __version__, geometric_stiffness=True)
     return encode_line("", Entry(1, now, event))[0]

@@ -70,7 +70,8 @@ assert jax.config.jax_compilation_cache_dir is None
 """
 
 LIVED_WITH = """
-import jax
+# Their own filters of warnings are theirs.
+import jax, numpy, scipy.linalg, scipy.sparse.linalg, scipy.special
 jax.config.update("jax_enable_x64", True)
 jax.numpy.ones(1) + 1
 """

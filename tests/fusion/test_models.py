@@ -9,6 +9,7 @@ from planner.studies.models.fidelity_levels import Exact, Samples
 from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import PRIOR, fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
+from tests.support.compilations import compilations
 from tests.support.fused import GRID_PRIOR, fit_fused
 from tests.support.mixture import mix
 
@@ -197,10 +198,18 @@ def test_evidence_is_the_integral_over_the_prior():
 
 
 def test_growth_compiles_nothing():
-    from planner.surrogate import gp, marginal
-
     fit_recursive(samples(3), exact_low(), SPREAD)
-    before = gp._compiled._cache_size(), marginal._objective._cache_size()
-    for n in range(4, 16):
-        fit_recursive(samples(n), exact_low(), SPREAD)
-    assert (gp._compiled._cache_size(), marginal._objective._cache_size()) == before
+    with compilations() as compiled:
+        for n in range(4, 16):
+            fit_recursive(samples(n), exact_low(), SPREAD)
+    assert not compiled
+
+
+def test_what_is_compiled_is_counted():
+    from planner.jax_setup import compiled as compile_it
+
+    doubled = compile_it()(lambda x: 2 * x)
+    with compilations() as compiled:
+        for size in (3, 3, 4):
+            doubled(np.ones(size))
+    assert len(compiled) == 2
