@@ -29,9 +29,7 @@ def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
     libraries = ",".join(version(name) for name in ("numpy", "scipy"))
     asked = f"{samples} {dimensions} {seed}"
     key = content_hash.digest("normal points", content_hash.program("surrogate"), libraries, asked)
-    points = _store().result(
-        key, np.ndarray, lambda: _normal_points(samples, dimensions, seed)
-    )
+    points = _store().result(key, np.ndarray, lambda: _normal_points(samples, dimensions, seed))
     points.flags.writeable = False  # all who ask get the same array
     return points
 
