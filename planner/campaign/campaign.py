@@ -3,20 +3,20 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeVar
 
 import msgspec
 import numpy as np
 
-from planner.campaign import store
-from planner.campaign.cell import Cell
+from planner.campaign import model_cache, store
 from planner.campaign.config import (
     CampaignConfig,
     ModesTable,
     config_from_builtins,
     load_campaign_config,
 )
-from planner.campaign.deliveries import Delivery, sort_paths
 from planner.campaign.events import (
+    REFUSED,
     AnyEvent,
     Configured,
     Confirmed,
@@ -31,38 +31,33 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.importing import (
-    REFUSED,
-    ImportReport,
-    displacement,
-    keep_files,
-    measure_files,
-    not_used,
-    place,
-    refusals,
-    taken_after_all,
-)
 from planner.campaign.journal import Journal
-from planner.campaign.log_conversion import from_homogeneity, from_modal
-from planner.campaign.model import Model, build
-from planner.campaign.proposals import propose
-from planner.campaign.question import question
 from planner.campaign.state import CampaignState, Measurement, fold, last_act
-from planner.dataset.dataset import Dataset, Progress, Recording
-from planner.dataset.measure import frf_of
 from planner.dataset.screened_files import Source
+from planner.dataset.store import Store
 from planner.errors import InputError
-from planner.frf.frequency_lines import frequency_lines
-from planner.frf.frf import Frf
-from planner.surrogate.frf_bands import ModalPrediction
 from planner.version import __version__
+
+# Imported where they are needed: with what is kept of a model, `status` needs none of them.
+if TYPE_CHECKING:
+    from planner.campaign.cell import Cell
+    from planner.campaign.deliveries import Delivery
+    from planner.campaign.importing import ImportReport
+    from planner.campaign.model import Model
+    from planner.dataset.dataset import Dataset, Progress
+    from planner.frf.frf import Frf
+    from planner.surrogate.frf_bands import ModalPrediction
+
+T = TypeVar("T")
 
 
 class Campaign:
     """A campaign folder, opened. Reads never write; every act is on the disk when it returns."""
 
-    def __init__(self, directory: Path):
+    def __init__(self, directory: Path, models: Store | None = None):
+        """Open a folder; `models` keeps fitted models, by default in the user's cache folder."""
         self.directory = directory.resolve()
+        self._kept = model_cache.user_models() if models is None else models
         self._journal = Journal(self.directory / store.LOG)
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
@@ -100,10 +95,12 @@ class Campaign:
         return state
 
     @property
-    def cell(self) -> Cell:
+    def cell(self) -> "Cell":
         """Robot, simulation and workspace as configured now."""
+        from planner.campaign.cell import Cell
+
         configured = self._configured()
-        key = msgspec.json.encode(configured).decode()
+        key = _text(configured)
         if key not in self._cells:
             config = config_from_builtins(configured.config)
             self._cells[key] = Cell.load(
@@ -119,16 +116,43 @@ class Campaign:
         return self.directory / self.cell.config.robot
 
     @property
-    def model(self) -> Model:
-        """The model after all measurements; fitted once per state."""
-        state = self.state
-        key = (msgspec.json.encode(self._configured()).decode(), state.model_version)
+    def model(self) -> "Model":
+        """The model after all measurements; fitted once per state, then kept on disk."""
+        state, configured = self.state, self._configured()
+        key = _text(configured), state.model_version
         if key not in self._models:
-            self._models = {key: build(self.cell, state, self.frf_of)}
+            name = model_cache.key("model", self.directory, configured, state.used)
+            found = model_cache.kept_model(self._kept, name)
+            if found is None:
+                found = self._fitted(state)
+                model_cache.keep_model(self._kept, name, found)
+            self._cells[key[0]] = found.cell  # with the candidates that were worked out for it
+            self._models = {key: found}
         return self._models[key]
 
-    def frf_of(self, measurement: Measurement, table: ModesTable) -> Frf:
+    def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
+        """What follows from the model, kept on disk: where it is, the model is not loaded.
+
+        Args:
+            what: Name of it, one for each `make`.
+            kind: Dataclass that msgspec can encode; arrays are allowed.
+            make: Makes it from the model.
+        """
+        used = self.state.used
+        name = model_cache.key(what, self.directory, self._configured(), used)
+        return self._kept.result(name, kind, lambda: make(self.model))
+
+    def _fitted(self, state: CampaignState) -> "Model":
+        from planner.campaign.model import build
+
+        model = build(self.cell, state, self.frf_of)
+        _ = model.frequency_sd_percent  # kept with it: every command needs it
+        return model
+
+    def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
+        from planner.dataset.measure import frf_of
+
         key = _frf_key(measurement.accepted, table)
         if key not in self._frfs:
             sources = tuple(self.source_of(hit) for hit in measurement.accepted)
@@ -140,12 +164,14 @@ class Campaign:
         band_hz: tuple[float, float],
         *,
         window_rate_1_s: float = 0.0,
-        progress: Progress = lambda text: None,
-    ) -> Dataset:
+        progress: "Progress" = lambda text: None,
+    ) -> "Dataset":
         """The accepted recordings of all poses in use, in the order of import.
 
         Raises InputError where there are none.
         """
+        from planner.dataset.dataset import Dataset, Recording
+
         found = [
             Recording(measurement.pose, np.deg2rad(measurement.joints_deg), self.source_of(hit))
             for measurement in self.state.used
@@ -181,7 +207,7 @@ class Campaign:
 
     # -- what is expected ----------------------------------------------------------------------
 
-    def predict(self, q_rad: np.ndarray) -> ModalPrediction:
+    def predict(self, q_rad: np.ndarray) -> "ModalPrediction":
         """Frequencies (Hz) and damping ratios (n, count), with sds, at poses q (n, dof) in rad."""
         return self.model.predict(np.atleast_2d(q_rad))
 
@@ -204,6 +230,8 @@ class Campaign:
     @property
     def frequency_lines(self) -> np.ndarray:
         """Lines (F,) in Hz over campaign.toml's band."""
+        from planner.frf.frequency_lines import frequency_lines
+
         return frequency_lines(self.cell.config.modes.band_hz)
 
     # -- acts ----------------------------------------------------------------------------------
@@ -213,6 +241,8 @@ class Campaign:
 
         Raises NoPoseLeftError when no reachable pose is left.
         """
+        from planner.campaign.proposals import propose
+
         with self._acting():
             state = self.state
             name = acquisition or self.cell.config.acquisition.name
@@ -228,13 +258,16 @@ class Campaign:
         paths: tuple[Path, ...],
         pose: str | None = None,
         progress: Callable[[str], None] | None = None,
-    ) -> tuple[ImportReport, ...]:
+    ) -> "tuple[ImportReport, ...]":
         """Import hits, one report per pose, in recording order.
 
         Files that the engineer refused are imported only where `paths` names them themselves.
         Hits far from what the model is sure of are held until `confirm`, `move` or `refuse_held`.
         Raises InputError, before anything is stored, if it is not clear what or where they are.
         """
+        from planner.campaign.deliveries import sort_paths
+        from planner.campaign.importing import place
+
         with self._acting():
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
@@ -250,6 +283,8 @@ class Campaign:
 
     def refuse(self, pose: str, paths: tuple[Path, ...]) -> None:
         """Refuse files that wait at a pose: they are kept, and not imported unless named."""
+        from planner.campaign.importing import refusals
+
         with self._acting():
             if paths:
                 self._append(Refused(pose, refusals(self.directory, paths)))
@@ -260,8 +295,11 @@ class Campaign:
             self._held(pose)
             self._append(Confirmed(pose))
 
-    def move(self, pose: str, other: str) -> ImportReport:
+    def move(self, pose: str, other: str) -> "ImportReport":
         """The held hits of a pose are from another one: import them there."""
+        from planner.campaign.deliveries import Delivery
+        from planner.campaign.importing import place
+
         with self._acting():
             entry, event = self._held(pose)
             sources = tuple(self.source_of(hit) for hit in event.hits)
@@ -344,8 +382,19 @@ class Campaign:
         return found[-1]
 
     def _import_pose(
-        self, delivery: Delivery, joints_deg: tuple[float, ...], named: frozenset[Path]
-    ) -> ImportReport:
+        self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
+    ) -> "ImportReport":
+        from planner.campaign.importing import (
+            ImportReport,
+            displacement,
+            keep_files,
+            measure_files,
+            not_used,
+            taken_after_all,
+        )
+        from planner.campaign.log_conversion import from_homogeneity, from_modal
+        from planner.campaign.question import question
+
         before, state, pose = self.model, self.state, delivery.pose
         known = state.measurements.get(pose)
         kept = keep_files(self.directory, delivery, state, named)
@@ -427,6 +476,10 @@ def _frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:
     return (*(hit.sha256 for hit in hits), table.band_hz, table.window_rate_1_s)
 
 
+def _text(configured: Configured) -> str:
+    return msgspec.json.encode(configured).decode()
+
+
 def _as_logged(config: CampaignConfig) -> dict:
     """The configuration as it reads back from the log, so that the two can be compared."""
     return msgspec.json.decode(msgspec.json.encode(config))
@@ -436,6 +489,7 @@ def _first_entry(directory: Path) -> bytes:
     """The log of a new campaign, once robot and workspace have been held against each other."""
     from datetime import UTC, datetime
 
+    from planner.campaign.cell import Cell
     from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)

@@ -4,6 +4,8 @@ import msgspec
 
 from planner.modal.modes import LEAST_PROBABILITY
 
+REFUSED = "refused by the engineer"  # the reason where none is given
+
 
 class Event(msgspec.Struct, frozen=True, tag_field="kind"):
     """Base of every entry of the log."""

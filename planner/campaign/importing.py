@@ -10,7 +10,7 @@ from planner.campaign import store
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
-from planner.campaign.events import HitRecord, Question
+from planner.campaign.events import REFUSED, HitRecord, Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose, measure
@@ -18,7 +18,6 @@ from planner.dataset.screened_files import Source
 from planner.errors import InputError
 
 SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
-REFUSED = "refused by the engineer"
 
 Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
 

@@ -91,7 +91,7 @@ class Model:
     def forecast(self) -> Forecast:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
         outputs, poses = self.outlook
-        best = poses.one(int(np.argmax(mixed(outputs, poses[:CONSIDERED]))))
+        best = poses.one(int(np.argmax(self._gains)))
         stop = self.cell.config.stop
         return forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
 
@@ -109,12 +109,18 @@ class Model:
         """
         if not self.labelled:
             return None
-        outputs, poses = self.outlook
+        outputs = self.outlook[0]
         sd = [[m.frequency_sd_hz / m.frequency_hz if m else np.nan for m in p.modes]
               for p in self.labelled]  # fmt: skip
         gain = repeat_gain(outputs, np.array(sd) ** 2)
-        best, fresh = int(np.argmax(gain)), mixed(outputs, poses[:CONSIDERED])
-        return self.labelled[best].pose, float(gain[best]), float(np.max(fresh))
+        best = int(np.argmax(gain))
+        return self.labelled[best].pose, float(gain[best]), float(np.max(self._gains))
+
+    @cached_property
+    def _gains(self) -> np.ndarray:
+        """(n,) what measuring each of the first candidates would gain."""
+        outputs, poses = self.outlook
+        return mixed(outputs, poses[:CONSIDERED])
 
     def _predict(
         self,

@@ -6,11 +6,13 @@ posterior of a common factor on them (scaled inverse χ², Gelman et al. 2013, s
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.design.frequency_posterior import FrequencyOutputs, Poses
-from planner.surrogate.gp import Posterior
+if TYPE_CHECKING:  # a forecast that was kept is read without JAX
+    from planner.design.frequency_posterior import FrequencyOutputs, Poses
+    from planner.surrogate.gp import Posterior
 
 FIELD_SAMPLES = 400  # samples of the error field, at least
 # Errors are as large as the model says, to within a factor of two, before any is seen.
@@ -44,8 +46,8 @@ class Forecast:
 
 
 def forecast(
-    outputs: FrequencyOutputs,
-    best: Poses | None,
+    outputs: "FrequencyOutputs",
+    best: "Poses | None",
     target_percent: float,
     probability: float,
     seed: int = 0,
@@ -68,7 +70,7 @@ def forecast(
     )  # fmt: skip
 
 
-def mean_squares(outputs: FrequencyOutputs, seed: int = 0) -> np.ndarray:
+def mean_squares(outputs: "FrequencyOutputs", seed: int = 0) -> np.ndarray:
     """Samples (≥ FIELD_SAMPLES,) of the weighted mean square error of ln f over the workspace."""
     rng = np.random.default_rng(seed)
     poses = outputs.workspace.poses[:WORKSPACE_POINTS]
@@ -91,7 +93,7 @@ def mean_squares(outputs: FrequencyOutputs, seed: int = 0) -> np.ndarray:
     return total
 
 
-def left_out(posterior: Posterior, count: int) -> tuple[int, float]:
+def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
     """Measured poses, and the size (rms) of their residuals, left out, in sds of the prediction.
 
     In closed form (Rasmussen & Williams 2006, eq. 5.12), averaged over the hyperparameters.
@@ -113,7 +115,7 @@ def left_out(posterior: Posterior, count: int) -> tuple[int, float]:
     return poses, float(np.sqrt(np.mean(np.concatenate(squares))))
 
 
-def _means_apart(posterior: Posterior, k: int, poses: Poses) -> np.ndarray:
+def _means_apart(posterior: "Posterior", k: int, poses: "Poses") -> np.ndarray:
     """How far the mean of each hyperparameter sample (s, u) is from that of all."""
     cross, _ = posterior._cross(k, poses.x, poses.low[:, k])
     means = (posterior.weights[k][:, None, :] @ cross)[:, 0]

@@ -9,15 +9,10 @@ loop over blocks of candidates makes it, squares it and sums it without keeping 
 from collections.abc import Sequence
 from functools import partial
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 
-from planner import jax_setup
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.inference.parallel import side_by_side
-from planner.surrogate.kernels import parse
 
 BLOCK_CANDIDATES = 128  # at a time: their covariances with the target stay in the cache
 BLOCKS_PER_CALL = 64  # where there are many; calls of equal shape are compiled once
@@ -60,6 +55,9 @@ def _label(
     outputs: FrequencyOutputs, target: Target, precision: type[np.floating], poses: Poses, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
+    # By JAX, which takes most of a second to import.
+    from planner.design.squared_covariances import squared_covariances
+
     weight = target.importance[:, k]
     if not weight.any() or not len(poses):
         return np.zeros(len(poses)), np.ones(len(poses))
@@ -81,26 +79,10 @@ def _label(
     for s, theta in enumerate(thetas):
         for i in range(0, len(x), step):
             part = slice(i, i + step)
-            done[s, part] = _squares(kernel, theta, x[part], a[s, part], xu, b[s], weight)
+            done[s, part] = squared_covariances(
+                kernel, theta, x[part], a[s, part], xu, b[s], weight
+            )
     return np.mean(done[:, :n] / scale, axis=0), np.mean(scale, axis=0)
-
-
-@jax_setup.compiled("wide", static_argnums=0)
-def _squares(
-    kernel: str, theta: Array, x: Array, a: Array, xu: Array, b: Array, weight: Array
-) -> Array:
-    """Σ_u weight_u cov(c, u)² of candidates c, block by block."""
-    delta = parse(kernel, x.shape[1])
-
-    def block(one: tuple[Array, Array]) -> Array:
-        xc, ac = one
-        return (delta.covariance(jnp, theta, xc, xu) + ac @ b.T) ** 2 @ weight
-
-    blocks = (
-        x.reshape(-1, BLOCK_CANDIDATES, x.shape[1]),
-        a.reshape(-1, BLOCK_CANDIDATES, a.shape[1]),
-    )
-    return jax.lax.map(block, blocks).reshape(-1)
 
 
 def _features(

@@ -186,11 +186,13 @@ def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) ->
     """θ (k, P): the prior's median, then quasi-random between the bounds; or those given."""
     if not isinstance(starts, int):
         return p.near(np.log(np.atleast_2d(starts)))
+    if starts == 1:
+        return p.mean[None]
     from scipy.stats import qmc  # scipy.stats takes most of a second to import
 
     lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
     sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
-    unit = sampler.random_base2(max(1, int(np.ceil(np.log2(max(starts, 2))))))[: starts - 1]
+    unit = sampler.random_base2(int(np.ceil(np.log2(starts))))[: starts - 1]
     return np.vstack([p.mean, lower + unit * (upper - lower)])
 
 

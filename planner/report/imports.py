@@ -2,17 +2,19 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Amplitude, MeasuredMode, Question
-from planner.campaign.importing import ImportReport
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
+
+if TYPE_CHECKING:
+    from planner.campaign.importing import ImportReport
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class PoseImport(Answer):
     question: "AskedOfPose | None" = None
 
     @classmethod
-    def of(cls, report: ImportReport) -> "PoseImport":
+    def of(cls, report: "ImportReport") -> "PoseImport":
         """Of what the campaign says of one pose."""
         measurement = report.measurement
         return cls(
@@ -137,7 +139,7 @@ class ImportedPoses(Answer):
     poses: tuple[PoseImport, ...]
 
     @classmethod
-    def of(cls, reports: tuple[ImportReport, ...]) -> "ImportedPoses":
+    def of(cls, reports: "tuple[ImportReport, ...]") -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave."""
         return cls(tuple(PoseImport.of(report) for report in reports))
 
@@ -170,7 +172,7 @@ def how_to_answer(directory: Path, pose: str, asked: str) -> str:
     )
 
 
-def _labelled_modes(report: ImportReport) -> tuple[ImportedMode, ...]:
+def _labelled_modes(report: "ImportReport") -> tuple[ImportedMode, ...]:
     """Modes of the pose with their label and expectation; unlikely ones only where labelled."""
     if report.measurement is None:
         return ()

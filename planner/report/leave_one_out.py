@@ -1,12 +1,13 @@
 """What the model would have said of each measured pose without it: a part of `status`."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.labels import frequencies
-from planner.campaign.model import Model
-from planner.surrogate.leave_one_out import LEVELS, LeaveOneOut, leave_one_out, report
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
+    from planner.surrogate.leave_one_out import LeaveOneOut
 
 
 @dataclass(frozen=True)
@@ -38,14 +39,19 @@ class LeftOutValues:
     text: tuple[str, ...]
 
 
-def found_without(model: Model) -> tuple[LeaveOneOut, tuple[str, ...]]:
+def found_without(model: "Model") -> "tuple[LeaveOneOut, tuple[str, ...]]":
     """Errors of ln f (n, count), by the likelier of the two models of each mode; pose names."""
+    from planner.surrogate.leave_one_out import leave_one_out
+
     found = leave_one_out(model.surrogate.primary.posterior, len(model.labelled))
     return found, tuple(pose.pose for pose in model.labelled)
 
 
-def left_out(model: Model) -> LeftOutValues:
+def left_out(model: "Model") -> LeftOutValues:
     """Of a campaign's model."""
+    from planner.campaign.labels import frequencies
+    from planner.surrogate.leave_one_out import LEVELS, report
+
     found, poses = found_without(model)
     modes = tuple(f"the frequency of mode {k + 1}" for k in range(model.surrogate.count))
     values, said = int(np.isfinite(found.rank).sum()), tuple(report(found, poses, modes))
@@ -58,7 +64,7 @@ def left_out(model: Model) -> LeftOutValues:
 
 
 def _rows(
-    found: LeaveOneOut, poses: tuple[str, ...], measured_hz: np.ndarray
+    found: "LeaveOneOut", poses: tuple[str, ...], measured_hz: np.ndarray
 ) -> tuple[LeftOutFrequency, ...]:
     predicted = measured_hz * np.exp(-found.error)
     sd = predicted * found.sd

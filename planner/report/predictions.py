@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Group
@@ -12,7 +13,9 @@ from planner.campaign.campaign import Campaign
 from planner.errors import InputError
 from planner.report.answer import Answer
 from planner.report.text import table, with_sd
-from planner.surrogate.frf_bands import ModalPrediction
+
+if TYPE_CHECKING:
+    from planner.surrogate.frf_bands import ModalPrediction
 
 
 @dataclass(frozen=True)
@@ -25,7 +28,7 @@ class ExpectedMode:
     damping_sd: float
 
     @classmethod
-    def all_of(cls, prediction: ModalPrediction, i: int) -> "tuple[ExpectedMode, ...]":
+    def all_of(cls, prediction: "ModalPrediction", i: int) -> "tuple[ExpectedMode, ...]":
         """All modes of the i-th pose of a prediction."""
         p = prediction
         columns = p.frequency_hz[i], p.frequency_sd_hz[i], p.damping_ratio[i], p.damping_sd[i]

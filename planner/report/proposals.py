@@ -1,7 +1,7 @@
 """Answer of `next`: where to measure, and what to expect there."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -9,11 +9,13 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
-from planner.campaign.model import Model
 from planner.design.stopping import Forecast
 from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import table
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class RepeatedPose:
     text: str
 
     @classmethod
-    def of(cls, model: Model) -> "RepeatedPose | None":
+    def of(cls, model: "Model") -> "RepeatedPose | None":
         """None where a new pose gains more."""
         found = model.repeat()
         if found is None or found[1] <= found[2]:

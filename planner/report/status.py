@@ -1,7 +1,8 @@
 """Answer of `status`: what was measured, what is open, how sure the model is."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group
@@ -9,7 +10,6 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
-from planner.campaign.model import Model
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
@@ -18,6 +18,9 @@ from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,35 @@ class RefusedHit:
     reason: str
 
 
+@dataclass(frozen=True, eq=False)
+class ModelStatus:
+    """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
+
+    robot: str
+    joint_names: tuple[str, ...]
+    frequency_sd_percent: np.ndarray
+    target_frequency_sd_percent: float
+    done: bool
+    forecast: Forecast
+    remarks: tuple[str, ...]
+    leave_one_out: LeftOutValues
+
+    @classmethod
+    def of(cls, model: "Model") -> "ModelStatus":
+        """Of a campaign's model."""
+        cell = model.cell
+        return cls(
+            robot=cell.robot.name,
+            joint_names=tuple(cell.robot.joint_names),
+            frequency_sd_percent=model.frequency_sd_percent,
+            target_frequency_sd_percent=cell.config.stop.frequency_sd_percent,
+            done=bool(model.done),
+            forecast=model.forecast,
+            remarks=model.remarks,
+            leave_one_out=left_out(model),
+        )
+
+
 @dataclass(frozen=True)
 class LogStatus:
     """Length of the log; bytes of a last line that a crash has torn."""
@@ -119,7 +151,7 @@ class StatusReport(Answer):
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     held: tuple["HeldPose", ...] = ()
-    model: Model | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+    model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
         """With the forecast's sentence."""
@@ -133,7 +165,7 @@ class StatusReport(Answer):
 
         mark = SIMULATED_TITLE if self.simulated else ""
         title = f"{mark}Each measured pose, predicted without it"
-        figure = left_out_figure(*found_without(self.model), title)
+        figure = left_out_figure(*found_without(self.model()), title)
         return replace(self, **pictures.write({"leave_one_out": figure}, name))
 
     def text(self) -> Group:
@@ -175,28 +207,29 @@ class StatusReport(Answer):
 
 def status(campaign: Campaign) -> StatusReport:
     """Of a campaign as it is now."""
-    state, model, cell = campaign.state, campaign.model, campaign.cell
+    state = campaign.state
+    believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
     measured = tuple(state.measurements.values())
     refused = [RefusedHit(m.pose, h.file, h.reason) for m in state.recorded for h in m.hits
                if not h.accepted]  # fmt: skip
     refused += [RefusedHit(pose, h.file, h.reason) for pose, h in state.refused.values()]
     return StatusReport(
         campaign=str(campaign.directory),
-        robot=cell.robot.name,
+        robot=believed.robot,
         simulated=any(m.simulated for m in state.recorded),
         measurements=tuple(MeasuredPoseStatus.of(m, m.pose in state.starred) for m in measured),
         open=tuple(state.proposals[pose] for pose in state.open),
         skipped=tuple(SkippedProposal(p, r) for p, r in state.skipped.items()),
         refused=tuple(refused),
-        frequency_sd_percent=model.frequency_sd_percent,
-        target_frequency_sd_percent=cell.config.stop.frequency_sd_percent,
-        done=bool(model.done),
-        forecast=model.forecast,
-        remarks=model.remarks,
+        frequency_sd_percent=believed.frequency_sd_percent,
+        target_frequency_sd_percent=believed.target_frequency_sd_percent,
+        done=believed.done,
+        forecast=believed.forecast,
+        remarks=believed.remarks,
         log=LogStatus(state.events, campaign.torn_bytes),
-        joint_names=tuple(cell.robot.joint_names),
+        joint_names=believed.joint_names,
         stored_but_not_imported=tuple(campaign.orphans()),
-        leave_one_out=left_out(model),
+        leave_one_out=believed.leave_one_out,
         held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
-        model=model,
+        model=lambda: campaign.model,
     )

@@ -11,7 +11,6 @@ import numpy as np
 
 from planner.surrogate.gp import Posterior, Prior, fit
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.marginal import laplace
 from planner.surrogate.training_data import TrainingData, pad
 
 
@@ -97,7 +96,11 @@ def fit_ar1(
     sd = np.hypot(np.where(np.isnan(data.sd), 0.0, data.sd), blind * unknown_sd[None, :])
     padded = pad(TrainingData(data.x, data.y - low, sd, low - centre[None, :]), uses_low)
     prior = _stack(priors, uses_low, parse(kernel, data.x.shape[1]))
-    start = laplace(kernel, padded, prior) if thorough else None
+    start = None
+    if thorough:
+        from planner.surrogate.marginal import laplace  # by JAX, which takes a second to import
+
+        start = laplace(kernel, padded, prior)
     posterior = fit(padded, prior, samples, kept, kernel, 2 if thorough else 1, start)
     return AR1(posterior, uses_low, centre, unknown_sd)
 

@@ -1,4 +1,4 @@
-"""Gaussian processes of many outputs, averaged over hyperparameters, in one compiled function.
+"""Gaussian processes of many outputs, averaged over hyperparameters.
 
 Per output: y = mean + ρ'·h + b + δ(x) + ε, where h is the centred low fidelity, ρ' = ρ − 1 and b
 have Gaussian priors that are marginalised exactly as kernel terms, δ is a zero-mean GP, and ε has
@@ -7,19 +7,14 @@ averaged (see `importance`).
 """
 
 from dataclasses import dataclass
-from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
-from jax.scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dtrtri
 
-from planner import jax_setup
 from planner.errors import InputError
 from planner.surrogate.importance import Gaussians, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
+from planner.surrogate.likelihood import data_covariance, log_likelihoods
 from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import Padded
 
@@ -151,7 +146,9 @@ def fit(
     for jitter in JITTERS:
         try:
             z, evidence = sample(
-                lambda z, j=jitter: _log_likelihoods(kernel, padded, y, prior, j, theta(z)),
+                lambda z, j=jitter: log_likelihoods(
+                    kernel, padded, y, prior.bias_sd, prior.slope_sd, j, theta(z)
+                ),
                 normal, m, kept, start,
             )  # fmt: skip
             whiten = _whitening(kernel, padded, prior, jitter, theta(z))
@@ -170,53 +167,13 @@ def fit(
     )
 
 
-def _covariance(
-    xp: Any, kernel: str, x: Any, low: Any, mask: Any, variance: Any, bias: Any, slope: Any,
-    jitter: Any, theta: Any,
-) -> Any:  # fmt: skip
-    """Covariance (…, c, c) of one output's data at θ (…, p); what does not count is decoupled."""
-    delta = parse(kernel, x.shape[1]).covariance(xp, theta, x, x)
-    both = mask[:, None] * mask[None, :]
-    known = (delta + (bias**2 + slope**2 * low[:, None] * low[None, :])) * both
-    noise = variance + xp.exp(2 * theta[..., 1, None])
-    noise = noise + jitter * (xp.exp(2 * theta[..., 0, None]) + bias**2)
-    return known + xp.where(mask > 0, noise, 1.0)[..., None] * xp.eye(len(x))
-
-
 def _whitening(
     kernel: str, data: Padded, prior: Prior, jitter: float, theta: np.ndarray
 ) -> np.ndarray:
     """Inverse Cholesky factors (m, k, c, c); LinAlgError where a covariance is singular."""
     outputs = zip(data.low, data.mask, data.variance, prior.bias_sd, prior.slope_sd, strict=True)
     each = [
-        np.linalg.cholesky(_covariance(np, kernel, data.x, *own, jitter, t))
+        np.linalg.cholesky(data_covariance(np, kernel, data.x, *own, jitter, t))
         for t, own in zip(theta, outputs, strict=True)
     ]
     return np.array([[dtrtri(factor, lower=True)[0] for factor in factors] for factors in each])
-
-
-def _log_likelihoods(
-    kernel: str, data: Padded, y: np.ndarray, prior: Prior, jitter: float, theta: np.ndarray
-) -> np.ndarray:
-    """(m, s) of y (m, c) at θ (m, s, p), without the constant; −∞ where there is none."""
-    return _compiled(
-        kernel, data.x, y, data.low, data.mask, data.variance, prior.bias_sd, prior.slope_sd,
-        jitter, theta,
-    )  # fmt: skip
-
-
-@jax_setup.compiled("quick", static_argnums=0)
-def _compiled(
-    kernel: str, x: Array, y: Array, low: Array, mask: Array, variance: Array, bias: Array,
-    slope: Array, jitter: Array, theta: Array,
-) -> Array:  # fmt: skip
-    def one(y: Array, low: Array, mask: Array, variance: Array, bias: Array, slope: Array,
-            theta: Array) -> Array:  # fmt: skip
-        k = _covariance(jnp, kernel, x, low, mask, variance, bias, slope, jitter, theta)
-        factor = jnp.linalg.cholesky(k)
-        white = solve_triangular(factor, y, lower=True)
-        value = -0.5 * jnp.sum(white**2) - jnp.sum(jnp.log(jnp.diagonal(factor)))
-        return jnp.where(jnp.isfinite(value), value, -jnp.inf)
-
-    of_an_output = jax.vmap(one, in_axes=(None,) * 6 + (0,))
-    return jax.vmap(of_an_output)(y, low, mask, variance, bias, slope, theta)

@@ -6,18 +6,43 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 """
 
 from collections.abc import Callable
+from functools import cache
+from importlib.metadata import version
 
 import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
+
+from planner import cache_folder, content_hash
+from planner.dataset.store import Store
 
 PROPOSAL_INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
 
 
+@cache
 def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
-    """Quasi-random points (samples, dimensions) of N(0, 1): a scrambled Sobol sequence."""
-    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+    """Quasi-random points (samples, dimensions) of N(0, 1): a scrambled Sobol sequence.
+
+    They are kept on disk: scipy.stats, which makes them, takes most of a second to import.
+    """
+    libraries = ",".join(version(name) for name in ("numpy", "scipy"))
+    asked = f"{samples} {dimensions} {seed}"
+    key = content_hash.digest("normal points", content_hash.program("surrogate"), libraries, asked)
+    points = _store().result(key, np.ndarray, lambda: _normal_points(samples, dimensions, seed))
+    points.flags.writeable = False  # all who ask get the same array
+    return points
+
+
+def _store() -> Store:
+    try:
+        return Store(cache_folder.folder("points"))
+    except RuntimeError:  # a user without a home
+        return Store(None)
+
+
+def _normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
+    from scipy.stats import qmc
 
     sobol = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
     unit = sobol.random_base2(int(np.ceil(np.log2(samples))))[:samples]
