@@ -14,7 +14,8 @@ def frequency_sensitivity(
     """∂ ln f of the `count` lowest undamped modes (n, count, P + R) at q (n, dof) in rad.
 
     By the parameters in the order of `identified.mean`: with mass-normalised shapes φ,
-    ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968).
+    ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968). The sag under gravity is held where the
+    identified springs carry the weight, as it is while they are identified.
     """
     p = parametrise(nominal, priors if identified.nuisances else Priors())
     return log_frequency_slope(identified.simulation, p, q, count)

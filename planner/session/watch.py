@@ -99,6 +99,8 @@ class _Session:
 
     def run(self) -> SessionSummary:
         try:
+            for remark in self.campaign.cell.remarks:
+                self.console.print(Text(remark, style="yellow"))
             while not self.stop:
                 held = () if self.auto else tuple(self.campaign.state.held)
                 if held:

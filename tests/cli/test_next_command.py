@@ -7,12 +7,15 @@ import json
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Configured, Proposed
 from planner.campaign.journal import encode_line, parse
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS
+from planner.session.keys import NoKeys
+from planner.session.watch import watch
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 UNCHECKED = "Nothing is checked for collision, because plain.urdf has no collision geometry"
@@ -82,6 +85,16 @@ def test_a_robot_without_collision_geometry_is_told_of_once(robot, tmp_path):
     assert " ".join(text.split()).count(UNCHECKED) == 1
     (remark,) = ask("next", tmp_path / "cell", "--count", 3)["remarks"]
     assert remark.startswith(UNCHECKED)
+
+
+def test_a_session_tells_of_it_once_at_its_beginning(robot, tmp_path):
+    (tmp_path / "inbox").mkdir()
+    console = Console(width=100, file=io.StringIO())
+    campaign = Campaign(begun(tmp_path, robot))
+    watch(campaign, tmp_path / "inbox", console=console, keys=NoKeys(), limit_s=0.0)
+    text = " ".join(console.file.getvalue().split())
+    assert text.count(UNCHECKED) == 1
+    assert text.index(UNCHECKED) < text.index("P001")
 
 
 def test_a_robot_with_collision_geometry_is_not_told_of(robot, tmp_path):
