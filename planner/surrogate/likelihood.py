@@ -53,9 +53,8 @@ def _of_an_output(
     mask: np.ndarray, variance: np.ndarray, bias: float, slope: float,
 ) -> np.ndarray:  # fmt: skip
     """(s,) at θ (s, p)."""
-    with np.errstate(
-        over="ignore", invalid="ignore", divide="ignore"
-    ):  # that sample has no likelihood then
+    # A sample whose covariance overflows or is singular has no likelihood.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         k = data_covariance(np, kernel, x, low, mask, variance, bias, slope, jitter, theta)
         factor = _factors(k)
         white = np.tile(y, (len(theta), 1))
