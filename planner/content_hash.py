@@ -2,6 +2,7 @@
 
 import hashlib
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 import msgspec
@@ -28,8 +29,22 @@ def program(*packages: str) -> str:
     Args:
         packages: Names of folders in the program, such as "modal"; none for the whole program.
     """
-    root = Path(__file__).parent
-    files = sorted(p for p in root.rglob("*.py") if "campaigns" not in p.relative_to(root).parts)
+    texts = _texts()
     if packages:
-        files = [p for p in files if p.relative_to(root).parts[0] in packages]
-    return digest(*(p.relative_to(root).as_posix() + "\n" + p.read_text("utf-8") for p in files))
+        texts = {name: text for name, text in texts.items() if name.split("/")[0] in packages}
+    return digest(*(f"{name}\n{text}" for name, text in texts.items()))
+
+
+@cache
+def libraries(*names: str) -> str:
+    """Versions of installed libraries."""
+    return ",".join(version(name) for name in names)
+
+
+@cache
+def _texts() -> dict[str, str]:
+    """Text of every module of this program by its path inside it, in order."""
+    root = Path(__file__).parent
+    files = {p.relative_to(root).as_posix(): p for p in root.rglob("*.py")}
+    own = sorted(name for name in files if "campaigns" not in name.split("/"))
+    return {name: files[name].read_text("utf-8") for name in own}

@@ -7,7 +7,6 @@ Models are pickled: they hold the robot and the identified simulation, and come 
 
 import pickle
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,11 +40,9 @@ def key(what: str, directory: Path, configured: Configured, used: tuple[Measurem
         used: Measurements that the model uses, in their order; hits by their files' hashes.
     """
     measured = tuple(replace(m, time="") for m in used)
-    libraries = ",".join(version(name) for name in LIBRARIES)
     told = content_hash.of(configured), content_hash.of(measured)
-    return content_hash.digest(
-        what, content_hash.program(), libraries, str(directory.resolve()), *told
-    )
+    computes = content_hash.program(), content_hash.libraries(*LIBRARIES)
+    return content_hash.digest(what, *computes, str(directory.resolve()), *told)
 
 
 def kept_model(store: Store, name: str) -> "Model | None":

@@ -11,7 +11,6 @@ the model is not sure enough there.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from planner.campaign.events import MeasuredMode, Question
 from planner.campaign.model import Model
@@ -71,6 +70,8 @@ def compare(
     expected_hz: np.ndarray, sd_hz: np.ndarray, modes: tuple[MeasuredMode, ...]
 ) -> Comparison:
     """Expected (count,) with sd in Hz against measured modes, paired so that most agree."""
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
+
     found = [(m.frequency_hz, m.frequency_sd_hz) for m in modes if m.likely]
     hz, own = np.array(found).reshape(-1, 2).T
     off = np.log(hz[None, :] / expected_hz[:, None])

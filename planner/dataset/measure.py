@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from importlib.metadata import version
 from typing import TypeVar
 
 import numpy as np
@@ -191,8 +190,7 @@ class MeasuredPose:
 
 def program() -> str:
     """What computes: this program's text and the libraries under it."""
-    libraries = ",".join(version(name) for name in ("numpy", "scipy"))
-    return content_hash.program(*PACKAGES) + libraries
+    return content_hash.program(*PACKAGES) + content_hash.libraries("numpy", "scipy")
 
 
 def _digest(sources: tuple[Source, ...]) -> str:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from planner.dynamics.vibration import SimulatedModes, normal_modes
@@ -94,6 +93,8 @@ def _path(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 def _follow(a: _Modes, i: int, b: _Modes, j: int) -> np.ndarray:
     """For each mode of pose i of `a` the one of pose j of `b` that is most like it."""
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
+
     alike = (a.shape[i].T @ b.mass[j] @ b.shape[j]) ** 2
     apart = np.log(b.frequency_hz[j] / a.frequency_hz[i][:, None]) / FREQUENCY_STEP
     return linear_sum_assignment(apart**2 - alike)[1]
@@ -121,6 +122,8 @@ def rearranged(
 
 def _partners(damped_hz: np.ndarray, undamped_hz: np.ndarray) -> np.ndarray:
     """For each undamped mode the damped one nearest in frequency, −1 without; one to one."""
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
+
     known = np.flatnonzero(np.isfinite(damped_hz))
     out = np.full(len(undamped_hz), -1)
     apart = np.abs(np.log(undamped_hz[:, None] / damped_hz[known]))

@@ -6,7 +6,6 @@ modes; free ones may exchange them.
 """
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 # Matchings are summed over subsets of the measured modes; beyond this many, the dearest are out.
 MOST = 12
@@ -20,6 +19,8 @@ def best(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
     """
     if ordered:
         return _best_ordered(gain)
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
+
     chosen = np.full(gain.shape[0], -1)
     rows, columns = linear_sum_assignment(-np.maximum(gain, 0.0))
     for row, column in zip(rows, columns, strict=True):
@@ -69,6 +70,7 @@ def _chances_ordered(gain: np.ndarray) -> np.ndarray:
 
 def _sums_ordered(odds: np.ndarray) -> np.ndarray:
     """Summed odds of all ordered matchings of leading parts; sets of matches counted once."""
+
     k, n = odds.shape
     total = np.ones((k + 1, n + 1))
     for i in range(1, k + 1):

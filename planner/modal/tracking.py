@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from planner.modal.label_permutations import name_chances
 from planner.modal.mac import align, unexpected_cost
@@ -97,6 +96,8 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
     ranked = _columns(guide, order)
     placed = _matched(poses, ranked, x, ordered=True)
     chance = name_chances(placed.modes, np.argsort(order, axis=1), x, guide.reference)
+    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
+
     place = np.array([linear_sum_assignment(-c)[1] for c in chance])
     rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
     sure = placed.probability[rows, place]
@@ -113,6 +114,7 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
 
 def _columns(guide: Guide, chosen: np.ndarray) -> Guide:
     """The guide with the chosen columns (n, k) of every pose."""
+
     rows = np.arange(len(chosen))[:, None]
     return Guide(guide.frequency_hz[rows, chosen], guide.shape[rows, chosen], guide.reference)
 

@@ -7,7 +7,6 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 
 from collections.abc import Callable
 from functools import cache
-from importlib.metadata import version
 
 import numpy as np
 from scipy.special import logsumexp, ndtri, softmax
@@ -26,7 +25,7 @@ def normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
 
     They are kept on disk: scipy.stats, which makes them, takes most of a second to import.
     """
-    libraries = ",".join(version(name) for name in ("numpy", "scipy"))
+    libraries = content_hash.libraries("numpy", "scipy")
     asked = f"{samples} {dimensions} {seed}"
     key = content_hash.digest("normal points", content_hash.program("surrogate"), libraries, asked)
     points = _store().result(key, np.ndarray, lambda: _normal_points(samples, dimensions, seed))

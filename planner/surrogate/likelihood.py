@@ -41,16 +41,20 @@ def log_likelihoods(
 
         return compiled_log_likelihoods(kernel, data.x, *outputs, jitter, theta)
     return np.array(
-        [_of_an_output(kernel, data.x, *one, jitter) for one in zip(theta, *outputs, strict=True)]
+        [
+            _of_an_output(kernel, data.x, jitter, theta[j], *(values[j] for values in outputs))
+            for j in range(m)
+        ]
     )
 
 
 def _of_an_output(
-    kernel: str, x: np.ndarray, theta: np.ndarray, y: np.ndarray, low: np.ndarray,
-    mask: np.ndarray, variance: np.ndarray, bias: float, slope: float, jitter: float,
+    kernel: str, x: np.ndarray, jitter: float, theta: np.ndarray, y: np.ndarray, low: np.ndarray,
+    mask: np.ndarray, variance: np.ndarray, bias: float, slope: float,
 ) -> np.ndarray:  # fmt: skip
     """(s,) at θ (s, p)."""
-    with np.errstate(over="ignore", invalid="ignore"):  # that sample has no likelihood then
+    # A sample whose covariance overflows or is singular has no likelihood.
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         k = data_covariance(np, kernel, x, low, mask, variance, bias, slope, jitter, theta)
         factor = _factors(k)
         white = np.tile(y, (len(theta), 1))

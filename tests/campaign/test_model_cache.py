@@ -1,0 +1,162 @@
+"""A fitted model that is kept on disk: the same as a new one, never a damaged or outdated one."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from planner import content_hash
+from planner.campaign import model as model_module
+from planner.campaign.campaign import Campaign
+from planner.campaign.store import CONFIG
+from planner.dataset.store import Store
+from planner.demo import NAME, shipped
+from planner.replay import replay
+from planner.report.status import status
+from tests.support.outside import planner
+
+POSES = "A11", "A33"
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    """A campaign of two poses."""
+    source, folder = shipped(NAME), tmp_path_factory.mktemp("two") / "campaign"
+    Campaign.new(folder, source / "robot" / "robot.toml", source / "campaign.toml")
+    campaign = Campaign(folder, Store(None))
+    for pose in POSES:
+        campaign.import_paths((source / "recordings",), pose)
+    return folder
+
+
+@pytest.fixture
+def folder(two, tmp_path):
+    return shutil.copytree(two, tmp_path / "campaign")
+
+
+@pytest.fixture
+def store(tmp_path):
+    return Store(tmp_path / "models")
+
+
+@pytest.fixture
+def fitted(monkeypatch):
+    """Counts the models that are fitted."""
+    count, build = [], model_module.build
+
+    def counted(*given):
+        count.append(given)
+        return build(*given)
+
+    monkeypatch.setattr(model_module, "build", counted)
+    return count
+
+
+def predictions(model):
+    q, lines = model.cell.candidates.q[:3], np.linspace(5.0, 60.0, 12)
+    p = model.predict(q)
+    numbers = p.frequency_hz, p.frequency_sd_hz, p.damping_ratio, p.damping_sd, *model.frf(q, lines)
+    return *numbers, model.frequency_sd_percent, np.array([model.forecast.rmse_percent])
+
+
+def same(a, b):
+    return all(np.array_equal(u, v) for u, v in zip(predictions(a), predictions(b), strict=True))
+
+
+def test_a_kept_model_is_the_fitted_one(folder, store, fitted):
+    first = Campaign(folder, store).model
+    again = Campaign(folder, store).model
+    assert len(fitted) == 1
+    assert again is not first
+    anew = Campaign(folder, Store(None)).model
+    assert len(fitted) == 2
+    assert same(first, again)
+    assert same(anew, again)
+    assert again.remarks == anew.remarks
+    assert [p.pose for p in again.labelled] == list(POSES)
+
+
+def test_a_damaged_entry_is_fitted_again(folder, store, fitted):
+    first = Campaign(folder, store).model
+    (entry,) = store.folder.iterdir()
+    whole = entry.read_bytes()
+    for damaged in (whole[: len(whole) // 2], whole[:-1] + bytes([whole[-1] ^ 1]), b""):
+        entry.write_bytes(damaged)
+        assert same(first, Campaign(folder, store).model)
+        assert entry.read_bytes() != damaged  # kept again
+    assert len(fitted) == 4
+
+
+def test_another_configuration_program_or_folder_has_another_model(
+    folder, store, fitted, monkeypatch, tmp_path
+):
+    first = Campaign(folder, store).model
+    config = folder / CONFIG
+    text = config.read_text()
+    config.write_text(text + "# Nothing is changed by this.\n")
+    Campaign(folder, store).model  # noqa: B018
+    assert len(fitted) == 1
+    config.write_text(
+        re.sub(r"(?m)^frequency_sd_percent = .*$", "frequency_sd_percent = 0.123", text)
+    )
+    assert Campaign(folder, store).model.forecast.target_percent == 0.123
+    assert len(fitted) == 2
+    config.write_text(text)
+    moved = shutil.copytree(folder, tmp_path / "moved")
+    assert Campaign(moved, store).model.cell.robot.path.is_relative_to(moved)
+    assert len(fitted) == 3
+    monkeypatch.setattr(content_hash, "program", lambda *packages: "another")
+    assert same(first, Campaign(folder, store).model)
+    assert len(fitted) == 4
+
+
+def test_other_measurements_have_another_model_and_undoing_finds_the_first(folder, store, fitted):
+    campaign = Campaign(folder, store)
+    first = campaign.model
+    campaign.withdraw(POSES[1])
+    assert [p.pose for p in campaign.model.labelled] == list(POSES[:1])
+    campaign.undo()
+    assert same(first, campaign.model)
+    assert len(fitted) == 2
+
+
+def test_status_is_the_same_from_what_was_kept(folder, store, fitted):
+    told = [status(Campaign(folder, store)).to_json() for _ in range(2)]
+    anew = status(Campaign(folder, Store(None))).to_json()
+    assert json.dumps(told[0]) == json.dumps(told[1]) == json.dumps(anew)
+    assert len(fitted) == 2
+
+
+def test_replay_takes_no_model_that_was_kept(folder, store, monkeypatch):
+    Campaign(folder, store).model  # noqa: B018
+
+    def refused(*given):
+        raise AssertionError("a kept model was asked for")
+
+    monkeypatch.setattr(Store, "get", lambda self, key, kind: refused() if kind is bytes else None)
+    steps = list(replay(Campaign(folder, store)))
+    assert {step.check for step in steps} <= {"identical", "close", "kept"}
+    assert len(steps[-1].model.labelled) == len(POSES)
+
+
+def test_a_folder_that_cannot_be_written_only_costs_time(folder, tmp_path, fitted):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    models = [Campaign(folder, Store(blocked / "models")).model for _ in range(2)]
+    assert same(*models)
+    assert len(fitted) == 2
+
+
+def test_status_of_a_kept_model_needs_no_heavy_library(folder):
+    assert planner("status", folder).returncode == 0
+    code = (
+        "import sys; from planner.cli.run import run; "
+        f"code = run(['status', {str(folder)!r}]); "
+        "heavy = {'jax', 'pinocchio', 'scipy'} & set(sys.modules); "
+        "sys.exit(code or len(heavy))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
