@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from planner.truth.deviation import Spring
+from planner.truth.handling import EVERYDAY
 from planner.truth.model import load_truth
 from planner.truth.secret import Artefact
 from tests.support.known_robots import KR10
@@ -85,3 +86,17 @@ def test_a_wrong_sensitivity_is_called_that_and_no_physics(tmp_path):
     (finding,) = answer["findings"]
     assert (finding["effect"], finding["at"]) == ("sensor_gain", "sensor_y")
     assert finding["parameters"]["gain"]["value"] == pytest.approx(GAIN, rel=0.02)
+
+
+def test_hits_beside_their_axes_and_an_ordinary_sensor_are_nothing(tmp_path):
+    answer = diagnosed(small_case(tmp_path, handling=EVERYDAY))
+    assert answer["verdict"] == "consistent"
+    assert answer["findings"] == []
+
+
+def test_a_soft_base_is_named_with_hits_beside_their_axes(tmp_path):
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
+    extra = tuple(Spring("base", axes[a], k, 5e-4 * k) for a, k in BASE.items())
+    answer = diagnosed(small_case(tmp_path, unlike(extra=extra), handling=EVERYDAY))
+    assert answer["verdict"] == "explained"
+    assert leader(answer) == ("base_compliance", "base")

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.truth.deviation import Deviation
+from planner.truth.handling import LABORATORY, Handling
 from planner.truth.hits import Hammer, write_predict, write_recordings
 from planner.truth.model import load_truth
 from planner.truth.secret import Artefact, HitVisit, Secret, hit_poses
@@ -27,12 +28,15 @@ class SmallCase:
 
 
 def small_case(
-    folder: Path, deviation: Deviation = SCATTER, artefact: Artefact | None = None
+    folder: Path,
+    deviation: Deviation = SCATTER,
+    artefact: Artefact | None = None,
+    handling: Handling = LABORATORY,
 ) -> SmallCase:
     """A KR10 with six springs, hit once along each axis at POSES poses.
 
     Its robot.toml knows the gravity that the truth has, so that nothing differs but what is
-    concealed.
+    concealed, and what `handling` leaves open.
     """
     robot_toml = KR10.write(folder / "robot")
     stated = robot_toml.read_text()
@@ -40,8 +44,12 @@ def small_case(
     truth = load_truth(robot_toml, deviation)
     angles_deg = np.round(np.rad2deg(KR10.poses(POSES + 1, SEED)), 4)
     shots = [(f"+{axis}", HAMMER.peak_n) for axis in "xyz"]
-    visits = [HitVisit(np.deg2rad(q), shots, i / POSES) for i, q in enumerate(angles_deg[:POSES])]
-    secret = Secret(deviation, artefact=artefact or Artefact())
+    own = np.random.default_rng(SEED)
+    visits = []
+    for i, q in enumerate(np.deg2rad(angles_deg[:POSES])):
+        off = np.deg2rad(handling.readback_deg) * own.standard_normal(len(q))
+        visits.append(HitVisit(q + off, shots, i / POSES, handling.aims([0, 1, 2], own)))
+    secret = Secret(deviation, artefact=artefact or Artefact(), chain=handling.chain(own))
     found = hit_poses(truth, secret, visits, HAMMER, np.random.default_rng(SEED))
     rows = [
         (f"P{i + 1}", q, 1, hit)
