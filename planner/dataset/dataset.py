@@ -60,7 +60,7 @@ class Stay(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class PoseEntry:
     """What has an FRF of its own: as a rule a pose with all its visits; q (dof,) in rad."""
 
     pose: str
@@ -78,7 +78,7 @@ class Dataset:
     channels carry.
     """
 
-    entries: tuple[Entry, ...]  # also those without an FRF
+    entries: tuple[PoseEntry, ...]  # also those without an FRF
     stays: tuple[Stay, ...]
     band_hz: tuple[float, float]
     window_rate_1_s: float = 0.0
@@ -155,7 +155,7 @@ class Dataset:
             measured = MeasuredPose(sources, band_hz, window_rate_1_s=window_rate_1_s, store=store)
             _ = measured.averaged
             q = np.mean([recording.q for recording in group], axis=0)
-            entries.append(Entry(pose, q, measured))
+            entries.append(PoseEntry(pose, q, measured))
         verdicts = [v for entry in entries for v in entry.measured.verdicts]
         refused = tuple((v.source.name, v.reason) for v in verdicts if not v.accepted)
         remarks = tuple(
@@ -196,7 +196,7 @@ class Dataset:
         return replace(
             self,
             entries=tuple(
-                Entry(v.pose, v.q, MeasuredPose((), self.band_hz, "h1", rate, v.hits))
+                PoseEntry(v.pose, v.q, MeasuredPose((), self.band_hz, "h1", rate, v.hits))
                 for v in given
             ),
             stays=tuple(Stay(i, (0,), v.q, v.order) for i, v in enumerate(given)),
@@ -206,7 +206,7 @@ class Dataset:
     # -- by pose -------------------------------------------------------------------------------
 
     @cached_property
-    def measured(self) -> tuple[Entry, ...]:
+    def measured(self) -> tuple[PoseEntry, ...]:
         """The n entries with an FRF."""
         return tuple(entry for entry in self.entries if entry.measured.frf is not None)
 

@@ -6,7 +6,7 @@ from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
-from planner.modal.pole_identification import MAX_ORDER, Identification, Identified, identify
+from planner.modal.pole_identification import MAX_ORDER, Identified, PoleIdentification, identify
 from planner.modal.residues import rank_one
 
 # Lines beyond the band that are fitted too, so that modes at its edges are met from both sides.
@@ -41,7 +41,7 @@ def estimate_modes(
 
 def identification(
     frf: Frf, band_hz: tuple[float, float], max_order: int = MAX_ORDER
-) -> Identification | None:
+) -> PoleIdentification | None:
     """The same with everything in between (stabilisation diagram, fit), None without a mode.
 
     Raises RefusedError where too few frequency lines are usable.
@@ -93,7 +93,7 @@ def _mode(mode: Identified, columns: np.ndarray) -> Mode:
     )
 
 
-def _remarks(found: Identification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:
+def _remarks(found: PoleIdentification, doubtful: tuple[Mode, ...]) -> tuple[str, ...]:
     remarks = []
     excess = float(np.median(found.fit.excess)) / found.data.correlated
     if found.data.variance is not None and excess >= 4:

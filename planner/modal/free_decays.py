@@ -8,7 +8,7 @@ from planner.errors import InputError, RefusedError
 from planner.modal.mac import mac
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.pole_identification import Identification, Identified
+from planner.modal.pole_identification import Identified, PoleIdentification
 from planner.modal.residues import rank_one
 from planner.modal.ringdown import identify_decays
 from planner.recording.records import Channel, TimeRecord
@@ -46,7 +46,7 @@ def analyse_record(
     record: TimeRecord,
     force_channel: str | None = None,
     band_hz: tuple[float, float] | None = None,
-) -> tuple[ModalModel, Identification]:
+) -> tuple[ModalModel, PoleIdentification]:
     """Modes of the free decays after each hit of a record; no use is made of the force's size.
 
     The hits are found in `force_channel` (default: the channel of quantity force, else the only
@@ -193,7 +193,7 @@ def _band(decays: _Decays) -> tuple[float, float]:
 
 def _identify_sound(
     record: TimeRecord, decays: _Decays, band: tuple[float, float], remarks: list[str]
-) -> tuple[_Decays, Identification]:
+) -> tuple[_Decays, PoleIdentification]:
     """Identify, leave out channels that the modes do not explain, identify again."""
     scale = np.std(decays.samples, axis=(1, 2), keepdims=True)
     scale[scale == 0] = 1.0
@@ -217,7 +217,7 @@ def _identify_sound(
     return decays, _rescaled(found, scale)
 
 
-def _explained(found: Identification, band: tuple[float, float]) -> np.ndarray:
+def _explained(found: PoleIdentification, band: tuple[float, float]) -> np.ndarray:
     """Share of each channel's energy in the band that the modes explain."""
     data = found.data
     inside = (data.frequency_hz >= band[0]) & (data.frequency_hz <= band[1])
@@ -226,7 +226,7 @@ def _explained(found: Identification, band: tuple[float, float]) -> np.ndarray:
     return 1 - error / np.sum(np.abs(data.response[..., inside]) ** 2, axis=(1, 2))
 
 
-def _rescaled(found: Identification, scale: np.ndarray) -> Identification:
+def _rescaled(found: PoleIdentification, scale: np.ndarray) -> PoleIdentification:
     factor = scale[:, :, 0]
     modes = tuple(
         replace(m, residue=m.residue * factor, residue_sd=m.residue_sd * factor)

@@ -32,7 +32,7 @@ class Identified:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class PoleIdentification:
     """Modes in increasing frequency, and what they came from."""
 
     modes: tuple[Identified, ...]
@@ -43,7 +43,7 @@ class Identification:
     order: int
 
 
-def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
+def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | None:
     """All modes that the lines of `data` carry, None where there is none."""
     # At least as many lines as half the unknowns of one column need, and once that to spare.
     top = max(2, min(max_order, data.frequency_hz.size // 3))
@@ -61,7 +61,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> Identification | None:
     modes = _modes(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))
-    return Identification(modes, data, found, fitted, relative, top) if modes else None
+    return PoleIdentification(modes, data, found, fitted, relative, top) if modes else None
 
 
 def ladder(top: int) -> tuple[int, ...]:

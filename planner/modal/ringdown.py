@@ -8,7 +8,7 @@ FRFs serves unchanged, the decays taking the place of hit directions.
 import numpy as np
 
 from planner.modal.fit_data import Data
-from planner.modal.pole_identification import Identification, identify
+from planner.modal.pole_identification import PoleIdentification, identify
 
 # Poles of higher orders than this do not help with a handful of channels.
 MAX_ORDER = 30
@@ -22,7 +22,7 @@ def identify_decays(
     sampling_rate_hz: float,
     band_hz: tuple[float, float],
     max_order: int = MAX_ORDER,
-) -> Identification | None:
+) -> PoleIdentification | None:
     """Modes of simultaneous channels over several decays, None where there is none.
 
     samples (channels, decays, n). Means are taken off; slower drifts stay below the band.

@@ -10,7 +10,7 @@ import rerun.urdf as rru
 from rerun.chunk import Chunk
 
 from planner.robot.robot import Robot
-from planner.robot.skeleton import Body, bodies
+from planner.robot.skeleton import BodyShape, bodies
 from planner.robot.urdf import find_mesh
 
 WORLD = "tf#/"  # Rerun's frame of the root entity, in which entities lie that name no frame
@@ -63,7 +63,7 @@ class RobotDrawing:
         """Rerun's name of a link's frame."""
         return f"{self._tree.frame_prefix or ''}{link}"
 
-    def _capsules(self, body: Body) -> None:
+    def _capsules(self, body: BodyShape) -> None:
         path = f"robot/capsules/{body.link}"
         self._stream.log(path, rr.CoordinateFrame(self._frame(body.link)), static=True)
         capsules = rr.Capsules3D(

@@ -11,7 +11,7 @@ APART_M = 1e-6  # joints nearer than this lie at one point
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class BodyShape:
     """What turns with one joint: a link, and all that hang on it by fixed joints.
 
     `ends_m` (n, 3) says where, in the frame of `link`, the next joints and the tcp are; its own
@@ -23,16 +23,16 @@ class Body:
     ends_m: np.ndarray
 
 
-def bodies(robot: Robot) -> tuple[Body, ...]:
+def bodies(robot: Robot) -> tuple[BodyShape, ...]:
     """The base, then one body a joint in the robot's order."""
     return tuple(_body(robot, number) for number in range(robot.model.njoints))
 
 
-def _body(robot: Robot, number: int) -> Body:
+def _body(robot: Robot, number: int) -> BodyShape:
     model, tcp = robot.model, robot.model.frames[robot.tcp_id]
     frames = [f for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint == number]
     ends = [model.jointPlacements[k].translation for k in model.children[number]]
     ends += [tcp.placement.translation] if tcp.parentJoint == number else []
     apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
     links = tuple(frame.name for frame in frames)
-    return Body(links[0], links, np.array(apart or [np.zeros(3)]))
+    return BodyShape(links[0], links, np.array(apart or [np.zeros(3)]))

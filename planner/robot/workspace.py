@@ -14,7 +14,7 @@ from planner.robot.robot import Robot
 TRIES = 4  # points tried per candidate wanted, before a sparse workspace is accepted as such
 
 
-class WorkspaceTable(Protocol):
+class WorkspaceRanges(Protocol):
     """The [workspace] table of campaign.toml."""
 
     @property
@@ -50,7 +50,7 @@ class Workspace:
     tool_axis: np.ndarray | None = None  # None: joint box
 
     @classmethod
-    def from_table(cls, table: WorkspaceTable, robot: Robot) -> "Workspace":
+    def from_table(cls, table: WorkspaceRanges, robot: Robot) -> "Workspace":
         """From campaign.toml; InputError where the table does not suit the robot."""
         if table.joints_deg is not None:
             return _joint_box(cls, table.joints_deg, robot)

@@ -61,7 +61,7 @@ class Handling:
         direction = np.deg2rad(angle_deg) * across * rng.standard_normal(3)
         return Aim(direction, offset_m * across * rng.standard_normal(3))
 
-    def chain(self, rng: np.random.Generator) -> "Chain":
+    def chain(self, rng: np.random.Generator) -> "MeasuringChain":
         """A measuring chain within its tolerances."""
         turn = Rotation.from_rotvec(np.deg2rad(self.mounting_deg) * rng.standard_normal(3))
         cross = self.cross_axis * rng.standard_normal((3, 3)) * (1 - np.eye(3))
@@ -69,11 +69,11 @@ class Handling:
         x, y, z = self.position_m * rng.standard_normal(3)
         force = 1 + self.force_gain * float(rng.standard_normal())
         delay = abs(self.delay_s * float(rng.standard_normal()))
-        return Chain(matrix, (float(x), float(y), float(z)), force, delay)
+        return MeasuringChain(matrix, (float(x), float(y), float(z)), force, delay)
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class MeasuringChain:
     """x' = matrix · x of the accelerations; the sensor sits `offset_m` beside where it is stated.
 
     The force is shown `force_gain` times as large as it is, accelerations come `delay_s` late.

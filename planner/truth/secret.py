@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from planner.errors import InputError
 from planner.truth.deviation import Deviation
-from planner.truth.handling import Aim, Chain
+from planner.truth.handling import Aim, MeasuringChain
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, SimulatedHit, pulse, sampled
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, respond, structural
@@ -71,7 +71,7 @@ class Secret:
     drift: StiffnessDrift | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)
-    chain: Chain = field(default_factory=Chain)
+    chain: MeasuringChain = field(default_factory=MeasuringChain)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from planner.identification.measurement_model import (
 )
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
-from planner.truth.handling import Aim, Chain
+from planner.truth.handling import Aim, MeasuringChain
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.model import load_truth
 from planner.truth.secret import HitVisit, Secret, hit_poses
@@ -99,7 +99,7 @@ def missed(robot_toml, tmp_path_factory):
     """Visits of a linear robot hit at three force levels, each hit off by 2° and 5 mm."""
     rng = np.random.default_rng(3)
     truth = load_truth(robot_toml, Deviation(stiffness=0.1, damping=0.1, seed=4))
-    secret = Secret(truth.deviation, chain=Chain())
+    secret = Secret(truth.deviation, chain=MeasuringChain())
     hammer, shots = Hammer(150.0, 0.006, noise=0.01), []
     shots = [(f"+{a}", 150.0 * k) for a in "xyz" for k in (0.4, 1.0, 2.5)]
     visits, aims = [], []

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.pole_identification import Identification
+from planner.modal.pole_identification import PoleIdentification
 from planner.modal.ringdown import MAX_ORDER, identify_decays
 
 
@@ -61,7 +61,7 @@ def ringdown(
 
 
 def amplitudes(
-    pole: complex, residue: np.ndarray, found: Identification, samples: int
+    pole: complex, residue: np.ndarray, found: PoleIdentification, samples: int
 ) -> np.ndarray:
     """Complex amplitude (channels, decays) at the first of so many samples: x ≈ Re(A e^{λt})."""
     step = found.data.step_s or 0.0
