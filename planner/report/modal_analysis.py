@@ -17,7 +17,7 @@ from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
-from planner.modal.pole_identification import Identification
+from planner.modal.pole_identification import PoleIdentification
 from planner.recording.folder import files_in
 from planner.recording.records import FrfRecord
 from planner.report.answer import Answer, RefusedFile
@@ -190,7 +190,7 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
 def _draw(
     pictures: Pictures,
     frf: Frf | None,
-    found: Identification | None,
+    found: PoleIdentification | None,
     modal: ModalModel,
     accepted: Sequence[str],
     simulated: bool,

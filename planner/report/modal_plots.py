@@ -13,7 +13,7 @@ from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
-from planner.modal.pole_identification import Identification
+from planner.modal.pole_identification import PoleIdentification
 from planner.modal.stabilisation import stable
 from planner.report.frf_plots import AXES, MEASURED, MODEL
 from planner.report.plot_marks import (
@@ -36,7 +36,7 @@ FITTED = {"color": MODEL, "lw": 1.2}
 
 
 def modal_figures(
-    frf: Frf | None, found: Identification, modal: ModalModel, name: str, simulated: bool
+    frf: Frf | None, found: PoleIdentification, modal: ModalModel, name: str, simulated: bool
 ) -> dict[str, Figure]:
     """Every picture of one pose by its name; without an FRF only those that need none."""
     mark = "SIMULATED recordings · " if simulated else ""
@@ -54,7 +54,7 @@ def modal_figures(
 
 
 def stabilisation_figure(
-    found: Identification, modal: ModalModel, title: str = "", scaled: bool = True
+    found: PoleIdentification, modal: ModalModel, title: str = "", scaled: bool = True
 ) -> Figure:
     """Poles of all model orders (right axis) over the singular values of the responses (left).
 
@@ -104,7 +104,7 @@ def cmif_figure(
     return figure
 
 
-def _poles(found: Identification) -> tuple[np.ndarray, np.ndarray]:
+def _poles(found: PoleIdentification) -> tuple[np.ndarray, np.ndarray]:
     """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others."""
     lines = stable(found.diagram)
     kept = {(int(o), complex(p)) for x in lines for o, p in zip(x.orders, x.poles, strict=True)}
@@ -118,7 +118,9 @@ def _poles(found: Identification) -> tuple[np.ndarray, np.ndarray]:
     return stays, moves
 
 
-def matrix_figure(frf: Frf, found: Identification, modal: ModalModel, title: str = "") -> Figure:
+def matrix_figure(
+    frf: Frf, found: PoleIdentification, modal: ModalModel, title: str = ""
+) -> Figure:
     """Magnitude and phase of every response to every hit axis, measured ± 2 sd, and the fit.
 
     The variance E|δH|² of a complex line is shared by its two parts, so that its magnitude has
