@@ -64,20 +64,25 @@ def tolerances_of(simulation: Simulation) -> Tolerances:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation."""
+    """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation.
+
+    Where it is `exact`, hits are taken to be on their axes and the measuring chain to be perfect.
+    """
 
     frfs: tuple[Frf, ...]
     q: np.ndarray
     simulation: Simulation
     band_hz: tuple[float, float]
     priors: Priors = PRIORS
+    exact: bool = False
 
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
         body, measured = _prepared(self, effect), _measured(self, grade)
         setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
         inertias, p = body.inertias, body.parametrisation
-        kind = grade.logarithmic, grade.inertial, tolerances_of(self.simulation)
+        tolerances = None if self.exact else tolerances_of(self.simulation)
+        kind = grade.logarithmic, grade.inertial, tolerances
         return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
 
     def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:
