@@ -14,12 +14,14 @@ from functools import partial
 from itertools import permutations
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from planner.design.frequency_posterior import AXES
 from planner.design.parameter_sensitivity import FrfNoise
-from planner.diagnosis.linear.fit import Fit, Problem, carried_on
+from planner.diagnosis.linear.fit import Fit, Problem, carried_on, tolerances_of
 from planner.diagnosis.linear.predict import misfit_at
 from planner.frf.frf import Frf
+from planner.identification.measurement_model import OPEN, basis
 from planner.inference.parallel import side_by_side
 
 FRF_LINES = 96  # lines over the band at which FRFs are compared, evenly spaced
@@ -142,18 +144,30 @@ def separation(
     lines = np.linspace(*problem.band_hz, FRF_LINES)
     # Lines closer than those of a record are not measured apart; farther ones stand for several.
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
-    known = [fit.precision(temper) for fit in fits]
+    open_ = 0 if problem.exact else OPEN
+    known = [np.asarray(block_diag(fit.precision(temper), np.eye(open_))) for fit in fits]
     rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):
-        predicted = [
-            tuple(
-                one[0] for one in misfit_at(problem, f.effect, row[None], lines, rate).response(f.x)
-            )
-            for f in fits
-        ]
+        predicted = [_predicted(problem, f, row, lines, rate) for f in fits]
         scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in predicted]
         gain[place] = expected_log_odds(predicted, scales, known, share)
     return gain
+
+
+def _predicted(
+    problem: Problem, found: Fit, q: np.ndarray, lines: np.ndarray, rate_1_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """FRF (3, 3, F) of a fit at q (dof,), and its derivatives (D, 3, 3, F).
+
+    By what hit and measuring chain leave open, too, in sds: a hit is never told as well as its
+    noise allows.
+    """
+    misfit = misfit_at(problem, found.effect, q[None], lines, rate_1_s)
+    h, slope, turned = misfit.parts(found.x)
+    if problem.exact:
+        return h[0], slope[0]
+    left_open = basis(h, turned, misfit.setting.s, tolerances_of(problem.simulation))
+    return h[0], np.concatenate([slope[0], left_open[0]])
 
 
 def expected_log_odds(

@@ -50,6 +50,7 @@ class Tolerances:
 
 
 EVERYDAY = Tolerances()
+OPEN = 26  # numbers a pose: 4 of each hit axis, 14 of the chain
 
 
 def hit_basis(h: np.ndarray, moment: np.ndarray, t: Tolerances) -> np.ndarray:

@@ -34,17 +34,26 @@ def response(problem, found, q):
     return misfit_at(problem, found.effect, q[None], LINES).response(found.x)[0][0]
 
 
-@pytest.fixture(scope="module")
-def tied(tmp_path_factory):
-    """Two candidates fitted to recordings in which neither is."""
+def two_candidates(tmp_path_factory, exact):
+    """Two candidates fitted to recordings in which neither is; with exact hits or a hand's."""
     simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("robot"))))
     q = KR210.poses(3, 5)
     rng = np.random.default_rng(0)
     frfs = tuple(measured(h, SD, rng) for h in simulation.accelerance(q, LINES))
-    problem = Problem(frfs, q, simulation, (6.0, 60.0))
+    problem = Problem(frfs, q, simulation, (6.0, 60.0), exact=exact)
     all_ = {(e.name, e.at): e for e in library(simulation)}
     chosen = [all_[("added_mass", at)] for at in ("link_5", "link_6")]
     return problem, [settle(problem, fit(problem, effect), FINE) for effect in chosen]
+
+
+@pytest.fixture(scope="module")
+def tied(tmp_path_factory):
+    return two_candidates(tmp_path_factory, False)
+
+
+@pytest.fixture(scope="module")
+def tied_by_exact_hits(tmp_path_factory):
+    return two_candidates(tmp_path_factory, True)
 
 
 def test_the_same_candidate_twice_cannot_be_told_apart(tied):
@@ -58,9 +67,12 @@ def test_one_candidate_has_no_rival(tied):
     assert not separation(problem, [first], [1.0], KR210.poses(2, 9), 1.0).any()
 
 
-def test_what_is_expected_happens(tied):
+# Fits bend, and stand on fewer lines than were reckoned with; where hits may miss, the rough
+# expectation is the farther above, and only says which hits are tried.
+@pytest.mark.parametrize(("hits", "least"), [("tied_by_exact_hits", 0.6), ("tied", 0.5)])
+def test_what_is_expected_happens(request, hits, least):
     """A hit is added that one of the two predicts, and both are fitted anew."""
-    problem, (light, heavy) = tied
+    problem, (light, heavy) = request.getfixturevalue(hits)
     moved = np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0])
     true = replace(heavy, x=moved)
     poses, rng = KR210.poses(4, 9), np.random.default_rng(1)
@@ -79,8 +91,7 @@ def test_what_is_expected_happens(tied):
             happened = value(after) - value(before)
             ratios.append(happened / told[axis])
     print(np.round(ratios, 2))
-    # Fits bend, and stand on fewer lines than were reckoned with.
-    assert 0.6 < np.median(ratios) < 1.4
+    assert least < np.median(ratios) < 1.4
     assert np.ptp(np.log(ratios)) < np.log(4)
 
 

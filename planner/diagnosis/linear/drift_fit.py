@@ -20,7 +20,7 @@ class DriftMisfit(Misfit):
 
     order: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def _parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
+    def parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
         assert isinstance(self.effect, Drift)
         p, (a, b) = self.parametrisation, self.split
         elasticity = p.elasticity(x[:a])

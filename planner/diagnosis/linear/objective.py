@@ -114,9 +114,10 @@ class Misfit:
 
     def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs as they would be measured (n, 3, 3, F), and derivatives (n, free, 3, 3, F)."""
-        return self._parts(x)[:2]
+        return self.parts(x)[:2]
 
-    def _parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
+    def parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
+        """As `response`, and responses to moments and the turning of the sensor."""
         p, (a, b), s = self.parametrisation, self.split, self.setting.s
         psi = x[b:]
         rate = self.effect.rate(psi)
@@ -152,7 +153,7 @@ class Misfit:
 
     def by_pose(self, x: np.ndarray) -> ByPose:
         """Misfit of each pose at x."""
-        h, slope, turned = self._parts(x)
+        h, slope, turned = self.parts(x)
         residual, slope = self._residual(h, slope)
         if self.tolerances is not None and not self.logarithmic:
             return self._marginal(x, h, turned, residual, slope)
