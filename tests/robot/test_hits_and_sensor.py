@@ -1,0 +1,45 @@
+"""[hits] and [sensor]: what robot.toml and campaign.toml say of hand and sensor."""
+
+import numpy as np
+import pytest
+
+from planner.campaign.cell import Cell
+from planner.campaign.config import load_campaign_config
+from planner.diagnosis.linear.fit import tolerances_of
+from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
+from planner.robot.robot import Robot
+from tests.support.known_robots import KR10
+
+
+def test_a_steady_hand_and_a_good_sensor_are_stated_in_robot_toml(tmp_path):
+    path = KR10.write(tmp_path)
+    usual = tolerances_of(Simulation(Robot.load(path)))
+    assert usual.angle_rad == pytest.approx(np.deg2rad(2.0))
+    assert usual.offset_m == pytest.approx(5e-3)
+    path.write_text(
+        path.read_text() + "\n[hits]\nangle_sd_deg = 0.5\n[sensor]\nposition_sd_mm = 2\n"
+    )
+    stated = tolerances_of(Simulation(Robot.load(path)))
+    assert stated.angle_rad == pytest.approx(np.deg2rad(0.5))
+    assert stated.offset_m == usual.offset_m
+    assert stated.position_m == pytest.approx(2e-3)
+
+
+@pytest.mark.parametrize("value", ["-1.0", "nan", "1000.0"])
+def test_what_no_sd_can_be_is_refused_by_name(tmp_path, value):
+    path = KR10.write(tmp_path)
+    path.write_text(path.read_text() + f"\n[hits]\noffset_sd_mm = {value}\n")
+    with pytest.raises(InputError, match=r"\[hits\] offset_sd_mm"):
+        Robot.load(path)
+
+
+def test_a_campaign_goes_before_its_robot(tmp_path):
+    path = KR10.write(tmp_path / "robot")
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text(KR10.campaign() + "\n[hits]\nangle_sd_deg = 1.0\n")
+    cell = Cell.load(path, load_campaign_config(campaign))
+    assert tolerances_of(Simulation(cell.robot)).angle_rad == pytest.approx(np.deg2rad(1.0))
+    campaign.write_text(KR10.campaign() + "\n[sensor]\ngain_sd_percent = -2\n")
+    with pytest.raises(InputError, match=r"campaign.toml: \[sensor\] gain_sd_percent"):
+        load_campaign_config(campaign)
