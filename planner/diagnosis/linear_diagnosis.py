@@ -9,7 +9,7 @@ import numpy as np
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.evidence import Weights, weigh
-from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle
+from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle, tolerances_of
 from planner.diagnosis.linear.search import Found, search
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
 from planner.dynamics.simulation import Simulation
@@ -138,8 +138,8 @@ def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
 
 def _told_of(found: Fit, temper: float) -> tuple[Effect, ...]:
     """The effects of a fit without artefacts as small as every measuring chain has them."""
-    parts = found.effect.parts()
-    kept = tuple(p for p in parts if not (p.artefact and p.usual(found.parameters(temper, p))))
+    parts, t = found.effect.parts(), tolerances_of(found.misfit.setting.simulation)
+    kept = tuple(p for p in parts if not (p.artefact and p.usual(found.parameters(temper, p), t)))
     return kept or (Effect(""),)
 
 

@@ -49,7 +49,6 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-EVERYDAY = Tolerances()
 OPEN = 26  # numbers a pose: 4 of each hit axis, 14 of the chain
 
 

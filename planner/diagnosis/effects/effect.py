@@ -8,6 +8,7 @@ import numpy as np
 from planner.diagnosis.thresholds import NOTHING
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
+from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Priors
 
 
@@ -102,8 +103,8 @@ class Effect:
         """ψ (k, p) from which it is fitted."""
         return np.array([[q.mean for q in self.quantities]])
 
-    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
-        """Whether an artefact of these parameters is as small as every measuring chain has it."""
+    def usual(self, values: dict[str, tuple[float, float, str]], t: Tolerances) -> bool:
+        """Whether an artefact of these parameters lies within the tolerances of hits and chain."""
         return False
 
     def parts(self) -> "tuple[Effect, ...]":

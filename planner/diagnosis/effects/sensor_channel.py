@@ -7,7 +7,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import USUAL
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import EVERYDAY
+from planner.identification.measurement_model import Tolerances
 
 AXES = "xyz"
 
@@ -38,9 +38,9 @@ class SensorGain(Effect):
         value, sd, _ = values["gain"]
         return f"Channel {self.at} shows {value:.3g} ± {sd:.1g} times too much: check calibration."
 
-    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
+    def usual(self, values: dict[str, tuple[float, float, str]], t: Tolerances) -> bool:
         """See `Effect.usual`."""
-        return abs(np.log(values["gain"][0])) < USUAL * EVERYDAY.gain
+        return abs(np.log(values["gain"][0])) < USUAL * t.gain
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,9 @@ class ChannelDelay(Effect):
             f"filters and sampling of the channels."
         )
 
-    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
+    def usual(self, values: dict[str, tuple[float, float, str]], t: Tolerances) -> bool:
         """See `Effect.usual`."""
-        return abs(values["delay"][0]) < USUAL * EVERYDAY.delay_s
+        return abs(values["delay"][0]) < USUAL * t.delay_s
 
 
 def _ones(s: np.ndarray) -> np.ndarray:

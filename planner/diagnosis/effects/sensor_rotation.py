@@ -7,7 +7,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import SENSOR_ROTATION_SD_DEG, USUAL
 from planner.dynamics.simulation import Simulation
-from planner.identification.measurement_model import EVERYDAY
+from planner.identification.measurement_model import Tolerances
 
 
 @dataclass(frozen=True)
@@ -44,10 +44,10 @@ class SensorRotation(Effect):
         told = ", ".join(f"{np.rad2deg(v):.1f}°" for v, _, _ in values.values())
         return f"The sensor is turned by {told} about its x, y and z axes: check how it sits."
 
-    def usual(self, values: dict[str, tuple[float, float, str]]) -> bool:
+    def usual(self, values: dict[str, tuple[float, float, str]], t: Tolerances) -> bool:
         """See `Effect.usual`."""
         angle = np.linalg.norm([value for value, _, _ in values.values()])
-        return bool(angle < USUAL * EVERYDAY.mounting_rad)
+        return bool(angle < USUAL * t.mounting_rad)
 
 
 def _turn(axis: int, angle: float) -> np.ndarray:

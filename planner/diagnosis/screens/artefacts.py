@@ -18,7 +18,7 @@ from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.sensor_chain import SensorChain
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.fit import Problem, fit
+from planner.diagnosis.linear.fit import Problem, fit, tolerances_of
 from planner.diagnosis.screens.exponential_window import screen_window
 from planner.diagnosis.thresholds import (
     ALIKE,
@@ -33,7 +33,7 @@ from planner.diagnosis.thresholds import (
 )
 from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band
-from planner.identification.measurement_model import EVERYDAY
+from planner.identification.measurement_model import Tolerances
 from planner.inference.evidence import laplace, savage_dickey, temper
 from planner.recording.records import AXES, Hit
 
@@ -98,8 +98,10 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     told = window is not None and window.log_evidence > CLEAR
     found = [window] if window is not None and told else []
     clean = correct(recorded, found)
-    chain = measure_chain(clean, nominal)
-    return tuple(f for f in (*found, _delay(chain), _matrix(chain)) if f and f.log_evidence > CLEAR)
+    chain, t = measure_chain(clean, nominal), tolerances_of(nominal)
+    return tuple(
+        f for f in (*found, _delay(chain, t), _matrix(chain, t)) if f and f.log_evidence > CLEAR
+    )
 
 
 def measure_chain(recorded: Dataset, nominal: Simulation) -> Chain:
@@ -132,9 +134,9 @@ def _off(chain: Chain, bounds: tuple[float, float]) -> float:
     return float(np.hypot(low, high * np.sqrt(chain.misfit / CHAIN_MISFIT)))
 
 
-def _delay(chain: Chain) -> Finding | None:
+def _delay(chain: Chain, t: Tolerances) -> Finding | None:
     sd = float(np.hypot(chain.delay_sd_s, _off(chain, DELAY_OFF_S)))
-    usual = float(np.hypot(sd, EVERYDAY.delay_s))  # what every chain has is no artefact
+    usual = float(np.hypot(sd, t.delay_s))  # what every chain has is no artefact
     evidence = min(savage_dickey(chain.delay_s, usual, DELAY_SD_S), chain.gain)
     text = (
         f"All responses come {1e3 * chain.delay_s:.3g} ± {1e3 * sd:.1g} ms after the force: the "
@@ -143,8 +145,8 @@ def _delay(chain: Chain) -> Finding | None:
     return Finding("channel_delay", "sensor", evidence, {"delay": (chain.delay_s, sd, "s")}, text)
 
 
-def _matrix(chain: Chain) -> Finding | None:
-    usual = np.where(np.eye(3), EVERYDAY.gain, EVERYDAY.across).ravel()
+def _matrix(chain: Chain, t: Tolerances) -> Finding | None:
+    usual = np.where(np.eye(3), t.gain, t.across).ravel()
     covariance = chain.covariance + _off(chain, MATRIX_OFF) ** 2 * np.eye(9) + np.diag(usual**2)
     weight = np.linalg.cholesky(np.linalg.inv(covariance)).T
     read = [_read(kind, chain.matrix, weight) for kind in KINDS]
