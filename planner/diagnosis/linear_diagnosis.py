@@ -100,7 +100,7 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
     weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
     candidates = _candidates(found, weights, all_)
-    likeliest = found.finalists[int(np.argmax(weights.log_evidence))]
+    likeliest = found.finalists[weights.likeliest]
     best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
     return Diagnosis(

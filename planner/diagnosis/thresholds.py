@@ -59,11 +59,22 @@ LAW_FARTHEST = 6.0  # prior sds (of ln a: units) beyond which no law is looked f
 
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
 NOISE_OVERSTATED = 0.3  # misfit below which noise is not believed to be overstated; chosen
-TOLERATED = 1.2  # misfit that nuisances leave where the physics is right; on generated cases
-UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each; chosen
-# Share of χ² that some background gains as well: up to it a gain counts nothing, from 2 × it whole.
-# A spring that differs by 1 % at two poses takes as much; on generated cases.
-SLIGHT_GAIN = 0.01
+# Sizes τ of the discrepancy that is inferred (`linear.discrepancy`): relative sd by which a spring
+# differs from pose to pose; of dampers DAMPERS times as much, as damping of joints scatters in the
+# literature. Where nothing unknown is there, sizes up to USUAL are alike, and beyond it a normal
+# law of ln τ, sd FACTOR, takes over; where something is, the same below UNKNOWN. Chosen.
+DISCREPANCIES = 0.0, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1
+DISCREPANCY_USUAL, DISCREPANCY_UNKNOWN, DISCREPANCY_FACTOR = 3e-3, 1e-2, 2.0
+DAMPERS = 10.0
+CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose to pose; chosen
+# How much may be left, relative to what was recorded and once misses are out, where nothing unknown
+# is there: without any effect what does not matter; with one, this share of what refitting left.
+# Beyond, it is less likely by a normal law of ln(left), sd ln LEFT_FACTOR; the same below MATTERS
+# where something unknown is there. Chosen.
+MATTERS = 0.03
+LEFT_SHARE, LEFT_LEAST = 0.15, 0.005
+LEFT_FACTOR = 1.5
+SOMETHING_UNKNOWN = 0.05  # probability, before any data, that something of no library is there
 INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed; chosen
 LAW_UNEXPLAINED = 1e-3  # of the levels' excess of χ², that no law can be expected to explain
 LAW_MODEL_ERROR = 0.01  # relative sd of an FRF, and of a difference, fitted in time; chosen
@@ -74,9 +85,6 @@ LAW_DIFFERENCE_ERROR = 0.003  # of the FRFs between which the difference is take
 CLEAR = 8.0  # log evidence from which a screen's finding is told: odds of 3000; chosen
 TIED = 0.05  # probability that keeps a candidate in the set the data cannot tell apart
 SUREST_SCREEN = 0.98  # screens approximate: none is surer than they were right on concealed cases
-# What is said first is never said surer than it was right: in 392 of the 433 concealed cases (seeds
-# 11001 to 16001) in which it was said with 90 % or more, before the latest had taught anything.
-SUREST = 0.92
 AT_NOISE = 1.15  # χ² per value at which nothing is left for a second effect to explain
 CLEARLY_WRONG = 3.0  # χ² per value from which a few poses are enough for a first look
 PAYS = 1.5  # factor by which one more effect has to lower χ² per value; on generated cases

@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
-from planner.diagnosis.thresholds import ARTEFACTS, SCREEN_PRIOR, SUREST, SUREST_SCREEN, UNKNOWN
+from planner.diagnosis.thresholds import ARTEFACTS, SCREEN_PRIOR, SUREST_SCREEN, UNKNOWN
 from planner.inference.evidence import probability as posterior
 
 Place = tuple[str, str | None]
@@ -80,23 +80,12 @@ def together(
             rest = tuple(p for p in places if p not in way and p not in own)
             key = places if unknown else (way + rest) or (("none", None),)
             out[key] = out.get(key, 0.0) + share * weight * part
-    candidates = _honest([Ranked(places, p) for places, p in out.items()])
+    ranked_all = [Ranked(places, p) for places, p in out.items()]
+    candidates = sorted(ranked_all, key=lambda r: -r.probability)
     first = candidates[0].places[0][0]
     verdict = {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
     told = tuple((f, p * (1.0 - sum(share for _, share in f.rivals))) for f, p in known)
     return Together(verdict, tuple(candidates), told, linear)
-
-
-def _honest(ranked: list[Ranked]) -> list[Ranked]:
-    """Most probable first, SUREST at most; the rest goes to "unknown", or from it to the next."""
-    first = max(ranked, key=lambda r: r.probability)
-    rest = max(first.probability - SUREST, 0.0)
-    others = [r for r in ranked if r is not first]
-    unknown = next((r for r in others if r.places == ((UNKNOWN, None),)), None)
-    heir = unknown or max(others, key=lambda r: r.probability)
-    given = {first.places: first.probability - rest, heir.places: heir.probability + rest}
-    out = [Ranked(r.places, given.get(r.places, r.probability)) for r in ranked]
-    return sorted(out, key=lambda r: -r.probability)
 
 
 def _linear(candidates: Sequence[Candidate]) -> tuple[tuple[tuple[Place, ...], float], ...]:

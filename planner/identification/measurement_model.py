@@ -49,7 +49,9 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-OPEN = 26  # numbers a pose: 4 of each hit axis, 14 of the chain
+HIT_COLUMNS = 12  # open numbers of a pose's hits, 4 of each axis; those of the chain follow
+CHAIN_COLUMNS = 14
+OPEN = HIT_COLUMNS + CHAIN_COLUMNS  # numbers that a pose leaves open
 
 
 def hit_basis(h: np.ndarray, moment: np.ndarray, t: Tolerances) -> np.ndarray:
@@ -86,10 +88,42 @@ def chain_basis(h: np.ndarray, turning: np.ndarray, s: np.ndarray, t: Tolerances
 def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.ndarray:
     """All of them of the poses, (n, 26, 3, 3, F)."""
     n, _, _, lines = h.shape
-    hits = np.zeros((n, 12, 3, 3, lines), dtype=complex)
+    hits = np.zeros((n, HIT_COLUMNS, 3, 3, lines), dtype=complex)
     for axis, columns in enumerate(np.moveaxis(hit_basis(h, turned.moment, t), 1, 0)):
         hits[:, 4 * axis : 4 * axis + 4, :, axis] = columns
     return np.concatenate([hits, chain_basis(h, turned.turning, s, t)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class ChainTransfer:
+    """What a chain shows whose numbers are known: `scale` (n, F) times `matrix` (3, 3).
+
+    `place` (3,) is where the sensor is, in m from where it is said to be.
+    """
+
+    matrix: np.ndarray
+    scale: np.ndarray
+    place: np.ndarray
+
+    @classmethod
+    def of(cls, numbers: np.ndarray, s: np.ndarray, t: Tolerances) -> "ChainTransfer":
+        """Of 14 numbers in sds, in the order of `chain_basis`, at s (n, F) in rad/s."""
+        matrix = np.eye(3) + np.where(np.eye(3), t.gain, t.across) * numbers[:9].reshape(3, 3)
+        scale = (1 + t.force_gain * numbers[12]) * np.exp(-t.delay_s * numbers[13] * s)
+        return cls(matrix, scale, t.position_m * numbers[9:12])
+
+    def of_accelerations(self, values: np.ndarray) -> np.ndarray:
+        """What is shown of accelerations (n, …, 3, 3, F), those of the responses third to last."""
+        lines = values.shape[-1]
+        flat = values.reshape(*values.shape[:-2], 3 * lines)
+        scale = self.scale.reshape(len(self.scale), *[1] * (values.ndim - 2), lines)
+        return (self.matrix @ flat).reshape(values.shape) * scale
+
+    def shown(self, h: np.ndarray, turned: Turned) -> tuple[np.ndarray, Turned]:
+        """FRFs (n, 3, 3, F) as the chain shows them, and what goes with them."""
+        beside = np.cross(np.moveaxis(turned.turning, 1, -1), self.place)
+        whole = self.of_accelerations(h + np.moveaxis(beside, -1, 1))
+        return whole, Turned(*map(self.of_accelerations, (turned.moment, turned.turning)))
 
 
 @dataclass(frozen=True, eq=False)

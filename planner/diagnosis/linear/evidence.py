@@ -6,13 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, log_sum
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import (
     ALIKE,
+    LEFT_FACTOR,
+    LEFT_LEAST,
+    LEFT_SHARE,
+    MATTERS,
     NOISE_OVERSTATED,
-    SLIGHT_GAIN,
-    TOLERATED,
-    UNKNOWN_PARAMETERS,
+    SOMETHING_UNKNOWN,
 )
 from planner.inference.evidence import bootstrapped, shared_noise, temper
 
@@ -31,48 +34,57 @@ def temper_of(fits: Sequence[Fit]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Probabilities of the fits, in their order, then of "unknown"; T; log evidence of the fits."""
+    """Probabilities of the fits, in their order, then of "unknown"; T; what each fit is worth."""
 
     probabilities: np.ndarray
     temper: float
-    log_evidence: np.ndarray
+    worth: tuple[Worth, ...]
+
+    @property
+    def likeliest(self) -> int:
+        """Number of the fit with the most evidence."""
+        return int(np.argmax([w.log_evidence for w in self.worth]))
 
 
 def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights:
-    """Tempered evidence, averaged over which poses might have been taken; the first fit is "none".
+    """Evidence with the discrepancy inferred anew for each, averaged over which poses there are.
 
-    `prior` are the weights of the fits before any data, in their order.
+    The first fit is "none"; `prior` are the weights of the fits before any data. Each fit is there
+    alone, or beside something unknown: how much it leaves tells which.
     """
-    t = temper_of(fits)
-    own = np.array([f.data.chi2 for f in fits])
-    chi2 = _without_slight(fits, own)
-    slight = (chi2 - own).sum(axis=1) / (2 * t)
-    evidence = np.array([f.log_evidence(t) for f in fits]) - slight + np.log(prior)
-    count = float(fits[0].misfit.counts.sum())
-    charge = UNKNOWN_PARAMETERS / 2 * np.log(max(count / t, 2.0))
-    # Springs that a fit has bent to imitate what is not known cost that fit, not the unknown.
-    unknown = -TOLERATED * count / (2 * t) - charge + max(_volume(f, t) for f in fits)
-    shares = bootstrapped(chi2, evidence, t, unknown, BOOTSTRAPS, seed)
-    return Weights(shares, t, evidence)
+    springs = [p.name for p in fits[0].misfit.parametrisation.parameters]
+    products = [InnerProducts.of(f, springs) for f in fits]
+    measured = fits[0].misfit.measured
+    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
+    shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
+    least = min(p.worth(1.0).per_value for p in products)
+    t = temper(least, 0.0, shared=shared, least=NOISE_OVERSTATED)
+    worth = tuple(p.worth(t) for p in products)
+    left = np.array([w.mismatch.unexplained for w in worth])
+    alone, beside = left_alone(left), left_beside(left)
+    known = np.array([w.log_evidence for w in worth]) + np.log(prior) + alone
+    strange = np.array([w.log_evidence_unknown for w in worth]) + np.log(prior) + beside
+    unknown = log_sum(strange) + float(np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN)))
+    scores = np.array([w.score for w in worth])
+    shares = bootstrapped(scores, known, 1.0, unknown, BOOTSTRAPS, seed)
+    return Weights(shares, t, worth)
 
 
-def _without_slight(fits: Sequence[Fit], chi2: np.ndarray) -> np.ndarray:
-    """χ² (fits, poses), those of the first fit where an effect hardly changes FRFs.
+def left_alone(left: np.ndarray) -> np.ndarray:
+    """Log likelihoods of so much (k,) being left, relative, where nothing unknown is there.
 
-    A simulation is never right to a tenth of the noise, and a spring that differs by 1 % at two
-    poses takes some of that. What widens priors alone gains nothing here and loses nothing.
+    The first is what refitting leaves: that may be what does not matter. What explains takes most
+    of it.
     """
-    out = chi2.copy()
-    for i, f in enumerate(fits):
-        gain = 1 - chi2[i].sum() / chi2[0].sum()
-        if gain > 0 and any(part.quantities for part in f.effect.parts()):
-            out[i] += min(1.0, max(2 * SLIGHT_GAIN / gain - 1, 0.0)) * (chi2[0] - chi2[i])
-    return out
+    least = np.full(len(left), max(LEFT_LEAST, LEFT_SHARE * left[0]))
+    least[0] = MATTERS
+    return -(np.log(np.maximum(left, least) / least) ** 2) / (2 * np.log(LEFT_FACTOR) ** 2)
 
 
-def _volume(fit: Fit, t: float) -> float:
-    """Log evidence of a fit without its χ²: what springs and nuisances cost any candidate."""
-    return fit.log_evidence(t) + float(fit.data.chi2.sum()) / (2 * t)
+def left_beside(left: np.ndarray) -> np.ndarray:
+    """The same where something unknown is: it would not be looked for if it did not matter."""
+    seen = np.clip(left, 1e-6, MATTERS) / MATTERS
+    return -(np.log(seen) ** 2) / (2 * np.log(LEFT_FACTOR) ** 2)
 
 
 def lag(fits: Sequence[Fit]) -> np.ndarray:

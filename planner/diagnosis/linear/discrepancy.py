@@ -1,0 +1,194 @@
+"""What a fit is worth where no simulation is quite right: a discrepancy whose size is inferred.
+
+At each pose on its own, every spring may differ from the robot's by a share τ (1 sd) and every
+damper by DAMPERS τ. FRFs then err smoothly over frequency, in proportion to themselves, and
+otherwise at every pose, as those of a simulation do that leaves small things out. τ is unknown: the
+evidence of a candidate is that of all sizes together (Kennedy and O'Hagan 2001, section 4.3, with
+the discrepancy in the springs instead of the output). So an effect is worth what it says of all
+poses in common, and what wears the discrepancy of each pose away is worth little.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.thresholds import (
+    CHAIN_VARIES,
+    DAMPERS,
+    DISCREPANCIES,
+    DISCREPANCY_FACTOR,
+    DISCREPANCY_UNKNOWN,
+    DISCREPANCY_USUAL,
+)
+from planner.identification.measurement_model import (
+    CHAIN_COLUMNS,
+    HIT_COLUMNS,
+    ChainTransfer,
+    basis,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatch:
+    """Mean squares over those of what was recorded: as it is, without misses, and of noise."""
+
+    whole: float
+    left: float
+    noise: float
+
+    @property
+    def unexplained(self) -> float:
+        """Relative size of what is left beyond noise, once the misses are out: 0.03 is 3 %."""
+        return float(np.sqrt(max(self.left - self.noise, 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class InnerProducts:
+    """Of a fit's residuals, of what each pose leaves open, and of derivatives, pose by pose.
+
+    `products` (n, 1 + l + k + D, …) are those of residual, l open numbers of the pose alone, k of
+    the chain at all poses, and D derivatives by what is `free` in x; `own` (l,) are sds of the open
+    numbers in multiples of τ (springs), 0 where they have their tolerance.
+    """
+
+    fit: Fit
+    products: np.ndarray
+    own: np.ndarray
+    chain: np.ndarray
+    mismatch: Mismatch
+
+    @classmethod
+    def of(cls, fit: Fit, springs: Sequence[str]) -> "InnerProducts":
+        """Of a fit; `springs` may differ from pose to pose.
+
+        Misses of hits and the chain act together, which is of second order: all is taken around
+        the chain that the fit itself tells.
+        """
+        tolerances = fit.misfit.tolerances
+        first = cls.around(fit, springs, np.zeros(0 if tolerances is None else CHAIN_COLUMNS))
+        if tolerances is None:
+            return first
+        return cls.around(fit, springs, first.worth(1.0).chain)
+
+    @classmethod
+    def around(cls, fit: Fit, springs: Sequence[str], chain: np.ndarray) -> "InnerProducts":
+        """Of a fit, around a chain with these numbers."""
+        misfit = fit.misfit
+        h, slope, turned = misfit.parts(fit.x)
+        names = [p.name for p in misfit.parametrisation.parameters]
+        loose = [i for i, name in enumerate(names) if name in springs]
+        own = np.where(["stiffness" in names[i] for i in loose], 1.0, DAMPERS)
+        tolerances = misfit.tolerances
+        if tolerances is not None and chain.any():
+            seen = ChainTransfer.of(chain, misfit.setting.s, tolerances)
+            h, turned = seen.shown(h, turned)
+            slope = seen.of_accelerations(slope)
+        residual = misfit.weight * (h - misfit.measured.accelerance)
+        sloped = misfit.weight[:, None] * slope
+        open_ = np.zeros((len(h), 0, *h.shape[1:]))
+        if tolerances is not None:
+            open_ = misfit.weight[:, None] * basis(h, turned, misfit.setting.s, tolerances)
+        made, sums = [], np.zeros(4)
+        for i in range(len(h)):
+            r, b, j = _real(residual[i][None]), _real(open_[i]), _real(sloped[i])
+            varies = b.copy()
+            varies[HIT_COLUMNS:] *= CHAIN_VARIES
+            rows = np.concatenate([r, varies, j[loose], b[HIT_COLUMNS:], j])
+            made.append(rows @ rows.T)
+            sums += _squares(r[0], b, misfit.weight[i], misfit.measured.accelerance[i])
+        own = np.concatenate([np.zeros(open_.shape[1]), own])
+        share = sums[:3] / max(sums[3], 1e-300)
+        return cls(fit, np.array(made), own, chain, Mismatch(*share.tolist()))
+
+    def worth(self, temper: float) -> "Worth":
+        """Evidence over all sizes, χ² counting 1/`temper`."""
+        each = [self._at(size, temper) for size in DISCREPANCIES]
+        evidence = np.array([one[0] for one in each])
+        likeliest = int(np.argmax(evidence))
+        known, unknown = (log_sum(evidence + p) for p in size_priors())
+        _, score, chi2, step = each[likeliest]
+        values = max(float(self.fit.misfit.counts.sum()), 1.0)
+        size = DISCREPANCIES[likeliest]
+        chain = self.chain + step[: len(self.chain)]
+        return Worth(known, unknown, score, chi2 / values, size, self.mismatch, chain)
+
+    def _at(self, size: float, temper: float) -> tuple[float, np.ndarray, float, np.ndarray]:
+        """Log evidence, −2 ln likelihood (n,) of each pose, χ², and the step, at a `size`.
+
+        By Laplace's method, after one step to the optimum that goes with this size.
+        """
+        misfit, count = self.fit.misfit, len(self.own)
+        scale = np.where(self.own > 0, size * self.own, 1.0)
+        rest = np.r_[0, 1 + count : self.products.shape[1]]
+        left, volume = [], []
+        for product in self.products / temper:
+            inner = scale[:, None] * product[1 : 1 + count, 1 : 1 + count] * scale + np.eye(count)
+            factor = np.linalg.cholesky(inner)
+            onto = np.linalg.solve(factor, scale[:, None] * product[1 : 1 + count][:, rest])
+            left.append(product[np.ix_(rest, rest)] - onto.T @ onto)
+            volume.append(2 * float(np.sum(np.log(np.diagonal(factor)))))
+        whole = np.sum(left, axis=0)
+        free = np.flatnonzero(misfit.free)
+        sd = np.concatenate([np.ones(len(self.chain)), misfit.sd[free]])
+        away = np.concatenate([self.chain, ((self.fit.x - misfit.mean) / misfit.sd)[free]])
+        precision = whole[1:, 1:] * np.outer(sd, sd) + np.eye(len(sd))
+        gradient = whole[1:, 0] * sd + away
+        step = -np.linalg.solve(precision, gradient)
+        # A step too long for what is linear gains at most what there is to gain.
+        gain = min(-0.5 * float(gradient @ step), 0.45 * float(whole[0, 0]))
+        volumes = np.array(volume)
+        evidence = gain - (whole[0, 0] + away @ away + volumes.sum()) / 2
+        evidence -= np.linalg.slogdet(precision)[1] / 2
+        chi2 = np.array([one[0, 0] for one in left])
+        score = chi2 * (1 - 2 * gain / max(chi2.sum(), 1e-300)) + volumes
+        return float(evidence), score, temper * float(chi2.sum() - 2 * gain), step
+
+
+@dataclass(frozen=True, eq=False)
+class Worth:
+    """Log evidence of a fit, with a simulation's usual discrepancy and with that of the unknown.
+
+    −2 ln likelihood (n,) of each pose, what is left of χ² per value, and the chain's numbers are
+    those of the likeliest `size` of the discrepancy.
+    """
+
+    log_evidence: float
+    log_evidence_unknown: float
+    score: np.ndarray
+    per_value: float
+    size: float
+    mismatch: Mismatch
+    chain: np.ndarray
+
+
+def size_priors() -> tuple[np.ndarray, np.ndarray]:
+    """Log probabilities of DISCREPANCIES, where nothing unknown is there and where something is."""
+    sizes = np.maximum(DISCREPANCIES, 1e-6)
+    over = np.log(np.maximum(sizes / DISCREPANCY_USUAL, 1.0)) / np.log(DISCREPANCY_FACTOR)
+    under = np.log(np.minimum(sizes / DISCREPANCY_UNKNOWN, 1.0)) / np.log(DISCREPANCY_FACTOR)
+    return tuple(p - log_sum(p) for p in (-(over**2) / 2, -(under**2) / 2))  # type: ignore
+
+
+def log_sum(values: np.ndarray) -> float:
+    """ln Σ e^values."""
+    most = float(values.max())
+    return most + float(np.log(np.sum(np.exp(values - most))))
+
+
+def _real(values: np.ndarray) -> np.ndarray:
+    """Complex (k, 3, 3, F) as real rows (k, 18 F)."""
+    whole = np.ascontiguousarray(values, dtype=complex)
+    return whole.reshape(len(values), -1).view(float)
+
+
+def _squares(r: np.ndarray, b: np.ndarray, weight: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Sums of squares (m/s²/N)² of a pose: mismatch, the same without misses, noise, recordings."""
+    eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
+    without = (r - eta @ b).view(complex).reshape(weight.shape)
+    used = weight > 0
+    unit = 1 / weight[used]
+    whole = r.view(complex).reshape(weight.shape)
+    parts = np.abs(whole[used] * unit) ** 2, np.abs(without[used] * unit) ** 2, 2 * unit**2
+    return np.array([*(np.sum(part) for part in parts), np.sum(np.abs(measured[used]) ** 2)])
