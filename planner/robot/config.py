@@ -121,6 +121,12 @@ class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     position_sd_mm: float = 10.0
 
 
+class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How well the joint angles of a measurement are known: sd of each joint's readback."""
+
+    joint_sd_deg: float = 0.05
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
@@ -145,6 +151,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     harmonic: tuple[Harmonic, ...] = ()
     hits: HitsTable = HitsTable()
     sensor: SensorTable = SensorTable()
+    readback: ReadbackTable = ReadbackTable()
 
 
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
@@ -189,7 +196,7 @@ def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
     return whole
 
 
-def check_sds(table: HitsTable | SensorTable, where: str) -> None:
+def check_sds(table: HitsTable | SensorTable | ReadbackTable, where: str) -> None:
     """Raise InputError where an sd of a table is no number from 0 to 100."""
     for name in table.__struct_fields__:
         value = getattr(table, name)
@@ -203,6 +210,7 @@ def _check(config: RobotConfig, path: Path) -> None:
     _check_obstacles(config, path)
     check_sds(config.hits, f"{path}: [hits]")
     check_sds(config.sensor, f"{path}: [sensor]")
+    check_sds(config.readback, f"{path}: [readback]")
     margin = config.collision.margin_m
     if not 0 <= margin < 1:
         raise InputError(
