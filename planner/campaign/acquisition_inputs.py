@@ -1,6 +1,7 @@
 """A campaign's model as acquisitions see it: what is open, what matters, what measuring costs."""
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from planner.campaign.cell import Cell
 from planner.campaign.low_fidelity import PRIORS, LowFidelity
@@ -26,7 +27,7 @@ def open_parameters(cell: Cell, low: LowFidelity, noise: FrfNoise | None) -> Ope
     noise = noise or FrfNoise.of((), band, 1.0)
     if learned is None:
         p = parametrise(nominal, PRIORS)
-        known = np.diag(np.concatenate([p.log_sd**2, np.ones(len(p.nuisances))]))
+        known = np.asarray(block_diag(p.covariance, np.eye(len(p.nuisances))))
         return OpenParameters(nominal, p, known, noise, band)
     p, found = parametrise(learned.structure.simulation, learned.priors), learned.identified
     return OpenParameters(found.simulation, p, found.covariance, noise, band)

@@ -141,7 +141,7 @@ class Cell:
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:
-    """The robot with what campaign.toml says of hits and sensor."""
-    stated = {"hits": config.hits, "sensor": config.sensor}
+    """The robot with what campaign.toml says of hits, sensor and readback."""
+    stated = {"hits": config.hits, "sensor": config.sensor, "readback": config.readback}
     given = {name: table for name, table in stated.items() if table is not msgspec.UNSET}
     return replace(robot, config=msgspec.structs.replace(robot.config, **given)) if given else robot

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
-from planner.robot.config import HitsTable, SensorTable, check_sds
+from planner.robot.config import HitsTable, ReadbackTable, SensorTable, check_sds
 from planner.toml_file import load_toml
 
 
@@ -93,7 +93,7 @@ class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of campaign.toml; [hits] and [sensor] go before those of robot.toml."""
+    """The whole of campaign.toml; [hits], [sensor] and [readback] go before those of robot.toml."""
 
     workspace: WorkspaceTable
     robot: str = "robot/robot.toml"
@@ -106,6 +106,7 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     forbidden: list[ForbiddenTable] = []
     hits: HitsTable | msgspec.UnsetType = msgspec.UNSET
     sensor: SensorTable | msgspec.UnsetType = msgspec.UNSET
+    readback: ReadbackTable | msgspec.UnsetType = msgspec.UNSET
 
 
 def load_campaign_config(path: Path) -> CampaignConfig:
@@ -143,7 +144,8 @@ def _check(config: CampaignConfig, path: Path) -> None:
     if not 0 < band[0] < band[1]:
         raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
     _check_choices(config, path)
-    for name, table in (("hits", config.hits), ("sensor", config.sensor)):
+    cell = {"hits": config.hits, "sensor": config.sensor, "readback": config.readback}
+    for name, table in cell.items():
         if table is not msgspec.UNSET:
             check_sds(table, f"{path}: [{name}]")
     limits = [

@@ -144,7 +144,7 @@ def separation(
     lines = np.linspace(*problem.band_hz, FRF_LINES)
     # Lines closer than those of a record are not measured apart; farther ones stand for several.
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
-    open_ = 0 if problem.exact else OPEN
+    open_ = 0 if problem.exact else OPEN + problem.q.shape[1]
     known = [np.asarray(block_diag(fit.precision(temper), np.eye(open_))) for fit in fits]
     rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):

@@ -7,11 +7,12 @@ Z = K(1+iη) + s C + s² M. Z is symmetric, so that with X = Z⁻¹ Jᵀ any cha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
 from planner.dynamics.simulation import Elasticity
+from planner.robot.angle_slopes import AngleSlopes
 from planner.robot.elastic_model import Matrices
 
 
@@ -79,15 +80,50 @@ def response(
 
 
 @dataclass(frozen=True, eq=False)
-class Turned:
-    """What goes with accelerances (n, 3, 3, F): responses to moments, and how the sensor turns.
+class Motion:
+    """Of e elastic degrees of freedom: X (n, e, points, F) in rad/N at s (n, F)."""
 
-    `moment` (n, 3s, 3, F) in m/s² per N·m at the hit point, `turning` (n, 3, 3h, F) in rad/s² per N
-    at the sensor.
+    matrices: Matrices
+    x_hit: np.ndarray
+    x_sensor: np.ndarray
+    s: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Turned:
+    """What goes with accelerances (n, 3s, 3h, F): responses to moments, to turned joints.
+
+    Made of the motions of poses one after another, each where it is first asked for.
     """
 
-    moment: np.ndarray
-    turning: np.ndarray
+    motions: tuple[Motion, ...]
+
+    @cached_property
+    def moment(self) -> np.ndarray:
+        """(n, 3s, 3h, F) in m/s² per N·m at the hit point."""
+        # Z is symmetric: what a moment at the hit point does to the sensor, a force at the sensor
+        # does to the turning of the hit point.
+        turns = [_synthesis(m.matrices.hit_turn, m.x_sensor, m.s) for m in self.motions]
+        return np.swapaxes(_joined(turns), 1, 2)
+
+    @cached_property
+    def turning(self) -> np.ndarray:
+        """(n, 3s, 3h, F) in rad/s² per N: how the sensor turns."""
+        return _joined([_synthesis(m.matrices.sensor_turn, m.x_hit, m.s) for m in self.motions])
+
+    @cached_property
+    def by_angle(self) -> np.ndarray | None:
+        """(n, dof, 3s, 3h, F) in m/s²/N per rad of each joint; None where slopes are not known."""
+        found = [
+            _by_angle(m.matrices.by_angle, m.x_hit, m.x_sensor, m.s)
+            for m in self.motions
+            if m.matrices.by_angle is not None
+        ]
+        return _joined(found) if len(found) == len(self.motions) else None
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def response_turned(
@@ -98,7 +134,7 @@ def response_turned(
     both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
     x = _solutions(matrices, elasticity, s, mass, both)
     x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
-    return _synthesis(matrices.sensor, x_hit, s), _turned(matrices, x_hit, x_sensor, s)
+    return _synthesis(matrices.sensor, x_hit, s), Turned((Motion(matrices, x_hit, x_sensor, s),))
 
 
 def response_gradient(
@@ -155,14 +191,27 @@ def response_parts(
         part = out[:, place : place + len(one.slope)]
         one.gradient(x_hit * minus[:, 0], x_sensor, part)
         place += len(one.slope)
-    return _synthesis(matrices.sensor, x_hit, s), out, _turned(matrices, x_hit, x_sensor, s)
+    return (
+        _synthesis(matrices.sensor, x_hit, s),
+        out,
+        Turned((Motion(matrices, x_hit, x_sensor, s),)),
+    )
 
 
-def _turned(matrices: Matrices, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray) -> Turned:
-    # Z is symmetric: what a moment at the hit point does to the sensor, a force at the sensor does
-    # to the turning of the hit point.
-    moment = np.swapaxes(_synthesis(matrices.hit_turn, x_sensor, s), 1, 2)
-    return Turned(moment, _synthesis(matrices.sensor_turn, x_hit, s))
+def _by_angle(
+    slopes: AngleSlopes, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray
+) -> np.ndarray:
+    """s² [J_s' X_h + X_sᵀ (J_h'ᵀ − Z' X_h)] of each joint's angle, (n, dof, 3s, 3h, F)."""
+    n, dof, e, _ = slopes.mass.shape
+    square = (s**2)[:, None, None, None]
+    inner = _moved(slopes.mass.reshape(n, -1, e), x_hit).reshape(n, dof, e, *x_hit.shape[2:])
+    inner *= -square
+    if slopes.stiffness.any():
+        inner -= slopes.stiffness[..., None, None] * x_hit[:, None]
+    inner += np.swapaxes(slopes.hit, 2, 3)[..., None]
+    out = _moved(slopes.sensor.reshape(n, -1, e), x_hit).reshape(n, dof, -1, *x_hit.shape[2:])
+    out = out + np.einsum("neif,nkejf->nkijf", x_sensor, inner)
+    return square * out
 
 
 def _synthesis(rows: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:

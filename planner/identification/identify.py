@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
@@ -278,10 +279,10 @@ def _result(
 ) -> Identification:
     end, misfit = best
     p, count = problem.parametrisation, len(problem.parametrisation.parameters)
-    scale = np.concatenate([1 / p.log_sd**2, np.ones(len(p.nuisances))])
+    prior = np.asarray(block_diag(p.precision, np.eye(len(p.nuisances))))
     # Where the misfit is above the noise, the noise is at least as large as the misfit.
-    data = (end.at.normal - np.diag(scale)) / max(misfit, 1.0)
-    covariance = inverse(data + np.diag(scale))
+    data = (end.at.normal - prior) / max(misfit, 1.0)
+    covariance = inverse(data + prior)
     change = p.inertia_change(end.x[count:]) if p.nuisances else None
     fitted = simulation.changed(p.elasticity(end.x[:count]), change)
     return Identification(

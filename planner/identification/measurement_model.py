@@ -1,10 +1,10 @@
-"""What every measurement leaves open, integrated out: misses of hits, tolerance of the chain.
+"""What every measurement leaves open, integrated out: of hits, measuring chain and readback.
 
 A hit along e that misses by δ and lands o beside the tcp is answered, to first order, by
 H (e + δ) + M (o × e), M being the response to moments at the tcp. A chain within its tolerance
-shows (I + E) (H + turning × p) at iω, delayed. All of these are a few numbers a pose with normal
-priors, in which the FRF is linear: B η, η ~ N(0, 1). Integrating over η turns the covariance of
-the residuals from I into I + B Bᵀ (Woodbury), pose by pose.
+shows (I + E) (H + turning × p) at iω, delayed. Joints stand beside their readback. All of these are
+a few numbers a pose with normal priors, in which the FRF is linear: B η, η ~ N(0, 1). Integrating
+over η turns the covariance of the residuals from I into I + B Bᵀ (Woodbury), pose by pose.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.gradient import Turned
-from planner.robot.config import HitsTable, SensorTable
+from planner.robot.config import RobotConfig
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
 
@@ -22,7 +22,8 @@ class Tolerances:
     """Standard deviations of what a careful hand, a good sensor and a taught pose leave.
 
     `angle_rad`, `offset_m`: of each of two directions of a hit; `gain`, `cross_axis`,
-    `mounting_rad`, `position_m`: of the sensor; `force_gain` of the hammer; `delay_s`.
+    `mounting_rad`, `position_m`: of the sensor; `force_gain` of the hammer; `delay_s`; `joint_rad`:
+    of each joint's readback.
     """
 
     angle_rad: float = np.deg2rad(2.0)
@@ -33,14 +34,16 @@ class Tolerances:
     position_m: float = 0.01
     force_gain: float = 0.03
     delay_s: float = 6e-5
+    joint_rad: float = np.deg2rad(0.05)
 
     @classmethod
-    def of(cls, hits: HitsTable, sensor: SensorTable) -> "Tolerances":
+    def of(cls, config: RobotConfig) -> "Tolerances":
         """As robot.toml or campaign.toml state them."""
+        hits, sensor, readback = config.hits, config.sensor, config.readback
         return cls(
             np.deg2rad(hits.angle_sd_deg), 1e-3 * hits.offset_sd_mm, sensor.gain_sd_percent / 100,
             sensor.cross_axis_sd_percent / 100, np.deg2rad(sensor.mounting_sd_deg),
-            1e-3 * sensor.position_sd_mm,
+            1e-3 * sensor.position_sd_mm, joint_rad=np.deg2rad(readback.joint_sd_deg),
         )  # fmt: skip
 
     @property
@@ -49,49 +52,65 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-HIT_COLUMNS = 12  # open numbers of a pose's hits, 4 of each axis; those of the chain follow
-CHAIN_COLUMNS = 14
-OPEN = HIT_COLUMNS + CHAIN_COLUMNS  # numbers that a pose leaves open
+HIT_COLUMNS = 12  # open numbers of a pose's hits, 4 of each axis
+CHAIN_COLUMNS = 14  # those of the chain, which follow
+OPEN = HIT_COLUMNS + CHAIN_COLUMNS  # numbers that a pose leaves open; then one of each joint
 
 
-def hit_basis(h: np.ndarray, moment: np.ndarray, t: Tolerances) -> np.ndarray:
+def hit_basis(
+    h: np.ndarray, moment: np.ndarray, t: Tolerances, out: np.ndarray | None = None
+) -> np.ndarray:
     """Changes (n, 3, 4, 3, F) of the column of each hit axis, per sd of δ (2) and of o (2).
 
     h (n, 3, 3, F) are accelerances, `moment` (n, 3, 3, F) those of moments.
     """
     n, _, _, lines = h.shape
-    out = np.empty((n, 3, 4, 3, lines), dtype=complex)
+    out = np.empty((n, 3, 4, 3, lines), dtype=complex) if out is None else out
     for axis, (first, second) in enumerate(ACROSS):
-        out[:, axis, 0] = t.angle_rad * h[:, :, first]
-        out[:, axis, 1] = t.angle_rad * h[:, :, second]
+        np.multiply(h[:, :, first], t.angle_rad, out=out[:, axis, 0])
+        np.multiply(h[:, :, second], t.angle_rad, out=out[:, axis, 1])
         # e_first × e = −e_second and e_second × e = e_first.
-        out[:, axis, 2] = -t.offset_m * moment[:, :, second]
-        out[:, axis, 3] = t.offset_m * moment[:, :, first]
+        np.multiply(moment[:, :, second], -t.offset_m, out=out[:, axis, 2])
+        np.multiply(moment[:, :, first], t.offset_m, out=out[:, axis, 3])
     return out
 
 
-def chain_basis(h: np.ndarray, turning: np.ndarray, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    """Changes (n, 14, 3, 3, F) of FRFs per sd: of E (9), the sensor's place (3), scale, delay."""
-    out = np.zeros((h.shape[0], 14, *h.shape[1:]), dtype=complex)
+def chain_basis(
+    h: np.ndarray, turning: np.ndarray, s: np.ndarray, t: Tolerances, out: np.ndarray | None = None
+) -> np.ndarray:
+    """Changes (n, 14, 3, 3, F) of FRFs per sd: of E (9), the sensor's place (3), scale, delay.
+
+    `out`, where it is given, holds zeros.
+    """
+    out = np.zeros((h.shape[0], CHAIN_COLUMNS, *h.shape[1:]), dtype=complex) if out is None else out
     for i in range(3):
         for j in range(3):
-            out[:, 3 * i + j, i] = (t.gain if i == j else t.across) * h[:, j]
+            np.multiply(h[:, j], t.gain if i == j else t.across, out=out[:, 3 * i + j, i])
     for axis, (first, second) in enumerate(ACROSS):
         # α × e_axis, α being the sensor's angular acceleration.
-        out[:, 9 + axis, first] = t.position_m * turning[:, second]
-        out[:, 9 + axis, second] = -t.position_m * turning[:, first]
-    out[:, 12] = t.force_gain * h
-    out[:, 13] = -t.delay_s * s[:, None, None] * h
+        np.multiply(turning[:, second], t.position_m, out=out[:, 9 + axis, first])
+        np.multiply(turning[:, first], -t.position_m, out=out[:, 9 + axis, second])
+    np.multiply(h, t.force_gain, out=out[:, 12])
+    np.multiply(h, -t.delay_s * s[:, None, None], out=out[:, 13])
     return out
 
 
 def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    """All of them of the poses, (n, 26, 3, 3, F)."""
+    """All of them of the poses, (n, 26 + dof, 3, 3, F).
+
+    Those of the joints are there where the matrices behind `turned` have their slopes.
+    """
     n, _, _, lines = h.shape
-    hits = np.zeros((n, HIT_COLUMNS, 3, 3, lines), dtype=complex)
-    for axis, columns in enumerate(np.moveaxis(hit_basis(h, turned.moment, t), 1, 0)):
-        hits[:, 4 * axis : 4 * axis + 4, :, axis] = columns
-    return np.concatenate([hits, chain_basis(h, turned.turning, s, t)], axis=1)
+    joints = 0 if turned.by_angle is None else turned.by_angle.shape[1]
+    # All is written once, in place: such arrays are large.
+    out = np.zeros((n, OPEN + joints, 3, 3, lines), dtype=complex)
+    by_axis = out[:, :HIT_COLUMNS].reshape(n, 3, 4, 3, 3, lines)
+    # A miss along an axis changes the column of that axis only: a view of these.
+    hit_basis(h, turned.moment, t, np.einsum("namiaf->namif", by_axis))
+    chain_basis(h, turned.turning, s, t, out[:, HIT_COLUMNS:OPEN])
+    if turned.by_angle is not None:
+        np.multiply(turned.by_angle, t.joint_rad, out=out[:, OPEN:])
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +138,10 @@ class ChainTransfer:
         scale = self.scale.reshape(len(self.scale), *[1] * (values.ndim - 2), lines)
         return (self.matrix @ flat).reshape(values.shape) * scale
 
-    def shown(self, h: np.ndarray, turned: Turned) -> tuple[np.ndarray, Turned]:
-        """FRFs (n, 3, 3, F) as the chain shows them, and what goes with them."""
+    def shown(self, h: np.ndarray, turned: Turned) -> np.ndarray:
+        """FRFs (n, 3, 3, F) as the chain shows them."""
         beside = np.cross(np.moveaxis(turned.turning, 1, -1), self.place)
-        whole = self.of_accelerations(h + np.moveaxis(beside, -1, 1))
-        return whole, Turned(*map(self.of_accelerations, (turned.moment, turned.turning)))
+        return self.of_accelerations(h + np.moveaxis(beside, -1, 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ end.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from planner.dynamics.gradient import Inertias, response_gradient
 from planner.identification.feasible_inertias import Barrier
@@ -90,7 +91,7 @@ class Objective:
         theta, phi = x[:count], x[count:]
         mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
         away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
-        scale = np.concatenate([1 / p.log_sd, np.ones(len(phi))])
+        pull, precision = self._prior(theta, phi)
         beyond = self._beyond(phi)
         possible = not self.free_inertia or positive(mass)
         possible = possible and stands(self.matrices, p.elasticity(theta).stiffness)
@@ -111,15 +112,20 @@ class Objective:
         springs = len(p.held)
         spread[:springs, :count] = p.spread
         spread[springs:, count:] = np.eye(len(phi))
-        if self.logarithmic:
-            away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
         chi2 = float(np.sum(residual.real**2 + residual.imag**2))
-        gradient = spread.T @ gradient + scale * away
-        normal = spread.T @ normal @ spread + np.diag(scale**2)
-        value = (chi2 + float(away @ away)) / 2 + beyond[0]
+        gradient = spread.T @ gradient + precision @ pull
+        normal = spread.T @ normal @ spread + precision
+        value = (chi2 + float(pull @ precision @ pull)) / 2 + beyond[0]
         gradient[count:] += beyond[1]
         normal[count:, count:] += beyond[2]
         return Quadratic(value, gradient, normal, chi2)
+
+    def _prior(self, theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far x is from the prior's mean, and the prior's precision."""
+        p = self.parametrisation
+        weight = LOG_PRIOR if self.logarithmic else 1.0
+        precision = weight * np.asarray(block_diag(p.precision, np.eye(len(phi))))
+        return np.concatenate([theta - p.mean, phi]), precision
 
     def _beyond(self, phi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
         if self.barrier is None or not self.free_inertia:

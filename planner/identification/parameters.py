@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
-from planner.robot.config import Compliance
+from planner.robot.config import Compliance, RobotConfig
 from planner.robot.virtual_joints import inertia_basis
 
 NEAR = 6.0
@@ -24,13 +25,16 @@ class Priors:
 
     `stiffness_factor` and so on are e^sd of the logarithm. `bounds` maps the name of a parameter
     to its least and largest plausible value; the log-normal then has mean and sd of a log-uniform
-    one. `mass`, `inertia` (relative) and `com_m` are sds of the inertias of robot and URDF; where
-    all are 0, inertias are taken for exact.
+    one. `bias_factor` is e^sd of what all stiffnesses have in common, those with bounds excepted.
+    What robot.toml says of its stiffnesses goes before both factors. `mass`, `inertia` (relative)
+    and `com_m` are sds of the inertias of robot and URDF; where all are 0, inertias are taken for
+    exact.
     """
 
     stiffness_factor: float = 3.0
     damping_factor: float = 5.0
     loss_factor_factor: float = 3.0
+    bias_factor: float = 1.0
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     mass: float = 0.0
     inertia: float = 0.0
@@ -46,8 +50,9 @@ class Priors:
 class Parameter:
     """One number to identify, shared by [[compliance]] blocks (counted from 0).
 
-    Its logarithm has a normal prior with mean ln `median` and standard deviation `log_sd`;
-    starts lie between `lower` and `upper`.
+    Its logarithm has a normal prior with mean ln `median` and standard deviation `log_sd`, of which
+    `shared` is that of a deviation common to all stiffnesses; starts lie between `lower` and
+    `upper`.
     """
 
     name: str
@@ -57,6 +62,7 @@ class Parameter:
     log_sd: float
     lower: float
     upper: float
+    shared: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +90,17 @@ class Parametrisation:
     def log_sd(self) -> np.ndarray:
         """Prior sd of θ (P,)."""
         return np.array([p.log_sd for p in self.parameters])
+
+    @cached_property
+    def covariance(self) -> np.ndarray:
+        """Prior covariance of θ (P, P): springs stated too stiff may all be so."""
+        shared = np.array([p.shared for p in self.parameters])
+        return np.diag(self.log_sd**2 - shared**2) + np.outer(shared, shared)
+
+    @cached_property
+    def precision(self) -> np.ndarray:
+        """Its inverse (P, P)."""
+        return np.linalg.inv(self.covariance)
 
     def near(self, theta: np.ndarray) -> np.ndarray:
         """θ (P,) brought within NEAR sds of the prior's mean."""
@@ -123,7 +140,11 @@ def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
             if values[k * e + blocks[0]] > 0:
                 name = f"{kind} of {_place(simulation, tie, blocks)}"
                 value = float(values[k * e + blocks[0]])
-                parameters.append(_parameter(name, kind, tuple(blocks), value, priors))
+                if name in priors.bounds:
+                    parameters.append(_bounded(name, kind, tuple(blocks), *priors.bounds[name]))
+                else:
+                    factors = _factors(config, kind, blocks[0], priors)
+                    parameters.append(_stated(name, kind, tuple(blocks), value, *factors))
                 columns.append(np.isin(np.arange(len(values)), k * e + np.array(blocks)))
     unknown = set(priors.bounds) - {p.name for p in parameters}
     if unknown:
@@ -160,20 +181,35 @@ def axis_name(axis: tuple[float, float, float]) -> str:
     return "(" + ", ".join(f"{a:.3g}" for a in axis) + ")"
 
 
-def _parameter(
-    name: str, kind: str, blocks: tuple[int, ...], value: float, priors: Priors
+def _bounded(name: str, kind: str, blocks: tuple[int, ...], low: float, high: float) -> Parameter:
+    if not 0 < low < high < float("inf"):
+        raise InputError(f"Bounds {low}, {high} of {name} must rise from above 0; correct them.")
+    log_sd = float(np.log(high / low) / np.sqrt(12))
+    return Parameter(name, kind, blocks, float(np.sqrt(low * high)), log_sd, low, high)
+
+
+def _stated(
+    name: str, kind: str, blocks: tuple[int, ...], value: float, own: float, bias: float
 ) -> Parameter:
-    if name in priors.bounds:
-        low, high = priors.bounds[name]
-        if not 0 < low < high < float("inf"):
-            raise InputError(
-                f"Bounds {low}, {high} of {name} must rise from above 0; correct them."
-            )
-        log_sd = float(np.log(high / low) / np.sqrt(12))
-        return Parameter(name, kind, blocks, float(np.sqrt(low * high)), log_sd, low, high)
-    factor = getattr(priors, f"{kind}_factor")
-    reach = factor**1.5
-    return Parameter(name, kind, blocks, value, float(np.log(factor)), value / reach, value * reach)
+    """Around a stated value: factors of its own deviation and of what it shares with others."""
+    shared = float(np.log(bias))
+    log_sd = float(np.hypot(np.log(own), shared))
+    reach = float(np.exp(1.5 * log_sd))
+    return Parameter(name, kind, blocks, value, log_sd, value / reach, value * reach, shared)
+
+
+def _factors(config: RobotConfig, kind: str, block: int, priors: Priors) -> tuple[float, float]:
+    """e^sd of a parameter's own deviation and of the common one: robot.toml's, else `priors`'."""
+    if kind != "stiffness":
+        return getattr(priors, f"{kind}_factor"), 1.0
+    own, bias = priors.stiffness_factor, priors.bias_factor
+    of_block = config.compliance[block].stiffness_sd_percent
+    percent = config.stiffness_sd_percent if of_block is None else of_block
+    if percent is not None:
+        own = 1 + percent / 100
+    if config.stiffness_bias_sd_percent is not None:
+        bias = 1 + config.stiffness_bias_sd_percent / 100
+    return own, bias
 
 
 def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...], np.ndarray]:

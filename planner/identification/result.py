@@ -106,17 +106,18 @@ def estimates(
 def undetermined(parametrisation: Parametrisation, covariance: np.ndarray) -> tuple[Direction, ...]:
     """Directions of the springs' parameters of which the data told little, least told first.
 
-    They are the eigenvectors of the posterior covariance in units of the prior's sds whose
-    eigenvalues exceed TOLD².
+    They are the directions in which the posterior's variance exceeds TOLD² of the prior's.
     """
     sd, names = parametrisation.log_sd, [p.name for p in parametrisation.parameters]
     count = len(names)
-    whitened = covariance[:count, :count] / np.outer(sd, sd)
-    values, vectors = np.linalg.eigh(whitened)
+    root = np.linalg.cholesky(parametrisation.covariance)
+    half = np.linalg.solve(root, covariance[:count, :count])
+    values, vectors = np.linalg.eigh(np.linalg.solve(root, half.T))
     found = []
-    for value, vector in sorted(zip(values, vectors.T, strict=True), key=lambda v: -v[0]):
+    for value, along in sorted(zip(values, vectors.T, strict=True), key=lambda v: -v[0]):
         if value > TOLD**2:
-            ratio = float(np.sqrt(value))
+            ratio, vector = float(np.sqrt(value)), root @ along / sd
+            vector = vector / np.linalg.norm(vector)
             found.append(Direction(ratio, tuple(map(float, vector)), _words(names, vector, ratio)))
     return tuple(found)
 

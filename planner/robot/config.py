@@ -27,6 +27,7 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     loss_factor: float = 0.0
     tie: str = ""
     slide: bool = False
+    stiffness_sd_percent: float | None = None
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -121,12 +122,20 @@ class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     position_sd_mm: float = 10.0
 
 
+class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How well the joint angles of a measurement are known: sd of each joint's readback."""
+
+    joint_sd_deg: float = 0.05
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
     With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
     own stiffness, of the size of weight times height, is added: so it is unless robot.toml says
     false (None is what it says where it says nothing; `load_config` puts a bool there).
+    `stiffness_sd_percent` is how well each stated stiffness is known (None: as the caller thinks),
+    `stiffness_bias_sd_percent` by how much all of them may be off together, as gear makers' are.
     """
 
     name: str
@@ -136,6 +145,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
     geometric_stiffness: bool | None = None
+    stiffness_sd_percent: float | None = None
+    stiffness_bias_sd_percent: float | None = None
     compliance: tuple[Compliance, ...] = ()
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
@@ -145,8 +156,10 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     harmonic: tuple[Harmonic, ...] = ()
     hits: HitsTable = HitsTable()
     sensor: SensorTable = SensorTable()
+    readback: ReadbackTable = ReadbackTable()
 
 
+LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
 
 
@@ -189,7 +202,7 @@ def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
     return whole
 
 
-def check_sds(table: HitsTable | SensorTable, where: str) -> None:
+def check_sds(table: HitsTable | SensorTable | ReadbackTable, where: str) -> None:
     """Raise InputError where an sd of a table is no number from 0 to 100."""
     for name in table.__struct_fields__:
         value = getattr(table, name)
@@ -197,12 +210,22 @@ def check_sds(table: HitsTable | SensorTable, where: str) -> None:
             raise InputError(f"{where} {name} is {value}; it must lie between 0 and 100.")
 
 
+def _check_percent(value: float | None, where: str) -> None:
+    if value is not None and not 0 < value <= LARGEST_SD_PERCENT:
+        raise InputError(
+            f"{where} is {value}; it must lie above 0 and at most at {LARGEST_SD_PERCENT:g}."
+        )
+
+
 def _check(config: RobotConfig, path: Path) -> None:
     _check_compliances(config, path)
+    _check_percent(config.stiffness_sd_percent, f"{path}: stiffness_sd_percent")
+    _check_percent(config.stiffness_bias_sd_percent, f"{path}: stiffness_bias_sd_percent")
     _check_payloads(config, path)
     _check_obstacles(config, path)
     check_sds(config.hits, f"{path}: [hits]")
     check_sds(config.sensor, f"{path}: [sensor]")
+    check_sds(config.readback, f"{path}: [readback]")
     margin = config.collision.margin_m
     if not 0 <= margin < 1:
         raise InputError(
@@ -234,8 +257,9 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
             raise InputError(
                 f"{entry} has loss_factor {block.loss_factor}; it must be at least 0 and below 2."
             )
+        _check_percent(block.stiffness_sd_percent, f"{entry}: stiffness_sd_percent")
         same = first.setdefault(block.tie or f"\0{number}", block)
-        for key in ("stiffness", "damping", "loss_factor"):
+        for key in ("stiffness", "damping", "loss_factor", "stiffness_sd_percent"):
             if getattr(same, key) != getattr(block, key):
                 raise InputError(
                     f'{entry} is tied to "{block.tie}" but has another {key} '

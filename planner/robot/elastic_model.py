@@ -8,14 +8,15 @@ section 2.1), and is linear in the inertias of the bodies.
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.robot.angle_slopes import AngleSlopes, mass_slopes, turned
 from planner.robot.robot import Robot
-from planner.robot.virtual_joints import virtual_model
+from planner.robot.virtual_joints import inertia_basis, virtual_model
 
 SINGULAR = 1e-12  # smallest eigenvalue of the mass matrix scaled to ones on its diagonal
 SAG_STEPS = 4  # each gains three digits or more where sagging is small at all
@@ -29,7 +30,8 @@ class Matrices:
     s sensors; unless others were named, that is the tcp and the sensor. `hit_turn` and
     `sensor_turn`, of the same shapes in rad/rad, turn them. `geometric` (n, e, e) in
     N·m/rad is the stiffness that goes with the pose: gravity's own, harmonics of joint angles; 0
-    where robot.toml leaves both out.
+    where robot.toml leaves both out. `by_angle` tells how they change with the joint angles, where
+    that was asked.
     """
 
     mass: np.ndarray
@@ -38,10 +40,13 @@ class Matrices:
     geometric: np.ndarray
     hit_turn: np.ndarray
     sensor_turn: np.ndarray
+    by_angle: AngleSlopes | None = None
 
     def at(self, poses: slice) -> "Matrices":
         """Of some of the poses."""
-        return Matrices(*(getattr(self, name)[poses] for name in self.__dataclass_fields__))
+        names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
+        slopes = None if self.by_angle is None else self.by_angle.at(poses)
+        return Matrices(*(getattr(self, name)[poses] for name in names), by_angle=slopes)
 
 
 class ElasticModel:
@@ -159,6 +164,32 @@ class ElasticModel:
         hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)
 
+    def with_slopes(self, q: np.ndarray) -> Matrices:
+        """Matrices of poses q (n, dof) in rad, and how they change with the joint angles."""
+        q = np.atleast_2d(q)
+        return replace(self.matrices(q), by_angle=self._slopes(q))
+
+    def _slopes(self, q: np.ndarray) -> AngleSlopes:
+        data, weight = self._model.createData(), self._weighed.createData()
+        joints, size = self._virtual.carriers, self._model.nv
+        bodies = np.empty((len(q), len(joints), 6, size))
+        ends = np.empty((len(q), 2, 6, size))
+        stiffness = np.empty((len(q), len(self.robot.joint_names), self.size))
+        frames = [self._virtual.frames[k] for k in (self.robot.tcp_id, self.robot.sensor_id)]
+        for i, row in enumerate(q):
+            pin.computeJointJacobians(self._model, data, self._standing(row, weight))
+            for b, joint in enumerate(joints):
+                bodies[i, b] = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
+            for k, frame in enumerate(frames):
+                pin.updateFramePlacement(self._model, data, frame)
+                ends[i, k] = pin.getFrameJacobian(self._model, data, frame, pin.LOCAL)
+            stiffness[i] = self._angle_slope(row)
+        places = self._virtual.rigid, self._elastic
+        inertia = np.einsum("bk,kij->bij", self.inertia, inertia_basis())
+        moved = turned(ends, *places)[..., :3, :]
+        mass = mass_slopes(bodies, inertia, *places)
+        return AngleSlopes(mass, moved[:, 0], moved[:, 1], stiffness)
+
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
 
@@ -189,6 +220,16 @@ class ElasticModel:
         for number, wave in self._waves:
             angle = wave.order * q[self.robot.joint_names.index(wave.joint)]
             change[number] += wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
+        return change
+
+    def _angle_slope(self, q: np.ndarray) -> np.ndarray:
+        """Derivatives (dof, e) of the same by the joint angles q (dof,)."""
+        change = np.zeros((len(q), self.size))
+        for number, wave in self._waves:
+            joint = self.robot.joint_names.index(wave.joint)
+            angle = wave.order * q[joint]
+            slope = wave.sine * np.cos(angle) - wave.cosine * np.sin(angle)
+            change[joint, number] += wave.order * slope
         return change
 
     def _sag(self, full: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> None:

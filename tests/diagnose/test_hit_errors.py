@@ -11,6 +11,7 @@ from planner.diagnosis.screens.hit_errors import taken_out
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import (
+    OPEN,
     Tolerances,
     basis,
     chain_basis,
@@ -27,7 +28,7 @@ from tests.support.known_robots import KR10
 
 HZ = np.linspace(6.0, 60.0, 40)
 S = 2j * np.pi * HZ[None]
-UNIT = Tolerances(*[1.0] * 8)
+UNIT = Tolerances(*[1.0] * 9)
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +73,18 @@ def test_a_sensor_beside_its_place_shows_what_the_other_engine_says(robot_toml):
     )
 
 
+@pytest.mark.parametrize("joint", range(6))
+def test_a_joint_beside_its_readback_shows_what_the_other_engine_says(robot_toml, joint):
+    simulation, truth = Simulation(Robot.load(robot_toml)), load_truth(robot_toml)
+    q, turn = KR10.poses(1, 6)[0], 1e-5 * np.eye(6)[joint]
+    h, turned = response_turned(simulation.elastic.with_slopes(q), simulation.elasticity, S)
+    change = (truth.accelerance(q + turn, HZ) - truth.accelerance(q - turn, HZ)) / 2e-5
+    # The sag that goes with the angle is left out: a thousandth.
+    least = 1e-5 * np.abs(h).max()
+    expected = pytest.approx(change, abs=3e-3 * np.abs(change).max() + least)
+    assert turned.by_angle[0, joint] == expected
+
+
 def test_integrating_out_is_the_dense_gaussian():
     rng = np.random.default_rng(0)
     r, j, b = rng.standard_normal(30), rng.standard_normal((4, 30)), rng.standard_normal((5, 30))
@@ -88,9 +101,17 @@ def test_all_of_them_are_of_the_poses_and_scale_with_their_sds(robot_toml):
     simulation = Simulation(Robot.load(robot_toml))
     q = KR10.poses(2, 7)
     s = np.repeat(S, 2, axis=0)
-    h, turned = response_turned(simulation.elastic.matrices(q), simulation.elasticity, s)
-    assert basis(h, turned, s, UNIT).shape == (2, 26, 3, 3, HZ.size)
-    half = Tolerances(*[0.5] * 8)
+    h, turned = response_turned(simulation.elastic.with_slopes(q), simulation.elasticity, s)
+    made = basis(h, turned, s, UNIT)
+    assert made.shape == (2, OPEN + 6, 3, 3, HZ.size)
+    chain = chain_basis(h, turned.turning, s, UNIT)
+    assert np.array_equal(made[:, 12:OPEN], chain)
+    hits = hit_basis(h, turned.moment, UNIT)
+    for axis in range(3):
+        own = made[:, 4 * axis : 4 * axis + 4]
+        assert np.array_equal(own[:, :, :, axis], hits[:, axis])
+        assert np.count_nonzero(own) == np.count_nonzero(hits[:, axis])
+    half = Tolerances(*[0.5] * 9)
     assert basis(h, turned, s, half) == pytest.approx(basis(h, turned, s, UNIT) / 2)
 
 

@@ -5,7 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from planner.dynamics.gradient import Inertias, laplace, response, response_gradient
+from planner.dynamics.gradient import (
+    Inertias,
+    laplace,
+    response,
+    response_gradient,
+    response_turned,
+)
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
@@ -93,3 +99,34 @@ def test_window_shifts_the_laplace_variable(tmp_path):
     expected = expected * (s**2)[:, None, None]
     found = response(matrices, simulation.elasticity, s)
     np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(found).max())
+
+
+MORE = """
+[[effects]]
+effect = "soft floor and a joint whose stiffness goes with its angle"
+at = ""
+[[effects.compliance]]
+joint = "base"
+axis = [1, 0, 0]
+stiffness = 1e6
+damping = 1e2
+[[effects.harmonic]]
+joint = "joint_2"
+order = 2
+cosine = 4e4
+sine = -3e4
+"""
+
+
+def test_slopes_by_joint_angles_are_those_of_the_whole_response(tmp_path):
+    path = KR10.write(tmp_path, 2)
+    path.write_text(f"geometric_stiffness = false\n{path.read_text()}{MORE}")
+    simulation, q = Simulation(Robot.load(path)), KR10.poses(3)
+    elastic, springs, s = simulation.elastic, simulation.elasticity, laplace(np.tile(LINES, (3, 1)))
+    turned = response_turned(elastic.with_slopes(q), springs, s)[1]
+    for joint, turn in enumerate(STEP * np.eye(6)):
+        there, back = (response(elastic.matrices(p), springs, s) for p in (q + turn, q - turn))
+        change = (there - back) / (2 * STEP)
+        largest = np.abs(change).max()
+        assert largest > 0
+        assert turned.by_angle[:, joint] == pytest.approx(change, abs=1e-6 * largest)

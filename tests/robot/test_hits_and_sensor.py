@@ -1,4 +1,4 @@
-"""[hits] and [sensor]: what robot.toml and campaign.toml say of hand and sensor."""
+"""[hits], [sensor], [readback]: what robot.toml and campaign.toml say of the measurement."""
 
 import numpy as np
 import pytest
@@ -42,4 +42,18 @@ def test_a_campaign_goes_before_its_robot(tmp_path):
     assert tolerances_of(Simulation(cell.robot)).angle_rad == pytest.approx(np.deg2rad(1.0))
     campaign.write_text(KR10.campaign() + "\n[sensor]\ngain_sd_percent = -2\n")
     with pytest.raises(InputError, match=r"campaign.toml: \[sensor\] gain_sd_percent"):
+        load_campaign_config(campaign)
+
+
+def test_the_readback_is_stated_in_robot_toml_or_in_campaign_toml(tmp_path):
+    path = KR10.write(tmp_path / "robot")
+    assert Robot.load(path).config.readback.joint_sd_deg == 0.05
+    path.write_text(path.read_text() + "\n[readback]\njoint_sd_deg = 0.2\n")
+    assert Robot.load(path).config.readback.joint_sd_deg == 0.2
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text(KR10.campaign() + "\n[readback]\njoint_sd_deg = 0.01\n")
+    cell = Cell.load(path, load_campaign_config(campaign))
+    assert cell.robot.config.readback.joint_sd_deg == 0.01
+    campaign.write_text(KR10.campaign() + "\n[readback]\njoint_sd_deg = -0.01\n")
+    with pytest.raises(InputError, match=r"campaign.toml: \[readback\] joint_sd_deg"):
         load_campaign_config(campaign)

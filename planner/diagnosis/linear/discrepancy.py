@@ -25,6 +25,7 @@ from planner.diagnosis.thresholds import (
 from planner.identification.measurement_model import (
     CHAIN_COLUMNS,
     HIT_COLUMNS,
+    OPEN,
     ChainTransfer,
     basis,
 )
@@ -80,22 +81,21 @@ class InnerProducts:
         names = [p.name for p in misfit.parametrisation.parameters]
         loose = [i for i, name in enumerate(names) if name in springs]
         own = np.where(["stiffness" in names[i] for i in loose], 1.0, DAMPERS)
-        tolerances = misfit.tolerances
+        open_, tolerances = np.zeros((len(h), 0, *h.shape[1:])), misfit.tolerances
+        if tolerances is not None:
+            open_ = basis(h, turned, misfit.setting.s, tolerances)
         if tolerances is not None and chain.any():
             seen = ChainTransfer.of(chain, misfit.setting.s, tolerances)
-            h, turned = seen.shown(h, turned)
-            slope = seen.of_accelerations(slope)
+            h = seen.shown(h, turned)
+            open_, slope = seen.of_accelerations(open_), seen.of_accelerations(slope)
         residual = misfit.weight * (h - misfit.measured.accelerance)
-        sloped = misfit.weight[:, None] * slope
-        open_ = np.zeros((len(h), 0, *h.shape[1:]))
-        if tolerances is not None:
-            open_ = misfit.weight[:, None] * basis(h, turned, misfit.setting.s, tolerances)
+        open_, sloped = misfit.weight[:, None] * open_, misfit.weight[:, None] * slope
         made, sums = [], np.zeros(4)
         for i in range(len(h)):
             r, b, j = _real(residual[i][None]), _real(open_[i]), _real(sloped[i])
             varies = b.copy()
-            varies[HIT_COLUMNS:] *= CHAIN_VARIES
-            rows = np.concatenate([r, varies, j[loose], b[HIT_COLUMNS:], j])
+            varies[HIT_COLUMNS:OPEN] *= CHAIN_VARIES
+            rows = np.concatenate([r, varies, j[loose], b[HIT_COLUMNS:OPEN], j])
             made.append(rows @ rows.T)
             sums += _squares(r[0], b, misfit.weight[i], misfit.measured.accelerance[i])
         own = np.concatenate([np.zeros(open_.shape[1]), own])

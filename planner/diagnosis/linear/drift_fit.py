@@ -43,10 +43,9 @@ class DriftMisfit(Misfit):
             along = full[:, :e].sum(axis=1)
             own = slope[i][None, :, None, None, None] * along[:, None]
             values.append(h)
-            turns.append(turned)
+            turns += turned.motions
             slopes.append(np.concatenate([theta, full[:, springs:], own], axis=1))
-        both = (np.concatenate([getattr(t, k) for t in turns]) for k in ("moment", "turning"))
-        return np.concatenate(values), np.concatenate(slopes), Turned(*both)
+        return np.concatenate(values), np.concatenate(slopes), Turned(tuple(turns))
 
 
 @dataclass(frozen=True, eq=False)

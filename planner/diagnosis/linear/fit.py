@@ -57,9 +57,8 @@ KEPT = 2  # starts that are followed
 
 
 def tolerances_of(simulation: Simulation) -> Tolerances:
-    """What the simulation's robot.toml says of hits and sensor."""
-    config = simulation.robot.config
-    return Tolerances.of(config.hits, config.sensor)
+    """What the simulation's robot.toml says of hits, sensor and readback."""
+    return Tolerances.of(simulation.robot.config)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +111,7 @@ def _prepared(problem: Problem, effect: Effect) -> _Prepared:
     simulation = effect.structure(problem.simulation)
     p = parametrise(simulation, effect.priors(simulation, problem.priors))
     jacobians = simulation.elastic.body_jacobians(problem.q)
-    matrices = simulation.elastic.matrices(problem.q)
+    matrices = simulation.elastic.with_slopes(problem.q)
     return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
 
 

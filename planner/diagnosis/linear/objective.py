@@ -172,7 +172,8 @@ class Misfit:
         """Misfit of each pose, what hits and chain leave open being integrated out."""
         assert self.tolerances is not None
         n, d = slope.shape[:2]
-        open_ = self.weight[:, None] * basis(h, turned, self.setting.s, self.tolerances)
+        open_ = basis(h, turned, self.setting.s, self.tolerances)
+        open_ *= self.weight[:, None]
         free, size = np.flatnonzero(self.free), len(x)
         chi2, gradient = np.empty(n), np.zeros((n, size))
         normal = np.zeros((n, size, size))

@@ -59,7 +59,7 @@ def misfit_at(
     s = laplace(lines, rate_1_s)
     nothing = Measured(lines, s, np.ones(shape, complex), np.full(shape, np.inf), np.zeros(len(q)))
     jacobians = simulation.elastic.body_jacobians(q)
-    setting, matrices = Setting(simulation, q, s, jacobians), simulation.elastic.matrices(q)
+    setting, matrices = Setting(simulation, q, s, jacobians), simulation.elastic.with_slopes(q)
     return Misfit(nothing, setting, matrices, p.inertias(jacobians), p, effect)
 
 
