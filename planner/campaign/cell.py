@@ -141,7 +141,6 @@ class Cell:
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:
-    """The robot with what campaign.toml says of hits, sensor and readback."""
-    stated = {"hits": config.hits, "sensor": config.sensor, "readback": config.readback}
-    given = {name: table for name, table in stated.items() if table is not msgspec.UNSET}
+    """The robot with what campaign.toml says of hits, sensor, readback and diagnosis."""
+    given = config.of_the_cell()
     return replace(robot, config=msgspec.structs.replace(robot.config, **given)) if given else robot

@@ -6,7 +6,7 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
-from planner.robot.config import HitsTable, ReadbackTable, SensorTable, check_sds
+from planner.robot.config import DiagnoseTable, HitsTable, ReadbackTable, SensorTable, check_sds
 from planner.toml_file import load_toml
 
 
@@ -93,7 +93,7 @@ class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of campaign.toml; [hits], [sensor] and [readback] go before those of robot.toml."""
+    """The whole of campaign.toml; [hits], [sensor], [readback] and [diagnose] go before robot.toml's."""
 
     workspace: WorkspaceTable
     robot: str = "robot/robot.toml"
@@ -107,6 +107,12 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hits: HitsTable | msgspec.UnsetType = msgspec.UNSET
     sensor: SensorTable | msgspec.UnsetType = msgspec.UNSET
     readback: ReadbackTable | msgspec.UnsetType = msgspec.UNSET
+    diagnose: DiagnoseTable | msgspec.UnsetType = msgspec.UNSET
+
+    def of_the_cell(self) -> dict[str, HitsTable | SensorTable | ReadbackTable | DiagnoseTable]:
+        """Tables that are given here and go before those of robot.toml, by name."""
+        found = {name: getattr(self, name) for name in ("hits", "sensor", "readback", "diagnose")}
+        return {name: table for name, table in found.items() if table is not msgspec.UNSET}
 
 
 def load_campaign_config(path: Path) -> CampaignConfig:
@@ -144,10 +150,8 @@ def _check(config: CampaignConfig, path: Path) -> None:
     if not 0 < band[0] < band[1]:
         raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
     _check_choices(config, path)
-    cell = {"hits": config.hits, "sensor": config.sensor, "readback": config.readback}
-    for name, table in cell.items():
-        if table is not msgspec.UNSET:
-            check_sds(table, f"{path}: [{name}]")
+    for name, table in config.of_the_cell().items():
+        check_sds(table, f"{path}: [{name}]")
     limits = [
         ("[cost] speed_share", config.cost.speed_share, 1e-3, 1.0),
         ("[cost] minutes_per_pose", config.cost.minutes_per_pose, 0.0, 1e3),

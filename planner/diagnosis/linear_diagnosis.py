@@ -8,7 +8,8 @@ import numpy as np
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.evidence import Weights, weigh
+from planner.diagnosis.linear.discrepancy import settled_with
+from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle, tolerances_of
 from planner.diagnosis.linear.search import Found, search
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
@@ -99,13 +100,25 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
 
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
     weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
-    candidates = _candidates(found, weights, all_)
+    candidates = tuple(
+        _with_discrepancy(c, found, weights) for c in _candidates(found, weights, all_)
+    )
     likeliest = found.finalists[weights.likeliest]
     best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
     return Diagnosis(
         _verdict(candidates), candidates, found.finalists[0], best, weights.temper, seconds, problem
     )
+
+
+def _with_discrepancy(candidate: Candidate, found: Found, weights: Weights) -> Candidate:
+    """The candidate with its fit where the discrepancy's likeliest size lets it be."""
+    fit = candidate.fit
+    number = next((i for i, f in enumerate(found.finalists) if f is fit), None)
+    if fit is None or number is None or candidate.probability < TIED:
+        return candidate
+    springs, size = stated_springs(found.finalists[0]), weights.worth[number].size
+    return replace(candidate, fit=settled_with(fit, springs, size))
 
 
 def beside_another(found: Diagnosis) -> Diagnosis:

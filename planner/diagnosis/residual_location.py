@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.linear.fit import FINE, Fit, Problem
+from planner.diagnosis.linear.mismatch import residuals
 from planner.diagnosis.thresholds import RESIDUAL_CLEARLY, RESIDUAL_SHARE
 
 BANDS = 12
@@ -43,10 +44,10 @@ class Where:
 
 
 def where(problem: Problem, found: Fit) -> Where:
-    """Residuals of a fit on the lines that it was fitted to."""
+    """Residuals of a fit on the lines that it was fitted to, misses of hits and chain taken out."""
     misfit = problem.misfit(found.effect, FINE)
     measured = misfit.measured
-    left = misfit.weight * (misfit.response(found.x)[0] - measured.accelerance)
+    _, left = residuals(misfit, found.x)
     square = np.where(measured.used, np.abs(left) ** 2 / 2, np.nan)
     edges = np.linspace(*problem.band_hz, BANDS + 1)
     place = np.clip(np.searchsorted(edges, measured.frequency_hz, "right") - 1, 0, BANDS - 1)

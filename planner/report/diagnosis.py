@@ -10,14 +10,17 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.design.next_hit import NextHit, in_words
+from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Explained
     from planner.diagnosis.finding import Finding
     from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
+    from planner.diagnosis.verdict import Ranked
 
 SHOWN = 6  # candidates in the table
 VERDICTS = {
@@ -74,49 +77,24 @@ class RankedExplanation:
         return cls(" + ".join(names), " + ".join(at) or None, probability, each)
 
 
-@dataclass(frozen=True)
-class MismatchPlaces:
-    """Where the refitted simulation misses the recordings clearly."""
-
-    bands_hz: list[list[float]]
-    poses: tuple[str, ...]
-    directions: list[str]
-
-    @property
-    def sentence(self) -> str:
-        """For the engineer."""
-        if not self.bands_hz:
-            return "Refitted, the simulation misses the recordings in no band clearly."
-        bands = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in self.bands_hz)
-        return (
-            f"Refitted without any effect, the simulation misses the recordings at {bands} Hz, at "
-            f"poses {', '.join(self.poses) or '–'}, along {', '.join(self.directions) or '–'}."
-        )
-
-
-@dataclass(frozen=True)
-class TwoMisfits:
-    """χ² per value, 1 at the noise: of the refitted simulation, and with what explains it."""
-
-    refitted: float
-    explained: float
-
-
 @dataclass(frozen=True, eq=False)
 class DiagnosisReport(Answer):
     """Answer of `diagnose`; `candidates` are most probable first and sum to 1.
 
-    `undecided` are those that the recordings cannot tell apart; `explained` holds the fits.
+    `undecided` are those that the recordings cannot tell apart; `sets` name, for what was found,
+    the effects any one of which may stand in its place. `explained` holds the fits.
     """
 
     verdict: str
     findings: tuple[EstablishedEffect, ...]
     candidates: tuple[RankedExplanation, ...]
     undecided: tuple[tuple[tuple[str, str | None], ...], ...]
+    sets: tuple[tuple[EffectAtPlace, ...], ...]
     where: MismatchPlaces
     fit: ThreeSimilarities
     held_out: HeldOutSimilarities
     misfit: TwoMisfits
+    shares: MismatchShares
     refused: tuple[RefusedFile, ...]
     remarks: tuple[str, ...]
     simulated: bool
@@ -192,7 +170,7 @@ class DiagnosisReport(Answer):
         made = table("What was considered", "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
             made.add_row(c.effect.replace("_", " "), c.at or "–", f"{100 * c.probability:.1f} %")
-        parts += [made, self._agreement()]
+        parts += [made, self._agreement(), Text(self.shares.sentence)]
         if self.next:
             parts.append(Text(self.next.sentence, style="bold"))
         parts += remarks(self.remarks)
@@ -230,17 +208,37 @@ def diagnosis_report(explained: "Explained") -> DiagnosisReport:
         findings=screened + (_of_fits(found) if whole.linear else ()),
         candidates=tuple(RankedExplanation.of(c.places, c.probability) for c in whole.candidates),
         undecided=tuple(c.places for c in found.undecided),
+        sets=alternatives(whole.candidates),
         where=MismatchPlaces(
-            place.bands_hz(), tuple(recorded.poses[i] for i in place.poses()), place.directions()
+            place.bands_hz(),
+            tuple(dict.fromkeys(recorded.poses[i] for i in place.poses())),
+            place.directions(),
         ),
         fit=ThreeSimilarities.of(judged.fitted),
         held_out=HeldOutSimilarities.at(aside, judged.held_out),
         misfit=TwoMisfits(found.refitted.per_value, found.best.per_value),
+        shares=MismatchShares.of(found),
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),
         remarks=tuple(recorded.remarks),
         simulated=recorded.simulated,
         explained=explained,
     )
+
+
+def alternatives(candidates: Sequence["Ranked"]) -> tuple[tuple[EffectAtPlace, ...], ...]:
+    """Effects of the likeliest candidate with those that others, nearly as likely, have instead."""
+    likely = [c.places for c in candidates if c.probability > TIED]
+    if not likely:
+        return ()
+    out = []
+    for place in likely[0]:
+        rest = set(likely[0]) - {place}
+        others = [set(places) - rest for places in likely[1:] if rest <= set(places)]
+        instead = [next(iter(other)) for other in others if len(other) == 1]
+        instead = [other for other in instead if other[0] not in ("none", UNKNOWN)]
+        if instead and place[0] not in ("none", UNKNOWN):
+            out.append(tuple(EffectAtPlace(*one) for one in (place, *instead)))
+    return tuple(out)
 
 
 def _of_fits(found: "Diagnosis") -> tuple[EstablishedEffect, ...]:

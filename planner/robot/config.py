@@ -128,6 +128,12 @@ class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     joint_sd_deg: float = 0.05
 
 
+class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a diagnosis need not explain: a mismatch of so many percent of |H| does not matter."""
+
+    matters_percent: float = 3.0
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
@@ -157,6 +163,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     hits: HitsTable = HitsTable()
     sensor: SensorTable = SensorTable()
     readback: ReadbackTable = ReadbackTable()
+    diagnose: DiagnoseTable = DiagnoseTable()
 
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
@@ -202,7 +209,7 @@ def with_effects(config: RobotConfig, path: Path) -> RobotConfig:
     return whole
 
 
-def check_sds(table: HitsTable | SensorTable | ReadbackTable, where: str) -> None:
+def check_sds(table: HitsTable | SensorTable | ReadbackTable | DiagnoseTable, where: str) -> None:
     """Raise InputError where an sd of a table is no number from 0 to 100."""
     for name in table.__struct_fields__:
         value = getattr(table, name)
@@ -226,6 +233,7 @@ def _check(config: RobotConfig, path: Path) -> None:
     check_sds(config.hits, f"{path}: [hits]")
     check_sds(config.sensor, f"{path}: [sensor]")
     check_sds(config.readback, f"{path}: [readback]")
+    check_sds(config.diagnose, f"{path}: [diagnose]")
     margin = config.collision.margin_m
     if not 0 <= margin < 1:
         raise InputError(

@@ -9,11 +9,12 @@ poses in common, and what wears the discrepancy of each pose away is worth littl
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.fit import LAST_STEPS, Fit, approached
+from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.thresholds import (
     CHAIN_VARIES,
     DAMPERS,
@@ -32,20 +33,6 @@ from planner.identification.measurement_model import (
 
 
 @dataclass(frozen=True, eq=False)
-class Mismatch:
-    """Mean squares over those of what was recorded: as it is, without misses, and of noise."""
-
-    whole: float
-    left: float
-    noise: float
-
-    @property
-    def unexplained(self) -> float:
-        """Relative size of what is left beyond noise, once the misses are out: 0.03 is 3 %."""
-        return float(np.sqrt(max(self.left - self.noise, 0.0)))
-
-
-@dataclass(frozen=True, eq=False)
 class InnerProducts:
     """Of a fit's residuals, of what each pose leaves open, and of derivatives, pose by pose.
 
@@ -58,7 +45,6 @@ class InnerProducts:
     products: np.ndarray
     own: np.ndarray
     chain: np.ndarray
-    mismatch: Mismatch
 
     @classmethod
     def of(cls, fit: Fit, springs: Sequence[str]) -> "InnerProducts":
@@ -78,9 +64,8 @@ class InnerProducts:
         """Of a fit, around a chain with these numbers."""
         misfit = fit.misfit
         h, slope, turned = misfit.parts(fit.x)
-        names = [p.name for p in misfit.parametrisation.parameters]
-        loose = [i for i, name in enumerate(names) if name in springs]
-        own = np.where(["stiffness" in names[i] for i in loose], 1.0, DAMPERS)
+        own = multiples(misfit, springs)
+        loose = np.flatnonzero(own)
         open_, tolerances = np.zeros((len(h), 0, *h.shape[1:])), misfit.tolerances
         if tolerances is not None:
             open_ = basis(h, turned, misfit.setting.s, tolerances)
@@ -90,17 +75,15 @@ class InnerProducts:
             open_, slope = seen.of_accelerations(open_), seen.of_accelerations(slope)
         residual = misfit.weight * (h - misfit.measured.accelerance)
         open_, sloped = misfit.weight[:, None] * open_, misfit.weight[:, None] * slope
-        made, sums = [], np.zeros(4)
+        made = []
         for i in range(len(h)):
             r, b, j = _real(residual[i][None]), _real(open_[i]), _real(sloped[i])
             varies = b.copy()
             varies[HIT_COLUMNS:OPEN] *= CHAIN_VARIES
             rows = np.concatenate([r, varies, j[loose], b[HIT_COLUMNS:OPEN], j])
             made.append(rows @ rows.T)
-            sums += _squares(r[0], b, misfit.weight[i], misfit.measured.accelerance[i])
-        own = np.concatenate([np.zeros(open_.shape[1]), own])
-        share = sums[:3] / max(sums[3], 1e-300)
-        return cls(fit, np.array(made), own, chain, Mismatch(*share.tolist()))
+        own = np.concatenate([np.zeros(open_.shape[1]), own[loose]])
+        return cls(fit, np.array(made), own, chain)
 
     def worth(self, temper: float) -> "Worth":
         """Evidence over all sizes, χ² counting 1/`temper`."""
@@ -112,7 +95,7 @@ class InnerProducts:
         values = max(float(self.fit.misfit.counts.sum()), 1.0)
         size = DISCREPANCIES[likeliest]
         chain = self.chain + step[: len(self.chain)]
-        return Worth(known, unknown, score, chi2 / values, size, self.mismatch, chain)
+        return Worth(known, unknown, score, chi2 / values, size, chain)
 
     def _at(self, size: float, temper: float) -> tuple[float, np.ndarray, float, np.ndarray]:
         """Log evidence, −2 ln likelihood (n,) of each pose, χ², and the step, at a `size`.
@@ -159,8 +142,28 @@ class Worth:
     score: np.ndarray
     per_value: float
     size: float
-    mismatch: Mismatch
     chain: np.ndarray
+
+
+def multiples(misfit: Misfit, springs: Sequence[str]) -> np.ndarray:
+    """(P,) sds in multiples of τ by which springs and dampers differ from pose to pose.
+
+    0 for those that are not among the named `springs`.
+    """
+    names = [p.name for p in misfit.parametrisation.parameters]
+    each = [(1.0 if "stiffness" in name else DAMPERS) * (name in springs) for name in names]
+    return np.array(each)
+
+
+def settled_with(fit: Fit, springs: Sequence[str], size: float) -> Fit:
+    """The fit followed to where it is best with a discrepancy of this size.
+
+    Its parameters are then as unsure as poses that differ leave them.
+    """
+    if not size or fit.misfit.tolerances is None:
+        return fit
+    misfit = replace(fit.misfit, discrepancy=size * multiples(fit.misfit, springs))
+    return approached(misfit, [fit.x], LAST_STEPS)
 
 
 def size_priors() -> tuple[np.ndarray, np.ndarray]:
@@ -181,14 +184,3 @@ def _real(values: np.ndarray) -> np.ndarray:
     """Complex (k, 3, 3, F) as real rows (k, 18 F)."""
     whole = np.ascontiguousarray(values, dtype=complex)
     return whole.reshape(len(values), -1).view(float)
-
-
-def _squares(r: np.ndarray, b: np.ndarray, weight: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Sums of squares (m/s²/N)² of a pose: mismatch, the same without misses, noise, recordings."""
-    eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
-    without = (r - eta @ b).view(complex).reshape(weight.shape)
-    used = weight > 0
-    unit = 1 / weight[used]
-    whole = r.view(complex).reshape(weight.shape)
-    parts = np.abs(whole[used] * unit) ** 2, np.abs(without[used] * unit) ** 2, 2 * unit**2
-    return np.array([*(np.sum(part) for part in parts), np.sum(np.abs(measured[used]) ** 2)])

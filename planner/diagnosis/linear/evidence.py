@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, log_sum
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
 from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.thresholds import (
     ALIKE,
     LEFT_FACTOR,
     LEFT_LEAST,
     LEFT_SHARE,
-    MATTERS,
     NOISE_OVERSTATED,
     SOMETHING_UNKNOWN,
 )
@@ -34,11 +34,12 @@ def temper_of(fits: Sequence[Fit]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Probabilities of the fits, in their order, then of "unknown"; T; what each fit is worth."""
+    """Probabilities of fits in their order, then of "unknown"; T; what each is worth and leaves."""
 
     probabilities: np.ndarray
     temper: float
     worth: tuple[Worth, ...]
+    mismatch: tuple[Mismatch, ...]
 
     @property
     def likeliest(self) -> int:
@@ -52,7 +53,9 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     The first fit is "none"; `prior` are the weights of the fits before any data. Each fit is there
     alone, or beside something unknown: how much it leaves tells which.
     """
-    springs = [p.name for p in fits[0].misfit.parametrisation.parameters]
+    simulation = fits[0].misfit.setting.simulation
+    matters = simulation.robot.config.diagnose.matters_percent / 100
+    springs = stated_springs(fits[0])
     products = [InnerProducts.of(f, springs) for f in fits]
     measured = fits[0].misfit.measured
     spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
@@ -60,30 +63,39 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     least = min(p.worth(1.0).per_value for p in products)
     t = temper(least, 0.0, shared=shared, least=NOISE_OVERSTATED)
     worth = tuple(p.worth(t) for p in products)
-    left = np.array([w.mismatch.unexplained for w in worth])
-    alone, beside = left_alone(left), left_beside(left)
+    mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
+    left = np.array([m.unexplained for m in mismatch])
+    alone, beside = left_alone(left, matters), left_beside(left, matters)
     known = np.array([w.log_evidence for w in worth]) + np.log(prior) + alone
     strange = np.array([w.log_evidence_unknown for w in worth]) + np.log(prior) + beside
-    unknown = log_sum(strange) + float(np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN)))
+    strange += np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
     scores = np.array([w.score for w in worth])
-    shares = bootstrapped(scores, known, 1.0, unknown, BOOTSTRAPS, seed)
-    return Weights(shares, t, worth)
+    shares = bootstrapped(
+        np.tile(scores, (2, 1)), np.concatenate([known, strange]), 1.0, -np.inf, BOOTSTRAPS, seed
+    )
+    alone_, beside_ = np.split(shares[:-1], 2)
+    return Weights(np.append(alone_, beside_.sum()), t, worth, mismatch)
 
 
-def left_alone(left: np.ndarray) -> np.ndarray:
+def stated_springs(none: Fit) -> tuple[str, ...]:
+    """Names of the springs and dampers that the simulation has without any effect."""
+    return tuple(p.name for p in none.misfit.parametrisation.parameters)
+
+
+def left_alone(left: np.ndarray, matters: float) -> np.ndarray:
     """Log likelihoods of so much (k,) being left, relative, where nothing unknown is there.
 
     The first is what refitting leaves: that may be what does not matter. What explains takes most
     of it.
     """
     least = np.full(len(left), max(LEFT_LEAST, LEFT_SHARE * left[0]))
-    least[0] = MATTERS
+    least[0] = matters
     return -(np.log(np.maximum(left, least) / least) ** 2) / (2 * np.log(LEFT_FACTOR) ** 2)
 
 
-def left_beside(left: np.ndarray) -> np.ndarray:
+def left_beside(left: np.ndarray, matters: float) -> np.ndarray:
     """The same where something unknown is: it would not be looked for if it did not matter."""
-    seen = np.clip(left, 1e-6, MATTERS) / MATTERS
+    seen = np.clip(left, 1e-6, matters) / matters
     return -(np.log(seen) ** 2) / (2 * np.log(LEFT_FACTOR) ** 2)
 
 

@@ -61,6 +61,7 @@ class Misfit:
     logarithmic: bool = False
     inertial: bool = True
     tolerances: Tolerances | None = None  # of hits and chain, integrated out; None: all are exact
+    discrepancy: np.ndarray | None = None  # (P,) sds by which ln θ differs from pose to pose
 
     @cached_property
     def split(self) -> tuple[int, int]:
@@ -181,6 +182,8 @@ class Misfit:
             j = np.ascontiguousarray(slope[i]).reshape(d, -1).view(float)
             r = np.ascontiguousarray(residual[i]).reshape(-1).view(float)
             b = np.ascontiguousarray(open_[i]).reshape(open_.shape[1], -1).view(float)
+            if self.discrepancy is not None:
+                b = np.concatenate([b, self.discrepancy[:, None] * j[: len(self.discrepancy)]])
             found = marginal(r, j, b)
             chi2[i] = found.chi2
             gradient[i, free] = found.gradient

@@ -1,0 +1,52 @@
+"""How much of the recordings a fit leaves: as it is, and once misses of hits and chain are out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnosis.linear.objective import Misfit
+from planner.identification.measurement_model import basis
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatch:
+    """Mean squares over those of what was recorded: as it is, without misses, and of noise."""
+
+    whole: float
+    left: float
+    noise: float
+
+    @property
+    def unexplained(self) -> float:
+        """Relative size of what is left beyond noise, once the misses are out: 0.03 is 3 %."""
+        return float(np.sqrt(max(self.left - self.noise, 0.0)))
+
+    @classmethod
+    def of(cls, misfit: Misfit, x: np.ndarray) -> "Mismatch":
+        """Of a simulation at x, on the lines of its misfit."""
+        whole, left = residuals(misfit, x)
+        used = misfit.weight > 0
+        unit = 1 / misfit.weight[used]
+        recorded = float(np.sum(np.abs(misfit.measured.accelerance[used]) ** 2))
+        parts = (np.abs(one[used] * unit) ** 2 for one in (whole, left))
+        sums = [*(float(np.sum(part)) for part in parts), float(np.sum(2 * unit**2))]
+        return cls(*(value / max(recorded, 1e-300) for value in sums))
+
+
+def residuals(misfit: Misfit, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3, 3, F) in units of the noise (√2 is usual): whole, and once the misses are out.
+
+    The misses are the likeliest ones, pose by pose.
+    """
+    h, _, turned = misfit.parts(x)
+    whole = misfit.weight * (h - misfit.measured.accelerance)
+    if misfit.tolerances is None:
+        return whole, whole
+    open_ = misfit.weight[:, None] * basis(h, turned, misfit.setting.s, misfit.tolerances)
+    left = np.empty_like(whole)
+    for i, columns in enumerate(open_):
+        r = np.ascontiguousarray(whole[i]).reshape(-1).view(float)
+        b = np.ascontiguousarray(columns).reshape(len(columns), -1).view(float)
+        eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
+        left[i] = (r - eta @ b).view(complex).reshape(whole[i].shape)
+    return whole, left

@@ -1,0 +1,73 @@
+"""How much and where simulation and recordings differ, as the answer of `diagnose` states it."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from planner.diagnosis.linear_diagnosis import Diagnosis
+
+
+@dataclass(frozen=True)
+class MismatchPlaces:
+    """Where the refitted simulation misses the recordings clearly."""
+
+    bands_hz: list[list[float]]
+    poses: tuple[str, ...]
+    directions: list[str]
+
+    @property
+    def sentence(self) -> str:
+        """For the engineer."""
+        if not self.bands_hz:
+            return "Refitted, the simulation misses the recordings in no band clearly."
+        bands = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in self.bands_hz)
+        return (
+            f"Refitted without any effect, the simulation misses the recordings at {bands} Hz, at "
+            f"poses {', '.join(self.poses) or '–'}, along {', '.join(self.directions) or '–'}."
+        )
+
+
+@dataclass(frozen=True)
+class TwoMisfits:
+    """χ² per value, 1 at the noise: of the refitted simulation, and with what explains it."""
+
+    refitted: float
+    explained: float
+
+
+@dataclass(frozen=True)
+class MismatchShares:
+    """Mean square of mismatch over that of the recordings, in dB, at the used poses.
+
+    Of the simulation as stated, refitted, and with what explains it; `left` is what remains of the
+    last once misses of hits and the chain's tolerances are taken out: noise, or physics.
+    """
+
+    stated: float
+    refitted: float
+    explained: float
+    left: float
+
+    @classmethod
+    def of(cls, found: "Diagnosis") -> "MismatchShares":
+        """Of a diagnosis."""
+        from planner.diagnosis.linear.fit import FINE
+        from planner.diagnosis.linear.mismatch import Mismatch
+
+        plain = found.problem.misfit(found.refitted.effect, FINE)
+        best = found.problem.misfit(found.best.effect, FINE)
+        last = Mismatch.of(best, found.best.x)
+        stated, refitted = (Mismatch.of(plain, x).whole for x in (plain.mean, found.refitted.x))
+        shares = stated, refitted, last.whole, last.left
+        return cls(*(round(10 * float(np.log10(max(share, 1e-12))), 2) for share in shares))
+
+    @property
+    def sentence(self) -> str:
+        """For the engineer."""
+        return (
+            f"Mismatch to what was recorded: {self.stated:.1f} dB as stated, {self.refitted:.1f} "
+            f"refitted, {self.explained:.1f} explained; {self.left:.1f} once misses of hits and "
+            f"sensor are taken out."
+        )
