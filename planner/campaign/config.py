@@ -93,7 +93,7 @@ class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The whole of campaign.toml; [hits], [sensor], [readback] and [diagnose] go before robot.toml's."""
+    """The whole of campaign.toml; tables that robot.toml has too go before its own."""
 
     workspace: WorkspaceTable
     robot: str = "robot/robot.toml"

@@ -12,7 +12,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.law_beside_linear import leaves_room
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis, beside_another
 from planner.diagnosis.revoked_artefacts import taken_back
-from planner.diagnosis.thresholds import SECOND_EFFECT, SUREST
+from planner.diagnosis.thresholds import SECOND_EFFECT
 from planner.diagnosis.verdict import linear_effects_apply, together
 
 
@@ -47,13 +47,11 @@ def test_probabilities_sum_to_one_and_fall(findings):
 
 
 @pytest.mark.parametrize("sure", [NONE, BASE, UNKNOWN])
-def test_nothing_is_surer_than_it_was_right_on_concealed_cases(sure):
+def test_no_probability_is_capped(sure):
     others = [place for place in (NONE, BASE, UNKNOWN) if place != sure]
-    found = combined((), (sure, 1.0), *((place, 0.0) for place in others)).candidates
+    found = combined((), (sure, 0.999), *((place, 0.0005) for place in others)).candidates
     assert found[0].places == (sure,)
-    assert found[0].probability == SUREST
-    assert found[1].probability == pytest.approx(1 - SUREST)
-    assert (found[1].places == (UNKNOWN,)) == (sure != UNKNOWN)
+    assert found[0].probability == pytest.approx(0.999)
 
 
 def test_without_findings_the_linear_verdict_stands():

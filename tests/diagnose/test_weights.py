@@ -1,17 +1,20 @@
 """What the weights must do whatever the robot."""
 
-from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
 
-from planner.diagnosis.effects.effect import Effect, Quantity
-from planner.diagnosis.linear.evidence import weigh
-from planner.diagnosis.thresholds import ALIKE, NOISE_OVERSTATED
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, size_priors
+from planner.diagnosis.linear.evidence import shares_of
+from planner.diagnosis.thresholds import ALIKE, DISCREPANCIES, NOISE_OVERSTATED
 from planner.inference.evidence import shared_noise, temper
+
+POSES = 9
 
 
 @given(st.floats(0.5, 1e6), st.floats(1.0, 10.0))
@@ -30,57 +33,87 @@ def test_shared_noise_is_the_sum_over_lags(spacing_hz, rate_1_s):
     assert shared_noise(spacing_hz, 0.0) == 1.0
 
 
-@dataclass(frozen=True)
-class Rough:
-    """A fit far above the noise: `bent` is what its springs cost, in nats."""
-
-    misfit_: float
-    bent: float
-    effect: Effect = field(default_factory=lambda: Effect(""))
-
-    @property
-    def per_value(self):
-        return self.misfit_
-
-    @property
-    def misfit(self):
-        frequency = np.tile(np.arange(100.0), (9, 1))
-        measured = SimpleNamespace(frequency_hz=frequency, s=2j * np.pi * frequency)
-        return SimpleNamespace(measured=measured, counts=np.full(9, 1000.0))
-
-    @property
-    def data(self):
-        return SimpleNamespace(chi2=np.full(9, 1000.0 * self.misfit_))
-
-    def log_evidence(self, temper):
-        return -9000 * self.misfit_ / (2 * temper) - self.bent
+def worth(evidence: float, size: float) -> Worth:
+    """Of a fit whose discrepancy is known to have one of the sizes."""
+    place = DISCREPANCIES.index(size)
+    known, unknown = (evidence + prior[place] for prior in size_priors())
+    return Worth(known, unknown, np.full(POSES, -2 * evidence / POSES), 1.0, size, np.zeros(14))
 
 
-def test_what_fits_nowhere_is_unknown_however_far_springs_were_bent_to_imitate_it():
-    """A feedback loop (misfit 490): once the refit's bent springs were held against "unknown"."""
-    fits = cast(Any, [Rough(492.0, 400.0), Rough(537.0, 140.0)])
-    assert weigh(fits, [100.0, 1.0]).probabilities[-1] > 0.99
+def shares(*fits: tuple[float, float, float], prior=None) -> np.ndarray:
+    """Of fits with log evidence, size of the discrepancy, and what is left."""
+    left = np.array([one[2] for one in fits])
+    made = [worth(evidence, size) for evidence, size, _ in fits]
+    return shares_of(made, left, prior or [100.0] + [1.0] * (len(fits) - 1), 0.03)
 
 
-def test_what_fits_to_the_noise_is_not_unknown():
-    fits = cast(Any, [Rough(200.0, 300.0), Rough(0.9, 150.0)])
-    assert weigh(fits, [100.0, 1.0]).probabilities[1] > 0.99
-
-
-@given(st.floats(0.001, 0.0095), st.floats(0.5, 0.99))
-def test_what_changes_frfs_far_below_the_noise_is_not_named(gain, misfit):
-    """As a spring that changed by 1 % with its joint's angle, at two poses: 0.7 % of χ²."""
-    made_up = Effect("joint_4", (Quantity("cosine", "N·m/rad", 0.0, 1e4),))
-    fits = cast(Any, [Rough(misfit, 10.0), Rough(misfit * (1 - gain), 10.0, made_up)])
-    none, effect, _ = weigh(fits, [1.0, 0.02]).probabilities
-    assert none > 0.9 > effect
-
-
-@given(st.floats(0.02, 0.5), st.floats(0.5, 0.99))
-def test_what_changes_them_by_more_counts_as_it_is(gain, misfit):
-    made = Effect("joint_4", (Quantity("cosine", "N·m/rad", 0.0, 1e4),))
-    with_own = weigh(
-        cast(Any, [Rough(misfit, 10.0), Rough(misfit * (1 - gain), 10.0, made)]), [1, 1]
+@given(
+    st.lists(
+        st.tuples(st.floats(-1e6, 0), st.sampled_from(DISCREPANCIES), st.floats(0, 2)), min_size=1
     )
-    without = weigh(cast(Any, [Rough(misfit, 10.0), Rough(misfit * (1 - gain), 10.0)]), [1, 1])
-    assert np.allclose(with_own.probabilities, without.probabilities)
+)
+def test_probabilities_sum_to_one(fits):
+    found = shares(*fits)
+    assert len(found) == len(fits) + 1
+    assert np.all(found >= 0)
+    assert found.sum() == pytest.approx(1.0)
+
+
+def test_what_is_as_small_as_every_simulation_errs_is_nothing():
+    assert shares((-900.0, 1e-3, 0.004))[0] > 0.99
+    assert shares((-900.0, 1e-3, 0.02))[0] > 0.99  # it does not matter
+
+
+def test_an_effect_that_takes_nearly_all_is_named_however_surely():
+    none, effect, unknown = shares((-900.0, 0.1, 0.3), (-500.0, 1e-3, 0.004))
+    assert effect > 0.999
+    assert none + unknown < 1e-3
+
+
+def test_what_leaves_most_of_it_is_beside_something_unknown():
+    """An effect takes a third of the mismatch; poses do not agree on its parameters."""
+    assert shares((-900.0, 0.1, 0.3), (-500.0, 0.1, 0.2))[-1] > 0.99
+
+
+def test_what_does_not_say_more_than_each_pose_for_itself_is_not_named():
+    """Twelve nats, as a spring gains that is free to change by 1 % with its joint's angle."""
+    none, effect, _ = shares((-900.0, 1e-3, 0.01), (-899.0, 1e-3, 0.009))
+    assert none > 0.95 > effect
+
+
+@given(st.floats(0.03, 1.0), st.floats(1.0, 3.0))
+def test_the_more_is_left_the_likelier_is_something_unknown(left, factor):
+    now = shares((-900.0, 3e-3, left))[-1]
+    assert shares((-900.0, 3e-3, factor * left))[-1] >= now - 1e-9
+
+
+def test_evidence_is_that_of_one_normal_distribution():
+    """Linear model: residuals, numbers open pose by pose, in common, and parameters; dense."""
+    rng = np.random.default_rng(3)
+    values, free, chain, springs, poses, temper_ = 14, 3, 2, 2, 3, 1.7
+    sd, x, mean = rng.uniform(0.5, 2, free), rng.normal(size=free), rng.normal(size=free)
+    r = rng.normal(size=(poses, values))
+    b, d = rng.normal(size=(poses, 2, values)), rng.normal(size=(poses, springs, values))
+    c, j = rng.normal(size=(poses, chain, values)), rng.normal(size=(poses, free, values))
+    rows = np.concatenate([r[:, None], b, d, c, j], axis=1)
+    misfit = SimpleNamespace(free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([42]))
+    around = rng.normal(size=chain)
+    made = InnerProducts(
+        cast(Any, SimpleNamespace(misfit=misfit, x=x)),
+        rows @ np.swapaxes(rows, 1, 2), np.array([0, 0, 1.0, 5.0]), around,
+    )  # fmt: skip
+
+    def dense(size: float) -> float:
+        # r holds where x and the chain are as they are: the priors' means are elsewhere.
+        expected = r - np.einsum("kpv,p->kv", j, x - mean) - np.einsum("kcv,c->kv", c, around)
+        whole = temper_ * np.eye(poses * values)
+        for k in range(poses):
+            own = slice(k * values, (k + 1) * values)
+            loose = size * np.array([1.0, 5.0])[:, None] * d[k]
+            whole[own, own] += b[k].T @ b[k] + loose.T @ loose
+        common = np.concatenate([np.swapaxes(c, 0, 1), sd[:, None, None] * np.swapaxes(j, 0, 1)])
+        flat = common.reshape(chain + free, -1)
+        return float(multivariate_normal.logpdf(expected.ravel(), cov=whole + flat.T @ flat))
+
+    told = [made._at(size, temper_)[0] - dense(size) for size in (0.0, 0.01, 0.3)]
+    assert np.ptp(told) < 1e-8

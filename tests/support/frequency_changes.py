@@ -14,7 +14,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from planner.diagnosis.effects.effect import Quantity
-from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT, TOLERATED, UNKNOWN_PARAMETERS
+from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT
+
+TOLERATED = 1.2  # misfit that nuisances leave where the physics is right; chosen
+UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each; chosen
 
 Model = Callable[[Mapping[str, float]], np.ndarray]  # values by name to frequencies (n, m) in Hz
 STARTS = (-1.0, 0.0, 1.0)  # of a change's own value, in sds of its prior

@@ -50,31 +50,40 @@ class Weights:
 def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights:
     """Evidence with the discrepancy inferred anew for each, averaged over which poses there are.
 
-    The first fit is "none"; `prior` are the weights of the fits before any data. Each fit is there
-    alone, or beside something unknown: how much it leaves tells which.
+    The first fit is "none"; `prior` are the weights of the fits before any data.
     """
-    simulation = fits[0].misfit.setting.simulation
-    matters = simulation.robot.config.diagnose.matters_percent / 100
     springs = stated_springs(fits[0])
     products = [InnerProducts.of(f, springs) for f in fits]
     measured = fits[0].misfit.measured
     spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
     shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
     least = min(p.worth(1.0).per_value for p in products)
-    t = temper(least, 0.0, shared=shared, least=NOISE_OVERSTATED)
+    t = max(least, NOISE_OVERSTATED) * shared
     worth = tuple(p.worth(t) for p in products)
     mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
     left = np.array([m.unexplained for m in mismatch])
-    alone, beside = left_alone(left, matters), left_beside(left, matters)
-    known = np.array([w.log_evidence for w in worth]) + np.log(prior) + alone
-    strange = np.array([w.log_evidence_unknown for w in worth]) + np.log(prior) + beside
-    strange += np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
-    scores = np.array([w.score for w in worth])
-    shares = bootstrapped(
-        np.tile(scores, (2, 1)), np.concatenate([known, strange]), 1.0, -np.inf, BOOTSTRAPS, seed
+    matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters_percent / 100
+    return Weights(shares_of(worth, left, prior, matters, seed), t, worth, mismatch)
+
+
+def shares_of(
+    worth: Sequence[Worth], left: np.ndarray, prior: Sequence[float], matters: float, seed: int = 0
+) -> np.ndarray:
+    """Probabilities (k + 1,) of k fits, each of them all there is, and of "unknown".
+
+    Something unknown may be there alone, as it were beside the first fit, or beside any other. How
+    large the discrepancy is tells, and how much is `left` (k,), relative to the recordings.
+    """
+    before = np.log(prior)
+    known = np.array([w.log_evidence for w in worth]) + before + left_alone(left, matters)
+    strange = np.array([w.log_evidence_unknown for w in worth]) + before
+    strange += left_beside(left, matters) + np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
+    scores = np.tile([w.score for w in worth], (2, 1))
+    both = np.concatenate([known, strange])
+    alone, beside, _ = np.split(
+        bootstrapped(scores, both, 1.0, -np.inf, BOOTSTRAPS, seed), [len(known), len(both)]
     )
-    alone_, beside_ = np.split(shares[:-1], 2)
-    return Weights(np.append(alone_, beside_.sum()), t, worth, mismatch)
+    return np.append(alone, beside.sum())
 
 
 def stated_springs(none: Fit) -> tuple[str, ...]:
