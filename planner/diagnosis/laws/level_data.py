@@ -1,12 +1,14 @@
 """What laws of a joint are fitted to: strongest hits, and differences of weaker ones to them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
+from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, several, whitening
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
@@ -14,6 +16,14 @@ from planner.dynamics.gradient import Impedance, response_gradient
 
 LINES = 64
 LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
+
+
+@dataclass(frozen=True, eq=False)
+class Opened:
+    """What misses leave open in some `columns` (b,) of LevelData: basis (l, b, 3, F)."""
+
+    columns: np.ndarray
+    basis: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +43,7 @@ class LevelData:
     hits: Strokes
     force: np.ndarray
     fastest_hz: float
+    opened: tuple[Opened, ...] = ()
 
     @property
     def weaker(self) -> np.ndarray:
@@ -42,6 +53,35 @@ class LevelData:
     def compared(self, h: np.ndarray) -> np.ndarray:
         """Strongest columns as they are, weaker ones as differences to them; h (..., c, 3, F)."""
         return np.where(self.weaker, h - h[..., self.best, :, :], h)
+
+    @cached_property
+    def _whitenings(self) -> list[Whitening]:
+        return [whitening(o.basis, self.weight[o.columns]) for o in self.opened]
+
+    def scaled(self, values: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """Real rows (k, N) of what is compared (k, c, 3, F) in units of its errors.
+
+        What misses leave open is taken out. With `rows` (b,) values hold these columns only, all
+        strongest ones or all columns.
+        """
+        rows = np.arange(len(self.h)) if rows is None else rows
+        out = real_rows(values * np.sqrt(self.weight[rows])).reshape(len(values), len(rows), -1)
+        place = {int(row): i for i, row in enumerate(rows)}
+        for opened, white in zip(self.opened, self._whitenings, strict=True):
+            at = [place[c] for c in opened.columns.tolist() if c in place]
+            if at:
+                part = out[:, at].reshape(len(values), -1)
+                out[:, at] = white(part).reshape(len(values), len(at), -1)
+        return out.reshape(len(values), -1)
+
+    def of_rows(self, scaled: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Those parts of scaled values (k, N) that belong to the columns `rows` (b,)."""
+        return scaled.reshape(len(scaled), len(self.h), -1)[:, rows].reshape(len(scaled), -1)
+
+    def chi2(self, values: np.ndarray) -> np.ndarray:
+        """(c,): Σ weight |value|² of each column (c, 3, F), with misses left open."""
+        each = self.scaled(values[None]).reshape(len(self.h), -1)
+        return np.sum(each**2, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +99,12 @@ class LinearSlopes:
     @classmethod
     def of(cls, data: LevelData, slope: np.ndarray, rows: np.ndarray) -> "LinearSlopes":
         """From derivatives (b, D, 3, F) of the columns `rows` (b,)."""
-        weighted = slope * np.sqrt(data.weight[rows])[:, None]
-        scaled = real_rows(np.swapaxes(weighted, 0, 1))
+        scaled = data.scaled(np.swapaxes(slope, 0, 1), rows)
         return cls(rows, scaled, scaled @ scaled.T)
 
 
-def real_rows(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts (k, N) of complex values (k, ...)."""
-    return np.ascontiguousarray(values).reshape(len(values), -1).view(float)
-
-
-def level_data(recorded: Dataset, plain: Fit) -> LevelData:
-    """Columns of all visits on lines of their own."""
+def level_data(recorded: Dataset, plain: Fit, misses: OpenMisses | None = None) -> LevelData:
+    """Columns of all visits on lines of their own; `misses` of their hits are left open."""
     columns: list[Column] = []
     visits: list[int] = []
     for number, group in enumerate(recorded.columns_at(LAID)):
@@ -93,11 +127,46 @@ def level_data(recorded: Dataset, plain: Fit) -> LevelData:
         + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2,
         variance + (LAW_MODEL_ERROR * np.abs(h)) ** 2,
     )
+    opened: list[Opened] = []
+    for visit in sorted(set(visits)) if misses is not None else ():
+        found, variance = _opened(columns, places, best, visit, misses, s)
+        opened += found
+        error = error + variance
     weight = np.where(np.isfinite(error), 1 / error, 0.0)
     hits = strokes(visits, columns)
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
-    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]))
+    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(opened))
+
+
+def _opened(
+    columns: list[Column],
+    places: list[tuple[int, int]],
+    best: np.ndarray,
+    visit: int,
+    misses: OpenMisses,
+    s: np.ndarray,
+) -> tuple[list[Opened], np.ndarray]:
+    """What misses leave open at a visit, and E|error|² (c, 3, F) of the simulation's part in it.
+
+    The strongest columns are opened together, to the measuring chain as well; of its part in
+    differences there is LAW_MODEL_ERROR.
+    """
+    hits, chain = misses.of_hits(visit, s), misses.of_chain(visit, s)
+    variance = np.zeros((len(columns), 3, len(s)))
+    strongest = [c for c, (v, _) in enumerate(places) if v == visit and best[c] == c]
+    whole = np.zeros((len(chain) + 4 * len(strongest), len(strongest), 3, len(s)), dtype=complex)
+    out = [Opened(np.array(strongest), whole)]
+    for i, c in enumerate(strongest):
+        axis, first = places[c][1], len(chain) + 4 * i
+        whole[: len(chain), i] = chain[:, :, axis]
+        whole[first : first + 4, i] = hits[axis]
+        variance[c] = misses.variance(visit, hits[axis])
+        for w in np.flatnonzero((best == c) & (np.arange(len(best)) != c)):
+            basis = np.sqrt(several((columns[w], columns[c]))) * hits[axis]
+            out.append(Opened(np.array([w]), basis[:, None]))
+            variance[w] = misses.variance(visit, basis)
+    return out, variance
 
 
 def strongest_slopes(data: LevelData, plain: Fit) -> LinearSlopes:
