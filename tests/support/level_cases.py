@@ -11,12 +11,14 @@ from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N, SCATTER
+from planner.truth.effects import LINEAR
 from planner.truth.handling import EVERYDAY, Handling, together
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, pulse
 from planner.truth.laws import Elastic, Friction, JointLaw
 from planner.truth.model import Truth, load_truth
 from planner.truth.nonlinear import Port, StruckPose, _linear, along
-from planner.truth.secret import HitVisit, Secret, hit_poses
+from planner.truth.scene import Scene
+from planner.truth.secret import HitVisit, Secret, StiffnessDrift, hit_poses
 
 HAND = replace(EVERYDAY, angle_deg=2.0, offset_m=0.005)
 
@@ -54,6 +56,7 @@ class Protocol:
     noise: float = 0.01
     handling: Handling = field(default_factory=lambda: HAND)
     returned: bool = False  # whether the first pose is hit again at the end
+    by_level: bool = False  # whether all hits of an axis and level at a pose miss alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,29 +75,40 @@ def made(
     how: Protocol | None = None,
     hardening: float = 0.0,
     friction: float = 0.0,
+    lacking: str = "",
+    drift: float = 0.0,
     robot: str = "",
     joint: str = "",
 ) -> LevelCase:
     """A case; `hardening`: k₃θ² over k at the largest angle of the strongest hits.
 
     `friction`: presliding stiffness over k, that has slid through at a third of the angle of
-    middling hits.
+    middling hits. `lacking` is an effect of `truth.effects.LINEAR` that the folder knows nothing of;
+    `drift` the relative change of all stiffnesses in the course of the visits.
     """
     how, rng = how or Protocol(), np.random.default_rng([seed, 24])
     robot = robot or str(rng.choice(sorted(ARMS)))
     joint = joint or f"joint_{rng.integers(1, 6)}"
     arm = replace(ARMS[robot], damping_s=DAMPING_S)
-    toml = arm.write(folder / f"{robot}-{seed}", int(rng.choice([1, 3])))
-    truth = load_truth(toml, replace(SCATTER, seed=int(rng.integers(2**31))))
+    per_joint = int(rng.choice([1, 3]))
+    toml = arm.write(folder / f"{robot}-{seed}", per_joint)
+    plain = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    truth = load_truth(toml, plain.deviation)
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     poses = rng.uniform(low, high, (how.poses, 6))
     hammer = Hammer(PEAK_N[robot], 0.008, noise=how.noise)
+    if lacking:
+        scene = Scene(arm, truth, per_joint, poses, hammer.peak_n)
+        plain = LINEAR[lacking](scene, plain, rng).secret
+        truth = load_truth(toml, plain.deviation)
     ports: tuple[Port, ...] = ()
     if hardening or friction:
         k = float(truth.own(joint) @ [spring.stiffness for spring in truth.springs])
         top = _angle(truth, poses, joint, how, hammer)
         ports = (Port(_law(k, top, hardening, friction, how), joint=joint),)
     secret = Secret(truth.deviation, ports, chain=how.handling.chain(rng))
+    if drift:
+        secret = replace(secret, drift=StiffnessDrift(drift, "warming"))
     visits = _hit(truth, secret, poses, how, hammer, rng)
     simulation = Simulation(Robot.load(toml))
     recorded = Dataset.of_visits(visits, simulation.robot.config.band_hz)
@@ -146,6 +160,8 @@ def _hit(
             ]
             axes = [AXES.index(axis[1]) for axis, _ in shots]
             own = how.handling.aims(axes, rng)
+            if how.by_level:
+                own = [own[i - i // n % how.repeats * n] for n in [len(how.axes)] for i in range(len(own))]
             aims = [together(common[a], aim) for a, aim in zip(axes, own, strict=True)]
             planned.append(HitVisit(q, shots, number / max(len(order) - 1, 1), aims))
         tip = replace(hammer, duration_s=hammer.duration_s * levels[0] ** -how.softer)

@@ -137,18 +137,16 @@ def equivalent(
     for number, columns in enumerate(recorded.columns):
         if not columns:
             continue
-        frequency = columns[0].frequency_hz
         lines = lines_of(columns[0])
-        s = 2j * np.pi * frequency + columns[0].rate_1_s
+        s = 2j * np.pi * columns[0].frequency_hz + columns[0].rate_1_s
         full = receptances(system, number, s)
-        basis = None if misses is None else misses.of_hits(number, s[lines])
+        missed = None if misses is None else misses.of_hits(number, columns, lines)
         for axis in range(3):
             group = [c for c in columns if c.axis == axis]
             swings = [swing(full, c) for c in group]
             for weaker, largest in zip(group[:-1], swings[:-1], strict=True):
                 pair = Pair.of(weaker, group[-1], lines)
-                if misses is not None and basis is not None:
-                    pair = pair.opened(misses, number, basis[axis])
+                pair = pair if missed is None else pair.opened(missed)
                 found = _delta(full, axis, lines, pair, scale)
                 before = float(pair.product(pair.change, pair.change))
                 count = int(np.count_nonzero(pair.weight))

@@ -8,7 +8,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
-from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, several, whitening
+from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
@@ -19,7 +19,7 @@ LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
 
 
 @dataclass(frozen=True, eq=False)
-class Opened:
+class LeftOpen:
     """What misses leave open in some `columns` (b,) of LevelData: basis (l, b, 3, F)."""
 
     columns: np.ndarray
@@ -43,7 +43,7 @@ class LevelData:
     hits: Strokes
     force: np.ndarray
     fastest_hz: float
-    opened: tuple[Opened, ...] = ()
+    left_open: tuple[LeftOpen, ...] = ()
 
     @property
     def weaker(self) -> np.ndarray:
@@ -56,7 +56,7 @@ class LevelData:
 
     @cached_property
     def _whitenings(self) -> list[Whitening]:
-        return [whitening(o.basis, self.weight[o.columns]) for o in self.opened]
+        return [whitening(o.basis, self.weight[o.columns]) for o in self.left_open]
 
     def scaled(self, values: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
         """Real rows (k, N) of what is compared (k, c, 3, F) in units of its errors.
@@ -67,8 +67,8 @@ class LevelData:
         rows = np.arange(len(self.h)) if rows is None else rows
         out = real_rows(values * np.sqrt(self.weight[rows])).reshape(len(values), len(rows), -1)
         place = {int(row): i for i, row in enumerate(rows)}
-        for opened, white in zip(self.opened, self._whitenings, strict=True):
-            at = [place[c] for c in opened.columns.tolist() if c in place]
+        for left, white in zip(self.left_open, self._whitenings, strict=True):
+            at = [place[c] for c in left.columns.tolist() if c in place]
             if at:
                 part = out[:, at].reshape(len(values), -1)
                 out[:, at] = white(part).reshape(len(values), len(at), -1)
@@ -127,45 +127,51 @@ def level_data(recorded: Dataset, plain: Fit, misses: OpenMisses | None = None) 
         + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2,
         variance + (LAW_MODEL_ERROR * np.abs(h)) ** 2,
     )
-    opened: list[Opened] = []
+    left: list[LeftOpen] = []
     for visit in sorted(set(visits)) if misses is not None else ():
-        found, variance = _opened(columns, places, best, visit, misses, s)
-        opened += found
+        found, variance = _left_open(columns, places, best, visit, misses, lines)
+        left += found
         error = error + variance
     weight = np.where(np.isfinite(error), 1 / error, 0.0)
     hits = strokes(visits, columns)
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
-    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(opened))
+    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(left))
 
 
-def _opened(
+def _left_open(
     columns: list[Column],
     places: list[tuple[int, int]],
     best: np.ndarray,
     visit: int,
     misses: OpenMisses,
-    s: np.ndarray,
-) -> tuple[list[Opened], np.ndarray]:
+    lines: np.ndarray,
+) -> tuple[list[LeftOpen], np.ndarray]:
     """What misses leave open at a visit, and E|error|² (c, 3, F) of the simulation's part in it.
 
     The strongest columns are opened together, to the measuring chain as well; of its part in
     differences there is LAW_MODEL_ERROR.
     """
-    hits, chain = misses.of_hits(visit, s), misses.of_chain(visit, s)
-    variance = np.zeros((len(columns), 3, len(s)))
-    strongest = [c for c, (v, _) in enumerate(places) if v == visit and best[c] == c]
-    whole = np.zeros((len(chain) + 4 * len(strongest), len(strongest), 3, len(s)), dtype=complex)
-    out = [Opened(np.array(strongest), whole)]
+    here = [c for c, (v, _) in enumerate(places) if v == visit]
+    strongest = [c for c in here if best[c] == c]
+    hits = misses.of_hits(visit, [columns[c] for c in here], lines)
+    chain = misses.of_chain(visit, columns[0], lines)
+    variance = np.zeros((len(columns), 3, len(lines)))
+    whole = [np.zeros((len(chain), len(strongest), 3, len(lines)), dtype=complex)]
+    out: list[LeftOpen] = []
     for i, c in enumerate(strongest):
-        axis, first = places[c][1], len(chain) + 4 * i
-        whole[: len(chain), i] = chain[:, :, axis]
-        whole[first : first + 4, i] = hits[axis]
-        variance[c] = misses.variance(visit, hits[axis])
-        for w in np.flatnonzero((best == c) & (np.arange(len(best)) != c)):
-            basis = np.sqrt(several((columns[w], columns[c]))) * hits[axis]
-            out.append(Opened(np.array([w]), basis[:, None]))
-            variance[w] = misses.variance(visit, basis)
+        axis = places[c][1]
+        whole[0][:, i] = chain[:, :, axis]
+        own, variance[c] = hits.left_open([columns[c]])
+        # An aim that all hits along the axis have in common, and each one's own.
+        own = np.concatenate([hits.basis[axis], own])
+        whole.append(np.zeros((len(own), len(strongest), 3, len(lines)), dtype=complex))
+        whole[-1][:, i] = own
+        for w in here:
+            if best[w] == c and w != c:
+                basis, variance[w] = hits.left_open([columns[w], columns[c]])
+                out.append(LeftOpen(np.array([w]), basis[:, None]))
+    out.append(LeftOpen(np.array(strongest), np.concatenate(whole)))
     return out, variance
 
 

@@ -16,10 +16,12 @@ from planner.dataset.dataset import LAID, Dataset
 from planner.dataset.level_columns import Column, column
 from planner.diagnosis.linear.fit import Fit
 from planner.dynamics.gradient import response_turned
-from planner.identification.measurement_model import Tolerances, chain_basis, hit_basis
+from planner.identification.measurement_model import ACROSS, Tolerances, chain_basis, hit_basis
 from planner.recording.force_levels import peak_n
 
 RELATIVE = 0.01  # of B: what no simulation is right to, however well it fits
+# Of what a tilt does, as hits along the other axes tell it that miss by themselves.
+TILTED = 0.03
 RAISED = 6  # times at most that B is taken to be less certain, until repeats agree
 LINES = 128  # most lines a column
 
@@ -30,18 +32,6 @@ def relative_misfit(plain: Fit) -> np.ndarray:
     off = np.where(measured.used, np.abs(h - measured.accelerance) ** 2, 0.0)
     size = np.where(measured.used, np.abs(measured.accelerance) ** 2, 0.0)
     return np.sqrt(off.sum(axis=(1, 2, 3)) / size.sum(axis=(1, 2, 3)))
-
-
-def several(columns: Sequence[Column]) -> float:
-    """Variance of the mean miss of the columns' differences, over that of one hit: Σ 1/n_eff.
-
-    H1 weighs hits by the square of their force.
-    """
-    out = 0.0
-    for column in columns:
-        square = np.array([peak_n(hit) ** 2 for hit in column.hits])
-        out += float(np.sum(square**2) / np.sum(square) ** 2)
-    return out
 
 
 def stronger(column: Column) -> float:
@@ -55,12 +45,42 @@ def stronger(column: Column) -> float:
 
 
 @dataclass(frozen=True, eq=False)
+class HitMisses:
+    """What misses of hits at a visit do at some `lines` (F,) of its columns.
+
+    `basis` (3, 4, 3, F) is B of a hit along each axis, per prior sd: two tilts, two offsets. `off`
+    (3, 4) is the share of each that is uncertain.
+    """
+
+    lines: np.ndarray
+    basis: np.ndarray
+    off: np.ndarray
+
+    def left_open(self, columns: Sequence[Column]) -> tuple[np.ndarray, np.ndarray]:
+        """What all the hits of columns along one axis leave open in differences between these.
+
+        Returns the basis (4 n, 3, F) of all n hits, and E|error|² (3, F) because B is not right. H1
+        weighs hits by the power of their force at each line: what several miss by in the mean goes
+        with the frequency.
+        """
+        axis = columns[0].axis
+        shares = np.concatenate([column.share[:, self.lines] for column in columns])
+        whole = shares[:, None, None] * self.basis[axis]
+        variance = np.einsum("k,nkif->if", self.off[axis] ** 2, np.abs(whole) ** 2)
+        return whole.reshape(-1, *whole.shape[2:]), variance
+
+
+@dataclass(frozen=True, eq=False)
 class OpenMisses:
-    """What hits miss by, as the linear fit `plain` to n visits answers it."""
+    """What hits miss by, as the linear fit `plain` to n visits answers it.
+
+    What a tilt does is told by the hits along the other axes, where there are any: that holds
+    whatever the simulation lacks. Only what an offset does is the simulation's own.
+    """
 
     plain: Fit
     tolerances: Tolerances
-    off: np.ndarray  # (n,): the share of B that is uncertain
+    off: np.ndarray  # (n,): the share of the simulation's B that is uncertain
 
     @classmethod
     def told(cls, plain: Fit, recorded: Dataset, tolerances: Tolerances) -> "OpenMisses":
@@ -72,46 +92,60 @@ class OpenMisses:
         for number, hits in enumerate(hit_columns(recorded)):
             pairs = list(_alike(hits))
             for _ in range(RAISED if pairs else 0):
-                left = cls(plain, tolerances, off)._left(number, pairs)
+                left = _left(cls(plain, tolerances, off).of_hits(number, hits), pairs)
                 if left <= 1:
                     break
                 off[number] *= np.sqrt(left)
         return cls(plain, tolerances, off)
 
-    def _left(self, visit: int, pairs: Sequence[tuple[Column, Column]]) -> float:
-        """χ² per value by which hits of one level differ beyond what is left open."""
-        lines = lines_of(pairs[0][0])
-        s = 2j * np.pi * pairs[0][0].frequency_hz[lines] + pairs[0][0].rate_1_s
-        basis, total, count = self.of_hits(visit, s), 0.0, 0
-        for one, other in pairs:
-            pair = Pair.of(one, other, lines).opened(self, visit, basis[one.axis])
-            total += float(pair.product(pair.change, pair.change))
-            count += np.count_nonzero(pair.weight)
-        return total / max(count, 1)
+    def of_hits(
+        self, visit: int, columns: Sequence[Column], lines: np.ndarray | None = None
+    ) -> HitMisses:
+        """At some lines of a visit's columns."""
+        lines = lines_of(columns[0]) if lines is None else lines
+        basis = hit_basis(*self._responses(visit, columns[0], lines)[:2], self.tolerances)[0]
+        off = np.full((3, 4), self.off[visit])
+        for axis in {column.axis for column in columns}:
+            group = [column for column in columns if column.axis == axis]
+            hits = [len(column.hits) for column in group]
+            mean = np.average([c.accelerance[:, lines] for c in group], axis=0, weights=hits)
+            for hit in range(3):
+                for tilt in np.flatnonzero(np.array(ACROSS[hit]) == axis):
+                    basis[hit, tilt] = self.tolerances.angle_rad * mean
+                    off[hit, tilt] = TILTED
+        return HitMisses(lines, basis, off)
 
-    def of_hits(self, visit: int, s: np.ndarray) -> np.ndarray:
-        """B (3, 4, 3, F) of a hit along each axis at s (F,) in rad/s."""
-        return self._both(visit, s)[0]
-
-    def of_chain(self, visit: int, s: np.ndarray) -> np.ndarray:
+    def of_chain(self, visit: int, one: Column, lines: np.ndarray) -> np.ndarray:
         """Changes (14, 3, 3, F) of all FRFs by the measuring chain's tolerance."""
-        return self._both(visit, s)[1]
+        h, _, turning = self._responses(visit, one, lines)
+        return chain_basis(h, turning, s_of(one, lines)[None], self.tolerances)[0]
 
-    def _both(self, visit: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _responses(
+        self, visit: int, one: Column, lines: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Accelerances, those of moments, and the sensor's turning: (1, 3, 3, F) each."""
         misfit, (a, b) = self.plain.misfit, self.plain.misfit.split
-        one, x = slice(visit, visit + 1), self.plain.x
+        at, x = slice(visit, visit + 1), self.plain.x
         mass = misfit.matrices.mass + misfit.inertias.mass_change(x[a:b])
         springs = misfit.parametrisation.elasticity(x[:a])
-        h, turned = response_turned(misfit.matrices.at(one), springs, s[None], mass[one])
-        hits = hit_basis(h, turned.moment, self.tolerances)[0]
-        return hits, chain_basis(h, turned.turning, s[None], self.tolerances)[0]
+        s = s_of(one, lines)[None]
+        h, turned = response_turned(misfit.matrices.at(at), springs, s, mass[at])
+        return h, turned.moment, turned.turning
 
-    def variance(self, visit: int, basis: np.ndarray) -> np.ndarray:
-        """E|error|² (3, F) of what a basis (l, 3, F) answers, because the simulation is not right.
 
-        Its own prior says how much that may be.
-        """
-        return self.off[visit] ** 2 * np.sum(np.abs(basis) ** 2, axis=0)
+def s_of(column: Column, lines: np.ndarray) -> np.ndarray:
+    """s (F,) in rad/s at some lines of a column."""
+    return 2j * np.pi * column.frequency_hz[lines] + column.rate_1_s
+
+
+def _left(misses: HitMisses, pairs: Sequence[tuple[Column, Column]]) -> float:
+    """χ² per value by which hits of one level differ beyond what is left open."""
+    total, count = 0.0, 0
+    for one, other in pairs:
+        pair = Pair.of(one, other, misses.lines).opened(misses)
+        total += float(pair.product(pair.change, pair.change))
+        count += np.count_nonzero(pair.weight)
+    return total / max(count, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,12 +182,13 @@ def whitening(basis: np.ndarray, weight: np.ndarray) -> Whitening:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Differences `change` (3, F) between two columns, with `weight` (3, F) = 1/E|error|².
+    """Differences `change` (3, F) between two columns at some `lines`, with `weight` (3, F) = 1/E|error|².
 
     `miss` takes out what misses leave open, None where hits are exact.
     """
 
     columns: tuple[Column, Column]
+    lines: np.ndarray
     change: np.ndarray
     weight: np.ndarray
     miss: Whitening | None = None
@@ -163,14 +198,14 @@ class Pair:
         """On some of the columns' lines."""
         variance = (one.variance + other.variance)[:, lines]
         change = (one.accelerance - other.accelerance)[:, lines]
-        return cls((one, other), change, _inverse(variance))
+        return cls((one, other), lines, change, _inverse(variance))
 
-    def opened(self, misses: "OpenMisses", visit: int, basis: np.ndarray) -> "Pair":
-        """With the misses of both columns' hits left open; basis (4, 3, F) is that of one hit."""
-        basis = np.sqrt(several(self.columns)) * basis
+    def opened(self, misses: HitMisses) -> "Pair":
+        """With the misses of both columns' hits left open."""
+        basis, uncertain = misses.left_open(self.columns)
         variance = np.where(self.weight > 0, 1 / np.maximum(self.weight, 1e-300), np.inf)
-        weight = _inverse(variance + misses.variance(visit, basis))
-        return Pair(self.columns, self.change, weight, whitening(basis, weight))
+        weight = _inverse(variance + uncertain)
+        return Pair(self.columns, self.lines, self.change, weight, whitening(basis, weight))
 
     def product(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Re Σ a* b over (3, F), weighted; a and b are (3, F, ...)."""

@@ -14,9 +14,9 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.open_misses import (
+    HitMisses,
     OpenMisses,
     hit_columns,
-    lines_of,
     real_rows,
     whitening,
 )
@@ -34,9 +34,10 @@ def chance(recorded: Dataset, misses: OpenMisses) -> float | None:
     rng = np.random.default_rng(0)
     ways, measured, shared = 1.0, 0.0, np.zeros(SHARED_OUT)
     for number, hits in enumerate(hit_columns(recorded)):
+        missed = misses.of_hits(number, hits)
         for group in _by_axis(hits):
             ways *= _ways(group)
-            real, random = _between(group, misses, number, rng)
+            real, random = _between(group, missed, rng)
             measured, shared = measured + real, shared + random
     if 1 / ways > BY_CHANCE:
         return None
@@ -80,15 +81,14 @@ def _ways(group: Sequence[Column]) -> float:
 
 
 def _between(
-    group: Sequence[Column], misses: OpenMisses, visit: int, rng: np.random.Generator
+    group: Sequence[Column], missed: HitMisses, rng: np.random.Generator
 ) -> tuple[float, np.ndarray]:
     """n/2 ln of all scatter over that within levels: as measured, and shared out at random."""
-    lines = lines_of(group[0])
-    s = 2j * np.pi * group[0].frequency_hz[lines] + group[0].rate_1_s
-    basis = np.sqrt(2.0) * misses.of_hits(visit, s)[group[0].axis]
+    lines = missed.lines
     # One weight for all: hits are to be exchangeable.
+    basis, uncertain = missed.left_open(group[:2])
     variance = np.mean([hit.variance[:, lines] for hit in group], axis=0)
-    variance = 2 * variance + misses.variance(visit, basis)
+    variance = 2 * variance + uncertain
     weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
     values = np.array([hit.accelerance[:, lines] for hit in group]) * np.sqrt(weight)
     seen = whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
