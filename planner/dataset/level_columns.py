@@ -26,6 +26,7 @@ class Column:
     rate_1_s: float
     force: np.ndarray  # (F,) in N·s: of one hit, time being 0 at its peak
     hits: tuple[Hit, ...]
+    share: np.ndarray  # (hits, F): of each hit in the accelerance, by the power of its force
 
 
 def column(
@@ -51,6 +52,7 @@ def column(
     excited = (f < high) | (high == f[-1])
     variance = frf.variance[:, axis] + _uncertain(spectra)
     variance = np.where(excited, variance, np.inf)[:, lines]
+    power = np.array([np.abs(hit.force) ** 2 for hit in spectra.hits])[:, lines]
     turned = np.exp(2j * np.pi * f * spectra.peak_s) / hits[0].sampling_rate_hz
     return Column(
         axis,
@@ -62,6 +64,7 @@ def column(
         frf.exponential_rate_1_s,
         (spectra.hits[0].force * turned)[lines],
         hits,
+        power / power.sum(axis=0),
     )
 
 

@@ -120,6 +120,10 @@ SEVERAL_HOPEFUL, SEVERAL_EXPLAINS = 0.3, 0.8
 SEVERAL_RIVAL = 4.0  # times what the best law leaves: beyond, another is not followed further
 SEVERAL_EVIDENCE = 50.0  # nats: what is explained at other poses, by so many numbers, is no chance
 
+# Levels against repeats: the chance that hits of one level, shared out among levels at random,
+# differ as much as levels do; and how often they are shared out
+BY_CHANCE, SHARED_OUT = 1e-3, 4000
+
 # A tone that sounds without any hit: chosen on generated cases
 TONE_WIDTH_HZ = 1.0  # half of what a tone takes up under the window
 TONE_CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together

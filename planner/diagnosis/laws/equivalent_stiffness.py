@@ -13,10 +13,10 @@ import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
+from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of, stronger
 from planner.diagnosis.linear.fit import Fit
 from planner.dynamics.simulation import Elasticity, Simulation
 
-LINES = 128  # most lines a column
 INSTANTS_S = np.linspace(0, 0.5, 257)
 STARTS = (-0.5, -0.1, 0.1, 0.5, 1.5)  # of Δ, times the joint's stiffness
 STEPS = 12
@@ -125,37 +125,40 @@ class Equivalent:
     count: np.ndarray
 
 
-def equivalent(recorded: Dataset, system: System) -> Equivalent:
-    """Fit Δ of every joint, by itself, to every pair of levels."""
+def equivalent(
+    recorded: Dataset, system: System, misses: OpenMisses | None = None
+) -> Equivalent:
+    """Fit Δ of every joint, by itself, to every pair of levels.
+
+    What `misses` of hits leave open is integrated out; without them hits are taken to be exact.
+    """
     rows = []
     scale = system.elasticity.stiffness[system.blocks]
     for number, columns in enumerate(recorded.columns):
         if not columns:
             continue
-        frequency = columns[0].frequency_hz
-        lines = np.unique(np.linspace(0, len(frequency) - 1, LINES).round().astype(int))
-        s = 2j * np.pi * frequency + columns[0].rate_1_s
+        lines = lines_of(columns[0])
+        s = 2j * np.pi * columns[0].frequency_hz + columns[0].rate_1_s
         full = receptances(system, number, s)
+        missed = None if misses is None else misses.of_hits(number, columns, lines)
         for axis in range(3):
             group = [c for c in columns if c.axis == axis]
             swings = [swing(full, c) for c in group]
             for weaker, largest in zip(group[:-1], swings[:-1], strict=True):
-                strongest = group[-1]
-                variance = (weaker.variance + strongest.variance)[:, lines]
-                weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
-                change = (weaker.accelerance - strongest.accelerance)[:, lines]
-                found = _delta(full, axis, lines, change, weight, scale)
-                before = float(np.sum(weight * np.abs(change) ** 2))
-                count = int(np.count_nonzero(weight))
-                pair = np.array([largest, swings[-1]])
-                rows.append((number, axis, weaker.level, pair, *found, before, count))
+                pair = Pair.of(weaker, group[-1], lines)
+                pair = pair if missed is None else pair.opened(missed)
+                found = _delta(full, axis, lines, pair, scale)
+                before = float(pair.product(pair.change, pair.change))
+                count = int(np.count_nonzero(pair.weight))
+                swung = np.array([largest, swings[-1]])
+                rows.append((number, axis, weaker.level, swung, *found, before, count))
     parts = [np.array(part) for part in zip(*rows, strict=True)]
     return Equivalent(*parts)
 
 
 def swing(full: Receptances, column: Column) -> np.ndarray:
     """Largest angle (J,) that the hit gives each joint, in the band."""
-    spectrum = full.port_hit[:, :, column.axis] * column.force[:, None]
+    spectrum = full.port_hit[:, :, column.axis] * column.force[:, None] * stronger(column)
     return np.max(np.abs((spectrum.T @ waves(full.s)).real), axis=1)
 
 
@@ -166,33 +169,30 @@ def waves(s: np.ndarray) -> np.ndarray:
 
 
 def _delta(
-    full: Receptances,
-    axis: int,
-    lines: np.ndarray,
-    change: np.ndarray,
-    weight: np.ndarray,
-    scale: np.ndarray,
+    full: Receptances, axis: int, lines: np.ndarray, pair: Pair, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Δ (J,), precision (J,) and χ² (J,) of each joint: Gauss-Newton from several starts.
 
-    Each Δ is one complex number, whose step is a quotient of two sums: all joints and starts go
-    side by side as arrays, which a fit with a matrix at each (`inference.least_squares`) would not.
+    Each Δ is one complex number, whose step solves two equations: all joints and starts go side
+    by side as arrays, which a fit with a matrix at each (`inference.least_squares`) would not.
     """
     s2 = (full.s[lines] ** 2)[:, None, None]
     path = -s2 * full.sensor_port[lines] * full.port_hit[lines][:, None, :, axis]
     path = np.moveaxis(path, 0, 1)[:, :, :, None]  # (3, F, J, 1)
     own = full.port_port[lines][None, :, :, None]
-    data, w = change[:, :, None, None], weight[:, :, None, None]
     delta = np.array(STARTS) * scale[:, None] * (1 + 0j)  # (J, starts)
 
     def misfit(at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """χ², step and precision."""
         soft = 1 / (1 + at * own)
-        residual = data - path * at * soft
+        residual = pair.change[:, :, None, None] - path * at * soft
         slope = path * soft**2
-        precision = np.sum(w * np.abs(slope) ** 2, axis=(0, 1))
-        step = np.sum(w * slope.conj() * residual, axis=(0, 1)) / (precision + 1e-300)
-        return np.sum(w * np.abs(residual) ** 2, axis=(0, 1)), step, precision
+        a, b = pair.product(slope, slope), pair.product(1j * slope, 1j * slope)
+        c = pair.product(slope, 1j * slope)
+        right = pair.product(slope, residual), pair.product(1j * slope, residual)
+        whole = a * b - c**2 + 1e-300
+        step = (b * right[0] - c * right[1] + 1j * (a * right[1] - c * right[0])) / whole
+        return pair.product(residual, residual), step, (a + b) / 2
 
     chi2, step, precision = misfit(delta)
     share = np.ones(delta.shape)

@@ -17,7 +17,6 @@ from planner.diagnosis.laws.level_data import (
     LevelData,
     LinearSlopes,
     own_parameter,
-    real_rows,
     stiffened_slopes,
 )
 from planner.diagnosis.laws.one_joint_response import Strokes, seen, side_by_side_views, spectra
@@ -220,7 +219,7 @@ def _weighed(
     """χ² and the objective of FRFs (c, 3, F)."""
     data = problem.data
     residual = data.compared(data.h) - data.compared(h)
-    chi2 = float(np.sum(data.weight * np.abs(residual) ** 2))
+    chi2 = float(np.sum(data.chi2(residual)))
     mean, sd = law.prior(problem.plain)
     away = (law.coordinates - mean) / sd
     value = chi2 + 0.5 * float(away @ away)
@@ -240,8 +239,7 @@ def _with_normal(
     data, law, plain = problem.data, at.law, problem.plain
     assert at.residual is not None
     m, d = len(law.ports), len(plain.x)
-    root = np.sqrt(data.weight)
-    ours, off = data.compared(slopes) * root, root * at.residual
+    flat, rest = data.scaled(data.compared(slopes)), data.scaled(at.residual[None])[0]
     blocks = system_of(plain).blocks[law.ports]
     own = [own_parameter(plain, int(block)) for block in blocks]
     # Where each of ours belongs among the coordinates: tied springs share a parameter.
@@ -249,14 +247,14 @@ def _with_normal(
     into[np.arange(3 * m), np.concatenate([d + np.arange(2 * m), own])] = 1.0
     others = np.ones(d)
     others[own] = 0.0
-    flat, rest = real_rows(ours), real_rows(off[None])[0]
-    cross = (linear.scaled @ real_rows(ours[:, linear.rows]).T) * others[:, None] @ into
+    theirs = data.of_rows(np.concatenate([flat, rest[None]]), linear.rows)
+    cross = (linear.scaled @ theirs[:-1].T) * others[:, None] @ into
     normal = into.T @ (flat @ flat.T) @ into
     normal[:d] += cross
     normal[:, :d] += cross.T
     normal[:d, :d] += linear.gram * np.outer(others, others)
     gradient = -(flat @ rest) @ into
-    gradient[:d] -= others * (linear.scaled @ real_rows(off[None, linear.rows])[0])
+    gradient[:d] -= others * (linear.scaled @ theirs[-1])
     mean, sd = law.prior(plain)
     away = (law.coordinates - mean) / sd
     # χ² over complex values is twice half the sum over real ones.

@@ -1,12 +1,14 @@
 """What laws of a joint are fitted to: strongest hits, and differences of weaker ones to them."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
+from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
@@ -14,6 +16,14 @@ from planner.dynamics.gradient import Impedance, response_gradient
 
 LINES = 64
 LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOpen:
+    """What misses leave open in some `columns` (b,) of LevelData: basis (l, b, 3, F)."""
+
+    columns: np.ndarray
+    basis: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +43,7 @@ class LevelData:
     hits: Strokes
     force: np.ndarray
     fastest_hz: float
+    left_open: tuple[LeftOpen, ...] = ()
 
     @property
     def weaker(self) -> np.ndarray:
@@ -42,6 +53,35 @@ class LevelData:
     def compared(self, h: np.ndarray) -> np.ndarray:
         """Strongest columns as they are, weaker ones as differences to them; h (..., c, 3, F)."""
         return np.where(self.weaker, h - h[..., self.best, :, :], h)
+
+    @cached_property
+    def _whitenings(self) -> list[Whitening]:
+        return [whitening(o.basis, self.weight[o.columns]) for o in self.left_open]
+
+    def scaled(self, values: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """Real rows (k, N) of what is compared (k, c, 3, F) in units of its errors.
+
+        What misses leave open is taken out. With `rows` (b,) values hold these columns only, all
+        strongest ones or all columns.
+        """
+        rows = np.arange(len(self.h)) if rows is None else rows
+        out = real_rows(values * np.sqrt(self.weight[rows])).reshape(len(values), len(rows), -1)
+        place = {int(row): i for i, row in enumerate(rows)}
+        for left, white in zip(self.left_open, self._whitenings, strict=True):
+            at = [place[c] for c in left.columns.tolist() if c in place]
+            if at:
+                part = out[:, at].reshape(len(values), -1)
+                out[:, at] = white(part).reshape(len(values), len(at), -1)
+        return out.reshape(len(values), -1)
+
+    def of_rows(self, scaled: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Those parts of scaled values (k, N) that belong to the columns `rows` (b,)."""
+        return scaled.reshape(len(scaled), len(self.h), -1)[:, rows].reshape(len(scaled), -1)
+
+    def chi2(self, values: np.ndarray) -> np.ndarray:
+        """(c,): Σ weight |value|² of each column (c, 3, F), with misses left open."""
+        each = self.scaled(values[None]).reshape(len(self.h), -1)
+        return np.sum(each**2, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +99,12 @@ class LinearSlopes:
     @classmethod
     def of(cls, data: LevelData, slope: np.ndarray, rows: np.ndarray) -> "LinearSlopes":
         """From derivatives (b, D, 3, F) of the columns `rows` (b,)."""
-        weighted = slope * np.sqrt(data.weight[rows])[:, None]
-        scaled = real_rows(np.swapaxes(weighted, 0, 1))
+        scaled = data.scaled(np.swapaxes(slope, 0, 1), rows)
         return cls(rows, scaled, scaled @ scaled.T)
 
 
-def real_rows(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts (k, N) of complex values (k, ...)."""
-    return np.ascontiguousarray(values).reshape(len(values), -1).view(float)
-
-
-def level_data(recorded: Dataset, plain: Fit) -> LevelData:
-    """Columns of all visits on lines of their own."""
+def level_data(recorded: Dataset, plain: Fit, misses: OpenMisses | None = None) -> LevelData:
+    """Columns of all visits on lines of their own; `misses` of their hits are left open."""
     columns: list[Column] = []
     visits: list[int] = []
     for number, group in enumerate(recorded.columns_at(LAID)):
@@ -93,11 +127,52 @@ def level_data(recorded: Dataset, plain: Fit) -> LevelData:
         + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2,
         variance + (LAW_MODEL_ERROR * np.abs(h)) ** 2,
     )
+    left: list[LeftOpen] = []
+    for visit in sorted(set(visits)) if misses is not None else ():
+        found, variance = _left_open(columns, places, best, visit, misses, lines)
+        left += found
+        error = error + variance
     weight = np.where(np.isfinite(error), 1 / error, 0.0)
     hits = strokes(visits, columns)
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
-    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]))
+    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(left))
+
+
+def _left_open(
+    columns: list[Column],
+    places: list[tuple[int, int]],
+    best: np.ndarray,
+    visit: int,
+    misses: OpenMisses,
+    lines: np.ndarray,
+) -> tuple[list[LeftOpen], np.ndarray]:
+    """What misses leave open at a visit, and E|error|² (c, 3, F) of the simulation's part in it.
+
+    The strongest columns are opened together, to the measuring chain as well; of its part in
+    differences there is LAW_MODEL_ERROR.
+    """
+    here = [c for c, (v, _) in enumerate(places) if v == visit]
+    strongest = [c for c in here if best[c] == c]
+    hits = misses.of_hits(visit, [columns[c] for c in here], lines)
+    chain = misses.of_chain(visit, columns[0], lines)
+    variance = np.zeros((len(columns), 3, len(lines)))
+    whole = [np.zeros((len(chain), len(strongest), 3, len(lines)), dtype=complex)]
+    out: list[LeftOpen] = []
+    for i, c in enumerate(strongest):
+        axis = places[c][1]
+        whole[0][:, i] = chain[:, :, axis]
+        own, variance[c] = hits.left_open([columns[c]])
+        # An aim that all hits along the axis have in common, and each one's own.
+        own = np.concatenate([hits.basis[axis], own])
+        whole.append(np.zeros((len(own), len(strongest), 3, len(lines)), dtype=complex))
+        whole[-1][:, i] = own
+        for w in here:
+            if best[w] == c and w != c:
+                basis, variance[w] = hits.left_open([columns[w], columns[c]])
+                out.append(LeftOpen(np.array([w]), basis[:, None]))
+    out.append(LeftOpen(np.array(strongest), np.concatenate(whole)))
+    return out, variance
 
 
 def strongest_slopes(data: LevelData, plain: Fit) -> LinearSlopes:

@@ -17,6 +17,7 @@ from scipy import signal
 from planner import jax_setup
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import System
+from planner.diagnosis.laws.open_misses import stronger
 from planner.diagnosis.laws.torque_laws import Law, Step
 
 FINER = 5  # steps a sample
@@ -51,7 +52,7 @@ def strokes(
         hit = column.hits[0]
         first, end = hit.pulse.around(len(hit.force_n))
         part = hit.sign * (hit.force_n[first:end] - hit.pulse.offset_n)
-        fine = np.asarray(signal.resample(part, finer * len(part)))
+        fine = stronger(column) * np.asarray(signal.resample(part, finer * len(part)))
         force[row, : min(len(fine), count)] = fine[:count]
         zero[row] = (hit.pulse.peak - first) / rate
     axes = np.array([column.axis for column in columns])

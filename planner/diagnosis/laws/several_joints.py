@@ -17,6 +17,7 @@ from planner.diagnosis.laws.level_data import (
 )
 from planner.diagnosis.laws.level_refits import Refit, begin
 from planner.diagnosis.laws.one_joint_response import strokes
+from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.torque_laws import LEAST_SHARE, Law
 from planner.diagnosis.linear.fit import Fit
 from planner.inference.least_squares import Damping
@@ -28,11 +29,13 @@ ROUNDS, GAIN = 5, 0.03  # of a descent at most, and what a round must gain of th
 DAMPING = Damping(first=1e-4, least=0.0, most=9.0, lighter=0.1, heavier=30.0)
 
 
-def problem_of_levels(recorded: Dataset, plain: Fit) -> LawProblem:
-    """What laws are fitted to, and judged by."""
+def problem_of_levels(
+    recorded: Dataset, plain: Fit, misses: OpenMisses | None = None
+) -> LawProblem:
+    """What laws are fitted to, and judged by; `misses` are as in `level_data`."""
     places = [(n, c) for n, group in enumerate(recorded.columns_at(LAID)) for c in group]
     hits = strokes([n for n, _ in places], [c for _, c in places], FINER, LASTS_S)
-    return LawProblem(level_data(recorded, plain), plain, hits)
+    return LawProblem(level_data(recorded, plain, misses), plain, hits)
 
 
 def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> LawAtJoints:
@@ -82,9 +85,9 @@ def differences(problem: LawProblem, law: LawAtJoints) -> tuple[float, float, fl
     """Of the weaker hits' differences to the strongest: χ² with and without the law, and values."""
     data = problem.data
     found = misfits(problem, [law])[0]
-    weight = np.where(data.weaker, data.weight, 0.0)
-    before = float(np.sum(weight * np.abs(data.h - data.h[data.best]) ** 2))
+    weaker = data.weaker[:, 0, 0]
+    count = float(np.count_nonzero(data.weight[weaker]))
+    before = float(np.sum(data.chi2(data.compared(data.h))[weaker]))
     if found.residual is None:
-        return np.inf, before, float(np.count_nonzero(weight))
-    left = float(np.sum(weight * np.abs(found.residual) ** 2))
-    return left, before, float(np.count_nonzero(weight))
+        return np.inf, before, count
+    return float(np.sum(data.chi2(found.residual)[weaker])), before, count

@@ -4,14 +4,18 @@ A pose that was visited twice tells by itself; otherwise the simulation, refitte
 course, takes what belongs to the pose.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
 from planner.diagnosis.linear.drift_fit import DriftProblem, problem_of
-from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.linear.fit import Fit, fit, settle, tolerances_of
 from planner.diagnosis.thresholds import (
     ALIKE,
     CLEAR,
@@ -51,7 +55,7 @@ def _since(free: Fit, problem: DriftProblem) -> float:
 
 def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     """`drift`, where the recordings change with time and not with the pose alone."""
-    if len(recorded.visits) < 4 or _unchanged(recorded):
+    if len(recorded.visits) < 4 or _unchanged(recorded, nominal):
         return ()
     plain, *found = fits(recorded, nominal)
     best = settle(problem_of(recorded, nominal), min(found, key=lambda f: f.per_value))
@@ -74,28 +78,39 @@ def evaluate(plain: Fit, best: Fit) -> Finding:
     return Finding("drift", "campaign", evidence, told, best.effect.text(told))
 
 
-def _unchanged(recorded: Dataset) -> bool:
-    """Whether a pose that was returned to answers as before."""
-    apart = returned(recorded)
+def _unchanged(recorded: Dataset, nominal: Simulation) -> bool:
+    """Whether a pose that was returned to answers as before, but for the misses of hits."""
+    if not any(_visits_again(recorded)):
+        return False
+    misses = OpenMisses.told(base(recorded, nominal), recorded, tolerances_of(nominal))
+    apart = returned(recorded, misses)
     return apart is not None and apart < DRIFT_STILL
 
 
-def returned(recorded: Dataset) -> float | None:
-    """χ² per value between first and last visit of a pose; largest of the poses, None without."""
+def returned(recorded: Dataset, misses: OpenMisses | None = None) -> float | None:
+    """χ² per value between first and last visit of a pose; largest of the poses, None without.
+
+    What `misses` of hits leave open is integrated out; without them hits are taken to be exact.
+    """
     found = []
-    for i, visit in enumerate(recorded.visits):
-        again = [j for j, v in enumerate(recorded.visits) if j > i and v.pose == visit.pose]
-        if not again:
-            continue
+    for first, last in _visits_again(recorded):
         total, count = 0.0, 0
-        for a in recorded.columns[i]:
-            for b in recorded.columns[again[-1]]:
+        missed = misses.of_hits(first, recorded.columns[first]) if misses else None
+        for a in recorded.columns[first]:
+            for b in recorded.columns[last]:
                 if (a.axis, a.level) == (b.axis, b.level):
-                    variance = a.variance + b.variance
-                    used = np.isfinite(variance)
-                    square = np.abs(a.accelerance - b.accelerance)[used] ** 2
-                    total += float(np.sum(square / variance[used]))
-                    count += int(used.sum())
+                    pair = Pair.of(a, b, lines_of(a))
+                    pair = pair if missed is None else pair.opened(missed)
+                    total += float(pair.product(pair.change, pair.change))
+                    count += int(np.count_nonzero(pair.weight))
         if count:
             found.append(total / count)
     return max(found) if found else None
+
+
+def _visits_again(recorded: Dataset) -> Iterator[tuple[int, int]]:
+    """First and last visit of each pose that was returned to."""
+    numbers: dict[str, list[int]] = {}
+    for number, visit in enumerate(recorded.visits):
+        numbers.setdefault(visit.pose, []).append(number)
+    return ((each[0], each[-1]) for each in numbers.values() if len(each) > 1)

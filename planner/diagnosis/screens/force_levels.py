@@ -20,15 +20,17 @@ from planner.diagnosis.laws.level_data import (
     strongest_slopes,
 )
 from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.starting_values import starts
 from planner.diagnosis.laws.torque_laws import behaviour
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.screens import several_joints
+from planner.diagnosis.linear.fit import Fit, tolerances_of
+from planner.diagnosis.screens import repeats, several_joints
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.diagnosis.screens.tone import screen_tone
 from planner.diagnosis.thresholds import (
     ALIKE,
+    BY_CHANCE,
     CLEAR,
     INDEPENDENT,
     LAW_EXPLAINS,
@@ -38,6 +40,7 @@ from planner.diagnosis.thresholds import (
     LINEARISED,
     ONE_JOINT,
     PROPORTIONAL,
+    UNKNOWN,
 )
 from planner.dynamics.simulation import Simulation
 from planner.inference.evidence import occam, temper, unexplained_shares
@@ -89,6 +92,14 @@ class WeighedLaw:
     temper: float
 
 
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """What the force levels tell; `remark` is what they can't tell, and how they could."""
+
+    findings: tuple[Finding, ...] = ()
+    remark: str = ""
+
+
 def screen(
     recorded: Dataset, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
 ) -> tuple[Finding, ...]:
@@ -96,17 +107,44 @@ def screen(
 
     `single`: a law of several joints is not looked for.
     """
+    return look(recorded, nominal, single=single, tell=tell).findings
+
+
+def look(
+    recorded: Dataset, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
+) -> Looked:
+    """As `screen`; with a remark where levels differ and repeats would have to say why."""
     if len(recorded.level_n) < 2:
-        return ()
+        return Looked()
     tone = screen_tone(recorded)
     if tone is not None:
-        return (tone,)
+        return Looked((tone,))
     plain = base(recorded, nominal)
+    misses = OpenMisses.told(plain, recorded, tolerances_of(nominal))
     system = system_of(plain)
-    found = equivalent(recorded, system)
+    found = equivalent(recorded, system, misses)
     if not len(found.count) or disproportion(found) < PROPORTIONAL:
-        return ()
-    share = equivalent_share(found)
+        return Looked()
+    by_chance = repeats.chance(recorded, misses)
+    if by_chance is not None and by_chance > BY_CHANCE:
+        return Looked()  # repeats at one level differ as much as levels do
+    findings = _named(recorded, nominal, found, misses, single, tell)
+    if by_chance is None and any(f.effect == UNKNOWN for f in findings):
+        return Looked((), repeats.wanted(recorded))
+    return Looked(findings)
+
+
+def _named(
+    recorded: Dataset,
+    nominal: Simulation,
+    found: Equivalent,
+    misses: OpenMisses,
+    single: bool,
+    tell: Tell,
+) -> tuple[Finding, ...]:
+    """Which joints' laws make the levels differ, or `unknown`."""
+    plain = misses.plain
+    system, share = system_of(plain), equivalent_share(found)
     if share < ONE_JOINT and not single:
         tell("fitting one law at all joints to the hits", 0.2)
     several = several_joints.screen(recorded, nominal) if share < ONE_JOINT and not single else ()
@@ -114,7 +152,7 @@ def screen(
         return several
     if share < LINEARISED:
         return (_unknown(found, "even with a stiffness of its own for every hit"),)
-    weighed = weigh(recorded, plain, system, found, tell)
+    weighed = weigh(recorded, misses, system, found, tell)
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > LAW_EXPLAINS:
         there, shares = _shares(weighed)
@@ -166,10 +204,11 @@ def _excess(found: Equivalent) -> float:
 
 
 def weigh(
-    recorded: Dataset, plain: Fit, system: System, found: Equivalent, tell: Tell = quietly
+    recorded: Dataset, misses: OpenMisses, system: System, found: Equivalent, tell: Tell = quietly
 ) -> tuple[WeighedLaw, ...]:
     """Every law at the joints that come into question, fitted in time, most probable first."""
-    data = level_data(recorded, plain)
+    plain = misses.plain
+    data = level_data(recorded, plain, misses)
     problem = LawProblem(data, plain, data.hits, strongest_slopes(data, plain))
     left = found.chi2.sum(axis=0)
     order = np.argsort(left)[:JOINTS]
@@ -234,11 +273,10 @@ def _weighed(
 
 
 def _levels(data: LevelData) -> LevelMisfit:
-    weaker = data.weaker
-    change = np.where(weaker, np.abs(data.h - data.h[data.best]) ** 2, 0.0)
-    differing = float(np.sum(data.weight * change))
-    strongest = float(np.count_nonzero(data.weight * ~weaker))
-    values = float(np.count_nonzero(data.weight * weaker))
+    weaker = data.weaker[:, 0, 0]
+    differing = float(np.sum(data.chi2(data.compared(data.h))[weaker]))
+    strongest = float(np.count_nonzero(data.weight[~weaker]))
+    values = float(np.count_nonzero(data.weight[weaker]))
     excess = max(differing - values, 1e-9)
     return LevelMisfit(differing + strongest, strongest + values, excess)
 

@@ -15,6 +15,7 @@ from planner.diagnosis.laws.equivalent_stiffness import own_springs
 from planner.diagnosis.laws.fit_in_time import LawProblem
 from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
 from planner.diagnosis.laws.level_refits import Refit, base, refits
+from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.several_joints import (
     beginning,
     differences,
@@ -23,6 +24,7 @@ from planner.diagnosis.laws.several_joints import (
     straightened,
 )
 from planner.diagnosis.laws.torque_laws import LAWS, Law, behaviour
+from planner.diagnosis.linear.fit import tolerances_of
 from planner.diagnosis.thresholds import (
     INDEPENDENT,
     SEVERAL_CHANGES,
@@ -69,9 +71,8 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     fitted = set(np.linspace(0, len(visits) - 1, count).round().astype(int).tolist())
     few = recorded.corrected(visits[i] for i in sorted(fitted))
     others = tuple(v for i, v in enumerate(visits) if i not in fitted)
-    told = problem_of_levels(few, base(few, nominal))
-    rest = recorded.corrected(others)
-    judged = problem_of_levels(rest, base(rest, nominal))
+    told = _problem(few, nominal)
+    judged = _problem(recorded.corrected(others), nominal)
     found = _laws(told, judged, refits(few, nominal))
     best = found[0]
     named = _that_matter(judged, best) if best.explained > SEVERAL_EXPLAINS else []
@@ -80,6 +81,12 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     share = unexplained_shares([f.left for f in found], INDEPENDENT)[0]
     sure = min(best.explained, float(share))
     return _findings(best, own_springs(nominal)[0], named, sure)
+
+
+def _problem(recorded: Dataset, nominal: Simulation) -> LawProblem:
+    plain = base(recorded, nominal)
+    misses = OpenMisses.told(plain, recorded, tolerances_of(nominal))
+    return problem_of_levels(recorded, plain, misses)
 
 
 def _laws(told: LawProblem, judged: LawProblem, seen: Sequence[Refit]) -> list[SharedLaw]:

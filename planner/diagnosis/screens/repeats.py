@@ -1,0 +1,103 @@
+"""Do force levels differ by more than hits of one level do among themselves?
+
+Hits of a linear structure are exchangeable: which level they belong to says nothing of how they
+are answered. Shared out among the levels at random they then differ from level to level as much as
+they really do (a permutation test; Anderson 2001, PERMANOVA). Nothing is assumed of how large the
+misses are, nor of the simulation, which only weighs.
+"""
+
+from collections.abc import Sequence
+from math import factorial, prod
+
+import numpy as np
+
+from planner.dataset.dataset import Dataset
+from planner.dataset.level_columns import Column
+from planner.diagnosis.laws.open_misses import (
+    HitMisses,
+    OpenMisses,
+    hit_columns,
+    real_rows,
+    whitening,
+)
+from planner.diagnosis.thresholds import BY_CHANCE, SHARED_OUT
+from planner.recording.records import Hit
+
+AXES = "xyz"
+
+
+def chance(recorded: Dataset, misses: OpenMisses) -> float | None:
+    """The chance that levels of a linear structure differ so much; None where it can't be told.
+
+    That is where so few hits were repeated at a level that even chance could make any difference.
+    """
+    rng = np.random.default_rng(0)
+    ways, measured, shared = 1.0, 0.0, np.zeros(SHARED_OUT)
+    for number, hits in enumerate(hit_columns(recorded)):
+        missed = misses.of_hits(number, hits)
+        for group in _by_axis(hits):
+            ways *= _ways(group)
+            real, random = _between(group, missed, rng)
+            measured, shared = measured + real, shared + random
+    if 1 / ways > BY_CHANCE:
+        return None
+    as_large = int(np.count_nonzero(shared >= measured - 1e-9))
+    return (1 + as_large) / (1 + SHARED_OUT)
+
+
+def wanted(recorded: Dataset) -> str:
+    """What to do where levels differ and repeats are missing: a sentence."""
+    few = [f"pose {v.pose} along {''.join(axes)}" for v in recorded.visits if (axes := _once(v.hits, recorded))]
+    return (
+        "FRFs of different force levels differ by more than noise, which misses of the hits would "
+        "do as well as a structure that is not linear: that can't be told without repeats. Hit "
+        f"twice at each level at {'; '.join(few[:3])}{' …' if len(few) > 3 else ''}."
+    )
+
+
+def _once(hits: Sequence[Hit], recorded: Dataset) -> list[str]:
+    """Axes that were hit at several levels, at one of them once only."""
+    out = []
+    for axis in range(3):
+        levels = [recorded.level(hit) for hit in hits if hit.axis_index == axis]
+        counts = np.bincount(levels) if levels else np.zeros(0)
+        if np.count_nonzero(counts) > 1 and np.any(counts == 1):
+            out.append(AXES[axis])
+    return out
+
+
+def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
+    """Hits of each axis that was hit at several levels, at one of them at least twice."""
+    groups = [[hit for hit in hits if hit.axis == axis] for axis in range(3)]
+    return [g for g in groups if 1 < len({hit.level for hit in g}) < len(g)]
+
+
+def _ways(group: Sequence[Column]) -> float:
+    """Ways to share hits out among the levels that make a difference: of equal levels one."""
+    sizes = np.bincount([hit.level for hit in group])
+    sizes = sizes[sizes > 0]
+    orders = prod(factorial(int(n)) for n in np.bincount(sizes))
+    return factorial(len(group)) / prod(factorial(int(n)) for n in sizes) / orders
+
+
+def _between(
+    group: Sequence[Column], missed: HitMisses, rng: np.random.Generator
+) -> tuple[float, np.ndarray]:
+    """n/2 ln of all scatter over that within levels: as measured, and shared out at random."""
+    lines = missed.lines
+    # One weight for all: hits are to be exchangeable.
+    basis, uncertain = missed.left_open(group[:2])
+    variance = np.mean([hit.variance[:, lines] for hit in group], axis=0)
+    variance = 2 * variance + uncertain
+    weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
+    values = np.array([hit.accelerance[:, lines] for hit in group]) * np.sqrt(weight)
+    seen = whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
+    gram, levels = seen @ seen.T, np.array([hit.level for hit in group])
+    orders = rng.permuted(np.tile(np.arange(len(group)), (SHARED_OUT, 1)), axis=1)
+    orders = np.concatenate([np.arange(len(group))[None], orders])
+    within = np.full(len(orders), float(np.trace(gram)))
+    for level in np.unique(levels):
+        own = orders[:, levels == level]
+        within -= gram[own[:, :, None], own[:, None, :]].sum(axis=(1, 2)) / own.shape[1]
+    told = -len(group) / 2 * np.log(np.maximum(within, 1e-12 * np.trace(gram)) / np.trace(gram))
+    return float(told[0]), told[1:]
