@@ -77,6 +77,7 @@ def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLE
     visits = Visits.planned(poses[:POSES], hammer, world.handling, rng, own)
     again = copy.deepcopy(rng)
     quiet = quiet_hits(truth, measured, visits.visits, hammer, rng)
+    hammer = world.handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
     record(folder / "recordings", truth, measured, visits, quiet, hammer, rng)
     held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
     write_predict(folder / "recordings", truth.joint_names, held_out, hammer.peak_n)
@@ -88,6 +89,7 @@ def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLE
             "seed": seed,
             "elastic_freedoms": 6 * per_joint,
             "noise": hammer.noise,
+            "rumble_m_s2": hammer.rumble_m_s2,
             "outside_library": any(drawn.effect == "unknown" for drawn in concealed),
             "effects": _effects(concealed, plain, conditions, robot_toml, measured, quiet, again),
             "held_out": _held_out(truth, secret, held_out, arm, hammer),
