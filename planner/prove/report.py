@@ -1,4 +1,4 @@
-"""The report of a proof: report.json, report.md and two pictures."""
+"""The report of a proof: report.json, report.md and pictures."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-
+from planner.prove.curves import MEASURES
+from planner.prove.pictures import PICTURES
 from planner.prove.run import Proof, told, unseal
-from planner.prove.score import BINS, Scored, score, summary
+from planner.prove.score import Scored, score
+from planner.prove.summary import summary
 from planner.report.answer import Answer, plain
 
 
@@ -54,52 +53,10 @@ def write(proof: Proof, scored: Sequence[Scored]) -> ProofReport:
     whole = answer.to_json() | {"scored": plain(scored), "seals": proof.seals}
     text = json.dumps(whole, indent=1)
     (proof.folder / "report.json").write_text(text, encoding="utf-8")
-    _confusion(scored).savefig(proof.folder / "confusion.png", dpi=110)
-    _calibration(scored).savefig(proof.folder / "calibration.png", dpi=110)
+    for name, draw in PICTURES.items():
+        draw(scored).savefig(proof.folder / f"{name}.png", dpi=110)
     (proof.folder / "report.md").write_text(_markdown(proof, scored, figures), encoding="utf-8")
     return answer
-
-
-def _name(places: Sequence[tuple[str, str | None]]) -> str:
-    if len(places) > 1:
-        return "pair"
-    return places[0][0] if places else "none"
-
-
-def _confusion(scored: Sequence[Scored]) -> Figure:
-    names = sorted({_name(s.true) for s in scored} | {_name(s.said) for s in scored})
-    counts = np.zeros((len(names), len(names)), dtype=int)
-    for s in scored:
-        counts[names.index(_name(s.true)), names.index(_name(s.said))] += 1
-    figure = Figure(figsize=(9, 8), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.subplots()
-    panel.imshow(counts, cmap="Blues")
-    for (i, j), count in np.ndenumerate(counts):
-        if count:
-            panel.text(j, i, str(count), ha="center", va="center")
-    panel.set_xticks(range(len(names)), names, rotation=90)
-    panel.set_yticks(range(len(names)), names)
-    panel.set_xlabel("said first")
-    panel.set_ylabel("concealed")
-    return figure
-
-
-def _calibration(scored: Sequence[Scored]) -> Figure:
-    p = np.array([s.probability for s in scored])
-    right = np.array([s.right for s in scored], dtype=float)
-    place = np.minimum((p * BINS).astype(int), BINS - 1)
-    figure = Figure(figsize=(5, 5), layout="constrained")
-    FigureCanvasAgg(figure)
-    panel = figure.subplots()
-    panel.plot([0, 1], [0, 1], color="black", lw=0.8, ls=":")
-    for k in np.unique(place):
-        there = place == k
-        panel.plot(p[there].mean(), right[there].mean(), "o", ms=3 + np.sqrt(there.sum()))
-        panel.annotate(str(there.sum()), (p[there].mean(), right[there].mean()))
-    panel.set_xlabel("stated probability")
-    panel.set_ylabel("share that is right")
-    return figure
 
 
 def _markdown(proof: Proof, scored: Sequence[Scored], figures: dict[str, Any]) -> str:
@@ -108,21 +65,59 @@ def _markdown(proof: Proof, scored: Sequence[Scored], figures: dict[str, Any]) -
         "",
         f"Seal of all answers, printed before the diagnosis: `{proof.whole}`",
         "",
-        "| group | right | of |",
+        "Shares with Wilson's 95 % intervals. Nats: what the recordings tell of an effect against",
+        "the best robot without it, refitted; hits and measuring chain known, or open too.",
+        "",
+        *_curves(figures),
+        "",
+        "| of | right | share |",
         "| --- | --- | --- |",
+        *(f"| {name} | {_text(of)} |" for name, of in figures["groups"].items()),
+        *(
+            f"| {name.replace('_', ' ')} | {_text(of)} |"
+            for name, of in figures.items()
+            if isinstance(of, dict) and "interval95" in of
+        ),
+        "",
     ]
-    for name, of in {**figures["groups"], "single, linear": figures["single_linear"]}.items():
-        lines.append(f"| {name} | {of['right']} | {of['of']} |")
-    rest = {k: v for k, v in figures.items() if k not in ("groups", "single_linear")}
-    lines += ["", *(f"- {key.replace('_', ' ')}: {value}" for key, value in rest.items())]
-    lines += ["", "![confusion](confusion.png) ![calibration](calibration.png)", "", "## Misses"]
-    lines += ["", "| case | robot | concealed | change | said | probability |", "|" + " --- |" * 6]
-    for s in sorted(scored, key=lambda s: s.detectability):
+    plainly = [k for k, v in figures.items() if not isinstance(v, dict)] + ["own_held_out"]
+    lines += [f"- {key.replace('_', ' ')}: {figures[key]}" for key in plainly]
+    pictures = ("curves", "confusion", "calibration")
+    lines += ["", " ".join(f"![{name}]({name}.png)" for name in pictures), "", "## Misses"]
+    return "\n".join([*lines, *_misses(scored), ""])
+
+
+def _curves(figures: dict[str, Any]) -> list[str]:
+    """A table with one row a bin and both measures side by side."""
+    heads = ["nats", "named, chain known", "in a set of 2", "named, chain open", "in a set of 2"]
+    lines = [f"| {' | '.join(heads)} |", "|" + " --- |" * len(heads)]
+    known, opened = (figures["curves"][m] for m in MEASURES)
+    ends = [(figures["clearly"][m],) for m in MEASURES]
+    for a, b in zip([*known, *ends[0]], [*opened, *ends[1]], strict=True):
+        most = "up" if a["most"] is None else f"{a['most']:g}"
+        cells = [_text(row[of], " · ") for row in (a, b) for of in ("named", "in_set")]
+        lines.append(f"| {a['least']:g} – {most} | {' | '.join(cells)} |")
+    return lines
+
+
+def _text(of: dict[str, Any], between: str = " | ") -> str:
+    if not of["of"]:
+        return f"0/0{between}"
+    low, high = of["interval95"]
+    return f"{of['right']}/{of['of']}{between}{of['share']:.0%} ({low:.0%}–{high:.0%})"
+
+
+def _misses(scored: Sequence[Scored]) -> list[str]:
+    heads = ["case", "robot", "concealed (nats)", "said", "falsely named", "probability"]
+    lines = ["", f"| {' | '.join(heads)} |", "|" + " --- |" * len(heads)]
+    for s in scored:
         if not s.right:
-            true = ", ".join(f"{n} {at}" for n, at in s.true) or "nothing"
-            said = ", ".join(f"{n} {at or ''}" for n, at in s.said)
+            true = ", ".join(f"{e.effect} {e.at or ''} ({e.nats_open:.3g})" for e in s.shown)
+            said, false = (
+                ", ".join(f"{n} {at or ''}" for n, at in of) for of in (s.said, s.false_names)
+            )
             lines.append(
-                f"| {s.name} | {s.robot} | {true} | {s.detectability:.2f} | {said} | "
+                f"| {s.name} | {s.robot} | {true or 'nothing'} | {said} | {false} | "
                 f"{s.probability:.2f} |"
             )
-    return "\n".join([*lines, ""])
+    return lines

@@ -1,4 +1,4 @@
-"""Scores of diagnoses against unsealed answers."""
+"""Scores of single diagnoses against their unsealed answers."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,22 +7,44 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnosis.thresholds import ARTEFACTS, LAWS_OF_JOINTS
+from planner.diagnosis.thresholds import ARTEFACTS
 from planner.frf import metrics
 
 BINS = 10
 Z90 = 1.645
+DETECTABLE = 5.0  # nats: below, not to name an effect is right; e⁵ is odds of 150
+LARGEST_SET = 2  # places that can't be told apart and yet count as told
 
 Place = tuple[str, str | None]
+NOTHING: frozenset[tuple[str, str | None]] = frozenset({("none", None), ("unknown", None)})
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A concealed effect: how much tells of it, and what the answer made of it.
+
+    `nats`: with the robot's own numbers refitted, hits and chain known; `nats_open`: those unknown
+    too. `named`: effect and place are named; `in_set`: or they are in a set of at most two that
+    can't be told apart.
+    """
+
+    effect: str
+    at: str | None
+    nats: float
+    nats_open: float
+    named: bool
+    in_set: bool
 
 
 @dataclass(frozen=True)
 class Scored:
     """One case: what was concealed, what was said first and how surely, whether that is right.
 
-    `group` is null, single, artefact, pair or outsider; `detectability` the relative change of
-    the FRFs; `covered` counts parameters inside and all that can be compared; `frac` is global
-    FRAC of the predictions with the true FRFs.
+    `group` is null, single, artefact, pair or outsider. `said` is the first candidate, `named` what
+    is told as there, `false_names` what of it is not there. `right`: what was said first is what
+    is there; what nothing tells of (DETECTABLE) may be left out. `detectability` is the smallest
+    relative change of the spectra by an effect; `covered` counts parameters inside and all that can
+    be compared; `frac` is global FRAC of the predictions with the true FRFs.
     """
 
     name: str
@@ -30,6 +52,10 @@ class Scored:
     robot: str
     true: tuple[Place, ...]
     said: tuple[Place, ...]
+    named: tuple[Place, ...]
+    false_names: tuple[Place, ...]
+    verdict: str
+    shown: tuple[Shown, ...]
     probability: float
     right: bool
     detectability: float
@@ -41,27 +67,64 @@ class Scored:
 
 def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
     """Score one case; one that failed is wrong, with certainty."""
-    true = tuple((e["effect"], e["at"]) for e in answer["effects"])
-    group = _group(answer, true)
-    changes = [e["change"] for e in answer["effects"]]
+    true = tuple(_place(e) for e in answer["effects"])
+    group, changes = _group(answer, true), [e["change"] for e in answer["effects"]]
+    change = min(changes, default=0.0)
     if "failed" in told:
+        shown = tuple(_shown(e, False, False) for e in answer["effects"])
         return Scored(
-            name, group, answer["robot"], true, (("failed", None),), 1.0, False,
-            min(changes, default=0.0), (0, 0), np.nan, np.nan, (np.nan, np.nan),
+            name, group, answer["robot"], true, (("failed", None),), (), (), "failed", shown,
+            1.0, False, change, (0, 0), np.nan, np.nan, (np.nan, np.nan),
         )  # fmt: skip
     first = told["candidates"][0]
-    said = tuple((e["effect"], e["at"]) for e in first["effects"])
-    wanted: tuple[Place, ...] = true or (("none", None),)
+    said = tuple(_place(e) for e in first["effects"])
+    named = _named(told, said)
+    sets = [frozenset(_place(e) for e in members) for members in told.get("sets") or ()]
+    pairs = [members for members in sets if len(members) <= LARGEST_SET]
+    wide = {p: {q for s in pairs if p in s for q in s} for p in {*true, *named}}
+    shown = tuple(
+        _shown(e, _place(e) in named, bool(wide[_place(e)] & set(named))) for e in answer["effects"]
+    )
+    there = {*true, *(_place(e) for e in answer.get("imperfections", ()))}
     held = told["held_out"]
     own = tuple(
         float("nan") if held[k]["frac"] is None else held[k]["frac"]
         for k in ("refitted", "explained")
     )
     return Scored(
-        name, group, answer["robot"], true, said, first["probability"],
-        sorted(said, key=str) == sorted(wanted, key=str), min(changes, default=0.0),
-        _covered(answer, told), _frac(answer, told), told["seconds"], (own[0], own[1]),
+        name, group, answer["robot"], true, said, named,
+        tuple(p for p in named if p not in there and not wide[p] & there),
+        told["verdict"], shown, first["probability"], _right(answer, shown, said),
+        change, _covered(answer, told), _frac(answer, told), told["seconds"], (own[0], own[1]),
     )  # fmt: skip
+
+
+def _place(effect: dict[str, Any]) -> Place:
+    return effect["effect"], effect["at"]
+
+
+def _shown(effect: dict[str, Any], named: bool, in_set: bool) -> Shown:
+    nats, opened = effect["nats"], effect["nats_open"]
+    return Shown(effect["effect"], effect["at"], nats, opened, named, named or in_set)
+
+
+def _named(told: dict[str, Any], said: Sequence[Place]) -> tuple[Place, ...]:
+    """What an engineer reads as being there; nothing where all is said to be consistent."""
+    if told["verdict"] == "consistent":
+        return ()
+    findings = [_place(f) for f in told["findings"]]
+    first = said if told["verdict"] == "explained" else ()
+    return tuple(dict.fromkeys(p for p in (*first, *findings) if p not in NOTHING))
+
+
+def _right(answer: dict[str, Any], shown: Sequence[Shown], said: Sequence[Place]) -> bool:
+    """Whether all that can be told is said first, and nothing that is not there."""
+    claimed, unknown = {p for p in said if p not in NOTHING}, ("unknown", None) in said
+    known = {(s.effect, s.at) for s in shown}
+    wanted = {(s.effect, s.at) for s in shown if s.nats_open >= DETECTABLE}
+    if not known or ("unknown", None) in wanted:
+        return not claimed and unknown == bool(wanted)
+    return wanted <= claimed <= known
 
 
 def _group(answer: dict[str, Any], true: Sequence[Place]) -> str:
@@ -135,36 +198,3 @@ def calibration_error(scored: Sequence[Scored]) -> float:
         if np.any(place == k)
     ]
     return float(np.sum(gaps))
-
-
-def summary(scored: Sequence[Scored]) -> dict[str, Any]:
-    """All figures of a proof."""
-
-    def share(chosen: Sequence[Scored]) -> dict[str, Any]:
-        good = sum(s.right for s in chosen)
-        return {"right": good, "of": len(chosen), "share": good / len(chosen) if chosen else None}
-
-    groups = {g: [s for s in scored if s.group == g] for g in sorted({s.group for s in scored})}
-    linear = [s for s in groups.get("single", []) if s.true[0][0] not in (*LAWS_OF_JOINTS, "drift")]
-    physics = [
-        s for s in groups.get("artefact", [])
-        if any(name not in (*ARTEFACTS, "unknown", "none") for name, _ in s.said)
-    ]  # fmt: skip
-    inside, known = np.sum([s.covered for s in scored], axis=0)
-    frac = [s.frac for s in scored if np.isfinite(s.frac)]
-    worse = [s.own_held_out[1] - s.own_held_out[0] for s in scored]
-    return {
-        "groups": {name: share(chosen) for name, chosen in groups.items()},
-        "single_linear": share(linear),
-        "artefacts_called_physics": len(physics),
-        "calibration_error": calibration_error(scored),
-        "coverage90": {"inside": int(inside), "of": int(known)},
-        "held_out_frac_median": float(np.median(frac)) if frac else None,
-        "own_held_out": {
-            side: float(np.nanmedian([s.own_held_out[k] for s in scored]))
-            for k, side in enumerate(("refitted", "explained"))
-        },
-        "worst_change_by_explaining": float(np.nanmin(worse)),
-        "seconds_median": float(np.nanmedian([s.seconds for s in scored])),
-        "seconds_most": float(np.nanmax([s.seconds for s in scored])),
-    }

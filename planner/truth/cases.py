@@ -7,42 +7,38 @@ into FOLDER/answers. Nothing in a case's folder tells what was concealed.
 """
 
 import argparse
+import copy
 import hashlib
 import json
 import secrets
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from planner.errors import InputError
+from planner.truth import conceal
 from planner.truth.arms import ARMS, Arm
-from planner.truth.detect import Detectability, detectability
+from planner.truth.conceal import EFFECTS, NothingShowsError
 from planner.truth.deviation import Deviation
-from planner.truth.effects import LINEAR, NONLINEAR, OTHER
-from planner.truth.handling import EVERYDAY, LABORATORY, Handling, together
-from planner.truth.hits import AXES, Hammer, write_predict, write_recordings
-from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
+from planner.truth.hits import Hammer, SimulatedHit, write_predict
 from planner.truth.model import Truth, load_truth
-from planner.truth.scene import PULSE_S, Draw, Drawn, Scene
-from planner.truth.secret import HitVisit, Secret, frfs, hit_poses, once
+from planner.truth.nats import Conditions, Lacking, lacking, nats
+from planner.truth.scene import PULSE_S, Drawn, Scene
+from planner.truth.secret import Secret, frfs, once, quiet_hits
+from planner.truth.visits import Visits, record
+from planner.truth.world import CLEAN, REAL, World
 
-EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
 KINDS = ("null", *EFFECTS, "pair", "drives")  # "drives": one law in several joints
 MIX = ("null", *EFFECTS, "pair", "null", "pair", "pair")  # pairs more often: there are many kinds
-DRIVES = 2, 4  # how many joints, at least and at most
 # Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
-LEVELS = (0.4, 1.0, 2.5)
 POSES, PREDICTED = 9, 4
 DAMPING_S = 9.5e-4  # C = s K: 3 % at 10 Hz, as robots in milling cells have
-SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)
-ATTEMPTS, SCENES = 40, 5
-
-
-class NothingShowsError(InputError):
-    """A scene whose noise hides whatever was drawn of an effect."""
+SCENES = 5
 
 
 @dataclass(frozen=True)
@@ -55,12 +51,8 @@ class Case:
     seal: str
 
 
-def make_case(
-    kind: str, robot: str, seed: int, folder: Path, handling: Handling = LABORATORY
-) -> Case:
+def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLEAN) -> Case:
     """Write folder/robot and folder/recordings of a kind of KINDS and a robot of ARMS.
-
-    `handling`: how hits and measuring chain err.
 
     Raises InputError for an unknown kind or robot.
     """
@@ -70,20 +62,26 @@ def make_case(
     arm = replace(ARMS[robot], damping_s=DAMPING_S)
     per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
     robot_toml = arm.write(folder / "robot", per_joint)
-    plain = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    plain = Secret(replace(world.scatter, seed=int(rng.integers(2**31))))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     poses = rng.uniform(low, high, (POSES + PREDICTED, 6))
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
+    hammer = replace(hammer, oversampling=world.oversampling)
     truth = load_truth(robot_toml, plain.deviation)
     scene = Scene(arm, truth, per_joint, poses, hammer.peak_n)
-    concealed, measures = _conceal(kind, scene, plain, robot_toml, hammer, rng)
+    concealed = conceal.concealed(kind, scene, plain, robot_toml, hammer, world, rng)
     secret = concealed[-1].secret if concealed else plain
     truth = load_truth(robot_toml, secret.deviation)
     own = np.random.default_rng([seed, zlib.crc32(b"handling")])
-    measured = replace(secret, chain=handling.chain(own))
-    _record(truth, measured, poses[:POSES], folder / "recordings", hammer, rng, handling, own)
+    measured = replace(secret, chain=world.handling.chain(own))
+    visits = Visits.planned(poses[:POSES], hammer, world.handling, rng, own)
+    again = copy.deepcopy(rng)
+    quiet = quiet_hits(truth, measured, visits.visits, hammer, rng)
+    hammer = world.handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
+    record(folder / "recordings", truth, measured, visits, quiet, hammer, rng)
     held_out = [(f"H{i + 1:02d}", q) for i, q in enumerate(poses[POSES:])]
     write_predict(folder / "recordings", truth.joint_names, held_out, hammer.peak_n)
+    conditions = Conditions(visits.visits, arm.band_hz, world.scatter, world.handling, hammer)
     answer = json.dumps(
         {
             "kind": kind,
@@ -91,11 +89,9 @@ def make_case(
             "seed": seed,
             "elastic_freedoms": 6 * per_joint,
             "noise": hammer.noise,
+            "rumble_m_s2": hammer.rumble_m_s2,
             "outside_library": any(drawn.effect == "unknown" for drawn in concealed),
-            "effects": [
-                {"effect": d.effect, "at": d.at, "parameters": d.parameters, **asdict(m)}
-                for d, m in zip(concealed, measures, strict=True)
-            ],
+            "effects": _effects(concealed, plain, conditions, robot_toml, measured, quiet, again),
             "held_out": _held_out(truth, secret, held_out, arm, hammer),
             "salt": secrets.token_hex(16),  # so that answers cannot be found by trying hashes
         },
@@ -105,95 +101,36 @@ def make_case(
     return Case(folder / "recordings", robot_toml, answer, seal)
 
 
-def _conceal(
-    kind: str,
-    scene: Scene,
-    secret: Secret,
+def _effects(
+    concealed: Sequence[Drawn],
+    plain: Secret,
+    conditions: Conditions,
     robot_toml: Path,
-    hammer: Hammer,
+    measured: Secret,
+    quiet: Sequence[Sequence[SimulatedHit]],
     rng: np.random.Generator,
-) -> tuple[list[Drawn], list[Detectability]]:
-    """Effects added one after the other, each drawn until it shows clearly in the FRFs."""
-    several = {"null": lambda *_: [], "pair": _pair, "drives": _drives}
-    names = several[kind](scene, rng) if kind in several else [kind]
-    concealed: list[Drawn] = []
-    measures: list[Detectability] = []
-    for name in names:
-        for _ in range(ATTEMPTS):
-            drawn = EFFECTS[name](scene, secret, rng)
-            if kind == "drives" and not _joins(drawn, concealed):
-                continue
-            with_it = load_truth(robot_toml, drawn.secret.deviation)
-            if not all(np.all(with_it.poles(q)[0].real < 0) for q in scene.poses):
-                continue  # a feedback loop that would shake by itself
-            without = load_truth(robot_toml, secret.deviation)
-            measure = detectability(without, secret, with_it, drawn.secret, scene, hammer)
-            if measure.shows(in_levels=name in NONLINEAR, in_time=name == "drift"):
-                concealed.append(drawn)
-                measures.append(measure)
-                secret = drawn.secret
-                break
-        else:
-            raise NothingShowsError(
-                f"No {name} of this robot shows in the noise; take another seed."
-            )
-    return concealed, measures
+) -> list[dict[str, Any]]:
+    """What was concealed, and how much the recordings tell of it; `rng` as for the recordings."""
+    found = []
+    whole = load_truth(robot_toml, measured.deviation)
+    for k, drawn in enumerate(concealed):
+        before = concealed[k - 1].secret if k else plain
+        secret = lacking(measured, before, drawn.secret)
+        truth = load_truth(robot_toml, secret.deviation)
+        hits = quiet_hits(truth, secret, conditions.visits, conditions.hammer, copy.deepcopy(rng))
+        most = _at_most(drawn, conditions.scatter)
+        told = nats(conditions, whole, measured, quiet, Lacking(truth, secret, hits, most))
+        said = {"effect": drawn.effect, "at": drawn.at, "parameters": drawn.parameters}
+        found.append({**said, "size": drawn.size, **asdict(told)})
+    return found
 
 
-def _pair(scene: Scene, rng: np.random.Generator) -> list[str]:
-    """Two different effects of the robot's own physics, at most one of them nonlinear."""
-    linear = [n for n in LINEAR if n != "transverse_compliance" or scene.per_joint == 1]
-    first, second = (str(name) for name in rng.choice(linear, 2, replace=False))
-    return [first, str(rng.choice(list(NONLINEAR)))] if rng.random() < 0.3 else [first, second]
-
-
-def _drives(scene: Scene, rng: np.random.Generator) -> list[str]:
-    """The same law several times."""
-    return [str(rng.choice(list(NONLINEAR)))] * int(rng.integers(DRIVES[0], DRIVES[1] + 1))
-
-
-def _joins(drawn: Drawn, concealed: list[Drawn]) -> bool:
-    """Whether a law is at a joint of its own, and hardens or softens as the others do."""
-    numbers = [next(iter(d.parameters.values())) for d in (drawn, *concealed)]
-    signs = {v > 0 for v in numbers if isinstance(v, float)}
-    return len(signs) == 1 and all(d.at != drawn.at for d in concealed)
-
-
-def _record(
-    truth: Truth,
-    secret: Secret,
-    poses: np.ndarray,
-    folder: Path,
-    hammer: Hammer,
-    rng: np.random.Generator,
-    handling: Handling,
-    own: np.random.Generator,
-) -> None:
-    """Three axes and three force levels a pose; the first pose is often hit again at the end.
-
-    `own` draws what `handling` leaves open, so that all else is the same in the laboratory.
-    """
-    visits = list(range(len(poses))) + ([0] if rng.random() < 0.5 else [])
-    shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
-    planned, readbacks = [], []
-    common, axes = handling.common(own), [AXES.index(axis[1]) for axis, _ in shots]
-    for number, index in enumerate(visits):
-        scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
-        readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
-        off = np.deg2rad(handling.readback_deg) * own.standard_normal(6)
-        aims = [
-            together(common[a], aim) for a, aim in zip(axes, handling.aims(axes, own), strict=True)
-        ]
-        there = np.deg2rad(readbacks[-1]) + off
-        planned.append(HitVisit(there, shots, number / (len(visits) - 1), aims))
-    rows = []
-    counts: dict[tuple[int, str], int] = {}
-    recorded = hit_poses(truth, secret, planned, hammer, rng)
-    for index, readback, hits in zip(visits, readbacks, recorded, strict=True):
-        for hit in hits:
-            repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
-            rows.append((f"P{index + 1:02d}", readback, repeat, hit))
-    write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")
+def _at_most(drawn: Drawn, scatter: Deviation) -> float:
+    """Nats of a joint's own stiffness: it scatters anyway, and this is what so far off costs."""
+    if drawn.effect != "joint_stiffness":
+        return float("inf")
+    off = np.log(float(str(drawn.parameters["factor"])))
+    return float(off**2 / 2 * (1 / scatter.stiffness**2 + 1 / scatter.damping**2))
 
 
 def _held_out(
@@ -215,11 +152,11 @@ def _held_out(
     }
 
 
-def _made(kind: str, robot: str, seed: int, folder: Path, handling: Handling) -> Case:
+def _made(kind: str, robot: str, seed: int, folder: Path, world: World) -> Case:
     """A case; of another scene where nothing drawn for this one shows in its noise."""
     for attempt in range(SCENES):
         try:
-            return make_case(kind, robot, seed + attempt * 1_000_003, folder, handling)
+            return make_case(kind, robot, seed + attempt * 1_000_003, folder, world)
         except NothingShowsError:
             if attempt == SCENES - 1:
                 raise
@@ -234,14 +171,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
     options = parser.parse_args()
+    world = CLEAN if options.laboratory else REAL
     answers = options.folder / "answers"
     answers.mkdir(parents=True, exist_ok=True)
-    handling = LABORATORY if options.laboratory else EVERYDAY
     order = np.random.default_rng(options.seed).permutation(options.cases)
     for number, kind in enumerate(order):
         name, robot = f"case_{number + 1:03d}", sorted(ARMS)[number % len(ARMS)]
         wanted = MIX[kind % len(MIX)], robot
-        case = _made(*wanted, options.seed + number, options.folder / name, handling)
+        case = _made(*wanted, options.seed + number, options.folder / name, world)
         (answers / f"{name}.json").write_text(case.answer, encoding="utf-8")
         print(f"{name} {case.seal}", flush=True)
 

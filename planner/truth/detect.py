@@ -1,4 +1,4 @@
-"""How clearly an effect shows in the FRFs: cases whose effect is below the noise are not used."""
+"""How clearly an effect shows in the FRFs: in the laboratory one below the noise is not used."""
 
 from dataclasses import dataclass, replace
 
@@ -16,7 +16,7 @@ LOW, HIGH = 0.4, 2.5  # of the middling peak force
 
 
 @dataclass(frozen=True)
-class Detectability:
+class Clarity:
     """Largest differences over some poses, relative to the size of the FRFs within the band.
 
     change: with to without the effect; level_change and time_change: with it, between the lowest
@@ -38,9 +38,9 @@ class Detectability:
         return min(seen) > max(LEAST_CHANGE, LEAST_NOISE_RATIO * self.frf_noise)
 
 
-def detectability(
+def clarity(
     truth: Truth, secret: Secret, other: Truth, concealed: Secret, scene: Scene, hammer: Hammer
-) -> Detectability:
+) -> Clarity:
     """Compare noise-free hits without (`truth`, `secret`) and with the effect."""
     quiet = replace(hammer, noise=0.0, force_noise=0.0)
     poses, band, peak = scene.poses[:COMPARED_POSES], scene.arm.band_hz, scene.peak_n
@@ -50,7 +50,7 @@ def detectability(
     steps = [(1.0, 0.0), (1.0, 1.0), (LOW, 0.0), (HIGH, 0.0)]
     visits = [once(q, k * peak, progress) for k, progress in steps for q in poses]
     early, late, low, high = np.split(frfs(other, concealed, visits, quiet, band)[1], len(steps))
-    return Detectability(
+    return Clarity(
         _distance(late, plain),
         _distance(high, low),
         _distance(late, early),

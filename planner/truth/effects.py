@@ -31,6 +31,7 @@ def joint_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
     """A joint about its own axis is far softer or stiffer than stated."""
     joint = some_joint(rng)
     factor = log_uniform(rng, 0.3, 0.55) if rng.random() < 0.7 else log_uniform(rng, 2.0, 3.5)
+    factor = factor**scene.size
     parameters: Parameters = {"factor": factor, "stiffness": factor * scene.stiffness(joint)}
     change = deviate(secret, scaled=(ScaledJoint(joint, factor),))
     return Drawn("joint_stiffness", joint, parameters, change)
@@ -40,7 +41,7 @@ def transverse_compliance(scene: Scene, secret: Secret, rng: np.random.Generator
     """A joint's bearing tilts about both axes across its own."""
     joint = some_joint(rng)
     axis = np.array(scene.arm.joints[int(joint[-1]) - 1].axis, dtype=float)
-    stiffness = [scene.stiffness(joint) * log_uniform(rng, 0.4, 2.5)]
+    stiffness = [scene.stiffness(joint) * log_uniform(rng, 0.4, 2.5) / scene.size]
     stiffness.append(stiffness[0] * log_uniform(rng, 0.7, 1.4))
     springs = [
         scene.spring(joint, a, k)
@@ -53,7 +54,7 @@ def transverse_compliance(scene: Scene, secret: Secret, rng: np.random.Generator
 
 def base_compliance(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """The floor gives way: two tilts, or sometimes all six."""
-    tilt = scene.stiffness("joint_2") * log_uniform(rng, 0.7, 4.0)
+    tilt = scene.stiffness("joint_2") * log_uniform(rng, 0.7, 4.0) / scene.size
     tilts = [tilt, tilt * log_uniform(rng, 0.7, 1.4)]
     springs = [scene.spring("base", a, k) for a, k in zip(np.eye(3)[:2], tilts, strict=True)]
     parameters: Parameters = {"stiffness": tilts, "freedoms": 2.0}
@@ -81,7 +82,7 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
     axis = np.array(scene.arm.joints[number - 1].axis, dtype=float)
     if kind == "torsion" and abs(axis @ along) > PARALLEL_COSINE * np.linalg.norm(along):
         kind = "bending"
-    own = scene.stiffness(f"joint_{number}")
+    own = scene.stiffness(f"joint_{number}") / scene.size
     parameters: Parameters = {"kind": kind}
     springs = []
     if kind != "torsion":
@@ -99,7 +100,7 @@ def link_flexibility(scene: Scene, secret: Secret, rng: np.random.Generator) -> 
 def added_mass(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A lump on a link, or a payload missing from the robot folder."""
     number = int(rng.integers(2, 7))
-    mass = scene.moving_kg * log_uniform(rng, 0.03, 0.15)
+    mass = scene.size * scene.moving_kg * log_uniform(rng, 0.03, 0.15)
     place = rng.uniform(0.1, 1.0) * scene.length(number) + 0.1 * some_direction(rng)
     lump = AttachedMass(f"link_{number}", triple(place), mass)
     parameters: Parameters = {"mass": mass, "position_m": place.tolist()}
@@ -115,7 +116,7 @@ def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
         f"link_{number}",
         triple(place),
         triple(some_direction(rng)),
-        scene.moving_kg * log_uniform(rng, 0.01, 0.05),
+        scene.size * scene.moving_kg * log_uniform(rng, 0.01, 0.05),
         log_uniform(rng, 0.9 * low, 1.1 * high),
         log_uniform(rng, 0.01, 0.05),
     )
@@ -132,7 +133,7 @@ def local_resonator(scene: Scene, secret: Secret, rng: np.random.Generator) -> D
 def angle_dependent_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Stiffness that goes with the joint's angle: first or second harmonic."""
     joint, order = some_joint(rng), int(rng.integers(1, 3))
-    size, phase = rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
+    size, phase = scene.size * rng.uniform(0.3, 0.6), rng.uniform(0, 2 * np.pi)
     wave = StiffnessRipple(joint, order, float(size * np.cos(phase)), float(size * np.sin(phase)))
     parameters: Parameters = {"order": float(order), "cosine": wave.cosine, "sine": wave.sine}
     change = deviate(secret, harmonics=(wave,))
@@ -141,7 +142,7 @@ def angle_dependent_stiffness(scene: Scene, secret: Secret, rng: np.random.Gener
 
 def structural_damping(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """K(1 + iη) in all joints instead of viscous damping."""
-    loss = log_uniform(rng, 0.04, 0.15)
+    loss = scene.size * log_uniform(rng, 0.04, 0.15)
     change = replace(secret, loss_factor=loss)
     return Drawn("structural_damping", "joints", {"loss_factor": loss}, change)
 
@@ -171,7 +172,8 @@ def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) 
     joint = some_joint(rng)
     factor = log_uniform(rng, 0.6, 2.0) if rng.random() < 0.6 else -rng.uniform(0.3, 0.6)
     law = Hardening(
-        factor * _left(scene, secret, joint), scene.angle(joint) * log_uniform(rng, 0.2, 1.0)
+        scene.size * factor * _left(scene, secret, joint),
+        scene.angle(joint) * log_uniform(rng, 0.2, 1.0),
     )
     parameters: Parameters = {"stiffness_change": law.stiffness, "angle_rad": law.angle}
     return _in_joint("nonlinear_stiffness", joint, law, parameters, secret)
@@ -180,7 +182,7 @@ def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) 
 def friction(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Presliding and Coulomb friction beside the spring."""
     joint = some_joint(rng)
-    stiffness = _left(scene, secret, joint) * log_uniform(rng, 0.3, 1.5)
+    stiffness = scene.size * _left(scene, secret, joint) * log_uniform(rng, 0.3, 1.5)
     law = Friction(stiffness, stiffness * scene.angle(joint) * log_uniform(rng, 0.05, 0.4))
     parameters: Parameters = {"presliding_stiffness": law.stiffness, "coulomb_torque": law.coulomb}
     return _in_joint("friction", joint, law, parameters, secret)
@@ -190,7 +192,7 @@ def backlash(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Play in a gear, in which some stiffness is left."""
     joint = some_joint(rng)
     law = Backlash(
-        _left(scene, secret, joint) * rng.uniform(0.4, 0.8),
+        scene.size * _left(scene, secret, joint) * rng.uniform(0.4, 0.8),
         scene.angle(joint) * log_uniform(rng, 0.1, 0.5),
     )
     parameters: Parameters = {"lost_stiffness": law.stiffness, "half_gap_rad": law.gap}
@@ -199,7 +201,7 @@ def backlash(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
 
 def drift(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Stiffnesses change in the course of the campaign."""
-    size = rng.uniform(0.12, 0.35) * rng.choice([-1, 1])
+    size = scene.size * rng.uniform(0.12, 0.35) * rng.choice([-1, 1])
     law = StiffnessDrift(float(size), str(rng.choice(["linear", "warming", "step"])))
     parameters: Parameters = {"change": law.change, "course": law.course}
     return Drawn("drift", "campaign", parameters, replace(secret, drift=law))

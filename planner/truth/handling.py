@@ -4,10 +4,15 @@ Nothing of it is an artefact: each number is what a careful hand, a good sensor 
 leave. All are drawn anew for each case, from ranges of their own.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+
+from planner.truth.hits import Hammer, SimulatedHit, largest_rms
+
+RUMBLE_HZ = 2.0, 8.0  # where a workshop's floor vibrates most; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +38,8 @@ class Handling:
     `angle_deg`, `offset_m`: of each hit by itself; `aim_deg`, `aim_m`: common to all hits along an
     axis in the campaign. `readback_deg`: of each joint at each pose. `gain`, `cross_axis`: of the
     sensor's channels and of what each feels of the others. `mounting_deg`, `position_m`: of the
-    sensor. `force_gain`: of the hammer. `delay_s`: between force and accelerations.
+    sensor. `force_gain`: of the hammer. `delay_s`: between force and accelerations. `rumble`: of
+    the floor's slow vibration, relative to the response to a middling hit.
     """
 
     angle_deg: float = 0.0
@@ -47,6 +53,7 @@ class Handling:
     position_m: float = 0.0
     force_gain: float = 0.0
     delay_s: float = 0.0
+    rumble: float = 0.0
 
     def aims(self, axes: list[int], rng: np.random.Generator) -> list[Aim]:
         """Of hits along axes 0..2; call `common` first where they share an aim."""
@@ -70,6 +77,17 @@ class Handling:
         force = 1 + self.force_gain * float(rng.standard_normal())
         delay = abs(self.delay_s * float(rng.standard_normal()))
         return MeasuringChain(matrix, (float(x), float(y), float(z)), force, delay)
+
+    def floor(
+        self, hammer: Hammer, hits: Sequence[SimulatedHit], rng: np.random.Generator
+    ) -> Hammer:
+        """The hammer on a floor that rumbles; `hits` are a campaign's, without noise."""
+        if self.rumble == 0:
+            return hammer
+        size = self.rumble * float(np.median([largest_rms(hit) for hit in hits]))
+        most_hz = float(rng.uniform(*RUMBLE_HZ))
+        rms = size * abs(float(rng.standard_normal()))
+        return replace(hammer, rumble_m_s2=rms, rumble_hz=most_hz)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,4 +116,5 @@ LABORATORY = Handling()
 EVERYDAY = Handling(
     angle_deg=1.5, offset_m=0.004, aim_deg=0.7, aim_m=0.002, readback_deg=0.05, gain=0.015,
     cross_axis=0.01, mounting_deg=1.0, position_m=0.004, force_gain=0.015, delay_s=3e-5,
+    rumble=0.01,
 )  # fmt: skip

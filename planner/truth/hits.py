@@ -12,6 +12,7 @@ from scipy import signal
 
 OVERSAMPLING = 16  # time steps of the solution per sample of the analyser
 AXES = ("x", "y", "z")
+FLOOR_DAMPING = 0.3  # ratio, of a floor's first mode with machines on it; chosen
 
 
 class TrueRobot(Protocol):
@@ -34,7 +35,7 @@ class TrueRobot(Protocol):
 
 @dataclass(frozen=True)
 class Hammer:
-    """What the person, the hammer and the analyser are like.
+    """What the person, the hammer, the analyser and the floor are like.
 
     Noise is relative: of the responses to the hit's largest response (rms), of the force to its
     peak. Readback angles scatter by `readback_deg` around the setpoint.
@@ -48,6 +49,14 @@ class Hammer:
     noise: float = 0.02
     force_noise: float = 5e-4
     readback_deg: float = 0.01
+    oversampling: int = OVERSAMPLING
+    rumble_m_s2: float = 0.0  # rms of the floor's slow vibration, in every channel
+    rumble_hz: float = 4.0  # where most of it is
+
+    @property
+    def step_s(self) -> float:
+        """Between time steps of the solution."""
+        return 1 / (self.sampling_rate_hz * self.oversampling)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +74,13 @@ def simulate_hit(
     """One hit at pose q (rad) along a signed axis of the tcp frame ("+x")."""
     force = pulse(hammer, rng)
     sense, index = (-1.0 if axis[0] == "-" else 1.0), AXES.index(axis[1])
-    step_s = 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
-    return sampled(axis, force, truth.respond(q, sense * force, index, step_s), hammer, rng)
+    response = truth.respond(q, sense * force, index, hammer.step_s)
+    return noisy(sampled(axis, force, response, hammer), hammer, rng)
 
 
 def pulse(hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
     """A hammer's pulse (n,) at the fine rate, sin^1.5 over its duration; no two hits are alike."""
-    rate_hz = hammer.sampling_rate_hz * OVERSAMPLING
+    rate_hz = 1 / hammer.step_s
     t = np.arange(round(hammer.record_s * rate_hz)) / rate_hz
     start = hammer.pretrigger_s + rng.uniform(0, 2 / hammer.sampling_rate_hz)
     duration = hammer.duration_s * rng.uniform(0.85, 1.15)
@@ -79,19 +88,51 @@ def pulse(hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
     return hammer.peak_n * rng.uniform(0.75, 1.25) * np.sin(np.pi * phase) ** 1.5
 
 
-def sampled(
-    axis: str, force: np.ndarray, response: np.ndarray, hammer: Hammer, rng: np.random.Generator
-) -> SimulatedHit:
-    """What the analyser keeps of a force (n,) and responses (3, n) at the fine rate."""
-    fine = hammer.sampling_rate_hz * OVERSAMPLING
+def sampled(axis: str, force: np.ndarray, response: np.ndarray, hammer: Hammer) -> SimulatedHit:
+    """What the analyser keeps of a force (n,) and responses (3, n) at the fine rate, noise-free."""
+    fine = hammer.sampling_rate_hz * hammer.oversampling
     # The analyser's anti-alias filter, the same on all channels.
     sos = signal.butter(6, 0.4 * hammer.sampling_rate_hz, fs=fine, output="sos")
     filtered = np.asarray(signal.sosfilt(sos, np.vstack([force, response])))
-    f, a = filtered[0, ::OVERSAMPLING], filtered[1:, ::OVERSAMPLING]
-    largest = np.max(np.sqrt(np.mean(a**2, axis=1)))
+    step = hammer.oversampling
+    return SimulatedHit(axis, filtered[0, ::step], filtered[1:, ::step])
+
+
+def largest_rms(hit: SimulatedHit) -> float:
+    """Of the accelerations, in m/s²."""
+    return float(np.max(np.sqrt(np.mean(hit.acceleration_m_s2**2, axis=1))))
+
+
+def noisy(hit: SimulatedHit, hammer: Hammer, rng: np.random.Generator) -> SimulatedHit:
+    """The hit with the noise of all channels, and the floor's rumble."""
+    f, a = hit.force_n, hit.acceleration_m_s2
     f = f + hammer.force_noise * np.max(f) * rng.standard_normal(f.size)
-    a = a + hammer.noise * largest * rng.standard_normal(a.shape)
-    return SimulatedHit(axis, f, a)
+    a = a + hammer.noise * largest_rms(hit) * rng.standard_normal(a.shape)
+    if hammer.rumble_m_s2 > 0:
+        a = a + _rumble(a.shape, hammer, rng)
+    return SimulatedHit(hit.axis, f, a)
+
+
+def noise_power(hit: SimulatedHit, hammer: Hammer) -> np.ndarray:
+    """Mean square (lines,) of an acceleration channel's noise in each line of `rfft`; of `hit`."""
+    n = hit.force_n.size
+    white = n * (hammer.noise * largest_rms(hit)) ** 2
+    return white + (n * hammer.rumble_m_s2) ** 2 * _rumble_shape(n, hammer)
+
+
+def _rumble_shape(n: int, hammer: Hammer) -> np.ndarray:
+    """Shares (lines,) of the lines of `rfft` in a rumble's mean square: a floor's first mode."""
+    frequency = np.fft.rfftfreq(n, 1 / hammer.sampling_rate_hz)
+    ratio = frequency / hammer.rumble_hz
+    power = ratio**2 / ((1 - ratio**2) ** 2 + (2 * FLOOR_DAMPING * ratio) ** 2)
+    return power / (2 * np.sum(power))  # each line stands for two
+
+
+def _rumble(shape: tuple[int, ...], hammer: Hammer, rng: np.random.Generator) -> np.ndarray:
+    n = shape[-1]
+    size = n * hammer.rumble_m_s2 * np.sqrt(_rumble_shape(n, hammer) / 2)
+    phase = rng.standard_normal((2, *shape[:-1], n // 2 + 1))
+    return np.fft.irfft(size * (phase[0] + 1j * phase[1]), n)
 
 
 def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, *text: str) -> None:

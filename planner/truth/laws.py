@@ -1,12 +1,14 @@
 """Torques of joints (and contacts) that are not linear, beside the spring that is in K.
 
 Every law is a scalar one: an elastic angle θ (rad, or m) gives a restoring torque (N·m, or N).
-Arrays are (hits,), because the hits at a pose are integrated together.
+Arrays of angles have any shape, as many hits and joints are integrated together; a law's numbers
+may then be arrays too, which `side_by_side` makes of several laws of a kind.
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,19 +16,30 @@ import numpy as np
 class JointLaw(Protocol):
     """A torque added to the linear spring's, with an internal state (0 at rest)."""
 
-    @property
-    def slope(self) -> float:
-        """The largest |dτ/dθ|."""
+    def slope(self, step_s: float) -> float:
+        """The largest |dτ/dθ| within a time step."""
+        ...
+
+    def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
+        """State of as many joints and hits."""
         ...
 
     def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
+        self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Torque and new state after θ went from `before` to `now`."""
+        """Torque and new state after θ went from `before` to `now` within a time step."""
         ...
 
 
-class Elastic(ABC):
+class OneState:
+    """A law whose state is one number."""
+
+    def at_rest(self, shape: tuple[int, ...]) -> np.ndarray:
+        """See `JointLaw`."""
+        return np.zeros(shape)
+
+
+class Elastic(OneState, ABC):
     """A law without a state: torque(θ) is a function of the angle."""
 
     @abstractmethod
@@ -34,10 +47,17 @@ class Elastic(ABC):
         """Torque at an angle."""
 
     def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
+        self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """See `JointLaw`."""
         return self.at(now), state
+
+
+def side_by_side(laws: Sequence[JointLaw]) -> JointLaw:
+    """Laws of one class as one law of arrays (laws, hits), one row each."""
+    kind: Any = type(laws[0])
+    rows = {f.name: [[getattr(law, f.name)] for law in laws] for f in fields(kind)}
+    return kind(**{name: np.array(row) for name, row in rows.items()})
 
 
 @dataclass(frozen=True)
@@ -50,8 +70,7 @@ class Hardening(Elastic):
     stiffness: float
     angle: float
 
-    @property
-    def slope(self) -> float:
+    def slope(self, step_s: float) -> float:
         """9/8 k, at θ = √3 a."""
         return 9 / 8 * abs(self.stiffness)
 
@@ -70,8 +89,7 @@ class Backlash(Elastic):
     stiffness: float
     gap: float
 
-    @property
-    def slope(self) -> float:
+    def slope(self, step_s: float) -> float:
         """k, within the gap."""
         return self.stiffness
 
@@ -81,7 +99,7 @@ class Backlash(Elastic):
 
 
 @dataclass(frozen=True)
-class Friction:
+class Friction(OneState):
     """Presliding friction of Dahl (Bouc–Wen with exponent 1) up to a Coulomb torque.
 
     dz/dθ = 1 - sgn(dθ) z/z_c, τ = `stiffness` z, z_c = `coulomb` / `stiffness`. The state is z; a
@@ -91,13 +109,12 @@ class Friction:
     stiffness: float
     coulomb: float
 
-    @property
-    def slope(self) -> float:
+    def slope(self, step_s: float) -> float:
         """Just after turning back it is up to twice the stiffness at rest."""
         return 2 * self.stiffness
 
     def torque(
-        self, state: np.ndarray, before: np.ndarray, now: np.ndarray
+        self, state: np.ndarray, before: np.ndarray, now: np.ndarray, step_s: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """See the class."""
         limit = self.coulomb / self.stiffness
@@ -114,8 +131,7 @@ class Contact(Elastic):
     stiffness: float
     preload: float
 
-    @property
-    def slope(self) -> float:
+    def slope(self, step_s: float) -> float:
         """k, while it touches."""
         return self.stiffness
 

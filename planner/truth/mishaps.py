@@ -22,7 +22,7 @@ from planner.truth.secret import Secret, Tone
 
 def sensor_rotation(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """The sensor is mounted askew."""
-    axis, angle = some_direction(rng), np.deg2rad(rng.uniform(10, 45))
+    axis, angle = some_direction(rng), scene.size * np.deg2rad(rng.uniform(10, 45))
     skew = np.cross(np.eye(3), axis)
     rotation = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
     parameters: Parameters = {"axis": axis.tolist(), "angle_rad": float(angle)}
@@ -40,7 +40,7 @@ def _channel(effect: str, factor: float, secret: Secret, rng: np.random.Generato
 def sensor_gain(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A wrong sensitivity of one channel."""
     factor = log_uniform(rng, 0.5, 0.8) if rng.random() < 0.5 else log_uniform(rng, 1.25, 2.0)
-    return _channel("sensor_gain", factor, secret, rng)
+    return _channel("sensor_gain", factor**scene.size, secret, rng)
 
 
 def polarity(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
@@ -50,14 +50,14 @@ def polarity(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
 
 def channel_delay(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Responses come later than the force."""
-    delay = log_uniform(rng, 0.8e-3, 6e-3)
+    delay = scene.size * log_uniform(rng, 0.8e-3, 6e-3)
     change = replace(secret, artefact=replace(secret.artefact, delay_s=delay))
     return Drawn("channel_delay", "sensor", {"delay_s": delay}, change)
 
 
 def exponential_window(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """The analyser's window is left in the recordings."""
-    time = log_uniform(rng, 0.25, 1.0)
+    time = log_uniform(rng, 0.25, 1.0) / scene.size
     change = replace(secret, artefact=replace(secret.artefact, window_s=time))
     return Drawn("exponential_window", "sensor", {"time_constant_s": time}, change)
 
@@ -68,7 +68,7 @@ def environment_contact(scene: Scene, secret: Secret, rng: np.random.Generator) 
     port = Port(Contact(1.0, 1.0), "", f"link_{number}", (0.0, 0.0, 0.0), triple(direction))
     q = scene.poses[0]
     at, matrix = port.vector(scene.truth, q), scene.truth.matrices(q)[2]
-    stiffness = log_uniform(rng, 0.5, 3.0) / float(at @ np.linalg.solve(matrix, at))
+    stiffness = scene.size * log_uniform(rng, 0.5, 3.0) / float(at @ np.linalg.solve(matrix, at))
     law = Contact(stiffness, log_uniform(rng, 1e-6, 1e-3))
     parameters: Parameters = {
         "cause": "environment_contact",
@@ -85,7 +85,8 @@ def nonreciprocal_feedback(scene: Scene, secret: Secret, rng: np.random.Generato
     """A controller turns one joint's twist into another's torque."""
     driven, sensed = (f"joint_{i}" for i in rng.choice([1, 2, 3], 2, replace=False))
     size = float(np.sqrt(scene.stiffness(driven) * scene.stiffness(sensed)))
-    loop = Feedback(driven, sensed, float(size * rng.uniform(0.25, 0.6) * rng.choice([-1, 1])))
+    gain = scene.size * size * rng.uniform(0.25, 0.6) * rng.choice([-1, 1])
+    loop = Feedback(driven, sensed, float(gain))
     parameters: Parameters = {
         "cause": "nonreciprocal_feedback",
         "driven": driven,
@@ -102,7 +103,7 @@ def tonal_disturbance(scene: Scene, secret: Secret, rng: np.random.Generator) ->
         f"link_{rng.integers(2, 5)}",
         triple(some_direction(rng)),
         log_uniform(rng, 0.8 * low, 1.2 * high),
-        scene.peak_n * log_uniform(rng, 0.01, 0.1),
+        scene.size * scene.peak_n * log_uniform(rng, 0.01, 0.1),
     )
     parameters: Parameters = {
         "cause": "tonal_disturbance",

@@ -8,8 +8,11 @@ robot.toml says geometric_stiffness = false.
 
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -40,6 +43,7 @@ class Truth:
     _elastic: np.ndarray = field(repr=False)
     _own: dict[str, int] = field(repr=False)  # joint: its spring about its own axis
     _weighs: bool = field(repr=False)  # whether gravity is part of the model
+    stated: int = 0  # how many of the springs robot.toml states; they are the first
     sensor_offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from where it is stated
 
     def matrices(
@@ -58,7 +62,7 @@ class Truth:
         hit, _ = self._site(model, data, "tcp")
         sensor, sensor_turn = self._site(model, data, "sensor")
         sensor = sensor - _cross(self.sensor_offset_m) @ sensor_turn
-        damping = np.diag(self._factors(q) * [s.damping for s in self.springs])
+        damping = np.diag(self.factors(q) * [s.damping for s in self.springs])
         return full[grid], damping, stiffness + gravity, hit, sensor
 
     def gravity_stiffness(self, q: np.ndarray) -> np.ndarray:
@@ -67,7 +71,7 @@ class Truth:
 
     def _springs(self, q: np.ndarray) -> np.ndarray:
         """K (e, e) without gravity's part."""
-        stiffness = np.diag(self._factors(q) * [s.stiffness for s in self.springs])
+        stiffness = np.diag(self.factors(q) * [s.stiffness for s in self.springs])
         for loop in self.deviation.feedback:
             stiffness[self._own[loop.driven], self._own[loop.sensed]] += loop.gain
         return stiffness
@@ -111,7 +115,7 @@ class Truth:
         rotation = data.site(name).xmat.reshape(3, 3)
         return (rotation.T @ linear)[:, self._elastic], (rotation.T @ angular)[:, self._elastic]
 
-    def _factors(self, q: np.ndarray) -> np.ndarray:
+    def factors(self, q: np.ndarray) -> np.ndarray:
         """What the stiffness of each spring (e,) is multiplied by at this pose."""
         factors = np.ones(len(self.springs))
         for wave in self.deviation.harmonics:
@@ -136,6 +140,36 @@ class Truth:
         jacobian = np.zeros((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, point, body)
         return np.asarray(direction) @ jacobian[:, self._elastic]
+
+    def links(self) -> dict[str, list[int]]:
+        """The model's bodies that have a link's mass, by the link's name: several if it bends."""
+        model: Any = self._model
+        found: dict[str, list[int]] = {}
+        for body in range(1, model.nbody):
+            if model.body(body).name and model.body_mass[body] > 0:
+                found.setdefault(model.body(body).name.split()[0], []).append(body)
+        return found
+
+    @contextmanager
+    def other_inertia(
+        self, link: str, mass: float = 1.0, turn: float = 1.0, shift: np.ndarray | float = 0.0
+    ) -> Iterator[None]:
+        """Meanwhile a link has `mass` times its mass and inertia, `turn` times its inertia.
+
+        `shift` (3,) in m moves its centre, in the link's frame.
+        """
+        model: Any = self._model
+        bodies = self.links()[link]
+        arrays = model.body_mass, model.body_inertia, model.body_ipos
+        before = [np.array(array[bodies]) for array in arrays]
+        model.body_mass[bodies] *= mass
+        model.body_inertia[bodies] *= mass * turn
+        model.body_ipos[bodies] += shift
+        try:
+            yield
+        finally:
+            for array, old in zip(arrays, before, strict=True):
+                array[bodies] = old
 
     def changed(self, factor: float) -> "Truth":
         """The same robot with the stiffness of every spring multiplied by a factor."""
@@ -275,6 +309,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         np.array(elastic),
         own,
         bool(table.get("geometric_stiffness", True)),
+        len(nominal),
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.linalg
 
 from planner.errors import InputError
-from planner.truth.laws import JointLaw
+from planner.truth.laws import JointLaw, side_by_side
 from planner.truth.model import Truth
 from planner.truth.propagate import driven, weights
 
@@ -81,15 +81,8 @@ def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -
     linear = [_linear(pose, ports, step_s) for pose in poses]
     if not ports:
         return [pose.accelerations for pose in linear]
-    torques = _torques(ports, linear, step_s)
-    found = []
-    for pose, torque in zip(linear, torques, strict=True):
-        out = pose.accelerations - np.einsum("sp,phn->hsn", pose.direct, torque)
-        for k, pole in enumerate(pose.poles):
-            y = driven(pole, np.einsum("p,phn->hn", pose.inputs[k], torque), step_s)
-            out -= np.einsum("s,hn->hsn", pose.sensed[:, k], y).real
-        found.append(out)
-    return found
+    changes = _changes(ports, linear, step_s)
+    return [pose.accelerations + more for pose, more in zip(linear, changes, strict=True)]
 
 
 def _linear(pose: StruckPose, ports: Sequence[Port], step_s: float) -> _Linear:
@@ -102,61 +95,107 @@ def _linear(pose: StruckPose, ports: Sequence[Port], step_s: float) -> _Linear:
     drive = np.vstack([hit, truth.turning(pose.q)]).T @ pose.wrench.T  # (e, h)
     inputs, outputs = entry @ drive, at @ shapes
     sensed, direct = sensor @ shapes * poles**2, sensor @ np.linalg.inv(truth.matrices(pose.q)[0])
-    out = np.einsum("sh,hn->hsn", direct @ drive, forces)
-    angles = np.zeros((len(ports), *forces.shape))
-    for k, pole in enumerate(poles):
-        y = driven(pole, forces, step_s) * inputs[k][:, None]
-        out += np.einsum("s,hn->hsn", sensed[:, k], y).real
-        angles += np.einsum("p,hn->phn", outputs[:, k], y).real
-    return _Linear(poles, entry @ at.T, outputs, sensed, direct @ at.T, out, angles)
+    y = np.array([driven(pole, forces, step_s) for pole in poles]) * inputs[:, :, None]
+    out = np.moveaxis(_real(sensed, y), 0, 1) + (direct @ drive).T[:, :, None] * forces[:, None]
+    return _Linear(poles, entry @ at.T, outputs, sensed, direct @ at.T, out, _real(outputs, y))
 
 
-def _torques(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) -> list[np.ndarray]:
-    """Torques (P, h, n) of the laws at each pose.
+def _real(matrix: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Real part (a, h, n) of a matrix (a, p) times modal coordinates (p, h, n)."""
+    flat = y.reshape(len(y), -1)
+    return (matrix.real @ flat.real - matrix.imag @ flat.imag).reshape(-1, *y.shape[1:])
+
+
+class _Laws:
+    """The laws of all ports at once: those of one class are one law of arrays."""
+
+    def __init__(self, ports: Sequence[Port], step_s: float) -> None:
+        kinds: dict[type, list[int]] = {}
+        for place, port in enumerate(ports):
+            kinds.setdefault(type(port.law), []).append(place)
+        self._step_s = step_s
+        self._groups = [
+            (np.array(places), side_by_side([ports[i].law for i in places]))
+            for places in kinds.values()
+        ]
+
+    def at_rest(self, shape: tuple[int, ...]) -> list[np.ndarray]:
+        """States, one a class; shape is (poses, ports, hits)."""
+        return [law.at_rest((shape[0], len(at), shape[2])) for at, law in self._groups]
+
+    def torques(
+        self, states: list[np.ndarray], before: np.ndarray, now: np.ndarray
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Of angles (poses, ports, hits)."""
+        if len(self._groups) == 1:
+            out, after = self._groups[0][1].torque(states[0], before, now, self._step_s)
+            return out, [after]
+        out, afters = np.empty_like(now), []
+        for (at, law), state in zip(self._groups, states, strict=True):
+            out[:, at], after = law.torque(state, before[:, at], now[:, at], self._step_s)
+            afters.append(after)
+        return out, afters
+
+
+def _changes(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) -> list[np.ndarray]:
+    """What the laws add to the accelerations (h, 3, n) at each pose.
 
     Each step solves θ = θ_free - G τ(θ) by fixed-point iteration, G being what the ports give way
-    within a step; it is so small that a few iterations are exact.
+    within a step; it is so small that a few iterations are exact. Complex modal coordinates are
+    kept as real and imaginary parts, one below the other.
     """
-    hits = [pose.angles.shape[1] for pose in linear]
-    most = max(len(pose.poles) for pose in linear)
+    hits, modes = (
+        max(of(p) for p in linear) for of in (lambda p: p.angles.shape[1], lambda p: len(p.poles))
+    )
 
-    def columns(of: Callable[[_Linear], np.ndarray]) -> np.ndarray:
-        """One column (p, ..., hits) per hit; poses with overdamped poles have more of them."""
-        padded = []
-        for pose, count in zip(linear, hits, strict=True):
-            a = of(pose)
-            a = np.concatenate([a, np.zeros((most - len(a), *a.shape[1:]))])
-            padded.append(np.repeat(a[..., None], count, axis=-1))
-        return np.concatenate(padded, axis=-1)
+    def stacked(of: Callable[[_Linear], np.ndarray]) -> np.ndarray:
+        """(poses, p, ...): poses with overdamped poles have more of them than others."""
+        rows = [of(pose) for pose in linear]
+        return np.array([np.pad(r, ((0, modes - len(r)), *[(0, 0)] * (r.ndim - 1))) for r in rows])
 
-    grow = columns(lambda pose: weights(pose.poles, step_s)[0])
-    older = columns(lambda pose: weights(pose.poles, step_s)[1][:, None] * pose.inputs)
-    newer = columns(lambda pose: weights(pose.poles, step_s)[2][:, None] * pose.inputs)
-    felt = columns(lambda pose: pose.outputs.T)
-    gives = np.real(np.einsum("kph,kqh->pqh", felt, newer))
-    slopes = np.array([port.law.slope for port in ports])
-    contraction = float(np.max(np.einsum("pqh,q->ph", np.abs(gives), slopes)))
+    grow, older, newer = (
+        stacked(lambda pose, k=k: weights(pose.poles, step_s)[k][:, None]) for k in range(3)
+    )
+    inputs, outputs = stacked(lambda p: p.inputs), stacked(lambda p: p.outputs.T)
+    gives = np.real(np.einsum("akp,akq->apq", outputs, newer * inputs))
+    slopes = np.array([port.law.slope(step_s) for port in ports])
+    contraction = float(np.max(np.abs(gives) @ slopes))
     if contraction > MOST_CONTRACTION:
         raise InputError("A nonlinear joint is too stiff for the time step; shorten the step.")
-    iterations = max(2, int(np.ceil(np.log(TORQUE_ACCURACY) / np.log(contraction))))
-
-    steps = np.moveaxis(np.concatenate([pose.angles for pose in linear], axis=1), 2, 0).copy()
-    torques = np.zeros_like(steps)
-    before, states = np.zeros_like(steps[0]), np.zeros_like(steps[0])
-    y = np.zeros(grow.shape, dtype=complex)
+    iterations = max(2, int(np.ceil(np.log(TORQUE_ACCURACY) / np.log(max(contraction, 1e-12)))))
+    # What a torque does to the next step's modes: as the older end of that step, and by now.
+    pushed = _columns((grow * newer + older) * inputs)
+    felt, heard = _rows(outputs), _rows(stacked(lambda p: p.sensed.T))
+    at_once = heard @ _columns(newer * inputs) + np.array([pose.direct for pose in linear])
+    laws = _Laws(ports, step_s)
+    angles = [np.pad(p.angles, ((0, 0), (0, hits - p.angles.shape[1]), (0, 0))) for p in linear]
+    steps = np.moveaxis(np.array(angles), 3, 0).copy()
+    out = np.zeros((len(steps), len(linear), 3, hits))
+    states, before = laws.at_rest(steps[0].shape), np.zeros_like(steps[0])
+    torque, y = np.zeros_like(steps[0]), np.zeros((len(linear), 2 * modes, hits))
+    real, imaginary = y[:, :modes], y[:, modes:]
     for i in range(1, len(steps)):
-        y = grow * y - (older * torques[i - 1]).sum(axis=1)
-        free = steps[i] + (felt * y[:, None]).sum(axis=0).real
-        torque, after, now = torques[i - 1], states, before
+        free, after, now = steps[i] + felt @ y, states, before
         for _ in range(iterations):
-            now = free - (gives * torque).sum(axis=1)
-            torques_after = [
-                p.law.torque(s, b, t) for p, s, b, t in zip(ports, states, before, now, strict=True)
-            ]
-            torque, after = (np.array(part) for part in zip(*torques_after, strict=True))
-        y -= (newer * torque).sum(axis=1)
-        torques[i], before, states = torque, now, after
-    return np.split(np.moveaxis(torques, 0, 2), np.cumsum(hits)[:-1], axis=1)
+            now = free - gives @ torque
+            torque, after = laws.torques(states, before, now)
+        before, states = now, after
+        out[i] = heard @ y - at_once @ torque
+        turned = grow.real * real - grow.imag * imaginary, grow.real * imaginary + grow.imag * real
+        real[...], imaginary[...] = turned
+        y -= pushed @ torque
+    out = np.moveaxis(out, 0, 3)
+    return [np.moveaxis(out[k, :, : pose.angles.shape[1]], 0, 1) for k, pose in enumerate(linear)]
+
+
+def _columns(modal: np.ndarray) -> np.ndarray:
+    """(poses, 2 p, ...) of complex modal quantities (poses, p, ...)."""
+    return np.concatenate([modal.real, modal.imag], axis=1)
+
+
+def _rows(modal: np.ndarray) -> np.ndarray:
+    """What gives the real part of their product (poses, a, 2 p), from (poses, p, a)."""
+    return np.moveaxis(np.concatenate([modal.real, -modal.imag], axis=1), 1, 2).copy()
 
 
 def structural(pose: StruckPose, loss_factor: float, step_s: float) -> np.ndarray:

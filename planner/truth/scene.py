@@ -17,13 +17,17 @@ Parameters = dict[str, float | str | list[float]]
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What the sizes of effects are drawn from; `truth` is the robot without them."""
+    """What the sizes of effects are drawn from; `truth` is the robot without them.
+
+    `size`: every effect's strength relative to a large one (1), down to nothing (0).
+    """
 
     arm: Arm
     truth: Truth
     per_joint: int
     poses: np.ndarray  # (n, 6) rad
     peak_n: float
+    size: float = 1.0
 
     @property
     def moving_kg(self) -> float:
@@ -51,12 +55,16 @@ class Scene:
 
 @dataclass(frozen=True)
 class Drawn:
-    """An effect of a case: name and place as a diagnosis states them, true parameters in SI."""
+    """An effect of a case: name and place as a diagnosis states them, true parameters in SI.
+
+    `secret` holds it and all that was there before; `size` as in `Scene`.
+    """
 
     effect: str
     at: str | None
     parameters: Parameters
     secret: Secret
+    size: float = 1.0
 
 
 Draw = Callable[[Scene, Secret, np.random.Generator], Drawn]

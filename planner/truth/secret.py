@@ -9,7 +9,7 @@ from scipy import ndimage
 from planner.errors import InputError
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, MeasuringChain
-from planner.truth.hits import AXES, OVERSAMPLING, Hammer, SimulatedHit, pulse, sampled
+from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
 from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, respond, structural
 
@@ -32,6 +32,10 @@ class StiffnessDrift:
             "step": float(progress >= 0.5),
         }
         return float(1 + self.change * courses[self.course])
+
+    def applied(self, truth: Truth, progress: float) -> Truth:
+        """The robot at a time of the campaign."""
+        return truth.changed(self.factor(progress))
 
 
 @dataclass(frozen=True)
@@ -95,21 +99,35 @@ def hit_poses(
     rng: np.random.Generator,
 ) -> list[list[SimulatedHit]]:
     """All hits of all visits; `truth` has the secret's deviation."""
+    quiet = quiet_hits(truth, secret, visits, hammer, rng)
+    return [
+        [windowed(secret.artefact, noisy(hit, hammer, rng), hammer) for hit in hits]
+        for hits in quiet
+    ]
+
+
+def quiet_hits(
+    truth: Truth,
+    secret: Secret,
+    visits: Sequence[HitVisit],
+    hammer: Hammer,
+    rng: np.random.Generator,
+) -> list[list[SimulatedHit]]:
+    """The same without noise and before any window; the pulses depend on `rng` alone."""
     truth = replace(truth, sensor_offset_m=secret.chain.offset_m)
-    step_s = 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
     pulses = [
         np.array([pulse(replace(hammer, peak_n=peak), rng) for _, peak in visit.shots])
         for visit in visits
     ]
-    responses = _responses(truth, secret, visits, pulses, step_s, rng)
-    recorded = []
-    for visit, forces, response in zip(visits, pulses, responses, strict=True):
-        hits = [
-            sampled(axis, secret.chain.force_gain * force, _heard(secret, a, step_s), hammer, rng)
+    responses = _responses(truth, secret, visits, pulses, hammer.step_s, rng)
+    gain, step_s = secret.chain.force_gain, hammer.step_s
+    return [
+        [
+            sampled(axis, gain * force, _heard(secret, a, step_s), hammer)
             for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
         ]
-        recorded.append([_windowed(secret.artefact, hit, hammer) for hit in hits])
-    return recorded
+        for visit, forces, response in zip(visits, pulses, responses, strict=True)
+    ]
 
 
 def _responses(
@@ -123,7 +141,7 @@ def _responses(
     """Accelerations (h, 3, n) of the sensor at each visit."""
     poses = []
     for visit, forces in zip(visits, pulses, strict=True):
-        now = truth if secret.drift is None else truth.changed(secret.drift.factor(visit.progress))
+        now = truth if secret.drift is None else secret.drift.applied(truth, visit.progress)
         senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
         axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
         aims = visit.aims or [Aim()] * len(axes)
@@ -156,11 +174,12 @@ def _hum(pose: StruckPose, tone: Tone, phases: np.ndarray, step_s: float) -> np.
 def _heard(secret: Secret, response: np.ndarray, step_s: float) -> np.ndarray:
     artefact, chain = secret.artefact, secret.chain
     mixed = np.array(artefact.gain)[:, None] * (artefact.rotation @ chain.matrix @ response)
-    late = round(artefact.delay_s / step_s) + chain.delay_s / step_s
+    late = (artefact.delay_s + chain.delay_s) / step_s
     return mixed if late == 0 else ndimage.shift(mixed, (0, late), order=3)
 
 
-def _windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> SimulatedHit:
+def windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> SimulatedHit:
+    """The hit times the window that was left on it."""
     t = np.arange(hit.force_n.size) / hammer.sampling_rate_hz
     window = np.exp(-np.maximum(t - hammer.pretrigger_s, 0.0) / artefact.window_s)
     return SimulatedHit(hit.axis, window * hit.force_n, window * hit.acceleration_m_s2)

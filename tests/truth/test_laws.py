@@ -42,9 +42,9 @@ def pulses(peaks: list[float]) -> np.ndarray:
 
 def loop(law: JointLaw, angles: np.ndarray) -> np.ndarray:
     """Torques along a path of angles (n,)."""
-    state, torques = np.zeros(1), [0.0]
+    state, torques = law.at_rest((1,)), [0.0]
     for before, now in itertools.pairwise(angles):
-        torque, state = law.torque(state, np.array([before]), np.array([now]))
+        torque, state = law.torque(state, np.array([before]), np.array([now]), STEP)
         torques.append(float(torque[0]))
     return np.array(torques)
 
@@ -68,7 +68,7 @@ def test_response_is_that_of_an_ode_solver(truth, law):
     def torque(angle: float, z: float) -> float:
         if isinstance(law, Friction):
             return law.stiffness * z
-        return float(law.torque(np.zeros(1), np.array([angle]), np.array([angle]))[0][0])
+        return float(law.torque(np.zeros(1), np.array([angle]), np.array([angle]), STEP)[0][0])
 
     def acceleration(y, f):
         load = hit[1] * f - damping @ y[e:-1] - stiffness @ y[:e]
@@ -178,7 +178,7 @@ def test_slopes_are_bounds():
     angles = 4 * ANGLE * np.sin(np.linspace(0, 4 * np.pi, 20001))
     for law in LAWS.values():
         steps = np.abs(np.diff(loop(law, angles))[1:])
-        assert np.all(steps <= law.slope * np.abs(np.diff(angles)[1:]) * (1 + 1e-6) + 1e-12)
+        assert np.all(steps <= law.slope(STEP) * np.abs(np.diff(angles)[1:]) * (1 + 1e-6) + 1e-12)
 
 
 def test_a_step_too_long_is_refused(truth):

@@ -1,0 +1,73 @@
+"""The hits of a case: planned pose by pose, and written as recordings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.truth.handling import Handling, together
+from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, write_recordings
+from planner.truth.model import Truth
+from planner.truth.secret import HitVisit, Secret, windowed
+
+LEVELS = (0.4, 1.0, 2.5)  # of the middling peak force
+TWICE = 0.5  # how often the first pose is hit again at the end
+
+
+@dataclass(frozen=True, eq=False)
+class Visits:
+    """What is done, and what recordings.csv says of it: pose's number and angles (dof,) in °."""
+
+    visits: Sequence[HitVisit]
+    poses: Sequence[int]
+    readbacks_deg: Sequence[np.ndarray]
+
+    @classmethod
+    def planned(
+        cls,
+        poses: np.ndarray,
+        hammer: Hammer,
+        handling: Handling,
+        rng: np.random.Generator,
+        own: np.random.Generator,
+    ) -> "Visits":
+        """Three axes and three force levels at each pose (n, 6) in rad.
+
+        `own` draws what `handling` leaves open, so that all else is the same in the laboratory.
+        """
+        numbers = list(range(len(poses))) + ([0] if rng.random() < TWICE else [])
+        shots = [(f"{rng.choice(['+', '-'])}{a}", hammer.peak_n * k) for a in "xyz" for k in LEVELS]
+        planned, readbacks = [], []
+        common, axes = handling.common(own), [AXES.index(axis[1]) for axis, _ in shots]
+        for number, index in enumerate(numbers):
+            scatter = hammer.readback_deg * rng.uniform(-1, 1, 6)
+            readbacks.append(np.round(np.rad2deg(poses[index]) + scatter, 4))
+            off = np.deg2rad(handling.readback_deg) * own.standard_normal(6)
+            aims = [
+                together(common[a], aim)
+                for a, aim in zip(axes, handling.aims(axes, own), strict=True)
+            ]
+            there = np.deg2rad(readbacks[-1]) + off
+            planned.append(HitVisit(there, shots, number / max(len(numbers) - 1, 1), aims))
+        return cls(planned, numbers, readbacks)
+
+
+def record(
+    folder: Path,
+    truth: Truth,
+    secret: Secret,
+    visits: Visits,
+    quiet: Sequence[Sequence[SimulatedHit]],
+    hammer: Hammer,
+    rng: np.random.Generator,
+) -> None:
+    """Write the hits `quiet` of all visits, with noise and with the window left on them."""
+    rows = []
+    counts: dict[tuple[int, str], int] = {}
+    for index, readback, hits in zip(visits.poses, visits.readbacks_deg, quiet, strict=True):
+        for hit in hits:
+            heard = windowed(secret.artefact, noisy(hit, hammer, rng), hammer)
+            repeat = counts[index, hit.axis] = counts.get((index, hit.axis), 0) + 1
+            rows.append((f"P{index + 1:02d}", readback, repeat, heard))
+    write_recordings(folder, truth.joint_names, rows, hammer, "concealed case")
