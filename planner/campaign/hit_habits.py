@@ -47,6 +47,12 @@ class PoseMisses:
     hits: tuple[HitMiss, ...]
 
 
+def misses_of(poses: Sequence[PoseMisses], pose: str, files: Sequence[str]) -> tuple[HitMiss, ...]:
+    """Of those files' hits at a pose, as far as anything is known of them."""
+    every = next((found.hits for found in poses if found.pose == pose), ())
+    return tuple(hit for hit in every if hit.file in files)
+
+
 def habits(hits: Sequence[HitMiss]) -> tuple[str, ...]:
     """What hits along a signed axis have in common, where it is sure: a sentence an axis."""
     found = []
