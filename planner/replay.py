@@ -88,7 +88,8 @@ def replay(
             assert after.configured is not None
             key = (after.model_version, id(cells.of(after.configured)))
             if model is None or key != model_key:
-                model, model_key = build(cells.of(after.configured), after, campaign.frf_of), key
+                of_hits = campaign.frf_of, campaign.columns_of
+                model, model_key = build(cells.of(after.configured), after, *of_hits), key
             yield Step(entry, check, detail, after, model, measured, instead)
 
 

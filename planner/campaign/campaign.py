@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset, Progress
+    from planner.dataset.hit_columns import HitColumns
     from planner.frf.frf import Frf
     from planner.surrogate.frf_bands import ModalPrediction
 
@@ -145,7 +146,7 @@ class Campaign:
     def _fitted(self, state: CampaignState) -> "Model":
         from planner.campaign.model import build
 
-        model = build(self.cell, state, self.frf_of)
+        model = build(self.cell, state, self.frf_of, self.columns_of)
         _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
 
@@ -158,6 +159,13 @@ class Campaign:
             sources = tuple(self.source_of(hit) for hit in measurement.accepted)
             self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
         return self._frfs[key]
+
+    def columns_of(self, measurement: Measurement, table: ModesTable) -> "HitColumns":
+        """What each accepted hit of a measured pose says by itself."""
+        from planner.dataset.hit_columns import columns_of
+
+        sources = tuple(self.source_of(hit) for hit in measurement.accepted)
+        return columns_of(sources, table.band_hz, table.window_rate_1_s)
 
     def dataset(
         self,

@@ -13,6 +13,7 @@ from planner.design.propose import check_name
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
+from planner.identification.measurement_model import Tolerances
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
@@ -54,6 +55,11 @@ class Cell:
         """What the engineer has to know of every pose that is proposed, in sentences."""
         unchecked = Collisions(self.robot).unchecked
         return () if unchecked is None else (unchecked,)
+
+    @property
+    def tolerances(self) -> Tolerances:
+        """Of hits and measuring chain, as robot.toml or campaign.toml state them."""
+        return Tolerances.of(self.robot.config.hits, self.robot.config.sensor)
 
     @cached_property
     def candidates(self) -> Candidates:

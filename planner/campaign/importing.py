@@ -11,6 +11,7 @@ from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
 from planner.campaign.events import REFUSED, HitRecord, Question
+from planner.campaign.hit_habits import HitMiss, misses_of
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose, measure
@@ -50,6 +51,11 @@ class ImportReport:
     remarks: tuple[str, ...] = ()
     left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
     question: Question | None = None
+
+    def misses(self, model: Model | None = None) -> tuple[HitMiss, ...]:
+        """How each accepted hit missed, by this import's model or a later one."""
+        files = [hit.file for hit in self.accepted]
+        return misses_of((model or self.model).misses, self.pose, files)
 
 
 def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, ...]:

@@ -9,9 +9,12 @@ import numpy as np
 from planner.campaign.acquisition_inputs import outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
+from planner.campaign.hit_habits import PoseMisses
 from planner.campaign.labels import LabelledPose, frequencies, label, observations
 from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.misses import tell, visits_of
 from planner.campaign.state import CampaignState, Measurement
+from planner.dataset.hit_columns import HitColumns
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
 from planner.design.parameter_sensitivity import FrfNoise
@@ -45,6 +48,7 @@ class Model:
     seen: ModalObservations
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
+    misses: tuple[PoseMisses, ...] = ()  # of the hits of each pose, where a simulation tells them
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad."""
@@ -172,19 +176,25 @@ def build(
     cell: Cell,
     state: CampaignState,
     frf_of: Callable[[Measurement, ModesTable], Frf],
+    columns_of: Callable[[Measurement, ModesTable], HitColumns] | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement; it is asked only where the simulation learns.
+    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself; they are
+    asked only where the simulation learns. Without the latter all hits count as exact.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise = None
+    noise, misses = None, ()
     if cell.config.fidelity.simulation == "updated" and used:
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
         frfs = tuple(frf_of(m, table) for m in used)
         low = learn(low, frfs, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(frfs, table.band_hz, misfit)
+        if columns_of is not None and low.learned is not None:
+            columns = [columns_of(m, table) for m in used]
+            told = tell(visits_of(used, columns, frfs), low.learned, cell.tolerances, table.band_hz)
+            misses, used = told.poses, tuple(map(told.corrected, used))
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:
         # What lacks physics is bent by fitting it: as it stands it may be a better
@@ -197,7 +207,7 @@ def build(
     surrogate = fit_surrogate(
         best.seen, primary=best.primary, residues=False, taught=best.low.taught
     )
-    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise)
+    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses)
 
 
 @dataclass(frozen=True, eq=False)

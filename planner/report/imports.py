@@ -9,12 +9,14 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.events import Amplitude, MeasuredMode, Question
+from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
+    from planner.campaign.model import Model
 
 
 @dataclass(frozen=True)
@@ -93,11 +95,12 @@ class PoseImport(Answer):
     remarks: tuple[str, ...]
     amplitude: Amplitude | None
     simulated: bool
+    hit_errors: tuple[HitMiss, ...] = ()
     question: "AskedOfPose | None" = None
 
     @classmethod
-    def of(cls, report: "ImportReport") -> "PoseImport":
-        """Of what the campaign says of one pose."""
+    def of(cls, report: "ImportReport", model: "Model | None" = None) -> "PoseImport":
+        """Of what the campaign says of one pose; hits by a later `model` where one is given."""
         measurement = report.measurement
         return cls(
             pose=report.pose,
@@ -113,6 +116,7 @@ class PoseImport(Answer):
             remarks=report.remarks,
             amplitude=measurement.amplitude if measurement else None,
             simulated=bool(measurement and measurement.simulated),
+            hit_errors=report.misses(model),
             question=AskedOfPose.of(report.question, report.pose),
         )
 
@@ -134,18 +138,30 @@ class PoseImport(Answer):
 
 @dataclass(frozen=True)
 class ImportedPoses(Answer):
-    """Answer of `import`, one entry a pose in recording order."""
+    """Answer of `import`, one entry a pose in recording order.
+
+    `habits`: what all hits of the campaign have in common.
+    """
 
     poses: tuple[PoseImport, ...]
+    habits: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, reports: "tuple[ImportReport, ...]") -> "ImportedPoses":
-        """Of what `Campaign.import_paths` gave."""
-        return cls(tuple(PoseImport.of(report) for report in reports))
+        """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
+        model = reports[-1].model
+        every = [hit for pose in model.misses for hit in pose.hits]
+        return cls(tuple(PoseImport.of(report, model) for report in reports), habits(every))
+
+    @property
+    def hit_errors(self) -> tuple[HitMiss, ...]:
+        """Of all accepted hits."""
+        return tuple(hit for pose in self.poses for hit in pose.hit_errors)
 
     def to_json(self) -> dict[str, Any]:
-        """The top-level keys speak of the last pose, "poses" of each."""
-        return {**self.poses[-1].to_json(), "poses": plain(self.poses)}
+        """The top-level keys speak of the last pose, "hit_errors" of all; "poses" of each."""
+        said = {"hit_errors": self.hit_errors, "habits": self.habits, "poses": self.poses}
+        return {**self.poses[-1].to_json(), **{key: plain(value) for key, value in said.items()}}
 
     @property
     def refused(self) -> tuple[RefusedFile, ...]:
@@ -160,6 +176,7 @@ class ImportedPoses(Answer):
     def text(self) -> Group:
         """Pose by pose."""
         parts = [part for pose in self.poses for part in pose.parts()]
+        parts += [Text(f"  {habit}") for habit in self.habits]
         return Group(*parts, SIMULATED) if self.poses[-1].simulated else Group(*parts)
 
 

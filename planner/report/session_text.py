@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import Proposal, Question
+from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 
@@ -71,7 +72,7 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
                 f"{100 * mode.damping_ratio:.2f} ± {100 * mode.damping_sd:.2f}",
                 sure,
             )
-    parts: list[RenderableType] = [table]
+    parts: list[RenderableType] = [table, *_missed(report)]
     for hit in report.refused:
         parts.append(Text(f"refused {hit.file}: {hit.reason}", style="red"))
     parts += [Text(remark, style="yellow") for remark in report.remarks]
@@ -80,6 +81,18 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
         parts.append(Text(SIMULATED, style="bold magenta"))
     title = f"Pose {report.pose}: {len(report.accepted)} hits in, {len(report.refused)} refused"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
+
+
+def _missed(report: ImportReport) -> list[RenderableType]:
+    """Hit by hit, how it missed, and what the hits so far have in common."""
+    hits = report.misses()
+    if not hits:
+        return []
+    rows = _table("hit", "tilt of its direction", "beside the point")
+    for hit in hits:
+        rows.add_row(*hit.cells)
+    every = [hit for pose in report.model.misses for hit in pose.hits]
+    return [Text(""), rows, *(Text(habit, style="bold") for habit in habits(every))]
 
 
 def question_panel(question: Question, pose: str, other: str) -> RenderableType:

@@ -1,0 +1,192 @@
+"""How the hits of a campaign missed, and its modes as they are without that."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
+from planner.campaign.log_conversion import from_mode, to_mode
+from planner.campaign.low_fidelity import Learned
+from planner.campaign.state import Measurement
+from planner.dataset.hit_columns import HitColumns
+from planner.frf.frf import Frf
+from planner.identification.hit_misses import (
+    AIMED,
+    OWN,
+    Known,
+    Misses,
+    VisitHits,
+    VisitMisses,
+    tell_misses,
+)
+from planner.identification.measurement_model import ACROSS, Tolerances
+from planner.identification.parameters import parametrise
+from planner.identification.simulated_visit import SolvedPoses, misses_at
+from planner.modal.modes import Mode
+from planner.modal.residue_change import residue_changes
+from planner.modal.residues import laplace
+from planner.recording.records import AXES
+
+TELL_BY = 8  # poses, the last ones, that tell what is common to all: nobody waits between hits
+# Relative size of what the simulation gets wrong from which it corrects no residue.
+TOO_WRONG = 0.1
+AROUND = 0.5, 1.6  # of the band's edges: where other poles matter in it
+UNIT = Tolerances(angle_rad=1.0, offset_m=1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """A pose with hits: its name, accepted files, joint angles (dof,) in rad, columns, and FRF."""
+
+    pose: str
+    files: tuple[str, ...]
+    q: np.ndarray
+    columns: HitColumns
+    frf: Frf
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignMisses:
+    """What is told of all poses with hits; `told` is None where there are none."""
+
+    visited: tuple[Visited, ...]
+    told: Misses | None
+    tolerances: Tolerances
+    band_hz: tuple[float, float]
+
+    @property
+    def poses(self) -> tuple[PoseMisses, ...]:
+        """Hit by hit."""
+        if self.told is None:
+            return ()
+        both = zip(self.visited, self.told.visits, strict=True)
+        return tuple(_pose(visited, told) for visited, told in both)
+
+    def corrected(self, measurement: Measurement) -> Measurement:
+        """With residues as hits without a miss would give them, and what is unsure in their sds.
+
+        Poles and shapes of response do not depend on where and how the robot is hit.
+        """
+        names = [visited.pose for visited in self.visited]
+        if self.told is None or measurement.pose not in names or not measurement.modes:
+            return measurement
+        number = names.index(measurement.pose)
+        visited, told = self.visited[number], self.told.visits[number]
+        modes = [to_mode(mode) for mode in measurement.modes]
+        if self.told.discrepancy > TOO_WRONG:
+            made = [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
+        else:
+            made = self._without_misses(modes, visited, told)
+        kept = [
+            msgspec.structs.replace(old, residue=from_mode(new).residue)
+            for old, new in zip(measurement.modes, made, strict=True)
+        ]
+        return replace(measurement, modes=tuple(kept))
+
+    def _without_misses(self, modes: list[Mode], visited: Visited, told: VisitMisses) -> list[Mode]:
+        assert self.told is not None
+        frf, simulation = visited.frf, self.told.simulation
+        lines = laplace(frf.frequency_hz, frf.exponential_rate_1_s, frf.tail_s)
+        basis = misses_at(simulation, visited.q, lines, UNIT)
+        changes = _changes(visited.columns, told, basis, frf.frequency_hz)
+        poles = np.array([mode.pole for mode in modes])
+        outside = _outside(SolvedPoses.of(simulation, visited.q[None]).poles[0], self.band_hz)
+        moved = residue_changes(frf, poles, outside, self.band_hz, changes)
+        # Of the real and of the imaginary part each.
+        spread = np.sqrt(np.sum(np.abs(moved[1:]) ** 2, axis=0) / 2)
+        return [
+            replace(
+                mode,
+                residue=mode.residue - moved[0, k],
+                residue_sd=np.hypot(mode.residue_sd, spread[k]),
+            )
+            for k, mode in enumerate(modes)
+        ]
+
+
+def tell(
+    visited: Sequence[Visited], learned: Learned, t: Tolerances, band_hz: tuple[float, float]
+) -> CampaignMisses:
+    """Misses of the hits of all poses, by the simulation as it was identified from them."""
+    those = tuple(one for one in visited if len(one.columns.axis))
+    if not those:
+        return CampaignMisses((), None, t, band_hz)
+    simulation = learned.structure.simulation
+    known = Known(simulation, parametrise(simulation, learned.priors), learned.identified.mean)
+    told = tell_misses([VisitHits(one.q, one.columns) for one in those], known, t, TELL_BY)
+    return CampaignMisses(those, told, t, band_hz)
+
+
+def visits_of(
+    used: Sequence[Measurement], columns: Sequence[HitColumns], frfs: Sequence[Frf]
+) -> tuple[Visited, ...]:
+    """Measurements as visits, with the columns of their hits and their FRFs."""
+    return tuple(
+        Visited(
+            m.pose, tuple(hit.file for hit in m.accepted), np.deg2rad(np.array(m.joints_deg)), c, f
+        )
+        for m, c, f in zip(used, columns, frfs, strict=True)
+    )
+
+
+def _pose(visited: Visited, told: VisitMisses) -> PoseMisses:
+    columns = visited.columns
+    sd = np.sqrt(np.diagonal(told.covariance)).reshape(-1, OWN)
+    hits = []
+    for i, (axis, sign) in enumerate(zip(columns.axis, columns.sign, strict=True)):
+        # A hit along −axis: the response is over the force along +axis, and so is its direction.
+        hits.append(
+            HitMiss(
+                visited.files[columns.file[i]],
+                ("+" if sign > 0 else "-") + AXES[axis],
+                _pair(sign * np.rad2deg(told.mean[i, :2])),
+                _pair(np.rad2deg(sd[i, :2])),
+                _pair(1e3 * told.mean[i, 2:]),
+                _pair(1e3 * sd[i, 2:]),
+            )
+        )
+    return PoseMisses(visited.pose, tuple(hits))
+
+
+def _pair(values: np.ndarray) -> Pair:
+    return float(values[0]), float(values[1])
+
+
+def _changes(
+    columns: HitColumns, told: VisitMisses, basis: np.ndarray, frequency_hz: np.ndarray
+) -> np.ndarray:
+    """(1 + 12, 3, 3, F): what the mean misses add to the FRF, and one sd of each unsure part."""
+    share = columns.shared_at(frequency_hz)
+    out = np.zeros((1 + AIMED, 3, 3, len(frequency_hz)), dtype=complex)
+    whole = np.zeros((AIMED, told.mean.size))
+    for i, axis in enumerate(columns.axis):
+        out[0, :, axis] += np.einsum("k,kif,f->if", told.mean[i], basis[axis], share[i])
+        at = OWN * axis + np.arange(OWN)
+        whole[at, OWN * i + np.arange(OWN)] = np.mean(share[i])
+    values, vectors = np.linalg.eigh(whole @ told.covariance @ whole.T)
+    roots = vectors * np.sqrt(np.maximum(values, 0.0))
+    for axis in range(3):
+        part = roots[OWN * axis : OWN * axis + OWN]
+        out[1:, :, axis] = np.einsum("kj,kif->jif", part, basis[axis])
+    return out
+
+
+def _outside(poles: np.ndarray, band_hz: tuple[float, float]) -> np.ndarray:
+    size, (low, high) = np.abs(poles) / (2 * np.pi), band_hz
+    near = (size > AROUND[0] * low) & (size < AROUND[1] * high) & (poles.imag > 0)
+    return poles[near & ((size < low) | (size > high))]
+
+
+def _unsure(mode: Mode, columns: HitColumns, t: Tolerances) -> Mode:
+    """As measured; its sds hold the hits' unknown directions.
+
+    What a hit beside the point does cannot be said without a simulation.
+    """
+    sd = mode.residue_sd.copy()
+    for axis, across in enumerate(ACROSS):
+        count = max(int(np.sum(columns.axis == axis)), 1)
+        power = np.nansum(np.abs(mode.residue[:, list(across)]) ** 2, axis=1)
+        sd[:, axis] = np.hypot(sd[:, axis], t.angle_rad * np.sqrt(power / (2 * count)))
+    return replace(mode, residue_sd=sd)

@@ -1,0 +1,114 @@
+"""What each hit of a pose says by itself: its own column of the FRF matrix, on a few lines."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.dataset.dataset import LAID
+from planner.dataset.measure import MeasuredPose
+from planner.dataset.screened_files import Source
+from planner.dataset.store import user_store
+from planner.frf.spectra import Windows, transform
+from planner.recording.records import FrfRecord, Hit
+
+LINES = 48  # of each hit, at most: four numbers a hit are told from 144 complex values
+DROP = 0.1  # of a pulse's force spectrum, where it ceases to excite: 20 dB
+CHANNELS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class HitColumns:
+    """The n hits of a pose at L lines, at s = iω + `rate_1_s`; n = 0 of exported FRFs.
+
+    `file` (n,) counts the files they are from; `axis` (n,) is 0, 1 or 2 and `sign` (n,) their sense
+    along it. `accelerance` (n, 3, L) in m/s²/N is that of a force along +axis, `variance` (n, 3, L)
+    is E|δH|² of the records' noise, `share` (n, L) each hit's part in the average of its axis.
+    `tail_s` as in `Frf`.
+    """
+
+    file: np.ndarray
+    axis: np.ndarray
+    sign: np.ndarray
+    frequency_hz: np.ndarray
+    accelerance: np.ndarray
+    variance: np.ndarray
+    share: np.ndarray
+    rate_1_s: float
+    tail_s: float
+
+    def shared_at(self, frequency_hz: np.ndarray) -> np.ndarray:
+        """`share` (n, F) at other lines (Hz)."""
+        return np.array([np.interp(frequency_hz, self.frequency_hz, row) for row in self.share])
+
+
+def hit_columns(
+    hits: tuple[Hit, ...],
+    file: tuple[int, ...],
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
+) -> HitColumns:
+    """Columns of hits, which are from the files of those numbers, in a band.
+
+    `window_rate_1_s`: of an exponential window that the analyser laid. Raises RefusedError where
+    the hits do not fit together.
+    """
+    spectra = transform(hits, band_hz, Windows(LAID, window_rate_1_s))
+    frequency = spectra.frequency_hz
+    force = np.array([s.force for s in spectra.hits])
+    size = np.abs(force)
+    low, high = band_hz
+    for own in size:
+        weak = (own < DROP * np.max(own)) & (frequency > low)
+        high = min(high, float(frequency[np.argmax(weak)])) if weak.any() else high
+    inside = np.flatnonzero((frequency >= low) & (frequency <= high))
+    if len(inside) > LINES:
+        inside = inside[np.linspace(0, len(inside) - 1, LINES).round().astype(int)]
+    force, size = force[:, inside], size[:, inside]
+    h = np.array([s.response for s in spectra.hits])[:, :, inside] / force[:, None]
+    noise = np.array([s.noise for s in spectra.hits])[:, :, None]
+    force_noise = np.array([s.force_noise for s in spectra.hits])[:, None, None]
+    axis = np.array([s.axis for s in spectra.hits])
+    total = np.array([np.sum(size[axis == own] ** 2, axis=0) for own in axis])
+    return HitColumns(
+        np.array(file),
+        axis,
+        np.array([hit.sign for hit in hits]),
+        frequency[inside],
+        h,
+        (noise + np.abs(h) ** 2 * force_noise) / size[:, None] ** 2,
+        size**2 / total,
+        LAID + window_rate_1_s,
+        spectra.tail_s,
+    )
+
+
+def columns_of(
+    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
+) -> HitColumns:
+    """Those of files that were accepted before, kept like FRFs."""
+    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+
+    def make() -> HitColumns:
+        from planner.recording.hits import hits_from
+        from planner.recording.read import read
+
+        hits, file = [], []
+        for number, source in enumerate(sources):
+            records = read(source.path)
+            if not any(isinstance(record, FrfRecord) for record in records):
+                found = hits_from(records, axis=source.hit)
+                hits += found
+                file += [number] * len(found)
+        if not hits:
+            return _none()
+        return hit_columns(tuple(hits), tuple(file), band_hz, window_rate_1_s)
+
+    return pose.kept("hit columns", HitColumns, make)
+
+
+def _none() -> HitColumns:
+    empty, h = np.zeros(0), np.zeros((0, CHANNELS, 0))
+    return HitColumns(
+        empty.astype(int), empty.astype(int), empty, empty, h.astype(complex), h,
+        np.zeros((0, 0)), LAID, np.inf,
+    )  # fmt: skip

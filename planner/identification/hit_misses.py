@@ -1,0 +1,291 @@
+"""How each hit missed its axis and its point, told from all hits of all poses at once.
+
+Every hit's column of the FRF matrix is, to first order, linear in what is not known: four numbers
+of its own (`measurement_model`), an aim common to all hits along an axis, the measuring chain, the
+readback of its pose, the simulation's parameters, and a discrepancy of the simulation at its pose
+whose size is inferred. All have normal priors. What belongs to one pose is eliminated pose by
+pose; what is common remains, and is linearised again where it moved.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.dataset.hit_columns import HitColumns
+from planner.dynamics.simulation import Simulation
+from planner.identification.measurement_model import Tolerances
+from planner.identification.parameters import Parametrisation
+from planner.identification.simulated_visit import SimulatedVisit, simulated_visit
+from planner.modal.residues import laplace
+
+# An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
+AIM = 0.5
+RELATIVE = 0.005  # of an FRF: what no column describes (curvature, rounding of first order)
+SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # of the discrepancy, relative to modal shapes
+FEWEST_LINES, LINES = 16, 400  # a pose, and of all poses that tell the common numbers together
+STEPS = 4  # linearisations
+STRIDE = 0.3  # prior sd of a step, in logarithms of springs and sds of inertias: it is damped
+SHORTER = 0.3  # of the stride, after a step that led uphill
+OWN, AIMED, CHAIN = 4, 12, 14  # numbers of a hit, of all aims, of the chain
+
+
+@dataclass(frozen=True, eq=False)
+class VisitHits:
+    """The hits of a pose at q (dof,) in rad."""
+
+    q: np.ndarray
+    columns: HitColumns
+
+
+@dataclass(frozen=True, eq=False)
+class VisitMisses:
+    """Of n hits, for a force along +axis: `mean` (n, 4) and `covariance` (4n, 4n).
+
+    Two angles in rad and two offsets in m, across the axis in cyclic order.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Misses:
+    """Of all visits, and the `simulation` that told them.
+
+    `discrepancy` is the inferred relative size of what it gets wrong in modal shapes.
+    """
+
+    visits: tuple[VisitMisses, ...]
+    simulation: Simulation
+    discrepancy: float
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """A simulation's parameters: their priors' mean and sd (D,), and where they are."""
+
+    nominal: Simulation
+    parametrisation: Parametrisation
+    x: np.ndarray
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Prior mean (D,)."""
+        p = self.parametrisation
+        return np.concatenate([p.mean, np.zeros(len(p.nuisances))])
+
+    @property
+    def sd(self) -> np.ndarray:
+        """Prior sd (D,)."""
+        p = self.parametrisation
+        return np.concatenate([p.log_sd, np.ones(len(p.nuisances))])
+
+    def simulation(self, x: np.ndarray) -> Simulation:
+        """At parameters x (D,)."""
+        p, count = self.parametrisation, len(self.parametrisation.parameters)
+        change = p.inertia_change(x[count:]) if p.nuisances else None
+        return self.nominal.changed(p.elasticity(x[:count]), change)
+
+    def near(self, x: np.ndarray) -> np.ndarray:
+        """x where a prior still speaks of it."""
+        count = len(self.parametrisation.parameters)
+        return np.concatenate([self.parametrisation.near(x[:count]), np.clip(x[count:], -3, 3)])
+
+
+def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_by: int) -> Misses:
+    """Misses of the hits of all visits.
+
+    Args:
+        visits: With at least one hit each.
+        known: The simulation, as it was identified from the hits' averages.
+        t: Priors of hits and measuring chain.
+        tell_by: How many of the visits, the last ones, tell what is common to all.
+    """
+    few = range(max(0, len(visits) - tell_by), len(visits))
+    lines = int(np.clip(LINES // max(len(few), 1), FEWEST_LINES, LINES))
+    common, stride, x = _Common(known, t), STRIDE, known.x
+    best = common.at(x, [visits[i] for i in few], lines)
+    size = max(SIZES, key=lambda s: best.solved(s).evidence)
+    for _ in range(STEPS - 1):
+        step = best.solved(size).step(stride)
+        try:
+            tried = common.at(known.near(best.x + step), [visits[i] for i in few], lines)
+        except np.linalg.LinAlgError:
+            tried = None  # no robot can have such inertias
+        if tried is None or tried.solved(size).here < best.solved(size).here:
+            stride *= SHORTER
+        else:
+            best = tried
+    size = max(SIZES, key=lambda s: best.solved(s).evidence)
+    solved = best.solved(size)
+    others = [common.visit(best.simulation, visits[i], lines) for i in range(few.start)]
+    told = [solved.misses(one) for one in (*others, *best.visits)]
+    scale = np.repeat([t.angle_rad, t.offset_m], 2)
+    found = tuple(_in_units(mean, covariance, scale) for mean, covariance in told)
+    return Misses(found, best.simulation, size)
+
+
+def _in_units(mean: np.ndarray, covariance: np.ndarray, scale: np.ndarray) -> VisitMisses:
+    every = np.tile(scale, len(mean) // OWN)
+    return VisitMisses((mean * every).reshape(-1, OWN), covariance * np.outer(every, every))
+
+
+@dataclass(frozen=True, eq=False)
+class _Visit:
+    """Normal equations of a visit: the hits' own numbers, the pose's, then those of all.
+
+    `sized` marks the discrepancy's among the first `local`; χ² is that without any of them.
+    """
+
+    axis: np.ndarray
+    normal: np.ndarray
+    right: np.ndarray
+    chi2: float
+    sized: np.ndarray
+
+    @property
+    def local(self) -> int:
+        return len(self.sized)
+
+    def eliminated(self, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Cholesky factor of the pose's own block, in prior sds; L⁻¹ times the rest; the sds."""
+        scale, a = np.where(self.sized, size, 1.0), self.local
+        own = scale[:, None] * self.normal[:a, :a] * scale
+        factor = np.linalg.cholesky(own + np.eye(a))
+        rest = np.concatenate([self.normal[:a, a:], self.right[:a, None]], axis=1)
+        return factor, np.linalg.solve(factor, scale[:, None] * rest), scale
+
+
+@dataclass(frozen=True, eq=False)
+class _Common:
+    """What stays the same from linearisation to linearisation."""
+
+    known: Known
+    t: Tolerances
+
+    def at(self, x: np.ndarray, visits: Sequence[VisitHits], lines: int) -> "_Point":
+        simulation = self.known.simulation(x)
+        made = tuple(self.visit(simulation, visit, lines) for visit in visits)
+        mean = np.concatenate([np.zeros(AIMED + CHAIN), self.known.mean - x])
+        sd = np.concatenate([np.ones(AIMED + CHAIN), self.known.sd])
+        return _Point(x, simulation, made, mean, sd)
+
+    def visit(self, simulation: Simulation, visit: VisitHits, most: int) -> _Visit:
+        columns = visit.columns
+        count = len(columns.frequency_hz)
+        kept = np.arange(count)
+        if count > most:
+            kept = np.linspace(0, count - 1, most).round().astype(int)
+        lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
+        made = simulated_visit(simulation, self.known.parametrisation, visit.q, lines, self.t)
+        return _normal_equations(
+            columns.axis, columns.accelerance[:, :, kept], columns.variance[:, :, kept], made
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """All visits linearised at x (D,); `mean` and `sd` of what is common are counted from there."""
+
+    x: np.ndarray
+    simulation: Simulation
+    visits: tuple[_Visit, ...]
+    mean: np.ndarray
+    sd: np.ndarray
+
+    def solved(self, size: float) -> "_Solved":
+        """With a discrepancy of that size."""
+        normal, right = np.diag(1 / self.sd**2), self.mean / self.sd**2
+        evidence = -float(np.sum(np.log(self.sd)) + np.sum((self.mean / self.sd) ** 2) / 2)
+        for visit in self.visits:
+            factor, rest, _ = visit.eliminated(size)
+            onto, own = rest[:, :-1], rest[:, -1]
+            normal = normal + visit.normal[visit.local :, visit.local :] - onto.T @ onto
+            right = right + visit.right[visit.local :] - onto.T @ own
+            volume = float(np.sum(np.log(np.diagonal(factor))))
+            evidence += float(own @ own) / 2 - volume - visit.chi2 / 2
+        return _Solved(normal, right, evidence, size)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """Normal equations of what is common to all visits, the rest integrated out."""
+
+    normal: np.ndarray
+    right: np.ndarray
+    rest: float
+    size: float
+
+    def _gain(self, chosen: slice) -> float:
+        half = np.linalg.cholesky(self.normal[chosen, chosen])
+        onto = np.linalg.solve(half, self.right[chosen])
+        return float(onto @ onto) / 2 - float(np.sum(np.log(np.diagonal(half))))
+
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood of the linearised model."""
+        return self.rest + self._gain(slice(None))
+
+    @property
+    def here(self) -> float:
+        """The same with the parameters where they are: what a step is judged by."""
+        return self.rest + self._gain(slice(AIMED + CHAIN))
+
+    def step(self, stride: float) -> np.ndarray:
+        """Change (D,) of the parameters, damped."""
+        damping = np.zeros(len(self.right))
+        damping[AIMED + CHAIN :] = 1 / stride**2
+        return np.linalg.solve(self.normal + np.diag(damping), self.right)[AIMED + CHAIN :]
+
+    def misses(self, visit: _Visit) -> tuple[np.ndarray, np.ndarray]:
+        """Mean (4n,) and covariance (4n, 4n) of the hits' whole misses, in prior sds."""
+        common, covariance = np.linalg.solve(self.normal, self.right), np.linalg.inv(self.normal)
+        factor, rest, scale = visit.eliminated(self.size)
+        n = OWN * len(visit.axis)
+        own = np.linalg.solve(factor.T, rest[:, -1] - rest[:, :-1] @ common)
+        inverse = np.linalg.solve(factor, np.eye(len(scale))[:, :n])
+        by_common = -np.linalg.solve(factor.T, rest[:, :-1])[:n]
+        for hit, axis in enumerate(visit.axis):
+            at, aim = OWN * hit + np.arange(OWN), OWN * axis + np.arange(OWN)
+            by_common[at, aim] += AIM
+            own[at] += AIM * common[aim]
+        return own[:n], inverse.T @ inverse + by_common @ covariance @ by_common.T
+
+
+def _normal_equations(
+    axes: np.ndarray, h: np.ndarray, variance: np.ndarray, made: SimulatedVisit
+) -> _Visit:
+    """Of hits (n, 3, F); the real and imaginary part of each value has half the variance."""
+    weight = 2 / (variance + (RELATIVE * np.abs(h)) ** 2)
+    weight = np.concatenate([weight, weight], axis=-1).reshape(len(h), -1)
+    aims = np.zeros((AIMED, *made.accelerance.shape), dtype=complex)
+    for axis in range(3):
+        aims[OWN * axis : OWN * axis + OWN, :, axis] = AIM * made.misses[axis]
+    pose = np.concatenate([made.discrepancy, made.readback])
+    shared = np.concatenate([pose, aims, made.chain, made.slope])
+    n, size = OWN * len(h), OWN * len(h) + len(shared)
+    normal, right, chi2 = np.zeros((size, size)), np.zeros(size), 0.0
+    for axis in range(3):
+        group = np.flatnonzero(axes == axis)
+        if not len(group):
+            continue
+        w, columns, own = weight[group], _real(shared[:, :, axis]), _real(made.misses[axis])
+        off = _real(h[group] - made.accelerance[:, axis])
+        normal[n:, n:] += (columns * w.sum(axis=0)) @ columns.T
+        right[n:] += columns @ np.sum(w * off, axis=0)
+        chi2 += float(np.sum(w * off**2))
+        for k, hit in enumerate(group):
+            at, weighed = slice(OWN * hit, OWN * hit + OWN), own * w[k]
+            normal[at, at] = weighed @ own.T
+            normal[at, n:] = weighed @ columns.T
+            normal[n:, at] = normal[at, n:].T
+            right[at] = weighed @ off[k]
+    sized = np.zeros(n + len(pose), dtype=bool)
+    sized[n : n + len(made.discrepancy)] = True
+    return _Visit(axes, normal, right, chi2, sized)
+
+
+def _real(values: np.ndarray) -> np.ndarray:
+    """(k, 3, F) complex as (k, 6F): real parts, then imaginary ones, channel by channel."""
+    return np.concatenate([values.real, values.imag], axis=-1).reshape(len(values), -1)
