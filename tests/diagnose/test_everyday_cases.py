@@ -1,0 +1,91 @@
+"""Small concealed cases with everyday's hits, sensor and readback: what is said, what is not."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from planner import Dataset, Robot, diagnose
+from planner.report.diagnosis import DiagnosisReport
+from planner.truth.deviation import (
+    AttachedMass,
+    AttachedResonator,
+    Deviation,
+    Feedback,
+    ScaledJoint,
+    Spring,
+    StiffnessRipple,
+)
+from planner.truth.handling import EVERYDAY
+from planner.truth.secret import Artefact
+from tests.support.small_cases import SCATTER, small_case, unlike
+
+TILTS = tuple(Spring("base", axis, 2.5e5, 200.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
+BEARING = tuple(Spring("joint_2", axis, 6e4, 40.0) for axis in ((1.0, 0, 0), (0, 0, 1.0)))
+BENDING = tuple(Spring("link_3", axis, 3e4, 15.0) for axis in ((0, 1.0, 0), (0, 0, 1.0)))
+HOSE = AttachedResonator("link_3", (0.2, 0.0, 0.1), (0.0, 0.6, 0.8), 1.2, 24.0, 0.02)
+TURNED = Rotation.from_rotvec(np.deg2rad([0, 0, 15])).as_matrix()
+
+
+@dataclass(frozen=True)
+class Concealed:
+    """What a small case hides; `said` are effects and places, any one of them being right."""
+
+    deviation: Deviation = SCATTER
+    artefact: Artefact | None = None
+    verdict: str = "explained"
+    said: tuple[tuple[str, str], ...] = ()
+
+
+CASES = {
+    "nothing": Concealed(verdict="consistent"),
+    "another hand, nothing": Concealed(unlike(seed=11), verdict="consistent"),
+    "soft floor": Concealed(unlike(extra=TILTS), said=(("base_compliance", "base"),)),
+    "weak joint": Concealed(
+        unlike(scaled=(ScaledJoint("joint_3", 0.4),)), said=(("joint_stiffness", "joint_3"),)
+    ),
+    "tilting bearing": Concealed(
+        unlike(extra=BEARING), said=(("transverse_compliance", "joint_2"),)
+    ),
+    "bending link": Concealed(unlike(extra=BENDING), said=(("link_flexibility", "link_3"),)),
+    "forgotten mass": Concealed(
+        unlike(added=(AttachedMass("link_4", (0.1, 0.05, 0.1), 4.0),)),
+        said=(("added_mass", "link_4"),),
+    ),
+    "hose pack": Concealed(unlike(resonators=(HOSE,)), said=(("local_resonator", "link_3"),)),
+    "uneven gear": Concealed(
+        unlike(harmonics=(StiffnessRipple("joint_2", 1, 0.5, 0.3),)),
+        said=(("angle_dependent_stiffness", "joint_2"),),
+    ),
+    "turned sensor": Concealed(
+        artefact=Artefact(rotation=TURNED), said=(("sensor_rotation", "sensor"),)
+    ),
+    "late channels": Concealed(
+        artefact=Artefact(delay_s=2e-3), said=(("channel_delay", "sensor"),)
+    ),
+    "a controller": Concealed(
+        unlike(feedback=(Feedback("joint_1", "joint_3", 4e4),)), verdict="unexplained"
+    ),
+}
+
+
+def told(tmp_path, concealed: Concealed) -> DiagnosisReport:
+    case = small_case(tmp_path, concealed.deviation, concealed.artefact, EVERYDAY)
+    robot = Robot.load(case.robot_toml)
+    names, band = robot.joint_names, robot.config.band_hz
+    return diagnose(Dataset.read(case.recordings, joint_names=names, band_hz=band), robot)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_concealed_is_named_and_nothing_else(tmp_path, name):
+    concealed = CASES[name]
+    found = told(tmp_path, concealed)
+    assert found.verdict == concealed.verdict
+    named = {(f.effect, f.at) for f in found.findings}
+    alternatives = {(one.effect, one.at) for group in found.sets for one in group[:2]}
+    if concealed.said:
+        assert len(named) == 1
+        assert (named | alternatives) & set(concealed.said)
+    else:
+        assert not named
