@@ -69,10 +69,9 @@ DAMPERS = 10.0
 CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose to pose; chosen
 # How much may be left, relative to what was recorded and once misses are out, where nothing unknown
 # is there: without any effect what does not matter ([diagnose] matters_percent); with one, this
-# share of what refitting left.
-# Beyond, it is less likely by a normal law of ln(left), sd ln LEFT_FACTOR; the same below what
-# matters where something unknown is there. Chosen.
-LEFT_SHARE, LEFT_LEAST = 0.15, 0.005
+# share of what refitting left. Beyond, it is less likely by a normal law of ln(left), sd ln
+# LEFT_FACTOR. Chosen.
+LEFT_SHARE = 0.15
 LEFT_FACTOR = 1.5
 SOMETHING_UNKNOWN = 0.05  # probability, before any data, that something of no library is there
 INDEPENDENT = 8.0  # values that what no law explains is worth, when laws are weighed; chosen

@@ -136,7 +136,9 @@ def level_data(recorded: Dataset, plain: Fit, misses: OpenMisses | None = None) 
     hits = strokes(visits, columns)
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
-    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(left))
+    return LevelData(
+        s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(left)
+    )
 
 
 def _left_open(

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
@@ -12,7 +13,6 @@ from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.thresholds import (
     ALIKE,
     LEFT_FACTOR,
-    LEFT_LEAST,
     LEFT_SHARE,
     NOISE_OVERSTATED,
     SOMETHING_UNKNOWN,
@@ -62,28 +62,39 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     worth = tuple(p.worth(t) for p in products)
     mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
     left = np.array([m.unexplained for m in mismatch])
+    seen = np.array([m.resolution for m in mismatch])
     matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters_percent / 100
-    return Weights(shares_of(worth, left, prior, matters, seed), t, worth, mismatch)
+    shares = shares_of(worth, left, prior, matters, float(seen.min()), seed)
+    return Weights(shares, t, worth, mismatch)
 
 
 def shares_of(
-    worth: Sequence[Worth], left: np.ndarray, prior: Sequence[float], matters: float, seed: int = 0
+    worth: Sequence[Worth],
+    left: np.ndarray,
+    prior: Sequence[float],
+    matters: float,
+    seen: float,
+    seed: int = 0,
 ) -> np.ndarray:
     """Probabilities (k + 1,) of k fits, each of them all there is, and of "unknown".
 
     Something unknown may be there alone, as it were beside the first fit, or beside any other. How
-    large the discrepancy is tells, and how much is `left` (k,), relative to the recordings.
+    large the discrepancy is tells, and how much is `left` (k,), relative to the recordings (noise
+    lets `seen` be seen). Where refitting leaves less than `matters`, what is unknown does not
+    matter: the first fit will do.
     """
-    before = np.log(prior)
-    known = np.array([w.log_evidence for w in worth]) + before + left_alone(left, matters)
+    before, left = np.log(prior), np.maximum(left, seen)
+    known = np.array([w.log_evidence for w in worth]) + before + left_alone(left, matters, seen)
     strange = np.array([w.log_evidence_unknown for w in worth]) + before
-    strange += left_beside(left, matters) + np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
+    strange += np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
     scores = np.tile([w.score for w in worth], (2, 1))
     both = np.concatenate([known, strange])
     alone, beside, _ = np.split(
         bootstrapped(scores, both, 1.0, -np.inf, BOOTSTRAPS, seed), [len(known), len(both)]
     )
-    return np.append(alone, beside.sum())
+    counts = float(norm.cdf(np.log(left[0] / matters) / np.log(LEFT_FACTOR)))
+    alone[0] += (1 - counts) * beside.sum()
+    return np.append(alone, counts * beside.sum())
 
 
 def stated_springs(none: Fit) -> tuple[str, ...]:
@@ -91,21 +102,15 @@ def stated_springs(none: Fit) -> tuple[str, ...]:
     return tuple(p.name for p in none.misfit.parametrisation.parameters)
 
 
-def left_alone(left: np.ndarray, matters: float) -> np.ndarray:
+def left_alone(left: np.ndarray, matters: float, seen: float) -> np.ndarray:
     """Log likelihoods of so much (k,) being left, relative, where nothing unknown is there.
 
     The first is what refitting leaves: that may be what does not matter. What explains takes most
-    of it.
+    of it, as far as noise lets that be `seen`.
     """
-    least = np.full(len(left), max(LEFT_LEAST, LEFT_SHARE * left[0]))
+    least = np.full(len(left), max(seen, LEFT_SHARE * left[0]))
     least[0] = matters
     return -(np.log(np.maximum(left, least) / least) ** 2) / (2 * np.log(LEFT_FACTOR) ** 2)
-
-
-def left_beside(left: np.ndarray, matters: float) -> np.ndarray:
-    """The same where something unknown is: it would not be looked for if it did not matter."""
-    seen = np.clip(left, 1e-6, matters) / matters
-    return -(np.log(seen) ** 2) / (2 * np.log(LEFT_FACTOR) ** 2)
 
 
 def lag(fits: Sequence[Fit]) -> np.ndarray:

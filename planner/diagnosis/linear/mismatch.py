@@ -10,16 +10,25 @@ from planner.identification.measurement_model import basis
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """Mean squares over those of what was recorded: as it is, without misses, and of noise."""
+    """Mean squares over those of what was recorded: as it is, without misses, and of noise.
+
+    `values` is the number of real values that they were taken of.
+    """
 
     whole: float
     left: float
     noise: float
+    values: int
 
     @property
     def unexplained(self) -> float:
         """Relative size of what is left beyond noise, once the misses are out: 0.03 is 3 %."""
         return float(np.sqrt(max(self.left - self.noise, 0.0)))
+
+    @property
+    def resolution(self) -> float:
+        """Relative size below which nothing is seen in the noise: one sd of its mean square."""
+        return float(np.sqrt(self.noise * np.sqrt(2 / max(self.values, 1))))
 
     @classmethod
     def of(cls, misfit: Misfit, x: np.ndarray) -> "Mismatch":
@@ -30,7 +39,8 @@ class Mismatch:
         recorded = float(np.sum(np.abs(misfit.measured.accelerance[used]) ** 2))
         parts = (np.abs(one[used] * unit) ** 2 for one in (whole, left))
         sums = [*(float(np.sum(part)) for part in parts), float(np.sum(2 * unit**2))]
-        return cls(*(value / max(recorded, 1e-300) for value in sums))
+        shares = (value / max(recorded, 1e-300) for value in sums)
+        return cls(*shares, values=2 * int(np.count_nonzero(used)))
 
 
 def residuals(misfit: Misfit, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
