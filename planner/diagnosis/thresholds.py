@@ -88,8 +88,9 @@ AT_NOISE = 1.15  # χ² per value at which nothing is left for a second effect t
 CLEARLY_WRONG = 3.0  # χ² per value from which a few poses are enough for a first look
 PAYS = 1.5  # factor by which one more effect has to lower χ² per value; on generated cases
 SPRING_STRAYED = 2.5  # prior sds that a spring does not move by chance beside a linear effect
-# The same beside a law: nor by what a fit in time neglects. A law's own spring was 0.0 to 2.2 prior
-# sds off on 36 concealed cases of seeds 19001 to 22001, where truth scatters by one.
+INERTIA_STRAYED = 2.5  # the same of masses, centres and moments of inertia
+# Of springs beside a law: nor by what a fit in time neglects. A law's own was 0.0 to 2.2 prior sds
+# off on 36 concealed cases of seeds 19001 to 22001, where truth scatters by one.
 SPRING_STRAYED_BESIDE_LAW = 3.2
 MOST_STRAYED = 1  # other joints that may be: several at once imitate what the law lacks
 LAW_FITS = 2.0  # χ² per value up to which a law is the joint's own; else springs imitate a lack

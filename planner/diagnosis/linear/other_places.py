@@ -10,31 +10,32 @@ import numpy as np
 
 from planner.diagnosis.effects.combined import Both, together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import CLOSE, Fit, Problem, approached, points
+from planner.diagnosis.linear.fit import CLOSE, Fit, Problem, approached, fit, points
+from planner.diagnosis.thresholds import INERTIA_STRAYED
 from planner.inference.parallel import side_by_side
 
 MOVABLE = MASS, RESONATOR = "added_mass", "local_resonator"
 KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
 
 
-def elsewhere(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+def elsewhere(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits with each of its movable effects at each other place."""
     moves: list[tuple[Effect, Effect, Effect]] = []
-    for part in fit.effect.parts():
-        rest = [p for p in fit.effect.parts() if p is not part]
+    for part in found.effect.parts():
+        rest = [p for p in found.effect.parts() if p is not part]
         for to in effects:
             if part.name not in MOVABLE or to.name != part.name or to.at == part.at:
                 continue
             effect = together(Both.of(*rest), to) if rest else to
             if effect is not None:
                 moves.append((part, to, effect))
-    return tuple(side_by_side(partial(_moved, problem, fit), moves))
+    return tuple(side_by_side(partial(_moved, problem, found), moves))
 
 
-def _moved(problem: Problem, fit: Fit, move: tuple[Effect, Effect, Effect]) -> Fit:
+def _moved(problem: Problem, found: Fit, move: tuple[Effect, Effect, Effect]) -> Fit:
     part, to, effect = move
-    misfit, known = problem.misfit(effect, CLOSE), fit.named()
-    starts = np.array(points(misfit, fit))
+    misfit, known = problem.misfit(effect, CLOSE), found.named()
+    starts = np.array(points(misfit, found))
     for name in KEPT:
         before, now = f"{name} of {part.name} at {part.at}", f"{name} of {to.name} at {to.at}"
         if before in known:
@@ -42,26 +43,45 @@ def _moved(problem: Problem, fit: Fit, move: tuple[Effect, Effect, Effect]) -> F
     return approached(misfit, list(np.unique(starts, axis=0)))
 
 
-def rigid(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """Fits with a mass at each place, where inertias were moved far to imitate one.
+
+    From a fit that has bent them nothing leads to the mass: each is fitted from afar too.
+    """
+    a, b = found.misfit.split
+    away = np.abs((found.x - found.misfit.mean) / found.misfit.sd)[a:b]
+    if away.max(initial=0.0) < INERTIA_STRAYED:
+        return ()
+    masses = [e for e in effects if e.name == MASS]
+    if found.effect.at:
+        masses = [t for e in masses if (t := together(found.effect, e)) is not None]
+    return tuple(side_by_side(partial(_from_afar, problem, found), masses))
+
+
+def _from_afar(problem: Problem, found: Fit, effect: Effect) -> Fit:
+    return fit(problem, effect, [found])
+
+
+def rigid(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits with a mass in the stead of each resonator.
 
     One that swings faster than the band is wide is nothing else, and a fit does not get there by
     itself.
     """
     pairs: list[tuple[Effect, Effect]] = []
-    for part in fit.effect.parts():
+    for part in found.effect.parts():
         if part.name == RESONATOR:
-            rest = [p for p in fit.effect.parts() if p is not part]
+            rest = [p for p in found.effect.parts() if p is not part]
             there = [e for e in effects if e.name == MASS and e.at == part.at]
             both = (together(Both.of(*rest), e) if rest else e for e in there)
             pairs += [(part, effect) for effect in both if effect is not None]
-    return tuple(side_by_side(partial(_held, problem, fit), pairs))
+    return tuple(side_by_side(partial(_held, problem, found), pairs))
 
 
-def _held(problem: Problem, fit: Fit, pair: tuple[Effect, Effect]) -> Fit:
+def _held(problem: Problem, found: Fit, pair: tuple[Effect, Effect]) -> Fit:
     part, effect = pair
-    misfit, known = problem.misfit(effect, CLOSE), fit.named()
-    x = points(misfit, fit)[0]
+    misfit, known = problem.misfit(effect, CLOSE), found.named()
+    x = points(misfit, found)[0]
     for q in part.quantities:
         now = f"{q.name} of {MASS} at {part.at}"
         if now in misfit.names:

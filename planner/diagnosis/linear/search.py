@@ -22,7 +22,7 @@ from planner.diagnosis.linear.fit import (
     settle,
     staged,
 )
-from planner.diagnosis.linear.other_places import elsewhere, rigid
+from planner.diagnosis.linear.other_places import burdened, elsewhere, rigid
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS, SPRING_STRAYED
 from planner.identification.held_out import farthest_first
@@ -86,7 +86,8 @@ def search(
     if not bent:
         found = _composed(problem, found, effects, tell)
     found = _lessened(problem, _rigid(problem, found, effects))
-    return _distinct(_spared(problem, _accompanied(problem, found, effects, tell), effects))
+    found = _spared(problem, _accompanied(problem, found, effects, tell), effects)
+    return _distinct(_burdened(problem, found, effects))
 
 
 def _best_of_few(found: Found) -> Fit:
@@ -204,6 +205,15 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     return Found((*found.finalists, *more), found.left)
 
 
+def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """Adds masses where the best has moved inertias far to explain everything."""
+    robots = [f for f in found.finalists if not any(p.artefact for p in f.effect.parts())]
+    best = min(robots, key=lambda f: f.misfit(f.x).value)
+    if best.per_value > AT_NOISE:
+        return found
+    return Found((*found.finalists, *burdened(problem, best, effects)), found.left)
+
+
 def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
     return carried_on(problem, *pair, LAST_STEPS)
 
@@ -226,8 +236,7 @@ def _place(effect: Effect) -> Place:
 def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
     """The next single effect whose company is looked for.
 
-    Once two explain everything, their company is looked for from the other side too: the first
-    may have been the best only as long as it was alone.
+    Once two explain everything, that of the other too: the first was the best perhaps alone.
     """
     waiting = [f for f in leaders if _place(f.effect) not in led]
     best = _best_of_few(found)
