@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.diagnosis.effects.combined import Both, together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import CLOSE, Fit, Problem, approached, fit, points
+from planner.diagnosis.linear.fit import CLOSE, Fit, Problem, approached, fit, points, settle
 from planner.diagnosis.thresholds import INERTIA_STRAYED
 from planner.inference.parallel import side_by_side
 
@@ -44,7 +44,7 @@ def _moved(problem: Problem, found: Fit, move: tuple[Effect, Effect, Effect]) ->
 
 
 def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
-    """Fits with a mass at each place, where inertias were moved far to imitate one.
+    """Fits with one mass at each place, where inertias were moved far to imitate one.
 
     From a fit that has bent them nothing leads to the mass: each is fitted from afar too.
     """
@@ -53,13 +53,15 @@ def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[F
     if away.max(initial=0.0) < INERTIA_STRAYED:
         return ()
     masses = [e for e in effects if e.name == MASS]
-    if found.effect.at:
-        masses = [t for e in masses if (t := together(found.effect, e)) is not None]
+    rest = [p for p in found.effect.parts() if p.at and p.name != MASS]
+    if rest:
+        masses = [t for e in masses if (t := together(Both.of(*rest), e)) is not None]
     return tuple(side_by_side(partial(_from_afar, problem, found), masses))
 
 
 def _from_afar(problem: Problem, found: Fit, effect: Effect) -> Fit:
-    return fit(problem, effect, [found])
+    # Valleys from inertias to a mass are long: a fit that stops early is still on its way.
+    return settle(problem, fit(problem, effect, [found]))
 
 
 def rigid(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:

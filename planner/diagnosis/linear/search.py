@@ -206,7 +206,7 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 
 def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """Adds masses where the best has moved inertias far to explain everything."""
+    """Adds a mass at each place where the best moved inertias far to explain everything."""
     robots = [f for f in found.finalists if not any(p.artefact for p in f.effect.parts())]
     best = min(robots, key=lambda f: f.misfit(f.x).value)
     if best.per_value > AT_NOISE:
