@@ -127,6 +127,15 @@ class Feedback:
 
 
 @dataclass(frozen=True)
+class ServoLoop:
+    """A controller that gives way slowly: `share` more of a joint's stiffness above a corner."""
+
+    joint: str
+    share: float
+    corner_hz: float
+
+
+@dataclass(frozen=True)
 class Deviation:
     """How truth differs from the robot folder: seeded scatter, and what the simulation lacks.
 
@@ -152,4 +161,24 @@ class Deviation:
     beams: tuple[BentLink, ...] = ()
     compensators: tuple[Compensator, ...] = ()
     bridges: tuple[Bridge, ...] = ()
+    servos: tuple[ServoLoop, ...] = ()
     spin: float = 0.0
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """By what robots differ from their folders without anything being wrong with them.
+
+    Relative standard deviations of each spring's stiffness and damping, of all stiffnesses
+    together (`common_sd`), of masses and inertias; of centres in m.
+    """
+
+    stiffness: float
+    damping: float
+    inertia: float
+    com_m: float
+    common_sd: float = 0.0
+
+    def of(self, seed: int) -> Deviation:
+        """A robot of this scatter, but for what all its stiffnesses have in common."""
+        return Deviation(seed, self.stiffness, self.damping, self.inertia, self.com_m)

@@ -244,7 +244,7 @@ class Truth:
         """
         mass, damping, stiffness, hit, sensor = self.matrices(q)
         e, inverse = len(mass), np.linalg.inv(mass)
-        maxwell = branches(self.springs, self.factors(q) * [s.stiffness for s in self.springs])
+        maxwell = self.relaxing(q)
         n = 2 * e + len(maxwell)  # states: places, speeds, and where each branch's damper is
         system = np.zeros((n, n))
         system[:e, e : 2 * e] = np.eye(e)
@@ -258,6 +258,15 @@ class Truth:
         poles, vectors = scipy.linalg.eig(system)[:2]
         entry = np.linalg.inv(vectors)[:, e : 2 * e] @ inverse
         return poles, vectors[:e], entry, hit, sensor
+
+    def relaxing(self, q: np.ndarray) -> list[tuple[int, float, float]]:
+        """(spring, stiffness, rate in 1/s) of what holds only against fast motion."""
+        own = self.factors(q) * [s.stiffness for s in self.springs]
+        found = branches(self.springs, own)
+        for loop in self.deviation.servos:
+            at = self._own[loop.joint]
+            found.append((at, float(loop.share * own[at]), 2 * np.pi * loop.corner_hz))
+        return found
 
     def poles(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Poles (2e,) in rad/s, receptance residues (2e, 3, 3), and Js M⁻¹ Jhᵀ (3, 3)."""

@@ -29,8 +29,9 @@ def check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_to
     at_links = (*deviation.added, *deviation.resonators, *deviation.beams)
     wrong += [a.link for a in at_links if a.link not in links]
     wrong += [name for b in deviation.bridges for name in b.links if name not in links]
-    changes = (*deviation.scaled, *deviation.harmonics, *deviation.compensators)
+    changes = (*deviation.scaled, *deviation.harmonics, *deviation.compensators, *deviation.servos)
     named = [change.joint for change in changes]
+    named += [wave.by for wave in deviation.harmonics if wave.by]
     named += [name for loop in deviation.feedback for name in (loop.driven, loop.sensed)]
     wrong += [name for name in named if name not in stated]
     wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]

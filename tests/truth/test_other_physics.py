@@ -78,7 +78,7 @@ def test_mixed_damping_is_damped_and_its_modes_are_those_of_the_dynamic_stiffnes
             whole[j, j] += more * s / (s + rate)
         exact.append(s**2 * sensor @ np.linalg.solve(whole, hit.T))
     ours = truth.accelerance(Q, f)
-    assert np.max(np.abs(ours - np.moveaxis(exact, 0, 2))) < 1e-8 * np.max(np.abs(exact))
+    assert np.max(np.abs(ours - np.moveaxis(np.array(exact), 0, 2))) < 1e-8 * np.max(np.abs(exact))
     assert all(0 < d < 0.3 for d in truth.modes(Q, 3)[1])
     shares = [s.loss * s.stiffness / (s.damping + 1e-12) for s in truth.springs]
     assert max(shares) > 3 * min(shares)  # no two joints alike: not proportional to stiffness
