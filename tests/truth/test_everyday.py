@@ -90,7 +90,7 @@ def test_a_case_says_what_it_should_and_hides_the_rest(tmp_path):
     effect = answer["effects"][0]
     assert effect["effect"] == "friction"
     assert effect["parameters"]["law"] in ("Friction", "BoucWen", "Iwan", "LuGre")
-    assert 1e-3 <= effect["size"] <= 1
+    assert 3e-4 <= effect["size"] <= 1
     assert 0 <= effect["nats_open"] <= effect["nats"] <= effect["nats_known"]
     assert answer["rumble_m_s2"] > 0
     assert {"effect": "drift", "at": "campaign"} in answer["imperfections"]
