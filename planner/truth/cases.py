@@ -22,9 +22,10 @@ import numpy as np
 from planner.errors import InputError
 from planner.truth import conceal
 from planner.truth.arms import ARMS, Arm
-from planner.truth.conceal import EFFECTS, NothingShowsError
-from planner.truth.deviation import Deviation
+from planner.truth.conceal import NothingShowsError, kinds
+from planner.truth.deviation import Scatter
 from planner.truth.hits import Hammer, SimulatedHit, write_predict
+from planner.truth.imperfections import Imperfect, imperfect
 from planner.truth.model import Truth, load_truth
 from planner.truth.nats import Conditions, Lacking, lacking, nats
 from planner.truth.scene import PULSE_S, Drawn, Scene
@@ -32,8 +33,7 @@ from planner.truth.secret import Secret, frfs, once, quiet_hits
 from planner.truth.visits import Visits, record
 from planner.truth.world import CLEAN, REAL, World
 
-KINDS = ("null", *EFFECTS, "pair", "drives")  # "drives": one law in several joints
-MIX = ("null", *EFFECTS, "pair", "null", "pair", "pair")  # pairs more often: there are many kinds
+MORE = ("null", "pair", "pair")  # more often than others: there are many kinds of pairs
 # Peaks (N) of a middling hit: a tenth of a millimetre or two at the tool.
 PEAK_N = {"kr10": 150.0, "kr210": 1200.0, "irb6640": 1200.0}
 POSES, PREDICTED = 9, 4
@@ -52,27 +52,32 @@ class Case:
 
 
 def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLEAN) -> Case:
-    """Write folder/robot and folder/recordings of a kind of KINDS and a robot of ARMS.
+    """Write folder/robot and folder/recordings of one of `kinds` and a robot of ARMS.
 
     Raises InputError for an unknown kind or robot.
     """
-    if kind not in KINDS or robot not in ARMS:
-        raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(KINDS)}.")
+    if kind not in kinds(world) or robot not in ARMS:
+        raise InputError(f"No case {kind} of robot {robot}; kinds are {', '.join(kinds(world))}.")
     rng = np.random.default_rng([seed, zlib.crc32(f"{kind} {robot}".encode())])
     arm = replace(ARMS[robot], damping_s=DAMPING_S)
     per_joint = 1 if kind == "transverse_compliance" else int(rng.choice([1, 3]))
     robot_toml = arm.write(folder / "robot", per_joint)
-    plain = Secret(replace(world.scatter, seed=int(rng.integers(2**31))))
+    plain = Secret(world.scatter.of(int(rng.integers(2**31))))
     low, high = np.deg2rad(np.array(arm.joints_deg)).T
     poses = rng.uniform(low, high, (POSES + PREDICTED, 6))
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
     hammer = replace(hammer, oversampling=world.oversampling)
     truth = load_truth(robot_toml, plain.deviation)
     scene = Scene(arm, truth, per_joint, poses, hammer.peak_n)
+    own = np.random.default_rng([seed, zlib.crc32(b"handling")])
+    robot_is = Imperfect(plain, ())
+    if world.imperfect:
+        robot_is = imperfect(scene, plain, own)
+        plain = robot_is.secret
+        scene = replace(scene, truth=load_truth(robot_toml, plain.deviation))
     concealed = conceal.concealed(kind, scene, plain, robot_toml, hammer, world, rng)
     secret = concealed[-1].secret if concealed else plain
     truth = load_truth(robot_toml, secret.deviation)
-    own = np.random.default_rng([seed, zlib.crc32(b"handling")])
     measured = replace(secret, chain=world.handling.chain(own))
     visits = Visits.planned(poses[:POSES], hammer, world.handling, rng, own)
     again = copy.deepcopy(rng)
@@ -92,6 +97,7 @@ def make_case(kind: str, robot: str, seed: int, folder: Path, world: World = CLE
             "rumble_m_s2": hammer.rumble_m_s2,
             "outside_library": any(drawn.effect == "unknown" for drawn in concealed),
             "effects": _effects(concealed, plain, conditions, robot_toml, measured, quiet, again),
+            "imperfections": [{"effect": e, "at": at} for e, at in robot_is.places],
             "held_out": _held_out(truth, secret, held_out, arm, hammer),
             "salt": secrets.token_hex(16),  # so that answers cannot be found by trying hashes
         },
@@ -125,7 +131,7 @@ def _effects(
     return found
 
 
-def _at_most(drawn: Drawn, scatter: Deviation) -> float:
+def _at_most(drawn: Drawn, scatter: Scatter) -> float:
     """Nats of a joint's own stiffness: it scatters anyway, and this is what so far off costs."""
     if drawn.effect != "joint_stiffness":
         return float("inf")
@@ -167,17 +173,18 @@ def main() -> None:
     """Make cases of all kinds in turn, robots in turn; print the seals."""
     parser = argparse.ArgumentParser(prog="python -m planner.truth.cases", description=__doc__)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--cases", type=int, default=len(MIX))
+    parser.add_argument("--cases", type=int, default=25)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--laboratory", action="store_true", help="no hit and no sensor errs")
     options = parser.parse_args()
     world = CLEAN if options.laboratory else REAL
     answers = options.folder / "answers"
     answers.mkdir(parents=True, exist_ok=True)
+    mix = [k for k in (*kinds(world), *MORE) if k != "drives"]
     order = np.random.default_rng(options.seed).permutation(options.cases)
     for number, kind in enumerate(order):
         name, robot = f"case_{number + 1:03d}", sorted(ARMS)[number % len(ARMS)]
-        wanted = MIX[kind % len(MIX)], robot
+        wanted = mix[kind % len(mix)], robot
         case = _made(*wanted, options.seed + number, options.folder / name, world)
         (answers / f"{name}.json").write_text(case.answer, encoding="utf-8")
         print(f"{name} {case.seal}", flush=True)

@@ -8,14 +8,19 @@ import numpy as np
 from planner.errors import InputError
 from planner.truth.detect import clarity
 from planner.truth.effects import LINEAR, NONLINEAR, OTHER
+from planner.truth.everyday_effects import EVERYDAY_EFFECTS
 from planner.truth.hits import Hammer
 from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
 from planner.truth.model import load_truth
+from planner.truth.outsiders import MORE_OUTSIDERS
 from planner.truth.scene import Draw, Drawn, Scene, log_uniform
 from planner.truth.secret import Secret
 from planner.truth.world import World
 
 EFFECTS: dict[str, Draw] = {**LINEAR, **NONLINEAR, **OTHER, **ARTEFACTS, **OUTSIDERS}
+# In everyday cells damping is mixed anyway: a loss factor is nothing that was left out.
+EVERYDAY: dict[str, Draw] = {**EFFECTS, **EVERYDAY_EFFECTS, **MORE_OUTSIDERS}
+del EVERYDAY["structural_damping"]
 DRIVES = 2, 4  # how many joints, at least and at most
 ATTEMPTS = 40
 SMALLER = 3.0  # at most: the first of several effects over any other; chosen
@@ -23,6 +28,11 @@ SMALLER = 3.0  # at most: the first of several effects over any other; chosen
 
 class NothingShowsError(InputError):
     """A scene whose noise hides whatever was drawn of an effect."""
+
+
+def kinds(world: World) -> tuple[str, ...]:
+    """Of cases: "null", an effect's or outsider's name, a "pair", one law in several "drives"."""
+    return ("null", *(EVERYDAY if world.imperfect else EFFECTS), "pair", "drives")
 
 
 def concealed(
@@ -40,13 +50,14 @@ def concealed(
     where the world says so, what does not show clearly in the FRFs.
     """
     found: list[Drawn] = []
+    table = EVERYDAY if world.imperfect else EFFECTS
     largest = log_uniform(rng, *world.sizes) if world.sizes else 1.0
     for name in _names(kind, scene, rng):
         size = largest
         for _ in range(ATTEMPTS):
             if world.sizes and found:
                 size = largest * log_uniform(rng, 1 / SMALLER, 1.0)
-            drawn = EFFECTS[name](replace(scene, size=size), secret, rng)
+            drawn = table[name](replace(scene, size=size), secret, rng)
             if kind == "drives" and not _joins(drawn, found):
                 continue
             with_it = load_truth(robot_toml, drawn.secret.deviation)

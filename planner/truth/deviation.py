@@ -11,7 +11,8 @@ class Spring:
 
     It sits after `joint`; between floor and robot if that is "base"; half-way to the next joint
     if it is a link's name. Stiffness in N·m/rad (N/m), damping in N·m·s/rad (N·s/m); the axis is
-    in the joint's child frame, or the link's (for the base: the world's).
+    in the joint's child frame, or the link's (for the base: the world's). `loss`: a loss factor
+    beside the viscous damping, nearly the same from LOSS_BAND_HZ's lower to its upper end.
     """
 
     joint: str
@@ -19,6 +20,52 @@ class Spring:
     stiffness: float
     damping: float
     slide: bool = False
+    loss: float = 0.0
+
+
+@dataclass(frozen=True)
+class BentLink:
+    """A link as a beam of `elements` lumped elements: it bends about two axes and twists.
+
+    Compliances are those of the whole link, as springs half-way would have them: `bending` about
+    two directions across it and `torsion` along it in N·m/rad; damping = damping_s · stiffness.
+    """
+
+    link: str
+    bending: tuple[float, float]
+    torsion: float
+    damping_s: float
+    elements: int = 5
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """A gas spring beside a joint, from a point on one link to one on the next.
+
+    Its length is l² = a² + b² - 2ab cos(q + offset) with `arm_m` a and `base_m` b, its force
+    `force_n` + `stiffness` (N/m) · (l - a); what counts is how its torque changes with the angle.
+    """
+
+    joint: str
+    arm_m: float
+    base_m: float
+    offset_rad: float
+    force_n: float
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class Bridge:
+    """A cable or hose from a point of one link to one of another: spring and damper along a line.
+
+    Positions in m in the links' frames, direction in the world's; N/m and N·s/m.
+    """
+
+    links: tuple[str, str]
+    positions_m: tuple[Vector, Vector]
+    direction: Vector
+    stiffness: float
+    damping: float
 
 
 @dataclass(frozen=True)
@@ -55,12 +102,16 @@ class ScaledJoint:
 
 @dataclass(frozen=True)
 class StiffnessRipple:
-    """Stiffness of a joint about its own axis, times 1 + c cos(n q) + s sin(n q)."""
+    """Stiffness of a joint about its own axis, times 1 + c cos(n q) + s sin(n q).
+
+    `by`: the joint whose angle q is; its own if that is empty.
+    """
 
     joint: str
     order: int
     cosine: float
     sine: float
+    by: str = ""
 
 
 @dataclass(frozen=True)
@@ -76,10 +127,22 @@ class Feedback:
 
 
 @dataclass(frozen=True)
+class ServoLoop:
+    """A controller that gives way slowly: `share` more of a joint's stiffness above a corner."""
+
+    joint: str
+    share: float
+    corner_hz: float
+
+
+@dataclass(frozen=True)
 class Deviation:
     """How truth differs from the robot folder: seeded scatter, and what the simulation lacks.
 
     `stiffness`, `damping` and `inertia` are relative standard deviations, `com_m` one in m.
+    All stated springs have `common` times their stiffness. Shares from 0 to 1, drawn for each, of
+    `mixed` times their damping are a loss factor's instead. `spin` (N·m·s) is the angular momentum
+    of a spindle along the tcp's z axis.
     """
 
     seed: int = 0
@@ -93,3 +156,29 @@ class Deviation:
     scaled: tuple[ScaledJoint, ...] = ()
     harmonics: tuple[StiffnessRipple, ...] = ()
     feedback: tuple[Feedback, ...] = ()
+    common: float = 1.0
+    mixed: float = 0.0
+    beams: tuple[BentLink, ...] = ()
+    compensators: tuple[Compensator, ...] = ()
+    bridges: tuple[Bridge, ...] = ()
+    servos: tuple[ServoLoop, ...] = ()
+    spin: float = 0.0
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """By what robots differ from their folders without anything being wrong with them.
+
+    Relative standard deviations of each spring's stiffness and damping, of all stiffnesses
+    together (`common_sd`), of masses and inertias; of centres in m.
+    """
+
+    stiffness: float
+    damping: float
+    inertia: float
+    com_m: float
+    common_sd: float = 0.0
+
+    def of(self, seed: int) -> Deviation:
+        """A robot of this scatter, but for what all its stiffnesses have in common."""
+        return Deviation(seed, self.stiffness, self.damping, self.inertia, self.com_m)

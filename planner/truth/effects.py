@@ -154,7 +154,7 @@ def _in_joint(
     return Drawn(effect, joint, parameters, change)
 
 
-def _left(scene: Scene, secret: Secret, joint: str) -> float:
+def left(scene: Scene, secret: Secret, joint: str) -> float:
     """Stiffness that a joint has where earlier effects leave it least, in N·m/rad.
 
     A law takes its share of this: no joint pushes away from its rest.
@@ -172,7 +172,7 @@ def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) 
     joint = some_joint(rng)
     factor = log_uniform(rng, 0.6, 2.0) if rng.random() < 0.6 else -rng.uniform(0.3, 0.6)
     law = Hardening(
-        scene.size * factor * _left(scene, secret, joint),
+        scene.size * factor * left(scene, secret, joint),
         scene.angle(joint) * log_uniform(rng, 0.2, 1.0),
     )
     parameters: Parameters = {"stiffness_change": law.stiffness, "angle_rad": law.angle}
@@ -182,7 +182,7 @@ def nonlinear_stiffness(scene: Scene, secret: Secret, rng: np.random.Generator) 
 def friction(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Presliding and Coulomb friction beside the spring."""
     joint = some_joint(rng)
-    stiffness = scene.size * _left(scene, secret, joint) * log_uniform(rng, 0.3, 1.5)
+    stiffness = scene.size * left(scene, secret, joint) * log_uniform(rng, 0.3, 1.5)
     law = Friction(stiffness, stiffness * scene.angle(joint) * log_uniform(rng, 0.05, 0.4))
     parameters: Parameters = {"presliding_stiffness": law.stiffness, "coulomb_torque": law.coulomb}
     return _in_joint("friction", joint, law, parameters, secret)
@@ -192,7 +192,7 @@ def backlash(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """Play in a gear, in which some stiffness is left."""
     joint = some_joint(rng)
     law = Backlash(
-        scene.size * _left(scene, secret, joint) * rng.uniform(0.4, 0.8),
+        scene.size * left(scene, secret, joint) * rng.uniform(0.4, 0.8),
         scene.angle(joint) * log_uniform(rng, 0.1, 0.5),
     )
     parameters: Parameters = {"lost_stiffness": law.stiffness, "half_gap_rad": law.gap}

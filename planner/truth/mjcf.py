@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from planner.truth.deviation import Deviation, Spring
+from planner.truth.deviation import BentLink, Deviation, Spring
+
+MOST_SLENDER, LEAST_SLENDER = 0.6, 0.01  # of a bending link's mass, that is spread along it
+THICK = 0.05  # radius of a beam over its length, for the inertia of its pieces
 
 
 class Builder:
@@ -73,7 +76,10 @@ class Builder:
                 self.limits.append(_limits(joint))
                 self._hinges(body, name)
             self._lumps(body, child)
-            if any(s.joint == child for s in self._springs):
+            beams = [beam for beam in self._deviation.beams if beam.link == child]
+            if beams:
+                self._bent(body, beams[0])
+            elif any(s.joint == child for s in self._springs):
                 self._split(body, child)
             else:
                 self._inertial(body, child)
@@ -95,6 +101,26 @@ class Builder:
         self._hinges(outer, link)
         _inertial(outer, mass / 2, centre + apart * along - end / 2, half)
         self._grow(outer, link, end / 2)
+
+    def _bent(self, body: ElementTree.Element, beam: BentLink) -> None:
+        """A link as a chain of rigid pieces; what no slender beam can have stays on the first."""
+        places = [_placement(joint.find("origin"))[0] for joint in self._children[beam.link]]
+        ends = [np.array([float(v) for v in place.split()]) for place in places]
+        end = max(ends, key=lambda place: float(np.linalg.norm(place)))
+        mass, centre, tensor = self._scattered(beam.link)
+        slender, rest = _slender(mass, centre, tensor, end, 0.5 / beam.elements)
+        _inertial(body, *rest)
+        piece, step = body, end / beam.elements
+        for element in range(beam.elements):
+            # Springs sit in the middle of elements; the last piece is half as long.
+            size = (0.5 if element == beam.elements - 1 else 1.0) * step
+            own = slender * np.linalg.norm(size) / np.linalg.norm(end - step / 2)
+            shift = step / 2 if element == 0 else step
+            name = f"{beam.link} piece {element}"
+            piece = ElementTree.SubElement(piece, "body", name=name, pos=_text(shift))
+            self._hinges(piece, f"{beam.link} element {element}")
+            _inertial(piece, float(own), size / 2, _rod(float(own), size, end))
+        self._grow(piece, beam.link, end - step / 2)
 
     def _lumps(self, body: ElementTree.Element, link: str) -> None:
         for extra in (a for a in self._deviation.added if a.link == link):
@@ -127,6 +153,36 @@ class Builder:
         rotation = _matrix(quaternion)
         tensor = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
         return float(inertial.find("mass").get("value")) * scale, place, tensor
+
+
+def _rod(mass_kg: float, along: np.ndarray, whole: np.ndarray) -> np.ndarray:
+    """Inertia (3, 3) about the centre of a piece (3,) of a rod (3,), of THICK times its length."""
+    radius2 = (THICK * np.linalg.norm(whole)) ** 2
+    second = np.outer(along, along) / 12 + radius2 / 4 * np.eye(3)
+    return mass_kg * (np.trace(second) * np.eye(3) - second)
+
+
+def _slender(
+    mass: float, centre: np.ndarray, tensor: np.ndarray, end: np.ndarray, start: float
+) -> tuple[float, tuple[float, np.ndarray, np.ndarray]]:
+    """Mass of a beam from `start` (a share) to `end`; and mass, centre, inertia of the rest.
+
+    As much of the link's mass as leaves a rest that can be: one with second moments > 0.
+    """
+
+    def second(about: np.ndarray, m: float, inertia: np.ndarray) -> np.ndarray:
+        return np.trace(inertia) / 2 * np.eye(3) - inertia + m * np.outer(about, about)
+
+    rod, middle = MOST_SLENDER * mass, (1 + start) / 2 * end
+    whole = second(centre, mass, tensor)
+    while True:
+        left = mass - rod
+        place = (mass * centre - rod * middle) / left
+        beam = second(middle, rod, _rod(rod, (1 - start) * end, end))
+        own = whole - beam - left * np.outer(place, place)
+        if np.min(np.linalg.eigvalsh(own)) > 0 or rod < LEAST_SLENDER * mass:
+            return rod, (left, place, np.trace(own) * np.eye(3) - own)
+        rod *= 0.8
 
 
 def _inertial(

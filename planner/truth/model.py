@@ -6,6 +6,7 @@ The robot vibrates about where it sags under gravity, whose own stiffness is par
 robot.toml says geometric_stiffness = false.
 """
 
+import copy
 import tomllib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -18,9 +19,11 @@ import numpy as np
 import scipy.linalg
 
 from planner.errors import InputError
-from planner.truth.deviation import AttachedResonator, Deviation, Spring
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.loss_factors import branches
 from planner.truth.mjcf import Builder
 from planner.truth.propagate import driven
+from planner.truth.springs import check, compensation, springs
 
 SAG_STEPS = 30  # at most; each gains a digit or more where springs carry the weight at all
 TURN = 1e-4  # rad (or m), of the differences that give gravity's stiffness: exact to 1e-8
@@ -63,7 +66,18 @@ class Truth:
         sensor, sensor_turn = self._site(model, data, "sensor")
         sensor = sensor - _cross(self.sensor_offset_m) @ sensor_turn
         damping = np.diag(self.factors(q) * [s.damping for s in self.springs])
-        return full[grid], damping, stiffness + gravity, hit, sensor
+        stiffness = stiffness + gravity
+        for bridge in self.deviation.bridges:
+            ends = zip(bridge.links, bridge.positions_m, strict=True)
+            one, other = (
+                self.along(q, link, np.array(at), np.array(bridge.direction)) for link, at in ends
+            )
+            stiffness = stiffness + bridge.stiffness * np.outer(one - other, one - other)
+            damping = damping + bridge.damping * np.outer(one - other, one - other)
+        if self.deviation.spin:
+            turning = self.turning(q)
+            damping = damping - turning.T @ _cross((0.0, 0.0, self.deviation.spin)) @ turning
+        return full[grid], damping, stiffness, hit, sensor
 
     def gravity_stiffness(self, q: np.ndarray) -> np.ndarray:
         """Gravity's part (e, e) of K: how the weight's torques change with the springs' angles."""
@@ -74,6 +88,9 @@ class Truth:
         stiffness = np.diag(self.factors(q) * [s.stiffness for s in self.springs])
         for loop in self.deviation.feedback:
             stiffness[self._own[loop.driven], self._own[loop.sensed]] += loop.gain
+        for spring in self.deviation.compensators:
+            at = self._own[spring.joint]
+            stiffness[at, at] += compensation(spring, q[self.joint_names.index(spring.joint)])
         return stiffness
 
     def _gravity(self, q: np.ndarray, bent: np.ndarray) -> np.ndarray:
@@ -119,7 +136,7 @@ class Truth:
         """What the stiffness of each spring (e,) is multiplied by at this pose."""
         factors = np.ones(len(self.springs))
         for wave in self.deviation.harmonics:
-            angle = wave.order * q[self.joint_names.index(wave.joint)]
+            angle = wave.order * q[self.joint_names.index(wave.by or wave.joint)]
             change = wave.cosine * np.cos(angle) + wave.sine * np.sin(angle)
             factors[self._own[wave.joint]] += change
         return factors
@@ -171,10 +188,22 @@ class Truth:
             for array, old in zip(arrays, before, strict=True):
                 array[bodies] = old
 
-    def changed(self, factor: float) -> "Truth":
-        """The same robot with the stiffness of every spring multiplied by a factor."""
-        springs = tuple(replace(s, stiffness=factor * s.stiffness) for s in self.springs)
+    def changed(self, factor: float | np.ndarray) -> "Truth":
+        """The same robot with the stiffness of every spring multiplied by a factor, or (e,)."""
+        each = np.broadcast_to(factor, len(self.springs))
+        springs = tuple(
+            replace(s, stiffness=float(f) * s.stiffness)
+            for s, f in zip(self.springs, each, strict=True)
+        )
         return replace(self, springs=springs)
+
+    def loaded(self, link: str, factor: float) -> "Truth":
+        """The same robot with a link's mass and inertia multiplied by a factor."""
+        model: Any = copy.copy(self._model)
+        bodies = self.links()[link]
+        model.body_mass[bodies] *= factor
+        model.body_inertia[bodies] *= factor
+        return replace(self, _model=model)
 
     def _posed(self, q: np.ndarray, bent: np.ndarray | float = 0.0) -> tuple:
         """MuJoCo's model and data at joint angles q (dof,) with the springs bent (e,)."""
@@ -214,13 +243,30 @@ class Truth:
         x = V y and y' = λ y + W f for generalised forces f (e,).
         """
         mass, damping, stiffness, hit, sensor = self.matrices(q)
-        e = len(mass)
-        zero, one = np.zeros((e, e)), np.eye(e)
-        left = np.block([[one, zero], [zero, mass]])
-        right = np.block([[zero, one], [-stiffness, -damping]])
-        poles, vectors = scipy.linalg.eig(right, left)[:2]
-        entry = np.linalg.inv(vectors) @ np.vstack([zero, np.linalg.inv(mass)])
+        e, inverse = len(mass), np.linalg.inv(mass)
+        maxwell = self.relaxing(q)
+        n = 2 * e + len(maxwell)  # states: places, speeds, and where each branch's damper is
+        system = np.zeros((n, n))
+        system[:e, e : 2 * e] = np.eye(e)
+        whole = stiffness.copy()
+        for k, (j, more, rate) in enumerate(maxwell, 2 * e):
+            whole[j, j] += more
+            system[e : 2 * e, k] = more * inverse[:, j]
+            system[k, j], system[k, k] = rate, -rate
+        system[e : 2 * e, :e] = -inverse @ whole
+        system[e : 2 * e, e : 2 * e] = -inverse @ damping
+        poles, vectors = scipy.linalg.eig(system)[:2]
+        entry = np.linalg.inv(vectors)[:, e : 2 * e] @ inverse
         return poles, vectors[:e], entry, hit, sensor
+
+    def relaxing(self, q: np.ndarray) -> list[tuple[int, float, float]]:
+        """(spring, stiffness, rate in 1/s) of what holds only against fast motion."""
+        own = self.factors(q) * [s.stiffness for s in self.springs]
+        found = branches(self.springs, own)
+        for loop in self.deviation.servos:
+            at = self._own[loop.joint]
+            found.append((at, float(loop.share * own[at]), 2 * np.pi * loop.corner_hz))
+        return found
 
     def poles(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Poles (2e,) in rad/s, receptance residues (2e, 3, 3), and Js M⁻¹ Jhᵀ (3, 3)."""
@@ -270,35 +316,21 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         ) from None
     deviation = deviation or Deviation()
     table, root = _read(robot_toml)
-    _check(table, root, deviation, robot_toml)
+    check(table, root, deviation, robot_toml)
     rng = np.random.default_rng(deviation.seed)
-    nominal = [
-        Spring(c["joint"], tuple(c["axis"]), c["stiffness"], c["damping"])
-        for c in table["compliance"]
-    ]
-    own_axes = _own_axes(root)
-    factors = {change.joint: change.factor for change in deviation.scaled}
-    scattered = [
-        _times(_deviating(s, deviation, rng), factors.get(s.joint, 1.0))
-        if _parallel(s, own_axes)
-        else _deviating(s, deviation, rng)
-        for s in nominal
-    ]
-    small = [_spring(r, i) for i, r in enumerate(deviation.resonators)]
-    springs = (*scattered, *deviation.extra, *small)
-    own = {s.joint: i for i, s in reversed(list(enumerate(springs))) if _parallel(s, own_axes)}
-    builder = Builder(root, table, springs, deviation, rng)
+    found, own = springs(table, root, deviation, rng)
+    builder = Builder(root, table, found, deviation, rng)
     # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
     mujoco.set_mju_user_warning(lambda text: None)
     model = mujoco.MjModel.from_xml_string(builder.xml())
     model.opt.gravity[:] = table.get("gravity", (0.0, 0.0, -9.81))
     held = [model.joint(name).dofadr[0] for name in builder.joint_names]
-    elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(springs))]
+    elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(found))]
     lower, upper = np.array(builder.limits).T
     return Truth(
         table["name"],
         tuple(builder.joint_names),
-        springs,
+        found,
         deviation,
         f"MuJoCo {mujoco.__version__}, seed {deviation.seed}",
         lower,
@@ -309,7 +341,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         np.array(elastic),
         own,
         bool(table.get("geometric_stiffness", True)),
-        len(nominal),
+        len(table["compliance"]),
     )
 
 
@@ -330,23 +362,6 @@ def _read(robot_toml: Path) -> tuple[dict, ElementTree.Element]:
     return table, root
 
 
-def _check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_toml: Path) -> None:
-    """Places that do not exist would be left out in silence otherwise."""
-    joints = {j.get("name") for j in root.findall("joint") if j.get("type") != "fixed"}
-    links = {link.get("name") for link in root.findall("link")}
-    stated = [c["joint"] for c in table.get("compliance", ())]
-    wrong = [name for name in stated if name not in joints | {"base"}]
-    wrong += [s.joint for s in deviation.extra if s.joint not in joints | links | {"base"}]
-    wrong += [a.link for a in (*deviation.added, *deviation.resonators) if a.link not in links]
-    named = [change.joint for change in (*deviation.scaled, *deviation.harmonics)]
-    named += [name for loop in deviation.feedback for name in (loop.driven, loop.sensed)]
-    wrong += [name for name in named if name not in stated]
-    wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]
-    if wrong or not stated:
-        what = f"no joint or link {wrong[0]}" if wrong else "no [[compliance]]"
-        raise InputError(f"{robot_toml} and its URDF have {what}; correct the name or add it.")
-
-
 def _full_mass(model: object, data: object) -> np.ndarray:
     import mujoco
 
@@ -356,35 +371,3 @@ def _full_mass(model: object, data: object) -> np.ndarray:
     except TypeError:  # before MuJoCo 3.5 the arguments were (model, full, qM)
         mujoco.mj_fullM(model, full, data.qM)
     return full
-
-
-def _deviating(spring: Spring, deviation: Deviation, rng: np.random.Generator) -> Spring:
-    k = spring.stiffness * np.exp(deviation.stiffness * rng.standard_normal())
-    c = spring.damping * np.exp(deviation.damping * rng.standard_normal())
-    return Spring(spring.joint, spring.axis, float(k), float(c * k / spring.stiffness))
-
-
-def _own_axes(root: ElementTree.Element) -> dict[str, np.ndarray]:
-    axes = {}
-    for joint in root.findall("joint"):
-        axis = joint.find("axis")
-        text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
-        if joint.get("type") != "fixed":
-            axes[joint.get("name", "")] = np.array([float(v) for v in text.split()])
-    return axes
-
-
-def _parallel(spring: Spring, own_axes: dict[str, np.ndarray]) -> bool:
-    """Whether a spring turns about the axis of its joint."""
-    own = own_axes.get(spring.joint)
-    return own is not None and bool(np.allclose(np.cross(own, spring.axis), 0, atol=1e-9))
-
-
-def _times(spring: Spring, factor: float) -> Spring:
-    return replace(spring, stiffness=factor * spring.stiffness, damping=factor * spring.damping)
-
-
-def _spring(small: AttachedResonator, number: int) -> Spring:
-    w = 2 * np.pi * small.frequency_hz
-    damping = 2 * small.damping_ratio * small.mass_kg * w
-    return Spring(f"resonator {number}", small.direction, small.mass_kg * w**2, damping, slide=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import Deviation, Scatter
 from planner.truth.handling import Handling
 from planner.truth.hits import Hammer, SimulatedHit, noise_power
 from planner.truth.model import Truth
@@ -38,7 +38,7 @@ class Conditions:
 
     visits: Sequence[HitVisit]
     band_hz: tuple[float, float]
-    scatter: Deviation
+    scatter: Scatter
     handling: Handling
     hammer: Hammer
 
@@ -183,15 +183,18 @@ def lacking(whole: Secret, before: Secret, after: Secret) -> Secret:
 
 
 def _lacking(whole: Deviation, before: Deviation, after: Deviation) -> Deviation:
-    changes = {
-        item.name: _less(*(getattr(d, item.name) for d in (whole, before, after)))
-        for item in fields(Deviation)
-        if isinstance(getattr(whole, item.name), tuple)
-    }
+    changes = {}
+    for item in fields(Deviation):
+        old, new, now = (getattr(d, item.name) for d in (before, after, whole))
+        if isinstance(now, tuple):
+            changes[item.name] = _less(now, old, new)
+        elif new != old:
+            changes[item.name] = old
     return replace(whole, **changes)
 
 
 def _less(whole: tuple, before: tuple, after: tuple) -> tuple:
-    """The items that `after` has beyond `before` are its last ones."""
-    extra = after[len(before) :]
-    return tuple(item for item in whole if not any(item is e for e in extra))
+    """Without what `after` has beyond `before`, and with what it had in its stead."""
+    extra = [item for item in after if not any(item is b for b in before)]
+    gone = [item for item in before if not any(item is a for a in after)]
+    return (*(item for item in whole if not any(item is e for e in extra)), *gone)

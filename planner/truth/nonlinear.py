@@ -64,12 +64,13 @@ class _Linear:
     """A pose's linear system, seen from P ports; of conjugate poles one is kept."""
 
     poles: np.ndarray  # (p,)
+    driven: np.ndarray  # (p, h): what the forces drive
     inputs: np.ndarray  # (p, P): what a torque at a port drives
     outputs: np.ndarray  # (P, p): what a port feels
     sensed: np.ndarray  # (3, p): acceleration
+    struck: np.ndarray  # (3, h): acceleration that follows a force at once
     direct: np.ndarray  # (3, P): acceleration that follows a torque at once
-    accelerations: np.ndarray  # (h, 3, n), without the laws
-    angles: np.ndarray  # (P, h, n), without the laws
+    forces: np.ndarray  # (h, n)
 
 
 def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
@@ -78,32 +79,35 @@ def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -
     The poses are integrated together, so all forces have the same length. Raises InputError if
     the step is too long for a law.
     """
-    linear = [_linear(pose, ports, step_s) for pose in poses]
-    if not ports:
-        return [pose.accelerations for pose in linear]
-    changes = _changes(ports, linear, step_s)
-    return [pose.accelerations + more for pose, more in zip(linear, changes, strict=True)]
+    linear = [_linear(pose, ports) for pose in poses]
+    if ports:
+        return _integrated(ports, linear, step_s)
+    return [_without_laws(pose, step_s) for pose in linear]
 
 
-def _linear(pose: StruckPose, ports: Sequence[Port], step_s: float) -> _Linear:
-    truth, forces = pose.truth, pose.forces_n
+def _linear(pose: StruckPose, ports: Sequence[Port]) -> _Linear:
+    truth = pose.truth
     poles, shapes, entry, hit, sensor = truth.modal(pose.q)
     one = poles.imag >= 0  # the other of a pair adds the conjugate
     poles, entry = poles[one], entry[one]
     shapes = shapes[:, one] * np.where(poles.imag > 0, 2.0, 1.0)
     at = np.array([port.vector(truth, pose.q) for port in ports]).reshape(len(ports), len(shapes))
     drive = np.vstack([hit, truth.turning(pose.q)]).T @ pose.wrench.T  # (e, h)
-    inputs, outputs = entry @ drive, at @ shapes
     sensed, direct = sensor @ shapes * poles**2, sensor @ np.linalg.inv(truth.matrices(pose.q)[0])
-    y = np.array([driven(pole, forces, step_s) for pole in poles]) * inputs[:, :, None]
-    out = np.moveaxis(_real(sensed, y), 0, 1) + (direct @ drive).T[:, :, None] * forces[:, None]
-    return _Linear(poles, entry @ at.T, outputs, sensed, direct @ at.T, out, _real(outputs, y))
+    return _Linear(
+        poles, entry @ drive, entry @ at.T, at @ shapes, sensed, direct @ drive, direct @ at.T,
+        pose.forces_n,
+    )  # fmt: skip
 
 
-def _real(matrix: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Real part (a, h, n) of a matrix (a, p) times modal coordinates (p, h, n)."""
-    flat = y.reshape(len(y), -1)
-    return (matrix.real @ flat.real - matrix.imag @ flat.imag).reshape(-1, *y.shape[1:])
+def _without_laws(pose: _Linear, step_s: float) -> np.ndarray:
+    y = np.array([driven(pole, pose.forces, step_s) for pole in pose.poles])
+    y = y * pose.driven[:, :, None]
+    flat, (_, hits, n) = y.reshape(len(y), -1), y.shape
+    heard = pose.sensed.real @ flat.real - pose.sensed.imag @ flat.imag
+    return np.moveaxis(heard.reshape(3, hits, n), 0, 1) + (
+        pose.struck.T[:, :, None] * pose.forces[:, None]
+    )
 
 
 class _Laws:
@@ -137,55 +141,66 @@ class _Laws:
         return out, afters
 
 
-def _changes(ports: Sequence[Port], linear: Sequence[_Linear], step_s: float) -> list[np.ndarray]:
-    """What the laws add to the accelerations (h, 3, n) at each pose.
+def _integrated(
+    ports: Sequence[Port], linear: Sequence[_Linear], step_s: float
+) -> list[np.ndarray]:
+    """Accelerations (h, 3, n) at each pose, step by step for all poses at once.
 
     Each step solves θ = θ_free - G τ(θ) by fixed-point iteration, G being what the ports give way
     within a step; it is so small that a few iterations are exact. Complex modal coordinates are
-    kept as real and imaginary parts, one below the other.
+    kept as real and imaginary parts, one below the other, and without what a step's own force
+    and torque do: these enter as the newer end of a step, and as the older end of the next.
     """
-    hits, modes = (
-        max(of(p) for p in linear) for of in (lambda p: p.angles.shape[1], lambda p: len(p.poles))
-    )
+    hits, modes = max(len(p.forces) for p in linear), max(len(p.poles) for p in linear)
 
-    def stacked(of: Callable[[_Linear], np.ndarray]) -> np.ndarray:
-        """(poses, p, ...): poses with overdamped poles have more of them than others."""
+    def stacked(of: Callable[[_Linear], np.ndarray], *shape: int) -> np.ndarray:
+        """(poses, *shape): poses with overdamped poles have more than others, or fewer hits."""
         rows = [of(pose) for pose in linear]
-        return np.array([np.pad(r, ((0, modes - len(r)), *[(0, 0)] * (r.ndim - 1))) for r in rows])
+        pads = [[(0, full - size) for full, size in zip(shape, r.shape, strict=True)] for r in rows]
+        return np.array([np.pad(r, pad) for r, pad in zip(rows, pads, strict=True)])
 
+    count = len(ports)
     grow, older, newer = (
-        stacked(lambda pose, k=k: weights(pose.poles, step_s)[k][:, None]) for k in range(3)
+        stacked(lambda pose, k=k: weights(pose.poles, step_s)[k], modes)[:, :, None]
+        for k in range(3)
     )
-    inputs, outputs = stacked(lambda p: p.inputs), stacked(lambda p: p.outputs.T)
-    gives = np.real(np.einsum("akp,akq->apq", outputs, newer * inputs))
-    slopes = np.array([port.law.slope(step_s) for port in ports])
-    contraction = float(np.max(np.abs(gives) @ slopes))
-    if contraction > MOST_CONTRACTION:
-        raise InputError("A nonlinear joint is too stiff for the time step; shorten the step.")
-    iterations = max(2, int(np.ceil(np.log(TORQUE_ACCURACY) / np.log(max(contraction, 1e-12)))))
-    # What a torque does to the next step's modes: as the older end of that step, and by now.
-    pushed = _columns((grow * newer + older) * inputs)
-    felt, heard = _rows(outputs), _rows(stacked(lambda p: p.sensed.T))
+    inputs = stacked(lambda p: p.inputs, modes, count)
+    blows = stacked(lambda p: p.driven, modes, hits)
+    felt = _rows(stacked(lambda p: p.outputs.T, modes, count))
+    heard = _rows(stacked(lambda p: p.sensed.T, modes, 3))
+    gives, struck = felt @ _columns(newer * inputs), felt @ _columns(newer * blows)
     at_once = heard @ _columns(newer * inputs) + np.array([pose.direct for pose in linear])
+    with_force = heard @ _columns(newer * blows) + stacked(lambda p: p.struck, 3, hits)
+    pushed, pushed_by = (_columns((grow * newer + older) * of) for of in (inputs, blows))
+    iterations = _iterations(ports, gives, step_s)
     laws = _Laws(ports, step_s)
-    angles = [np.pad(p.angles, ((0, 0), (0, hits - p.angles.shape[1]), (0, 0))) for p in linear]
-    steps = np.moveaxis(np.array(angles), 3, 0).copy()
-    out = np.zeros((len(steps), len(linear), 3, hits))
-    states, before = laws.at_rest(steps[0].shape), np.zeros_like(steps[0])
-    torque, y = np.zeros_like(steps[0]), np.zeros((len(linear), 2 * modes, hits))
+    n = linear[0].forces.shape[1]
+    forces = np.moveaxis(stacked(lambda p: p.forces, hits, n), 2, 0)[:, :, None].copy()
+    out = np.zeros((n, len(linear), 3, hits))
+    before = np.zeros((len(linear), count, hits))
+    states, torque = laws.at_rest(before.shape), np.zeros_like(before)
+    y = np.zeros((len(linear), 2 * modes, hits))
     real, imaginary = y[:, :modes], y[:, modes:]
-    for i in range(1, len(steps)):
-        free, after, now = steps[i] + felt @ y, states, before
+    for i in range(1, n):
+        free, after, now = felt @ y + struck * forces[i], states, before
         for _ in range(iterations):
             now = free - gives @ torque
             torque, after = laws.torques(states, before, now)
         before, states = now, after
-        out[i] = heard @ y - at_once @ torque
+        out[i] = heard @ y + with_force * forces[i] - at_once @ torque
         turned = grow.real * real - grow.imag * imaginary, grow.real * imaginary + grow.imag * real
         real[...], imaginary[...] = turned
-        y -= pushed @ torque
+        y += pushed_by * forces[i] - pushed @ torque
     out = np.moveaxis(out, 0, 3)
-    return [np.moveaxis(out[k, :, : pose.angles.shape[1]], 0, 1) for k, pose in enumerate(linear)]
+    return [np.moveaxis(out[k, :, : len(pose.forces)], 0, 1) for k, pose in enumerate(linear)]
+
+
+def _iterations(ports: Sequence[Port], gives: np.ndarray, step_s: float) -> int:
+    slopes = np.array([port.law.slope(step_s) for port in ports])
+    contraction = float(np.max(np.abs(gives) @ slopes))
+    if contraction > MOST_CONTRACTION:
+        raise InputError("A nonlinear joint is too stiff for the time step; shorten the step.")
+    return max(2, int(np.ceil(np.log(TORQUE_ACCURACY) / np.log(max(contraction, 1e-12)))))
 
 
 def _columns(modal: np.ndarray) -> np.ndarray:

@@ -39,6 +39,30 @@ class StiffnessDrift:
 
 
 @dataclass(frozen=True)
+class JointDrift:
+    """Stiffnesses that warm up or settle joint by joint: (joint, change, course) of each."""
+
+    joints: tuple[tuple[str, float, str], ...]
+
+    def applied(self, truth: Truth, progress: float) -> Truth:
+        """The robot at a time of the campaign."""
+        factors = np.ones(len(truth.springs))
+        for joint, change, course in self.joints:
+            factor = StiffnessDrift(change, course).factor(progress)
+            factors[[s.joint == joint for s in truth.springs]] *= factor
+        return truth.changed(factors)
+
+
+@dataclass(frozen=True)
+class LoadChange:
+    """From a time of the campaign on, a link has `factor` times its mass and inertia."""
+
+    link: str
+    factor: float
+    start: float = 0.5
+
+
+@dataclass(frozen=True)
 class Tone:
     """A force (N) of one frequency on a link's origin, at any phase; direction in the world."""
 
@@ -72,10 +96,17 @@ class Secret:
     deviation: Deviation
     ports: tuple[Port, ...] = ()
     loss_factor: float | None = None
-    drift: StiffnessDrift | None = None
+    drift: StiffnessDrift | JointDrift | None = None
+    load: LoadChange | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)
     chain: MeasuringChain = field(default_factory=MeasuringChain)
+
+    def at(self, truth: Truth, progress: float) -> Truth:
+        """The robot at a time of the campaign."""
+        if self.load is not None and progress >= self.load.start:
+            truth = truth.loaded(self.load.link, self.load.factor)
+        return truth if self.drift is None else self.drift.applied(truth, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +172,7 @@ def _responses(
     """Accelerations (h, 3, n) of the sensor at each visit."""
     poses = []
     for visit, forces in zip(visits, pulses, strict=True):
-        now = truth if secret.drift is None else secret.drift.applied(truth, visit.progress)
+        now = secret.at(truth, visit.progress)
         senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
         axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
         aims = visit.aims or [Aim()] * len(axes)

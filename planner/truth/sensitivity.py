@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import Scatter
 from planner.truth.handling import Aim, Handling, MeasuringChain
 from planner.truth.hits import AXES, Hammer, SimulatedHit
 from planner.truth.model import Truth
@@ -48,7 +48,7 @@ def columns(
     secret: Secret,
     visit: HitVisit,
     hits: list[SimulatedHit],
-    scatter: Deviation,
+    scatter: Scatter,
     handling: Handling,
     hammer: Hammer,
     used: np.ndarray,
@@ -61,9 +61,7 @@ def columns(
     one; what a nonlinear law changes in the columns is left out.
     """
     chain = secret.chain
-    truth = replace(truth, sensor_offset_m=chain.offset_m)
-    if secret.drift is not None:
-        truth = secret.drift.applied(truth, visit.progress)
+    truth = secret.at(replace(truth, sensor_offset_m=chain.offset_m), visit.progress)
     n, step_s = hits[0].force_n.size, 1 / hammer.sampling_rate_hz
     at = 2j * np.pi * np.fft.rfftfreq(n, step_s)[used] + rate_1_s
     window = np.exp(-rate_1_s * step_s * np.arange(n))
@@ -128,21 +126,29 @@ def _matrix(raw: np.ndarray, handling: Handling) -> list[np.ndarray]:
 
 
 def _pose(
-    truth: Truth, q: np.ndarray, s: np.ndarray, scatter: Deviation, handling: Handling
+    truth: Truth, q: np.ndarray, s: np.ndarray, scatter: Scatter, handling: Handling
 ) -> _Pose:
     mass, damping, stiffness, drive, sensor = _matrices(truth, q)
+    own = truth.factors(q) * [spring.stiffness for spring in truth.springs]
+    relaxing = np.zeros((len(s), len(own)), dtype=complex)  # what loss factors add to each spring
+    for j, more, rate in truth.relaxing(q):
+        relaxing[:, j] += more * s / (s + rate)
     s = s[:, None, None]
-    inverse = np.linalg.inv(stiffness + s * damping + s**2 * mass)
+    whole = stiffness + s * damping + s**2 * mass + relaxing[:, None] * np.eye(len(own))
+    inverse = np.linalg.inv(whole)
     left, right = sensor @ inverse, inverse @ drive  # (F, 3, e), (F, e, 6)
 
     def change(of_mass: np.ndarray, of_stiffness: np.ndarray) -> np.ndarray:
         return -left @ (s**2 * of_mass + of_stiffness) @ right
 
-    springs = []
+    springs, losses = [], []
     for j in range(truth.stated):
-        one = left[:, :, j, None] * right[:, None, j, :]
-        springs.append((-stiffness_of(truth, q)[j] * one, -s * damping[j, j] * one))
-    robot = [scatter.stiffness * k for k, _ in springs] + [scatter.damping * c for _, c in springs]
+        one, more = left[:, :, j, None] * right[:, None, j, :], relaxing[:, j, None, None]
+        springs.append(-(own[j] + more) * one)
+        losses.append(-(s * damping[j, j] + more) * one)
+    robot = [scatter.stiffness * k for k in springs] + [scatter.damping * c for c in losses]
+    if scatter.common_sd > 0:
+        robot.append(scatter.common_sd * sum(springs))
     for change_of, sd in _inertias(truth, scatter):
         with change_of:
             near = _matrices(truth, q)
@@ -161,11 +167,6 @@ def _pose(
     return _Pose(left @ drive, robot, place, readback)
 
 
-def stiffness_of(truth: Truth, q: np.ndarray) -> np.ndarray:
-    """Of every spring (e,) at a pose, in N·m/rad or N/m."""
-    return truth.factors(q) * [spring.stiffness for spring in truth.springs]
-
-
 def _matrices(truth: Truth, q: np.ndarray) -> tuple[np.ndarray, ...]:
     """M, C, K (e, e), what a wrench at the tcp drives (e, 6), and the sensor's Jacobian (3, e)."""
     mass, damping, stiffness, hit, sensor = truth.matrices(q)
@@ -173,7 +174,7 @@ def _matrices(truth: Truth, q: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def _inertias(
-    truth: Truth, scatter: Deviation
+    truth: Truth, scatter: Scatter
 ) -> Iterator[tuple[AbstractContextManager[None], float]]:
     """(context in which the model is changed by STEP, standard deviation) of inertial numbers."""
     for link in truth.links():

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from planner.truth.deviation import Deviation
+from planner.truth.deviation import Scatter
 from planner.truth.handling import EVERYDAY, LABORATORY, Handling
 
 
@@ -11,19 +11,17 @@ class World:
     """How hits and chain err, how robots scatter, and how large effects are.
 
     `sizes`: the log-uniform range of effects' sizes, 1 being large; each is drawn once. None: all
-    are large, and drawn again until they show clearly.
+    are large, and drawn again until they show clearly. `imperfect`: robots have small unlisted
+    imperfections everywhere, and effects come in shapes that the planner's models do not have.
     """
 
     handling: Handling
-    scatter: Deviation
+    scatter: Scatter
     sizes: tuple[float, float] | None = None
+    imperfect: bool = False
     oversampling: int = 16
 
 
-CLEAN = World(LABORATORY, Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005))
-REAL = World(
-    EVERYDAY,
-    Deviation(stiffness=0.15, damping=0.4, inertia=0.08, com_m=0.01),
-    sizes=(1e-3, 1.0),
-    oversampling=8,
-)
+CLEAN = World(LABORATORY, Scatter(0.15, 0.15, 0.04, 0.005))
+# Stiffnesses that are off together: see `imperfections.SOFT`.
+REAL = World(EVERYDAY, Scatter(0.15, 0.4, 0.08, 0.01, 0.25), (3e-4, 1.0), True, 8)

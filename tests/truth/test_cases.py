@@ -12,13 +12,14 @@ from planner.recording.folder import read_poses, read_recordings
 from planner.recording.read import read
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
-from planner.truth.cases import KINDS, Case, make_case
-from planner.truth.conceal import DRIVES, EFFECTS
+from planner.truth.cases import Case, make_case
+from planner.truth.conceal import DRIVES, EFFECTS, kinds
 from planner.truth.deviation import Deviation, ScaledJoint, StiffnessRipple
 from planner.truth.laws import Backlash, Hardening
 from planner.truth.model import load_truth
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret
+from planner.truth.world import CLEAN
 
 PLACES = {
     "joint_stiffness": "joint_", "transverse_compliance": "joint_", "friction": "joint_",
@@ -51,7 +52,7 @@ def test_every_effect_can_be_concealed(tmp_path):
                 assert (drawn.effect, drawn.at) == ("unknown", None)
             json.dumps(drawn.parameters)
     assert PLACES.keys() <= EFFECTS.keys()
-    assert {"null", "pair"} <= set(KINDS)
+    assert {"null", "pair"} <= set(kinds(CLEAN))
 
 
 @pytest.mark.parametrize("robot", sorted(ARMS))
@@ -157,7 +158,7 @@ def test_held_out_truth_is_that_of_its_robot(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", sorted(ARMS))
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", kinds(CLEAN))
 def test_every_kind_of_every_robot(tmp_path, kind, robot):
     case = make_case(kind, robot, 11, tmp_path)
     effects = json.loads(case.answer)["effects"]

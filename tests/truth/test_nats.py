@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.truth.deviation import AttachedMass, Deviation, ScaledJoint, StiffnessRipple
+from planner.truth.deviation import AttachedMass, Deviation, ScaledJoint, Scatter, StiffnessRipple
 from planner.truth.handling import EVERYDAY, LABORATORY, Handling
 from planner.truth.hits import Hammer, noise_power, noisy
 from planner.truth.laws import Backlash
@@ -17,7 +17,7 @@ from planner.truth.secret import Secret, quiet_hits
 from planner.truth.visits import Visits
 from tests.support.known_robots import KR210
 
-SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.08, com_m=0.01)
+SCATTER = Scatter(stiffness=0.15, damping=0.15, inertia=0.08, com_m=0.01)
 HAMMER = Hammer(noise=0.02, record_s=1.28, oversampling=8)
 BAND = (4.0, 60.0)
 

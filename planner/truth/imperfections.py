@@ -1,0 +1,107 @@
+"""Small unlisted imperfections: no robot is quite what its simulation has, with nothing wrong."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.truth.deviation import AttachedResonator, BentLink, Compensator, StiffnessRipple
+from planner.truth.laws import Friction, JointLaw
+from planner.truth.nonlinear import Port
+from planner.truth.other_laws import AmplitudeSoftening, Iwan
+from planner.truth.scene import Scene, across, deviate, log_uniform, some_direction, triple
+from planner.truth.secret import JointDrift, Secret
+
+# All chosen, so that FRFs change by some percent together: what an engineer would let pass.
+SOFT_SHARE, SOFT = 0.4, (0.5, 1.3)  # of the cases: all stated stiffnesses times such a factor
+BEARINGS = 60.0, 300.0  # stiffness across a joint's axis over that about it
+LAWS = 1e-3, 1e-2  # of a joint's stiffness, that is not linear
+HOSES = 2  # at least; and up to as many more
+HOSE_MASS = 3e-4, 2e-3  # of the moving mass
+RIPPLE = 0.01  # of a joint's stiffness
+DRIFT_SD = 0.004  # of each joint's stiffness, over the campaign
+BEAM = 30.0, 100.0  # stiffness of a link as a beam over that of its joint
+COMPENSATOR = 0.005, 0.03  # of joint 2's stiffness
+
+
+@dataclass(frozen=True)
+class Imperfect:
+    """A robot with imperfections, and the names by which a diagnosis could rightly call them."""
+
+    secret: Secret
+    places: tuple[tuple[str, str], ...]
+
+
+def imperfect(scene: Scene, secret: Secret, rng: np.random.Generator) -> Imperfect:
+    """Each joint a little nonlinear, rippled, drifting and soft across; links, hoses, a gas spring.
+
+    Damping is partly viscous, partly a loss factor, by a share of each gear's own.
+    """
+    common = log_uniform(rng, *SOFT) if rng.random() < SOFT_SHARE else 1.0
+    secret = replace(secret, deviation=replace(secret.deviation, common=common, mixed=1.0))
+    joints = [f"joint_{n}" for n in range(1, 7)]
+    places = [("structural_damping", "joints"), ("drift", "campaign")]
+    for joint in joints:
+        secret, effects = _joint(scene, secret, joint, rng)
+        places += [(effect, joint) for effect in effects]
+        if abs(np.log(common)) > np.log(1.2):
+            places.append(("joint_stiffness", joint))
+    drifts = tuple((j, DRIFT_SD * float(rng.standard_normal()), "warming") for j in joints)
+    secret = replace(secret, drift=JointDrift(drifts))
+    for _ in range(HOSES + int(rng.integers(HOSES + 1))):
+        secret, link = _hose(scene, secret, rng)
+        places.append(("local_resonator", link))
+    number = int(rng.choice([n for n in (2, 3) if np.linalg.norm(scene.length(n)) > 0]))
+    stiff = scene.stiffness(f"joint_{number}")
+    bending = log_uniform(rng, *BEAM) * stiff, log_uniform(rng, *BEAM) * stiff
+    twist = log_uniform(rng, *BEAM) * stiff
+    beam = BentLink(f"link_{number}", bending, twist, scene.arm.damping_s)
+    secret = deviate(secret, beams=(beam,), compensators=(gas_spring(scene, COMPENSATOR, rng),))
+    places += [("link_flexibility", beam.link), ("angle_dependent_stiffness", "joint_2")]
+    return Imperfect(secret, tuple(dict.fromkeys(places)))
+
+
+def _joint(
+    scene: Scene, secret: Secret, joint: str, rng: np.random.Generator
+) -> tuple[Secret, list[str]]:
+    own, angle = scene.stiffness(joint), scene.angle(joint)
+    share = log_uniform(rng, *LAWS) * own
+    laws: list[tuple[str, JointLaw]] = [
+        ("nonlinear_stiffness", AmplitudeSoftening(share * rng.choice([-1, 1]), 0.3 * angle)),
+        ("friction", Iwan(share, 0.3 * share * angle)),
+        ("friction", Friction(share, 0.3 * share * angle)),
+    ]
+    effect, law = laws[int(rng.integers(len(laws)))]
+    secret = replace(secret, ports=(*secret.ports, Port(law, joint=joint)))
+    cosine, sine = RIPPLE * rng.standard_normal(2)
+    wave = StiffnessRipple(joint, int(rng.integers(1, 3)), float(cosine), float(sine))
+    secret = deviate(secret, harmonics=(wave,))
+    effects = [effect, "angle_dependent_stiffness"]
+    if scene.per_joint == 1:
+        axis = np.array(scene.arm.joints[int(joint[-1]) - 1].axis, dtype=float)
+        springs = [scene.spring(joint, a, own * log_uniform(rng, *BEARINGS)) for a in across(axis)]
+        secret = deviate(secret, extra=springs)
+        effects.append("transverse_compliance")
+    return secret, effects
+
+
+def _hose(scene: Scene, secret: Secret, rng: np.random.Generator) -> tuple[Secret, str]:
+    number = int(rng.integers(2, 7))
+    low, *_, high = scene.truth.modes(scene.poses[0], 4)[0]
+    hose = AttachedResonator(
+        f"link_{number}",
+        triple(rng.uniform(0.1, 1.0) * scene.length(number)),
+        triple(some_direction(rng)),
+        scene.moving_kg * log_uniform(rng, *HOSE_MASS),
+        log_uniform(rng, 0.5 * low, 2 * high),
+        log_uniform(rng, 0.03, 0.15),
+    )
+    return deviate(secret, resonators=(hose,)), hose.link
+
+
+def gas_spring(scene: Scene, share: tuple[float, float], rng: np.random.Generator) -> Compensator:
+    """Of joint 2; its stiffness is of the size of a share of the joint's own."""
+    arm, base = rng.uniform(0.15, 0.3), rng.uniform(0.5, 0.9)
+    size = log_uniform(rng, *share) * scene.stiffness("joint_2")
+    force, stiffness = 0.3 * size / arm, 0.7 * size / arm**2
+    offset = float(rng.uniform(0.3, np.pi - 0.3))
+    return Compensator("joint_2", float(arm), float(base), offset, float(force), float(stiffness))

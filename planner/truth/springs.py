@@ -1,0 +1,145 @@
+"""All springs of a true robot: those that robot.toml states, as they are, and those it lacks."""
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.truth.deviation import (
+    AttachedResonator,
+    BentLink,
+    Compensator,
+    Deviation,
+    Spring,
+)
+from planner.truth.loss_factors import mixed
+
+ANGLE_STEP = 1e-4  # rad, for the change of a gas spring's torque
+
+
+def check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_toml: Path) -> None:
+    """Raise InputError for places that do not exist, which would be left out in silence."""
+    joints = {j.get("name") for j in root.findall("joint") if j.get("type") != "fixed"}
+    links = {link.get("name") for link in root.findall("link")}
+    stated = [c["joint"] for c in table.get("compliance", ())]
+    wrong = [name for name in stated if name not in joints | {"base"}]
+    wrong += [s.joint for s in deviation.extra if s.joint not in joints | links | {"base"}]
+    at_links = (*deviation.added, *deviation.resonators, *deviation.beams)
+    wrong += [a.link for a in at_links if a.link not in links]
+    wrong += [name for b in deviation.bridges for name in b.links if name not in links]
+    changes = (*deviation.scaled, *deviation.harmonics, *deviation.compensators, *deviation.servos)
+    named = [change.joint for change in changes]
+    named += [wave.by for wave in deviation.harmonics if wave.by]
+    named += [name for loop in deviation.feedback for name in (loop.driven, loop.sensed)]
+    wrong += [name for name in named if name not in stated]
+    wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]
+    if wrong or not stated:
+        what = f"no joint or link {wrong[0]}" if wrong else "no [[compliance]]"
+        raise InputError(f"{robot_toml} and its URDF have {what}; correct the name or add it.")
+
+
+def springs(
+    table: dict, root: ElementTree.Element, deviation: Deviation, rng: np.random.Generator
+) -> tuple[tuple[Spring, ...], dict[str, int]]:
+    """The stated ones first; and where a joint's own one is, or a named other.
+
+    Names of others are "extra K" and "resonator K", K counting in the deviation.
+    """
+    nominal = [
+        Spring(c["joint"], tuple(c["axis"]), c["stiffness"], c["damping"])
+        for c in table["compliance"]
+    ]
+    own_axes = _own_axes(root)
+    factors = {change.joint: change.factor for change in deviation.scaled}
+    scattered = [
+        _times(_deviating(s, deviation, rng), factors.get(s.joint, 1.0))
+        if _parallel(s, own_axes)
+        else _deviating(s, deviation, rng)
+        for s in nominal
+    ]
+    scattered = [_times(s, deviation.common) for s in scattered]
+    if deviation.mixed > 0:  # of the gears' own springs: each branch costs the engine a state
+        gears = [i for i, s in enumerate(scattered) if _parallel(s, own_axes)]
+        for i, s in zip(gears, mixed([scattered[i] for i in gears], deviation), strict=True):
+            scattered[i] = s
+    bent = [s for beam in deviation.beams for s in _beam(beam, root)]
+    small = [_small(r, i) for i, r in enumerate(deviation.resonators)]
+    found = (*scattered, *deviation.extra, *bent, *small)
+    own = {s.joint: i for i, s in reversed(list(enumerate(found))) if _parallel(s, own_axes)}
+    own |= {f"extra {k}": len(nominal) + k for k in range(len(deviation.extra))}
+    own |= {s.joint: len(found) - len(small) + k for k, s in enumerate(small)}
+    return found, own
+
+
+def compensation(spring: Compensator, angle_rad: float) -> float:
+    """Stiffness (N·m/rad) that a gas spring adds to its joint at an angle."""
+
+    def torque(angle: float) -> float:
+        turned = angle + spring.offset_rad
+        product = spring.arm_m * spring.base_m
+        length = np.sqrt(spring.arm_m**2 + spring.base_m**2 - 2 * product * np.cos(turned))
+        force = spring.force_n + spring.stiffness * (length - spring.arm_m)
+        return float(force * product * np.sin(turned) / length)
+
+    return (torque(angle_rad + ANGLE_STEP) - torque(angle_rad - ANGLE_STEP)) / (2 * ANGLE_STEP)
+
+
+def _deviating(spring: Spring, deviation: Deviation, rng: np.random.Generator) -> Spring:
+    k = spring.stiffness * np.exp(deviation.stiffness * rng.standard_normal())
+    c = spring.damping * np.exp(deviation.damping * rng.standard_normal())
+    return Spring(spring.joint, spring.axis, float(k), float(c * k / spring.stiffness))
+
+
+def _own_axes(root: ElementTree.Element) -> dict[str, np.ndarray]:
+    axes = {}
+    for joint in root.findall("joint"):
+        axis = joint.find("axis")
+        text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+        if joint.get("type") != "fixed":
+            axes[joint.get("name", "")] = np.array([float(v) for v in text.split()])
+    return axes
+
+
+def _parallel(spring: Spring, own_axes: dict[str, np.ndarray]) -> bool:
+    """Whether a spring turns about the axis of its joint."""
+    own = own_axes.get(spring.joint)
+    return own is not None and bool(np.allclose(np.cross(own, spring.axis), 0, atol=1e-9))
+
+
+def _times(spring: Spring, factor: float) -> Spring:
+    return replace(spring, stiffness=factor * spring.stiffness, damping=factor * spring.damping)
+
+
+def _small(small: AttachedResonator, number: int) -> Spring:
+    w = 2 * np.pi * small.frequency_hz
+    damping = 2 * small.damping_ratio * small.mass_kg * w
+    return Spring(f"resonator {number}", small.direction, small.mass_kg * w**2, damping, slide=True)
+
+
+def beam_end(link: str, root: ElementTree.Element) -> np.ndarray:
+    """(3,) in m: the farthest frame that a link carries, in its own."""
+    ends = []
+    for joint in root.findall("joint"):
+        parent, origin = joint.find("parent"), joint.find("origin")
+        if parent is not None and parent.get("link") == link and origin is not None:
+            ends.append(np.array([float(v) for v in origin.get("xyz", "0 0 0").split()]))
+    return max(ends, key=lambda place: float(np.linalg.norm(place)))
+
+
+def _beam(beam: BentLink, root: ElementTree.Element) -> list[Spring]:
+    """Three springs an element; in series they are the link's compliances."""
+    along = beam_end(beam.link, root)
+    along = along / np.linalg.norm(along)
+    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    first /= np.linalg.norm(first)
+    axes = first, np.cross(along, first), along
+    found = []
+    for element in range(beam.elements):
+        for axis, whole in zip(axes, (*beam.bending, beam.torsion), strict=True):
+            x, y, z = (float(v) for v in axis)
+            k = whole * beam.elements
+            name = f"{beam.link} element {element}"
+            found.append(Spring(name, (x, y, z), k, beam.damping_s * k))
+    return found

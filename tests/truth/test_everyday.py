@@ -1,0 +1,99 @@
+"""Cases of real cells: imperfections are small, and every effect can have any size."""
+
+import hashlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.truth.arms import ARMS
+from planner.truth.cases import DAMPING_S, PEAK_N, make_case
+from planner.truth.conceal import EVERYDAY, kinds
+from planner.truth.imperfections import imperfect
+from planner.truth.mishaps import OUTSIDERS
+from planner.truth.model import load_truth
+from planner.truth.nats import lacking
+from planner.truth.nonlinear import StruckPose, along, respond
+from planner.truth.outsiders import MORE_OUTSIDERS
+from planner.truth.scene import Scene
+from planner.truth.secret import Secret
+from planner.truth.world import CLEAN, REAL
+
+STEP_S, N = 1 / 3200, 240
+
+
+def scene_of(robot: str, folder, seed: int = 1):
+    """A scene with an imperfect robot, its secret, and where its robot.toml is."""
+    arm = replace(ARMS[robot], damping_s=DAMPING_S)
+    path, plain = arm.write(folder), Secret(REAL.scatter.of(seed))
+    scene = Scene(arm, load_truth(path, plain.deviation), 1, arm.poses(3), PEAK_N[robot])
+    secret = imperfect(scene, plain, np.random.default_rng(seed)).secret
+    return replace(scene, truth=load_truth(path, secret.deviation)), secret, path
+
+
+def heard(scene: Scene, secret: Secret, path, progress: float = 1.0) -> np.ndarray:
+    """(3, 3, n): how three hits move the sensor at first, as speeds in m/s."""
+    truth = secret.at(load_truth(path, secret.deviation), progress)
+    t = np.arange(N) * STEP_S
+    force = scene.peak_n * np.sin(np.pi * np.clip(t / 0.008, 0, 1)) ** 2
+    pose = StruckPose(truth, scene.poses[0], np.tile(force, (3, 1)), along([0, 1, 2]))
+    return STEP_S * np.cumsum(respond([pose], secret.ports, STEP_S)[0], axis=2)
+
+
+def test_there_are_outsiders_of_many_kinds_and_mixed_damping_is_no_effect():
+    assert len(OUTSIDERS) + len(MORE_OUTSIDERS) >= 8
+    assert "structural_damping" not in kinds(REAL)
+    assert set(MORE_OUTSIDERS) <= set(kinds(REAL))
+    assert not set(MORE_OUTSIDERS) & set(kinds(CLEAN))
+
+
+@pytest.mark.parametrize("robot", sorted(ARMS))
+def test_imperfections_are_everywhere_and_small(robot, tmp_path):
+    scene, secret, path = scene_of(robot, tmp_path)
+    assert {port.joint for port in secret.ports} == {f"joint_{n}" for n in range(1, 7)}
+    plain = replace(secret.deviation, beams=(), compensators=(), harmonics=(), extra=())
+    ours = scene.truth.modes(scene.poses[0], 2)[0]
+    without = load_truth(path, plain).modes(scene.poses[0], 2)[0]
+    change = np.abs(ours / without - 1)
+    assert 0 < np.max(change) < 0.08
+    assert np.all(scene.truth.poles(scene.poses[0])[0].real < 0)
+
+
+@pytest.mark.parametrize("name", EVERYDAY)
+def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
+    scene, secret, path = scene_of("kr210", tmp_path)
+    if name in ("sensor_rotation", "sensor_gain", "polarity", "channel_delay", "exponential_window",
+                "tonal_disturbance"):  # fmt: skip
+        small, large = (
+            EVERYDAY[name](replace(scene, size=s), secret, np.random.default_rng(3)).secret
+            for s in (0.01, 1.0)
+        )
+        assert small != secret
+        assert small != large or name == "polarity"
+        return
+    plain = heard(scene, secret, path)
+    changes = []
+    for size in (0.01, 1.0):
+        drawn = EVERYDAY[name](replace(scene, size=size), secret, np.random.default_rng(3))
+        json.dumps(drawn.parameters)
+        changes.append(np.linalg.norm(heard(scene, drawn.secret, path) - plain))
+        left = lacking(drawn.secret, secret, drawn.secret)
+        assert np.linalg.norm(heard(scene, left, path) - plain) < 1e-6 * changes[0]
+    assert 0 < changes[0] < 0.2 * changes[1]
+    assert changes[0] < 0.15 * np.linalg.norm(plain)  # a base's long lever is the most
+
+
+def test_a_case_says_what_it_should_and_hides_the_rest(tmp_path):
+    case = make_case("friction", "kr210", 2, tmp_path, REAL)
+    answer = json.loads(case.answer)
+    effect = answer["effects"][0]
+    assert effect["effect"] == "friction"
+    assert effect["parameters"]["law"] in ("Friction", "BoucWen", "Iwan", "LuGre")
+    assert 3e-4 <= effect["size"] <= 1
+    assert 0 <= effect["nats_open"] <= effect["nats"] <= effect["nats_known"]
+    assert answer["rumble_m_s2"] > 0
+    assert {"effect": "drift", "at": "campaign"} in answer["imperfections"]
+    assert case.seal == hashlib.sha256(case.answer.encode()).hexdigest()
+    text = b"".join(p.read_bytes() for p in case.recordings.parent.rglob("*") if p.is_file())
+    assert not [w for w in (b"friction", b"rumble", b"nats", b"MuJoCo") if w in text]
