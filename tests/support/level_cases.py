@@ -161,7 +161,11 @@ def _hit(
             axes = [AXES.index(axis[1]) for axis, _ in shots]
             own = how.handling.aims(axes, rng)
             if how.by_level:
-                own = [own[i - i // n % how.repeats * n] for n in [len(how.axes)] for i in range(len(own))]
+                own = [
+                    own[i - i // n % how.repeats * n]
+                    for n in [len(how.axes)]
+                    for i in range(len(own))
+                ]
             aims = [together(common[a], aim) for a, aim in zip(axes, own, strict=True)]
             planned.append(HitVisit(q, shots, number / max(len(order) - 1, 1), aims))
         tip = replace(hammer, duration_s=hammer.duration_s * levels[0] ** -how.softer)

@@ -125,9 +125,7 @@ class Equivalent:
     count: np.ndarray
 
 
-def equivalent(
-    recorded: Dataset, system: System, misses: OpenMisses | None = None
-) -> Equivalent:
+def equivalent(recorded: Dataset, system: System, misses: OpenMisses | None = None) -> Equivalent:
     """Fit Δ of every joint, by itself, to every pair of levels.
 
     What `misses` of hits leave open is integrated out; without them hits are taken to be exact.

@@ -8,8 +8,8 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
-from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
+from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
 from planner.dynamics.gradient import Impedance, response_gradient
@@ -136,7 +136,9 @@ def level_data(recorded: Dataset, plain: Fit, misses: OpenMisses | None = None) 
     hits = strokes(visits, columns)
     force = spectra(hits.force.T, hits, s)
     level = np.array([c.level for c in columns])
-    return LevelData(s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(left))
+    return LevelData(
+        s, h, weight, best, level, hits, force, FASTEST * float(frequency[-1]), tuple(left)
+    )
 
 
 def _left_open(

@@ -47,7 +47,11 @@ def chance(recorded: Dataset, misses: OpenMisses) -> float | None:
 
 def wanted(recorded: Dataset) -> str:
     """What to do where levels differ and repeats are missing: a sentence."""
-    few = [f"pose {v.pose} along {''.join(axes)}" for v in recorded.visits if (axes := _once(v.hits, recorded))]
+    few = [
+        f"pose {v.pose} along {''.join(axes)}"
+        for v in recorded.visits
+        if (axes := _once(v.hits, recorded))
+    ]
     return (
         "FRFs of different force levels differ by more than noise, which misses of the hits would "
         "do as well as a structure that is not linear: that can't be told without repeats. Hit "
