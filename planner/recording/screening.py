@@ -228,11 +228,18 @@ class _Agreement:
         """Likeness of an FRF, had it been tilted to the axis as far as hands tilt at most."""
         if not self.across:
             return _likeness(frf, self.centre)
-        tilts = np.array(self.across)
-        normal = (tilts.conj() @ tilts.T).real
-        right = (tilts.conj() @ (frf - self.centre)).real
-        tilt = np.linalg.lstsq(normal, right, rcond=None)[0]
-        return _likeness(frf - np.clip(tilt, -MOST_TILT, MOST_TILT) @ tilts, self.centre)
+        off = untilted((frf - self.centre)[None], np.array(self.across))[0]
+        return _likeness(self.centre + off, self.centre)
+
+
+def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """By what FRFs (n, N) of hits along an axis differ, without what tilts of the hits explain.
+
+    A tilt adds a little of the FRFs `across` (k, N) of the other axes; MOST_TILT rad is the most.
+    """
+    normal = (across.conj() @ across.T).real
+    tilts = np.linalg.lstsq(normal, (off @ across.conj().T).real.T, rcond=None)[0]
+    return off - np.clip(tilts, -MOST_TILT, MOST_TILT).T @ across
 
 
 def _disagreement(
