@@ -7,7 +7,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import beside_another, diagnose
-from planner.diagnosis.misses_again import asked_again
+from planner.diagnosis.misses_again import abstained, asked_again
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
@@ -55,6 +55,8 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
         findings, found = both
     elif not linear:
         found = replace(found, best=found.refitted)
+    findings, wanted = abstained(findings)
+    recorded = replace(recorded, remarks=(*recorded.remarks, *wanted))
     tell("judging at poses set aside", 0.95)
     judged = judge(found)
     counts = linear or both is not None or again is not None

@@ -14,7 +14,8 @@ class Finding:
     `parameters` maps a name to value, standard deviation and unit. `misfit` is χ² per value of the
     fit that says so, ∞ where there is none. No finding is surer than `sure`, and `rivals` are other
     effects at the same place that take a share of its probability; `laws` are their fits, by which
-    a further hit can be planned.
+    a further hit can be planned. `wants` says what would have to be measured for it to be told at
+    all: until then it is no more than a remark.
     """
 
     effect: str
@@ -26,3 +27,4 @@ class Finding:
     sure: float = 1.0
     rivals: tuple[tuple[str, float], ...] = ()
     laws: "Laws | None" = None
+    wants: str = ""

@@ -30,9 +30,14 @@ def asked_again(
     if found.verdict != "explained" or first.fit.per_value > AT_NOISE:
         return None
     simulation = explained_simulation(found, first)
-    clean, _ = taken_out(hits, simulation)
-    again = force_levels.screen(clean, simulation, single=True, tell=tell)
+    again = force_levels.screen(hits, simulation, single=True, tell=tell)
     if any(f.effect == UNKNOWN for f in again):
         return None
     kept = tuple(f for f in findings if f.effect != UNKNOWN)
-    return (*kept, *again), clean
+    return (*kept, *again), taken_out(hits, simulation)[0]
+
+
+def abstained(findings: tuple[Finding, ...]) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """The findings that can be told, and remarks on what can't before more is measured."""
+    told = tuple(f for f in findings if not f.wants)
+    return told, tuple(f.wants for f in findings if f.wants)

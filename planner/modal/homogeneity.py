@@ -8,19 +8,22 @@ frequencies and damping depend on the level.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
+from planner.frf.spectra import Windows, transform
+from planner.inference import exchangeable
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.mac import mac
 from planner.modal.modes import ModalModel, Mode
 from planner.recording.force_levels import by_level, peak_n
 from planner.recording.records import Hit
+from planner.recording.screening import untilted
 
 # What is worth telling: FRFs that differ by this share, with such odds against chance.
 SHARE, CHANCE = 0.03, 1e-3
+SHARED_OUT = 4000  # times that hits are shared out among the levels at random
 NEAR, ALIKE = 0.1, 0.5  # log frequency and MAC within which it is the same mode
 
 
@@ -44,12 +47,14 @@ class Homogeneity:
     """Comparison of the levels of one pose, weakest first.
 
     `difference` is the largest relative difference ‖ΔH‖/‖H‖ between the FRFs of two levels in the
-    band beyond what their scatter explains; `p_value` the chance of so much scatter alone.
+    band beyond what their scatter explains; `p_value` the chance of so much scatter alone. Where
+    hits were not repeated it can't be told (`told` is False): no two hits miss alike.
     """
 
     levels: tuple[Level, ...]
     difference: float
     p_value: float
+    told: bool = True
 
     @property
     def homogeneous(self) -> bool:
@@ -59,9 +64,15 @@ class Homogeneity:
     @property
     def remark(self) -> str:
         """One sentence for the engineer; empty where the structure answers in proportion."""
+        low, high = self.levels[0], self.levels[-1]
+        if not self.told and self.difference >= SHARE:
+            return (
+                f"FRFs at {low.peak_force_n:.0f} N and {high.peak_force_n:.0f} N differ by "
+                f"{100 * self.difference:.0f} %, as hits that miss do too: whether the response is "
+                "proportional to the force can't be told without repeats; hit twice at each level."
+            )
         if self.homogeneous:
             return ""
-        low, high = self.levels[0], self.levels[-1]
         text = (
             f"The response is not proportional to the force: FRFs at {low.peak_force_n:.0f} N and "
             f"{high.peak_force_n:.0f} N differ by {100 * self.difference:.0f} %"
@@ -101,30 +112,51 @@ def homogeneity(
     levels = tuple(
         _level(group, frf, modal, band_hz) for group, frf in zip(groups, frfs, strict=True)
     )
-    worst, p = 0.0, 1.0
     pairs = [(a, b) for a in range(len(frfs)) for b in range(a)]
-    for a, b in pairs:
-        difference, chance = _compare(frfs[a], frfs[b], band_hz)
-        worst, p = max(worst, difference), min(p, chance)
-    return Homogeneity(levels, worst, min(1.0, p * len(pairs)))
+    worst = max(_difference(frfs[a], frfs[b], band_hz) for a, b in pairs)
+    p = _chance(groups, band_hz, window_rate_1_s)
+    return Homogeneity(levels, worst, 1.0 if p is None else p, p is not None)
 
 
-def _compare(a: Frf, b: Frf, band_hz: tuple[float, float]) -> tuple[float, float]:
-    """Relative difference of two FRFs beyond their scatter, and the chance of scatter alone."""
+def _difference(a: Frf, b: Frf, band_hz: tuple[float, float]) -> float:
+    """Relative difference of two FRFs beyond their scatter."""
     low = max(band_hz[0], a.usable_band_hz[0], b.usable_band_hz[0])
     high = min(band_hz[1], a.usable_band_hz[1], b.usable_band_hz[1])
     lines = (a.frequency_hz >= low) & (a.frequency_hz <= high)
     both = np.flatnonzero(a.measured & b.measured)
     if a.frequency_hz.shape != b.frequency_hz.shape or not lines.any() or not both.size:
-        return 0.0, 1.0
+        return 0.0
     ha, hb = a.accelerance[:, both][..., lines], b.accelerance[:, both][..., lines]
     noise = a.variance[:, both][..., lines] + b.variance[:, both][..., lines]
     square = np.abs(ha - hb) ** 2
-    mean = float(np.mean(square / noise))
-    # E|ΔH|²/noise is 1 with sd 1 a line; the noise is itself estimated from few hits.
-    spread = np.sqrt(2 / square.size) * 1.5
     beyond = max(0.0, float(np.sum(square - noise)) / float(np.sum(np.abs(ha * hb))))
-    return float(np.sqrt(beyond)), float(ndtr(-(mean - 1) / spread))
+    return float(np.sqrt(beyond))
+
+
+def _chance(
+    groups: tuple[tuple[Hit, ...], ...], band_hz: tuple[float, float], window_rate_1_s: float
+) -> float | None:
+    """That hits, which miss as hands do, differ so much from level to level; None: no repeats."""
+    hits = [hit for group in groups for hit in group]
+    level = np.array([number for number, group in enumerate(groups) for _ in group])
+    windows = Windows(0.0, window_rate_1_s)
+    spectra = transform(tuple(hits), band_hz, windows)
+    f = spectra.frequency_hz
+    lines = (f >= band_hz[0]) & (f <= band_hz[1])
+    frfs = np.array([(s.response / s.force)[:, lines].ravel() for s in spectra.hits])
+    axes = np.array([hit.axis_index for hit in hits])
+    rng, possible, measured, shared = np.random.default_rng(0), 1.0, 0.0, np.zeros(SHARED_OUT)
+    for axis in set(axes.tolist()):
+        own = axes == axis
+        if not 1 < len(set(level[own].tolist())) < own.sum():
+            continue
+        across = [frfs[axes == other].mean(axis=0) for other in set(axes.tolist()) - {axis}]
+        off = frfs[own] - frfs[own].mean(axis=0)
+        seen = untilted(off, np.array(across)) if across else off
+        possible *= exchangeable.ways(level[own])
+        real, random = exchangeable.between(seen.view(float), level[own], SHARED_OUT, rng)
+        measured, shared = measured + real, shared + random
+    return exchangeable.chance(measured, shared) if 1 / possible <= CHANCE else None
 
 
 def _level(

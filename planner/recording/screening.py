@@ -4,8 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.recording.force_levels import SAME_LEVEL, peak_n
+from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
+
+# Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
+# the last they are the same. Chosen.
+UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
+MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
 
 
 @dataclass(frozen=True)
@@ -176,52 +181,96 @@ def screen_repeats(
 ) -> tuple[tuple[Fault, ...], ...]:
     """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
 
-    Judged only where three hits or more of an axis agree; a robust vote needs a majority.
+    Judged only where three hits or more were made along an axis; a robust vote needs a majority.
+    What a careful hand misses by is no disagreement, and what only sets one force level apart from
+    another may be the structure: that is for the diagnosis to say.
     """
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    for axis in range(3):
-        group = [i for i, hit in enumerate(hits) if hit.axis_index == axis]
-        if len(group) < 3 or len({len(hits[i].force_n) for i in group}) > 1:
+    if len({len(hit.force_n) for hit in hits}) > 1:
+        return tuple(faults)
+    frfs = np.array([_frf(hit, band_hz) for hit in hits])
+    axes = np.array([hit.axis_index for hit in hits])
+    level = _levels(hits)
+    centres = {axis: _centre(frfs[axes == axis]) for axis in set(axes.tolist())}
+    for axis, centre in centres.items():
+        group = np.flatnonzero(axes == axis)
+        if len(group) < 3:
             continue
-        frfs = np.array([_frf(hits[i], band_hz) for i in group])
-        centre = np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
-        alike = [_likeness(frf, centre) for frf in frfs]
+        across = {other: c for other, c in centres.items() if other != axis}
+        own = _Agreement(centre, tuple(across.values()))
+        alike = np.array([own.of(frf) for frf in frfs[group]])
         typical = float(np.median(alike))
-        for i, frf, share in zip(group, frfs, alike, strict=True):
-            if share > 0.5 or share > typical - 0.3:
+        for i, share in zip(group.tolist(), alike, strict=True):
+            if share > UNLIKE or share > typical - FAR_BELOW:
                 continue
-            if _likeness(-frf, centre) > 0.8:
-                text, kind = "has the opposite sign of the others", "wrong_axis"
-            elif _seconded(i, group, frfs, hits):
-                continue
-            else:
-                text, kind = "does not agree with the others of its axis", "incoherent"
-            faults[i] = (
-                Fault(
-                    kind,
-                    f"Its FRF {text} (likeness {share:.2f}, others {typical:.2f}); check axis and "
-                    f"hit point, and hit again.",
-                ),
-            )
+            same = [frfs[j] for j in group if j != i and level[j] == level[i]]
+            told = _disagreement(frfs[i], own, across, same)
+            if told:
+                kind, text = told
+                faults[i] = (
+                    Fault(
+                        kind,
+                        f"Its FRF {text} (likeness {share:.2f}, others {typical:.2f}); check axis "
+                        f"and hit point, and hit again.",
+                    ),
+                )
     return tuple(faults)
 
 
-def _seconded(number: int, group: list[int], frfs: np.ndarray, hits: tuple[Hit, ...]) -> bool:
-    """Whether it is of another strength than most and another hit of that strength agrees.
+@dataclass(frozen=True, eq=False)
+class _Agreement:
+    """How hits along an axis are answered, and in `across` those along the others."""
 
-    A nonlinear structure answers each force level differently.
+    centre: np.ndarray
+    across: tuple[np.ndarray, ...]
+
+    def of(self, frf: np.ndarray) -> float:
+        """Likeness of an FRF, had it been tilted to the axis as far as hands tilt at most."""
+        if not self.across:
+            return _likeness(frf, self.centre)
+        off = untilted((frf - self.centre)[None], np.array(self.across))[0]
+        return _likeness(self.centre + off, self.centre)
+
+
+def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """By what FRFs (n, N) of hits along an axis differ, without what tilts of the hits explain.
+
+    A tilt adds a little of the FRFs `across` (k, N) of the other axes; MOST_TILT rad is the most.
     """
-    own = peak_n(hits[number])
-    usual = float(np.median([peak_n(hits[i]) for i in group]))
-    if 1 / SAME_LEVEL < own / usual < SAME_LEVEL:
-        return False
-    same = [
-        frf
-        for i, frf in zip(group, frfs, strict=True)
-        if i != number and 1 / SAME_LEVEL < peak_n(hits[i]) / own < SAME_LEVEL
-    ]
-    mine = frfs[group.index(number)]
-    return any(_likeness(mine, other) > 0.8 for other in same)
+    normal = (across.conj() @ across.T).real
+    tilts = np.linalg.lstsq(normal, (off @ across.conj().T).real.T, rcond=None)[0]
+    return off - np.clip(tilts, -MOST_TILT, MOST_TILT).T @ across
+
+
+def _disagreement(
+    frf: np.ndarray, own: _Agreement, across: dict[int, np.ndarray], same: list[np.ndarray]
+) -> tuple[str, str] | None:
+    """Kind and text where an FRF that is unlike others of its axis is a mistake."""
+    if own.of(-frf) > UNLIKE:  # modes that move make FRFs unlike, never opposite
+        return "wrong_axis", "has the opposite sign of the others"
+    for axis, centre in across.items():
+        if abs(_likeness(frf, centre)) > LIKE:
+            return "wrong_axis", f"is that of hits along {AXES[axis]}"
+    # A structure that is not linear answers each level differently: only hits of the same force
+    # count, if they agree with each other or with all.
+    if any(_Agreement(one, own.across).of(frf) > LIKE for one in same):
+        return None
+    voters = [*same, own.centre]
+    agreed = any(_likeness(a, b) > LIKE for i, a in enumerate(voters) for b in voters[:i])
+    if not agreed:
+        return None
+    return "incoherent", "does not agree with the others of its axis"
+
+
+def _levels(hits: tuple[Hit, ...]) -> np.ndarray:
+    """Which force level each hit belongs to."""
+    groups = levels(np.sort([peak_n(hit) for hit in hits]))
+    weakest = [group[0] for group in groups[1:]]
+    return np.searchsorted(weakest, [peak_n(hit) for hit in hits], side="right")
+
+
+def _centre(frfs: np.ndarray) -> np.ndarray:
+    return np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
 
 
 def _frf(hit: Hit, band_hz: tuple[float, float]) -> np.ndarray:

@@ -10,7 +10,7 @@ from planner.modal.estimate_modes import estimate_modes
 from planner.modal.homogeneity import homogeneity
 from planner.recording.force_levels import by_level, peak_n
 from planner.recording.records import Hit
-from tests.support.simulated_hits import POLES, make_hit
+from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
 BAND = (4.0, 60.0)
 LEVELS_N = (100.0, 400.0, 1600.0)
@@ -65,3 +65,36 @@ def test_a_mode_that_softens_is_told(seed):
     assert high.frequency_hz[0] / low.frequency_hz[0] == pytest.approx(0.96, abs=0.005)
     assert high.frequency_hz[1] / low.frequency_hz[1] == pytest.approx(1.0, abs=0.003)
     assert [level.hits for level in found.levels] == [6, 6, 6]
+
+
+def aimed(seed: int, repeats: int):
+    """A linear structure hit by a hand that tilts by 2° in each direction."""
+    rng = np.random.default_rng(seed)
+    hits: list[Hit] = []
+    for level in LEVELS_N:
+        for axis in range(3):
+            for _ in range(repeats):
+                tilt = np.deg2rad(2.0) * rng.standard_normal(3) * (1 - np.eye(3)[axis])
+                moved = RESIDUES.copy()
+                moved[..., axis] += RESIDUES @ tilt
+                peak = level * rng.uniform(0.8, 1.2)
+                hits.append(make_hit(rng, "+" + "xyz"[axis], 0.01, peak_n=peak, residues=moved))
+    return tuple(hits)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_hits_that_tilt_are_homogeneous(seed):
+    found = judged(aimed(seed, 2))
+    assert found is not None
+    assert found.told
+    assert found.homogeneous
+    assert found.p_value > 1e-3
+
+
+def test_without_repeats_it_is_said_what_would_tell():
+    found = judged(aimed(3, 1))
+    assert found is not None
+    assert not found.told
+    assert found.homogeneous
+    assert found.difference > 0.03
+    assert "can't be told without repeats; hit twice" in found.remark

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.recording.screening import screen, screen_repeats
-from tests.support.simulated_hits import make_hit
+from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
 BAND = (4.0, 60.0)
 
@@ -68,3 +68,60 @@ def test_a_hit_on_the_wrong_axis_stands_out():
     assert [bool(f) for f in faults] == [False, False, True, False]
     hits[2] = replace(make_hit(rng, "-x"), axis="+x")
     assert screen_repeats(tuple(hits), BAND)[2][0].kind == "wrong_axis"
+
+
+def levelled(rng, changed=POLES, axes=("+x", "+y", "+z"), repeats=1):
+    """Three levels; the strongest hits are those of a structure with `changed` poles."""
+    return tuple(
+        make_hit(rng, axis, peak_n=peak * rng.uniform(0.8, 1.2), poles=poles)
+        for axis in axes
+        for peak, poles in ((300.0, POLES), (750.0, POLES), (1900.0, changed))
+        for _ in range(repeats)
+    )
+
+
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_a_level_that_is_answered_otherwise_is_not_refused(repeats):
+    """A joint that grows stiffer moves the modes: the diagnosis is to say so."""
+    hits = levelled(np.random.default_rng(5), 1.3 * POLES, repeats=repeats)
+    assert screen_repeats(hits, BAND) == ((),) * len(hits)
+
+
+def test_a_hit_that_its_own_level_disagrees_with_is_refused():
+    rng = np.random.default_rng(6)
+    hits = list(levelled(rng, 1.3 * POLES, repeats=3))
+    hits[7] = make_hit(rng, "+x", peak_n=1900.0, poles=0.7 * POLES)
+    faults = screen_repeats(tuple(hits), BAND)
+    assert [number for number, found in enumerate(faults) if found] == [7]
+    assert faults[7][0].kind == "incoherent"
+    # Of two that differ nobody knows which is wrong, unless one is as all others are.
+    two = [*hits[:6], hits[6], hits[7]]
+    assert screen_repeats(tuple(two), BAND) == ((),) * 8
+    linear = list(levelled(rng, repeats=2))
+    linear[5] = hits[7]
+    assert [i for i, found in enumerate(screen_repeats(tuple(linear), BAND)) if found] == [5]
+
+
+def test_a_hit_along_another_axis_stands_out_at_a_level_of_its_own():
+    rng = np.random.default_rng(7)
+    hits = list(levelled(rng))
+    hits[2] = replace(make_hit(rng, "+y", peak_n=1900.0), axis="+x")
+    (fault,) = screen_repeats(tuple(hits), BAND)[2]
+    assert (fault.kind, "along y" in fault.text) == ("wrong_axis", True)
+
+
+def test_hits_that_tilt_as_hands_do_agree():
+    """Along an axis that hardly answers, what a tilt brings from another is larger than that."""
+    rng = np.random.default_rng(8)
+    stiff = RESIDUES * np.array([1.0, 1.0, 0.03])[:, None] * np.array([1.0, 1.0, 0.03])
+    alone = 0
+    for _ in range(10):
+        hits = [make_hit(rng, axis, residues=stiff) for axis in ("+x", "+y") for _ in range(2)]
+        for tilt in rng.normal(0.0, np.deg2rad(2.0), (3, 2)):
+            turned = np.array([stiff[..., 0], stiff[..., 1]])
+            moved = stiff.copy()
+            moved[..., 2] += np.tensordot(tilt, turned, 1)
+            hits.append(make_hit(rng, "+z", residues=moved))
+        alone += any(screen_repeats(tuple(hits[4:]), BAND)[i] for i in range(3))
+        assert screen_repeats(tuple(hits), BAND) == ((),) * 7
+    assert alone > 0  # without the other axes nobody could tell

@@ -83,8 +83,8 @@ def made(
     """A case; `hardening`: k₃θ² over k at the largest angle of the strongest hits.
 
     `friction`: presliding stiffness over k, that has slid through at a third of the angle of
-    middling hits. `lacking` is an effect of `truth.effects.LINEAR` that the folder knows nothing of;
-    `drift` the relative change of all stiffnesses in the course of the visits.
+    middling hits. `lacking` is an effect of `truth.effects.LINEAR` that the folder knows
+    nothing of; `drift` the relative change of all stiffnesses in the course of the visits.
     """
     how, rng = how or Protocol(), np.random.default_rng([seed, 24])
     robot = robot or str(rng.choice(sorted(ARMS)))

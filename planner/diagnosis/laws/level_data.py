@@ -8,8 +8,8 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
-from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
+from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
 from planner.dynamics.gradient import Impedance, response_gradient
@@ -19,7 +19,7 @@ LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOpen:
+class OpenColumns:
     """What misses leave open in some `columns` (b,) of LevelData: basis (l, b, 3, F)."""
 
     columns: np.ndarray
@@ -43,7 +43,7 @@ class LevelData:
     hits: Strokes
     force: np.ndarray
     fastest_hz: float
-    left_open: tuple[LeftOpen, ...] = ()
+    left_open: tuple[OpenColumns, ...] = ()
 
     @property
     def weaker(self) -> np.ndarray:
@@ -127,8 +127,10 @@ def level_data(recorded: Dataset, plain: Fit, misses: OpenMisses | None = None) 
         + (LAW_DIFFERENCE_ERROR * np.abs(h)) ** 2,
         variance + (LAW_MODEL_ERROR * np.abs(h)) ** 2,
     )
-    left: list[LeftOpen] = []
-    for visit in sorted(set(visits)) if misses is not None else ():
+    left: list[OpenColumns] = []
+    for visit in sorted(set(visits)):
+        if misses is None:
+            break
         found, variance = _left_open(columns, places, best, visit, misses, lines)
         left += found
         error = error + variance
@@ -148,7 +150,7 @@ def _left_open(
     visit: int,
     misses: OpenMisses,
     lines: np.ndarray,
-) -> tuple[list[LeftOpen], np.ndarray]:
+) -> tuple[list[OpenColumns], np.ndarray]:
     """What misses leave open at a visit, and E|error|² (c, 3, F) of the simulation's part in it.
 
     The strongest columns are opened together, to the measuring chain as well; of its part in
@@ -160,7 +162,7 @@ def _left_open(
     chain = misses.of_chain(visit, columns[0], lines)
     variance = np.zeros((len(columns), 3, len(lines)))
     whole = [np.zeros((len(chain), len(strongest), 3, len(lines)), dtype=complex)]
-    out: list[LeftOpen] = []
+    out: list[OpenColumns] = []
     for i, c in enumerate(strongest):
         axis = places[c][1]
         whole[0][:, i] = chain[:, :, axis]
@@ -172,8 +174,8 @@ def _left_open(
         for w in here:
             if best[w] == c and w != c:
                 basis, variance[w] = hits.left_open([columns[w], columns[c]])
-                out.append(LeftOpen(np.array([w]), basis[:, None]))
-    out.append(LeftOpen(np.array(strongest), np.concatenate(whole)))
+                out.append(OpenColumns(np.array([w]), basis[:, None]))
+    out.append(OpenColumns(np.array(strongest), np.concatenate(whole)))
     return out, variance
 
 

@@ -105,9 +105,9 @@ class OpenMisses:
         lines = lines_of(columns[0]) if lines is None else lines
         basis = hit_basis(*self._responses(visit, columns[0], lines)[:2], self.tolerances)[0]
         off = np.full((3, 4), self.off[visit])
-        for axis in {column.axis for column in columns}:
-            group = [column for column in columns if column.axis == axis]
-            hits = [len(column.hits) for column in group]
+        for axis in {c.axis for c in columns}:
+            group = [c for c in columns if c.axis == axis]
+            hits = [len(c.hits) for c in group]
             mean = np.average([c.accelerance[:, lines] for c in group], axis=0, weights=hits)
             for hit in range(3):
                 for tilt in np.flatnonzero(np.array(ACROSS[hit]) == axis):
@@ -174,17 +174,18 @@ def real_rows(values: np.ndarray) -> np.ndarray:
 def whitening(basis: np.ndarray, weight: np.ndarray) -> Whitening:
     """Of complex values with errors of E|·|² = 1/weight and a basis (l, ...) of the same shape.
 
-    It acts on `real_rows` of the values times √weight, whose real and imaginary parts have a variance
-    of a half each.
+    It acts on `real_rows` of the values times √weight, whose real and imaginary parts have a
+    variance of a half each.
     """
     return Whitening.of(np.sqrt(2.0) * real_rows(basis * np.sqrt(weight)))
 
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """Differences `change` (3, F) between two columns at some `lines`, with `weight` (3, F) = 1/E|error|².
+    """Differences `change` (3, F) between two columns at some `lines`.
 
-    `miss` takes out what misses leave open, None where hits are exact.
+    `weight` (3, F) is 1/E|error|². `miss` takes out what misses leave open, None where hits are
+    exact.
     """
 
     columns: tuple[Column, Column]

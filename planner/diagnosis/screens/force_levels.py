@@ -92,46 +92,33 @@ class WeighedLaw:
     temper: float
 
 
-@dataclass(frozen=True, eq=False)
-class Looked:
-    """What the force levels tell; `remark` is what they can't tell, and how they could."""
-
-    findings: tuple[Finding, ...] = ()
-    remark: str = ""
-
-
 def screen(
     recorded: Dataset, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
 ) -> tuple[Finding, ...]:
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it.
 
-    `single`: a law of several joints is not looked for.
+    Without repeats `unknown` says what it wants. `single`: a law of several joints is not looked
+    for.
     """
-    return look(recorded, nominal, single=single, tell=tell).findings
-
-
-def look(
-    recorded: Dataset, nominal: Simulation, *, single: bool = False, tell: Tell = quietly
-) -> Looked:
-    """As `screen`; with a remark where levels differ and repeats would have to say why."""
     if len(recorded.level_n) < 2:
-        return Looked()
+        return ()
     tone = screen_tone(recorded)
     if tone is not None:
-        return Looked((tone,))
+        return (tone,)
     plain = base(recorded, nominal)
     misses = OpenMisses.told(plain, recorded, tolerances_of(nominal))
     system = system_of(plain)
     found = equivalent(recorded, system, misses)
     if not len(found.count) or disproportion(found) < PROPORTIONAL:
-        return Looked()
+        return ()
     by_chance = repeats.chance(recorded, misses)
     if by_chance is not None and by_chance > BY_CHANCE:
-        return Looked()  # repeats at one level differ as much as levels do
+        return ()  # repeats at one level differ as much as levels do
     findings = _named(recorded, nominal, found, misses, single, tell)
-    if by_chance is None and any(f.effect == UNKNOWN for f in findings):
-        return Looked((), repeats.wanted(recorded))
-    return Looked(findings)
+    if by_chance is None:
+        wanted = repeats.wanted(recorded)
+        return tuple(replace(f, wants=wanted if f.effect == UNKNOWN else "") for f in findings)
+    return findings
 
 
 def _named(

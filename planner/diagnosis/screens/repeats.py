@@ -1,13 +1,11 @@
 """Do force levels differ by more than hits of one level do among themselves?
 
 Hits of a linear structure are exchangeable: which level they belong to says nothing of how they
-are answered. Shared out among the levels at random they then differ from level to level as much as
-they really do (a permutation test; Anderson 2001, PERMANOVA). Nothing is assumed of how large the
-misses are, nor of the simulation, which only weighs.
+are answered (see `inference.exchangeable`). Nothing is assumed of how large the misses are, nor of
+the simulation, which only weighs.
 """
 
 from collections.abc import Sequence
-from math import factorial, prod
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from planner.diagnosis.laws.open_misses import (
     whitening,
 )
 from planner.diagnosis.thresholds import BY_CHANCE, SHARED_OUT
+from planner.inference import exchangeable
 from planner.recording.records import Hit
 
 AXES = "xyz"
@@ -36,13 +35,12 @@ def chance(recorded: Dataset, misses: OpenMisses) -> float | None:
     for number, hits in enumerate(hit_columns(recorded)):
         missed = misses.of_hits(number, hits)
         for group in _by_axis(hits):
-            ways *= _ways(group)
+            ways *= exchangeable.ways(_levels(group))
             real, random = _between(group, missed, rng)
             measured, shared = measured + real, shared + random
     if 1 / ways > BY_CHANCE:
         return None
-    as_large = int(np.count_nonzero(shared >= measured - 1e-9))
-    return (1 + as_large) / (1 + SHARED_OUT)
+    return exchangeable.chance(measured, shared)
 
 
 def wanted(recorded: Dataset) -> str:
@@ -76,18 +74,10 @@ def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
     return [g for g in groups if 1 < len({hit.level for hit in g}) < len(g)]
 
 
-def _ways(group: Sequence[Column]) -> float:
-    """Ways to share hits out among the levels that make a difference: of equal levels one."""
-    sizes = np.bincount([hit.level for hit in group])
-    sizes = sizes[sizes > 0]
-    orders = prod(factorial(int(n)) for n in np.bincount(sizes))
-    return factorial(len(group)) / prod(factorial(int(n)) for n in sizes) / orders
-
-
 def _between(
     group: Sequence[Column], missed: HitMisses, rng: np.random.Generator
 ) -> tuple[float, np.ndarray]:
-    """n/2 ln of all scatter over that within levels: as measured, and shared out at random."""
+    """As `exchangeable.between`, with misses left open."""
     lines = missed.lines
     # One weight for all: hits are to be exchangeable.
     basis, uncertain = missed.left_open(group[:2])
@@ -96,12 +86,8 @@ def _between(
     weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
     values = np.array([hit.accelerance[:, lines] for hit in group]) * np.sqrt(weight)
     seen = whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
-    gram, levels = seen @ seen.T, np.array([hit.level for hit in group])
-    orders = rng.permuted(np.tile(np.arange(len(group)), (SHARED_OUT, 1)), axis=1)
-    orders = np.concatenate([np.arange(len(group))[None], orders])
-    within = np.full(len(orders), float(np.trace(gram)))
-    for level in np.unique(levels):
-        own = orders[:, levels == level]
-        within -= gram[own[:, :, None], own[:, None, :]].sum(axis=(1, 2)) / own.shape[1]
-    told = -len(group) / 2 * np.log(np.maximum(within, 1e-12 * np.trace(gram)) / np.trace(gram))
-    return float(told[0]), told[1:]
+    return exchangeable.between(seen, _levels(group), SHARED_OUT, rng)
+
+
+def _levels(group: Sequence[Column]) -> np.ndarray:
+    return np.array([hit.level for hit in group])

@@ -15,24 +15,22 @@ class Screened:
     """What was found, artefacts first, and the recordings without artefacts and misses of hits.
 
     `hit_errors` are empty where the hits of a pose agree without looking for their misses, and
-    where they differ because a joint is not linear. `remark` is what can't be told, and what to do.
+    where they differ because a joint is not linear.
     """
 
     findings: tuple[Finding, ...]
     clean: Dataset
     missed: Dataset  # as `clean`, with the misses of hits
     hit_errors: HitErrors = ()
-    remark: str = ""
 
 
 def screen(recorded: Dataset, nominal: Simulation, tell: Tell = quietly) -> Screened:
     """Find artefacts first, so that they are not called physics, then the rest in clean data."""
     found = artefacts.screen(recorded, nominal)
     clean = artefacts.correct(recorded, found)
-    levels, missed, errors = force_levels.look(clean, nominal, tell=tell), clean, ()
-    if not levels.findings and force_levels.differ(clean, nominal):
+    by_level, missed, errors = force_levels.screen(clean, nominal, tell=tell), clean, ()
+    if not by_level and force_levels.differ(clean, nominal):
         tell("telling how each hit missed its axis and point", 0.3)
         clean, errors = taken_out(clean, nominal)
-    by_time = () if levels.findings else drift.screen(clean, nominal)
-    findings = (*found, *levels.findings, *by_time)
-    return Screened(findings, clean, missed, errors, levels.remark)
+    by_time = () if by_level else drift.screen(clean, nominal)
+    return Screened((*found, *by_level, *by_time), clean, missed, errors)
