@@ -11,14 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.campaign.frf_posterior import FrfPosterior, LeftOutFrf
-from planner.campaign.frf_simulation import FITS
 from planner.identification.measured_frfs import Measured
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
 
 Moments = tuple[np.ndarray, np.ndarray]  # mean and sd (n, 3, 3, F) of FRFs in m/s²/N
-ZONES = 5  # of the band, evenly on a logarithmic scale: what is left out differs from one to another
+ZONES = (
+    5  # of the band, evenly on a logarithmic scale: what is left out differs from one to another
+)
 WIDTH = 0.05  # of the frequency: over which an FRF's size is averaged
 OWN = 0.5  # share of an FRF's own square in its size; the rest is the mean of all nine
+# χ² per value up to which the simulation is not weighed against fused modes: on generated cells
+# these never came near it. A share too small to matter would only widen the bands.
+ALONE, LITTLE_SHARE = 3.0, 0.05
 # Before any pose is left out, and as one pose beside those that are.
 ERROR_BEFORE, POSES_BEFORE = 0.03, 1.0
 
@@ -133,11 +137,11 @@ def frf_model(
     several = len(measured.s) > 1
     by_simulation = simulated.left_out() if simulated is not None and several else []
     first = [_simulated(pose) for pose in by_simulation]
-    enough = simulated is not None and (simulated.misfit <= FITS or not several)
+    enough = simulated is not None and (simulated.misfit <= ALONE or not several)
     second = [] if enough or not several else _fused(measured, left_out_modes(), above)
     share = float(simulated is not None)
     if first and second:
-        share = _share(first, second)
+        share = share_of(first, second)
     return FrfModel(
         simulated, share, ErrorByZone.of(first, band_hz), ErrorByZone.of(second, band_hz)
     )
@@ -146,9 +150,7 @@ def frf_model(
 def _simulated(pose: LeftOutFrf) -> LeftOut:
     used = np.isfinite(pose.noise_sd)
     known = np.where(used, pose.noise_sd, 0.0) ** 2 + pose.sd**2
-    return LeftOut(
-        pose.frequency_hz, pose.measured, pose.predicted, pose.missed, known, used
-    )
+    return LeftOut(pose.frequency_hz, pose.measured, pose.predicted, pose.missed, known, used)
 
 
 def _fused(
@@ -164,9 +166,7 @@ def _fused(
         used = measured.used[i]
         known = np.where(used, measured.sd[i], 0.0) ** 2 + sd[0] ** 2
         nothing = np.zeros_like(predicted)
-        found.append(
-            LeftOut(hertz, measured.accelerance[i], predicted, nothing, known, used)
-        )
+        found.append(LeftOut(hertz, measured.accelerance[i], predicted, nothing, known, used))
     return found
 
 
@@ -180,7 +180,7 @@ def _windowed(modes: ModalPrediction, rate_1_s: float) -> ModalPrediction:
     return replace(modes, frequency_hz=size / (2 * np.pi), damping_ratio=real / size)
 
 
-def _share(simulated: Sequence[LeftOut], fused: Sequence[LeftOut]) -> float:
+def share_of(simulated: Sequence[LeftOut], fused: Sequence[LeftOut]) -> float:
     """Of the simulation: that with which the FRFs of all poses left out are least off.
 
     One pose more, at which it is right, speaks for it.
@@ -193,4 +193,7 @@ def _share(simulated: Sequence[LeftOut], fused: Sequence[LeftOut]) -> float:
         along.append(np.mean(np.sum((apart.conj() * a.off).real, axis=-1) / size))
         across.append(np.mean(np.sum(np.abs(apart) ** 2, axis=-1) / size))
     total = float(np.sum(across) + np.mean(across))
-    return 1 - float(np.clip(np.sum(along) / total, 0.0, 1.0)) if total > 0 else 1.0
+    modal = float(np.sum(along)) / total if total > 0 else 0.0
+    return 1 - float(
+        np.where(modal > 1 - LITTLE_SHARE, 1.0, modal if modal > LITTLE_SHARE else 0.0)
+    )

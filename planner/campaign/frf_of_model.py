@@ -3,9 +3,10 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from planner.campaign.frf_model import FrfModel, frf_model
-from planner.campaign.frf_posterior import CLOSELY
+from planner.campaign.frf_posterior import closely
 from planner.campaign.frf_simulation import learned_simulation
 from planner.identification.measured_frfs import common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
 
 def frf_model_of(model: "Model") -> FrfModel:
     """From the FRFs of its poses and, where there is one, from what was identified of them."""
+    with threadpool_limits(1):
+        return _frf_model(model)
+
+
+def _frf_model(model: "Model") -> FrfModel:
     q = np.array([pose.q for pose in model.labelled])
     band = model.cell.config.modes.band_hz
     learned = model.low.learned or model.low.suspect
@@ -26,7 +32,8 @@ def frf_model_of(model: "Model") -> FrfModel:
         measured = simulated.objective.misfit.measured
     else:
         seen = common_band(model.frfs, band)
-        measured = stack(model.frfs, seen, CLOSELY.lines, CLOSELY.model_error)
+        grade = closely(len(q))
+        measured = stack(model.frfs, seen, grade.lines, grade.model_error)
 
     def modes() -> ModalPrediction:
         return left_out_modes(model.with_residues, model.seen)

@@ -31,15 +31,18 @@ from planner.inference.least_squares import (
 )
 from planner.robot.elastic_model import Matrices
 
-# Lines a pose, and the relative sd of what no simulation follows beside hits and chain: small
+# The relative sd of what no simulation follows beside hits and chain: small
 # imperfections, readback. Of generated cases those that lack nothing are predicted as well by 0.003
 # to 0.03, those that lack something better the larger it is.
-CLOSELY = Grade(72, 0.01)
+MODEL_ERROR = 0.01
+LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
 HITS = 12  # columns of the basis that belong to a pose's own hits
 CHAIN = OPEN - HITS  # those that belong to the chain
+LEAST_TEMPER = 0.3
 NEARLY = 0.999  # of the farthest that is possible
-TOLERANCE, MOST_STEPS = 1e-5, 40  # of a fit: least gain of a step, and how many
-LEFT_STEPS = 6  # of a fit without a pose, from one with it
+TOLERANCE, MOST_STEPS = 5e-4, 30  # of a fit: least gain of a step, and how many
+FOLDS = 6  # that poses are left out in, at most
+LEFT_STEPS = 3  # of a fit without a pose, from one with it
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +98,9 @@ class ChainMisfit:
         data = []
         for i, weight in enumerate(self.misfit.weight):
             off = shown(h[i], slope[i], z) - self.misfit.measured.accelerance[i]
-            found = marginal(_real(weight * off)[0], _real(weight * slope[i]), _real(weight * hits[i]))
+            found = marginal(
+                _real(weight * off)[0], _real(weight * slope[i]), _real(weight * hits[i])
+            )
             count = 2 * int(np.count_nonzero(weight))
             data.append(PoseData(found.chi2, found.gradient, found.normal, count))
         chi2 = sum(d.chi2 for d in data)
@@ -161,8 +166,11 @@ class FrfPosterior:
 
     @property
     def temper(self) -> float:
-        """By what χ² is divided: where the simulation is off, its parameters are less certain."""
-        return max(self.misfit, 1.0)
+        """By what χ² is divided: where the simulation is off, its parameters are less certain.
+
+        Noise as hits scatter holds their misses, which are counted in anyway: it may be less.
+        """
+        return max(self.misfit, LEAST_TEMPER)
 
     def precision(self, temper: float) -> np.ndarray:
         """(d, d) of z."""
@@ -191,15 +199,18 @@ class FrfPosterior:
 
         Nothing of a single pose.
         """
-        poses, found = np.arange(len(self.at.data)), []
-        if len(poses) < 2:
-            return ()
-        for i in poses:
-            others = self.objective.of(poses[poses != i])
+        poses = np.arange(len(self.at.data))
+        found: dict[int, LeftOutFrf] = {}
+        folds = min(len(poses), FOLDS)
+        for fold in range(folds if folds > 1 else 0):
+            away = poses % folds == fold
+            others = self.objective.of(poses[~away])
             z, at = least(others, self.z, LEFT_STEPS)
             rest = replace(self, objective=others, z=z, at=at)
-            found.append(_beside(self.objective.of(poses[[i]]), z, rest.precision(rest.temper)))
-        return tuple(found)
+            precision = rest.precision(rest.temper)
+            for i in poses[away]:
+                found[int(i)] = _beside(self.objective.of(poses[[i]]), z, precision)
+        return tuple(found[i] for i in sorted(found))
 
 
 def _beside(one: ChainMisfit, z: np.ndarray, precision: np.ndarray) -> LeftOutFrf:
@@ -215,10 +226,17 @@ def _beside(one: ChainMisfit, z: np.ndarray, precision: np.ndarray) -> LeftOutFr
     )  # fmt: skip
 
 
-def fitted(problem: Problem, effect: Effect, x: np.ndarray) -> FrfPosterior:
-    """The simulation of a problem with an effect, from x (D,) on."""
-    objective = ChainMisfit(problem.misfit(effect, CLOSELY))
-    z, at = least(objective, np.append(x, np.zeros(CHAIN)), MOST_STEPS)
+def closely(poses: int) -> Grade:
+    """How closely so many poses are looked at: in about the same time however many they are."""
+    return Grade(int(np.clip(LINES // poses, LEAST, MOST)), MODEL_ERROR)
+
+
+def fitted(problem: Problem, effect: Effect, z: np.ndarray, most: int = MOST_STEPS) -> FrfPosterior:
+    """The simulation of a problem with an effect, from z or x (the chain then exact) on."""
+    objective = ChainMisfit(problem.misfit(effect, closely(len(problem.q))))
+    size = len(objective.misfit.mean)
+    z = z if len(z) > size else np.append(z, np.zeros(CHAIN))
+    z, at = least(objective, z, most)
     return FrfPosterior(problem, effect, objective, z, at)
 
 

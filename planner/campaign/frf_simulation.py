@@ -11,7 +11,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from planner.campaign.frf_posterior import CLOSELY, FrfPosterior, fitted
+from planner.campaign.frf_posterior import CHAIN, FrfPosterior, fitted
 from planner.campaign.low_fidelity import PRIORS, Learned
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.extra_compliance import across, triple
@@ -20,7 +20,13 @@ from planner.diagnosis.linear.fit import Fit, Problem, glance
 from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.extended_structure import DAMPING_S, FLOOR, STIFFNESS, Structure, extended
+from planner.identification.extended_structure import (
+    DAMPING_S,
+    FLOOR,
+    STIFFNESS,
+    Structure,
+    extended,
+)
 from planner.identification.identify import QUICK, STAGES, identify
 from planner.identification.measured_frfs import common_band
 from planner.identification.parameters import place_name
@@ -28,12 +34,14 @@ from planner.identification.truncated_decay import cut_off
 from planner.robot.config import Compliance
 
 # χ² per value above which more structure is looked for: where nothing lacked on generated cells it
-# was 0.4 to 0.9, for hands and sensors are mostly better than their tolerances.
-FITS = 1.5
-PATIENT = replace(QUICK, stages=STAGES, lines=40, log_lines=24, log_steps=40, last_completions=0)
+# was 0.35 to 0.6, for hands and sensors are mostly better than their tolerances.
+FITS = 1.0
+PATIENT = replace(
+    QUICK, stages=STAGES, lines=32, last_lines=32, log_lines=24, log_steps=40, last_completions=0
+)
 SHORT = 0.1  # of the longest link: what is shorter does not bend
 BEND = 0.3  # of the joint's stiffness: the scale of a link's, whose prior is STIFFNESS times this
-FOLLOWED = 3  # resonators that are fitted to the end
+FOLLOWED, TRIED_STEPS = 3, 10  # places of a resonator that are tried, and in how many steps
 
 
 def learned_simulation(
@@ -92,7 +100,7 @@ def widened(structure: Structure) -> Structure:
     stated = robot.config.compliance[: len(robot.config.compliance) - structure.added]
     stiffest = max(block.stiffness for block in stated if not block.slide)
     ways = _links(structure.simulation)
-    longest = max(np.linalg.norm(way) for _, _, way in ways)
+    longest = max(float(np.linalg.norm(way)) for _, _, way in ways)
     listed = {place_name(block) for block in robot.config.compliance}
     springs = [_spring(FLOOR, np.eye(3)[2], stiffest)]
     springs += [_spring(FLOOR, a, stiffest / (2 * longest) ** 2, slide=True) for a in np.eye(3)]
@@ -139,9 +147,10 @@ def _spring(
 
 def _resonant(base: FrfPosterior) -> list[FrfPosterior]:
     """With something that swings on a link: the likeliest places, followed to the end."""
-    problem, misfit = base.problem, base.problem.misfit(Effect(""), CLOSELY)
-    x = base.z[: len(misfit.mean)]
+    problem, misfit, x = base.problem, base.objective.misfit, base.z[:-CHAIN]
     warm = Fit(Effect(""), misfit, x, misfit.by_pose(x))
     rough = [glance(problem, e, warm) for e in LocalResonator.everywhere(problem.simulation)]
     rough.sort(key=lambda f: f.per_value)
-    return [fitted(problem, f.effect, f.x) for f in rough[:FOLLOWED]]
+    tried = [fitted(problem, f.effect, f.x, TRIED_STEPS) for f in rough[:FOLLOWED]]
+    best = min(tried, key=lambda f: f.at.value)
+    return [fitted(problem, best.effect, best.z)]

@@ -162,6 +162,11 @@ class Model:
 
         return frf_model_of(self)
 
+    @property
+    def knows_frfs(self) -> bool:
+        """Whether `frf_model` was worked out already."""
+        return "frf_model" in vars(self)
+
     def _modal_frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs of the fused modes, and of those above them where a simulation knows them."""
         x, simulated = self.cell.features(q), self.low.simulate(q)

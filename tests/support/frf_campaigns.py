@@ -152,9 +152,9 @@ class FrfScore:
             mean, sd = predict(model)
         inside = np.abs(mean - case.true_frf) <= 2 * sd
         half = LINES // 2
-        simulation = model.low.simulation
-        alone = np.nan
-        if simulation is not None:
+        learned, alone = model.low.learned or model.low.suspect, np.nan
+        if learned is not None:
+            simulation = learned.identified.simulation
             alone = frac_of(case.true_frf, simulation.accelerance(case.unseen, case.lines_hz))
         found = metrics.agreement(case.true_frf, mean)
         return cls(
