@@ -103,7 +103,8 @@ class FrfModel:
         """FRFs at q (n, dof) in rad; `modal` gives those of the fused modes there, where needed."""
         found: list[tuple[float, Moments]] = []
         if self.simulated is not None and self.share > 0:
-            moments = self.simulated.response(q, frequency_hz)
+            mean, sd = self.simulated.response(q, frequency_hz)
+            moments = mean, np.hypot(sd, self.simulated.common_error * np.abs(mean))
             found.append((self.share, _widened(moments, self.simulated_error, frequency_hz)))
         if self.share < 1:
             moments = _widened(modal(), self.modal_error, frequency_hz)

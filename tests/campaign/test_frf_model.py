@@ -160,7 +160,7 @@ def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(bas
     mean, sd = model.frf(base.unseen[:1], base.lines_hz)
     stated = base.cell.simulation.accelerance(base.unseen[:1], base.lines_hz)
     low = base.lines_hz < 20
-    assert direct_mean(global_frac(stated[..., low], mean[..., low])) > 0.8
+    assert direct_mean(global_frac(stated[..., low], mean[..., low])) > 0.6
     assert np.all(sd > 0)
 
 
