@@ -29,6 +29,7 @@ def _frf_model(model: "Model") -> FrfModel:
     simulated = None
     if learned is not None:
         simulated = learned_simulation(learned, model.frfs, q, band)
+    if simulated is not None:
         measured = simulated.objective.misfit.measured
     else:
         seen = common_band(model.frfs, band)

@@ -19,6 +19,7 @@ from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.fit import Fit, Problem, glance
 from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.extended_structure import (
     DAMPING_S,
@@ -46,20 +47,25 @@ FOLLOWED, TRIED_STEPS = 3, 10  # places of a resonator that are tried, and in ho
 
 def learned_simulation(
     learned: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
-) -> FrfPosterior:
+) -> FrfPosterior | None:
     """From what was identified of FRFs at q (n, dof) in rad, to what explains them best.
 
-    By the evidence of each structure, χ² counting as the closest one's says.
+    By the evidence of each structure, χ² counting as the closest one's says. None where none of
+    them can be: the robot would not stand.
     """
     first, structure = learned.identified, learned.structure
     whole = completed(frfs, first.simulation, q)
     band = common_band(frfs, band_hz)
     problem = Problem(whole, q, structure.simulation, band, structure.priors)
-    found = [fitted(problem, Effect(""), first.mean)]
-    if found[0].misfit > FITS:
+    stated = fitted(problem, Effect(""), first.mean)
+    found = [stated]
+    if stated.misfit > FITS:
         found += _wider(structure, whole, q, band)
-    if min(f.misfit for f in found) > FITS:
-        found += _resonant(found[0])
+    if min(f.misfit for f in found) > FITS and np.isfinite(stated.misfit):
+        found += _resonant(stated)
+    found = [f for f in found if np.isfinite(f.misfit)]
+    if not found:
+        return None
     temper = min(f.temper for f in found)
     return max(found, key=lambda f: f.log_evidence(temper))
 
@@ -85,9 +91,12 @@ def _wider(
 ) -> list[FrfPosterior]:
     """With every spring that may be missing, from an identification that begins anew."""
     wide = widened(structure)
-    found = identify(
-        frfs, q, wide.simulation, wide.priors, band_hz=band_hz, starts=1, effort=PATIENT
-    )
+    try:
+        found = identify(
+            frfs, q, wide.simulation, wide.priors, band_hz=band_hz, starts=1, effort=PATIENT
+        )
+    except (InputError, ValueError):  # a search that ended nowhere: no candidate
+        return []
     problem = Problem(frfs, q, wide.simulation, band_hz, wide.priors)
     return [fitted(problem, Effect(""), found.mean)]
 
