@@ -122,7 +122,7 @@ class Campaign:
         state, configured = self.state, self._configured()
         key = _text(configured), state.model_version
         if key not in self._models:
-            name = model_cache.key("model", self.directory, configured, state.used)
+            name = self._model_name(configured, state)
             found = model_cache.kept_model(self._kept, name)
             if found is None:
                 found = self._fitted(state)
@@ -130,6 +130,9 @@ class Campaign:
             self._cells[key[0]] = found.cell  # with the candidates that were worked out for it
             self._models = {key: found}
         return self._models[key]
+
+    def _model_name(self, configured: Configured, state: CampaignState) -> str:
+        return model_cache.key("model", self.directory, configured, state.used)
 
     def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
         """What follows from the model, kept on disk: where it is, the model is not loaded.
@@ -232,8 +235,13 @@ class Campaign:
             Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N: response
             axis, then hit axis.
         """
-        lines = self.frequency_lines if frequency_hz is None else frequency_hz
-        return self.model.frf(np.atleast_2d(q_rad), lines)
+        lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
+        known = model.knows_frfs
+        found = model.frf(np.atleast_2d(q_rad), lines)
+        if not known:
+            name = self._model_name(self._configured(), self.state)
+            model_cache.keep_model(self._kept, name, model)
+        return found
 
     @property
     def frequency_lines(self) -> np.ndarray:

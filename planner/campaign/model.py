@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,6 +32,9 @@ from planner.surrogate.modal_surrogate import (
     fit_surrogate,
 )
 
+if TYPE_CHECKING:
+    from planner.campaign.frf_model import FrfModel
+
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
@@ -49,6 +53,7 @@ class Model:
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
     misses: tuple[PoseMisses, ...] = ()  # of the hits of each pose, where a simulation tells them
+    frfs: tuple[Frf, ...] = ()  # of the labelled poses
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad."""
@@ -142,9 +147,32 @@ class Model:
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N.
 
-        What modes above those modelled add is a simulation's that fits the recordings, else left
-        out.
+        sd is the root of E|H − mean|².
         """
+
+        def modal() -> tuple[np.ndarray, np.ndarray]:
+            return self._modal_frf(q, frequency_hz)
+
+        if self.frf_model is None:
+            return modal()
+        return self.frf_model.predict(q, frequency_hz, modal)
+
+    @cached_property
+    def frf_model(self) -> "FrfModel | None":
+        """How FRFs are predicted; None before one was measured. Worked out when asked for."""
+        if not self.frfs:
+            return None
+        from planner.campaign.frf_of_model import frf_model_of
+
+        return frf_model_of(self)
+
+    @property
+    def knows_frfs(self) -> bool:
+        """Whether `frf_model` was worked out already."""
+        return "frf_model" in vars(self)
+
+    def _modal_frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """FRFs of the fused modes, and of those above them where a simulation knows them."""
         x, simulated = self.cell.features(q), self.low.simulate(q)
         modes = self._predict(q, x, simulated, self.with_residues)
         mean, sd = frf_moments(modes, frequency_hz)
@@ -180,14 +208,13 @@ def build(
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself; they are
-    asked only where the simulation learns. Without the latter all hits count as exact.
+    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself, which is
+    asked only where the simulation learns. Without it all hits count as exact.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise, misses = None, ()
+    frfs, noise, misses = tuple(frf_of(m, table) for m in used), None, ()
     if cell.config.fidelity.simulation == "updated" and used:
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        frfs = tuple(frf_of(m, table) for m in used)
         low = learn(low, frfs, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(frfs, table.band_hz, misfit)
@@ -207,7 +234,8 @@ def build(
     surrogate = fit_surrogate(
         best.seen, primary=best.primary, residues=False, taught=best.low.taught
     )
-    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses)
+    kept = tuple(frf.within(table.band_hz) for frf in frfs)
+    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses, kept)
 
 
 @dataclass(frozen=True, eq=False)

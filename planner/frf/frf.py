@@ -1,6 +1,6 @@
 """The frequency response matrix of one pose."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,3 +38,22 @@ class Frf:
     def measured(self) -> np.ndarray:
         """(3,) bool: which columns (hit axes) were measured."""
         return np.array(self.hits) > 0
+
+    def within(self, band_hz: tuple[float, float]) -> "Frf":
+        """The same on the lines of a band only, edges included; two at least, to keep the spacing.
+
+        As it is where the band holds fewer.
+        """
+        low, high = band_hz
+        kept = (self.frequency_hz >= low) & (self.frequency_hz <= high)
+        if np.count_nonzero(kept) < 2:
+            return self
+        share = None if self.force_share is None else self.force_share[:, kept]
+        return replace(
+            self,
+            frequency_hz=self.frequency_hz[kept],
+            accelerance=self.accelerance[..., kept],
+            variance=self.variance[..., kept],
+            coherence=self.coherence[..., kept],
+            force_share=share,
+        )

@@ -1,0 +1,45 @@
+"""How a campaign's model predicts FRFs: simulation and fused modes of its measured poses."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from planner.campaign.frf_model import FrfModel, frf_model
+from planner.campaign.frf_posterior import closely
+from planner.campaign.frf_simulation import learned_simulation
+from planner.identification.measured_frfs import common_band, stack
+from planner.surrogate.frf_bands import ModalPrediction
+from planner.surrogate.left_out_modes import left_out_modes
+
+if TYPE_CHECKING:
+    from planner.campaign.model import Model
+
+
+def frf_model_of(model: "Model") -> FrfModel:
+    """From the FRFs of its poses and, where there is one, from what was identified of them."""
+    with threadpool_limits(1):
+        return _frf_model(model)
+
+
+def _frf_model(model: "Model") -> FrfModel:
+    q = np.array([pose.q for pose in model.labelled])
+    band = model.cell.config.modes.band_hz
+    learned = model.low.learned or model.low.suspect
+    simulated = None
+    if learned is not None:
+        simulated = learned_simulation(learned, model.frfs, q, band)
+    if simulated is not None:
+        measured = simulated.objective.misfit.measured
+    else:
+        seen = common_band(model.frfs, band)
+        grade = closely(len(q))
+        measured = stack(model.frfs, seen, grade.lines, grade.model_error)
+
+    def modes() -> ModalPrediction:
+        return left_out_modes(model.with_residues, model.seen)
+
+    def above(pose: int, frequency_hz: np.ndarray) -> np.ndarray:
+        return model.low.above(q[[pose]], frequency_hz)[0]
+
+    return frf_model(simulated, measured, band, modes, above)

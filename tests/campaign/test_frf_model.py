@@ -1,0 +1,182 @@
+"""FRFs of a campaign: what is left out says what to trust, and how far off FRFs are elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.campaign import frf_of_model
+from planner.campaign.campaign import Campaign
+from planner.campaign.frf_model import ErrorByZone, LeftOut, local_size, share_of
+from planner.campaign.frf_posterior import FrfPosterior
+from planner.campaign.frf_simulation import completed, widened
+from planner.campaign.low_fidelity import PRIORS
+from planner.dataset.store import Store
+from planner.demo import NAME, shipped
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.frf.metrics import direct_mean, global_frac
+from planner.identification.extended_structure import Structure
+from planner.identification.parameters import parametrise, place_name
+from planner.identification.truncated_decay import cut_off
+from planner.robot.robot import Robot
+from planner.surrogate.left_out_modes import left_out_modes
+from planner.surrogate.modal_surrogate import fit_surrogate
+from tests.support.frf_campaigns import FrfScore, make
+from tests.support.known_robots import KR210
+from tests.support.surrogates import observed
+
+BAND_HZ = 5.0, 50.0
+HERTZ = np.linspace(*BAND_HZ, 80)
+
+
+def left_out(rng, error: float, true: np.ndarray) -> LeftOut:
+    """A prediction that is off by `error` of its size, and nothing else known of it."""
+    noise = rng.standard_normal(true.shape) + 1j * rng.standard_normal(true.shape)
+    off = error / np.sqrt(2) * noise * local_size(true, HERTZ)
+    nothing, used = np.zeros(true.shape), np.ones(true.shape, dtype=bool)
+    return LeftOut(HERTZ, true, true + off, nothing, nothing, used)
+
+
+@pytest.fixture
+def true(rng):
+    return rng.standard_normal((3, 3, 80)) * np.exp(1j * HERTZ / 10)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(0)
+
+
+def test_the_error_of_poses_left_out_is_found_again(rng, true):
+    found = ErrorByZone.of([left_out(rng, 0.2, true) for _ in range(20)], BAND_HZ)
+    assert np.all(np.abs(found.at(HERTZ) / 0.2 - 1) < 0.15)
+
+
+def test_what_is_known_of_an_error_counts_once(rng, true):
+    poses = [left_out(rng, 0.2, true) for _ in range(20)]
+    known = [replace(p, known=(0.2 * local_size(true, HERTZ)) ** 2) for p in poses]
+    assert np.max(ErrorByZone.of(known, BAND_HZ).relative) < 0.06
+
+
+def test_the_better_of_two_predictions_has_the_larger_share(rng, true):
+    good, bad = ([left_out(rng, e, true) for _ in range(4)] for e in (0.02, 0.5))
+    assert share_of(good, bad) == 1.0
+    assert share_of(bad, good) < 0.3
+    assert 0.4 < share_of(bad, [left_out(rng, 0.5, true) for _ in range(4)]) < 0.8
+
+
+def test_modes_left_out_are_those_of_a_fit_without_the_pose():
+    seen = observed(8, 1)
+    found = left_out_modes(fit_surrogate(seen), seen)
+    for i in (0, 5):
+        kept = np.arange(8) != i
+        others = replace(
+            seen,
+            **{name: v[kept] for name, v in vars(seen).items()},
+        )
+        there = fit_surrogate(others).predict(seen.x[[i]], seen.simulated[[i]])
+        gap = np.abs(np.log(found.frequency_hz[i] / there.frequency_hz[0]))
+        assert np.all(gap < 0.6 * there.frequency_sd_hz[0] / there.frequency_hz[0])
+        size = np.abs(there.residue[0]).max()
+        np.testing.assert_allclose(found.residue[i], there.residue[0], atol=0.1 * size)
+
+
+def test_missing_modes_are_predicted_where_they_are_left_out():
+    seen = observed(6, 1)
+    seen.frequency_hz[2, 1] = np.nan
+    seen.residue[3, 0] = np.nan
+    found = left_out_modes(fit_surrogate(seen), seen)
+    assert all(np.all(np.isfinite(values)) for values in vars(found).values())
+
+
+def test_a_record_cut_off_is_completed(tmp_path):
+    simulation = Simulation(Robot.load(KR210.write(tmp_path)))
+    q, tail = KR210.poses(1, 3), 0.8
+    full = simulation.accelerance(q, HERTZ)
+    lost = cut_off(simulation.poles(q), 2j * np.pi * HERTZ[None], np.array([tail]))
+    unknown = np.full((3, 3, 80), np.nan)
+    cut = Frf(HERTZ, full[0] - lost[0], unknown, unknown, (1, 1, 1), BAND_HZ, tail_s=tail)
+    assert np.abs(lost).max() > 0.01 * np.abs(full).max()
+    (found,) = completed([cut], simulation, q)
+    np.testing.assert_allclose(found.accelerance, full[0], atol=1e-12 * np.abs(full).max())
+    assert found.tail_s == np.inf
+
+
+def test_a_wider_structure_lists_every_spring_once_and_can_be_identified(tmp_path):
+    simulation = Simulation(Robot.load(KR210.write(tmp_path)))
+    wide = widened(Structure(simulation, PRIORS))
+    places = [place_name(block) for block in wide.simulation.robot.config.compliance]
+    assert len(set(places)) == len(places)
+    assert {"base along x", "base along y", "base along z", "base about z"} <= set(places)
+    assert any(place.startswith("link_2 about") for place in places)
+    assert wide.added == len(places) - len(simulation.robot.config.compliance)
+    names = {p.name for p in parametrise(wide.simulation, wide.priors).parameters}
+    assert set(wide.priors.bounds) <= names
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory):
+    """A robot on a soft base that nobody knows of, hit as people hit; two poses."""
+    return make("kr210", "soft base", 1, tmp_path_factory.mktemp("base"), poses=2, unseen=4)
+
+
+def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base):
+    first, second = (FrfScore.of(base, base.model(n)) for n in (1, 2))
+    print(first, second)
+    assert second.frac > 0.995
+    assert second.frac > first.frac - 0.002
+    assert second.frac > second.alone
+    assert second.covered > 0.9
+    assert min(second.covered_low, second.covered_high) > 0.85
+
+
+def test_a_pose_is_predicted_without_its_own_frf(base):
+    model = base.model(2)
+    simulated = model.frf_model.simulated
+    assert isinstance(simulated, FrfPosterior)
+    for pose, measured in zip(simulated.left_out(), base.measurements, strict=True):
+        frf = base.frfs[measured.pose]
+        seen = np.isfinite(pose.noise_sd)
+        assert seen.any()
+        off = np.abs(pose.measured - pose.predicted)[seen]
+        assert np.mean(off <= 2 * np.hypot(pose.sd, 0.05 * np.abs(pose.measured))[seen]) > 0.8
+        assert pose.frequency_hz.min() >= frf.usable_band_hz[0]
+
+
+def test_without_a_simulation_frfs_are_those_of_fused_modes_and_less_sure(tmp_path):
+    case = make("kr210", "nothing", 2, tmp_path, poses=3, unseen=3, simulation="none")
+    model = case.model(3)
+    mean, sd = model.frf(case.unseen, case.lines_hz)
+    fused, fused_sd = model._modal_frf(case.unseen, case.lines_hz)
+    np.testing.assert_allclose(mean, fused)
+    assert np.all(sd > fused_sd)
+    assert np.mean(np.abs(mean - case.true_frf) <= 2 * sd) > 0.85
+
+
+def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(base):
+    model = base.model(0)
+    assert model.frf_model is None
+    mean, sd = model.frf(base.unseen[:1], base.lines_hz)
+    stated = base.cell.simulation.accelerance(base.unseen[:1], base.lines_hz)
+    low = base.lines_hz < 20
+    assert direct_mean(global_frac(stated[..., low], mean[..., low])) > 0.6
+    assert np.all(sd > 0)
+
+
+def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
+    source = shipped(NAME)
+    Campaign.new(tmp_path / "c", source / "robot" / "robot.toml", source / "campaign.toml")
+    store = Store(tmp_path / "models")
+    campaign = Campaign(tmp_path / "c", store)
+    campaign.import_paths((source / "recordings",), "A11")
+    q = campaign.cell.candidates.q[:1]
+    assert not campaign.model.knows_frfs
+    first = campaign.frf(q)
+
+    def refused(*given):
+        raise AssertionError("worked out again")
+
+    monkeypatch.setattr(frf_of_model, "frf_model_of", refused)
+    again = Campaign(tmp_path / "c", store).frf(q)
+    assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))

@@ -1,0 +1,169 @@
+"""Campaigns on true robots (MuJoCo) hit as people hit: FRFs predicted at poses never measured."""
+
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.cell import Cell
+from planner.campaign.config import config_from_builtins
+from planner.campaign.log_conversion import from_modal
+from planner.campaign.model import Model, build
+from planner.campaign.state import CampaignState, Measurement
+from planner.errors import RefusedError
+from planner.frf import metrics
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.modal.estimate_modes import estimate_modes
+from planner.recording.records import Hit
+from planner.truth.arms import ARMS
+from planner.truth.cases import DAMPING_S, EFFECTS, PEAK_N, SCATTER
+from planner.truth.handling import EVERYDAY, Handling, together
+from planner.truth.hits import AXES, Hammer
+from planner.truth.model import Truth, load_truth
+from planner.truth.scene import PULSE_S, Scene
+from planner.truth.secret import HitVisit, Secret, hit_poses
+
+# What a simulation lacks: an effect of the truth's library; "" nothing.
+LACKING = {
+    "nothing": "",
+    "soft base": "base_compliance",
+    "bending link": "link_flexibility",
+    "hose": "local_resonator",
+}
+MODES, LINES, REPEATS = 4, 300, 3
+
+
+@dataclass(frozen=True, eq=False)
+class FrfCase:
+    """Measured poses of a true robot in order, and FRFs (u, 3, 3, LINES) at q (u, 6) unseen."""
+
+    cell: Cell
+    measurements: tuple[Measurement, ...]
+    frfs: dict[str, Frf]
+    unseen: np.ndarray
+    lines_hz: np.ndarray
+    true_frf: np.ndarray
+
+    def frf_of(self, measurement: Measurement, _: object) -> Frf:
+        """As a campaign asks for it."""
+        return self.frfs[measurement.pose]
+
+    def model(self, n: int) -> Model:
+        """After the first n poses."""
+        used = {m.pose: m for m in self.measurements[:n]}
+        return build(self.cell, CampaignState(measurements=used, events=n), self.frf_of)
+
+    def models(self) -> Iterator[Model]:
+        """After each pose."""
+        return (self.model(n) for n in range(1, len(self.measurements) + 1))
+
+
+def make(
+    robot: str, lacking: str, seed: int, folder: Path, poses: int = 6, unseen: int = 8,
+    simulation: str = "updated", handling: Handling = EVERYDAY,
+) -> FrfCase:  # fmt: skip
+    """A robot of ARMS whose simulation lacks one of LACKING, hit at `poses` random poses."""
+    rng = np.random.default_rng([seed, zlib.crc32(f"{robot} {lacking}".encode())])
+    arm = replace(ARMS[robot], damping_s=DAMPING_S)
+    per_joint = int(rng.choice([1, 3]))
+    toml = arm.write(folder / "robot", per_joint)
+    low, high = np.deg2rad(np.array(arm.joints_deg)).T
+    q = rng.uniform(low, high, (poses, 6))
+    other = rng.uniform(low, high, (unseen, 6))
+    secret = Secret(replace(SCATTER, seed=int(rng.integers(2**31))))
+    if LACKING[lacking]:
+        scene = Scene(arm, load_truth(toml, secret.deviation), per_joint, q, PEAK_N[robot])
+        secret = EFFECTS[LACKING[lacking]](scene, secret, rng).secret
+    truth = load_truth(toml, secret.deviation)
+    hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
+    measurements, frfs = _measured(truth, secret, q, hammer, arm.band_hz, handling, rng)
+    table = {
+        "robot": str(toml),
+        "workspace": {"joints_deg": [list(r) for r in arm.joints_deg]},
+        "modes": {"count": MODES, "band_hz": list(arm.band_hz)},
+        "fidelity": {"simulation": simulation},
+        "acquisition": {"candidates": 50},
+    }
+    cell = Cell.load(toml, config_from_builtins(table))
+    lines = np.linspace(*arm.band_hz, LINES)
+    true = np.array([truth.accelerance(one, lines) for one in other])
+    return FrfCase(cell, measurements, frfs, other, lines, true)
+
+
+def _measured(
+    truth: Truth, secret: Secret, q: np.ndarray, hammer: Hammer, band_hz: tuple[float, float],
+    handling: Handling, rng: np.random.Generator,
+) -> tuple[tuple[Measurement, ...], dict[str, Frf]]:  # fmt: skip
+    """REPEATS hits an axis at each pose (n, 6), with errors of hand and chain."""
+    secret, common = replace(secret, chain=handling.chain(rng)), handling.common(rng)
+    axes = [axis for axis in range(3) for _ in range(REPEATS)]
+    shots = [(f"+{AXES[axis]}", hammer.peak_n) for axis in axes]
+    visits = []
+    for one in q:
+        there = one + np.deg2rad(handling.readback_deg) * rng.standard_normal(6)
+        own = zip(axes, handling.aims(axes, rng), strict=True)
+        aims = [together(common[axis], aim) for axis, aim in own]
+        visits.append(HitVisit(there, shots, aims=aims))
+    measurements, frfs = [], {}
+    for number, recorded in enumerate(hit_poses(truth, secret, visits, hammer, rng)):
+        rate = hammer.sampling_rate_hz
+        hits = tuple(
+            Hit(Path("hit"), h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True)
+            for h in recorded
+        )
+        name, frf = f"P{number + 1}", estimate(hits, band_hz)
+        try:
+            modes = from_modal(estimate_modes(frf, band_hz))
+        except RefusedError:
+            modes = ()
+        measurements.append(Measurement(name, tuple(np.rad2deg(q[number])), (), modes))
+        frfs[name] = frf
+    return tuple(measurements), frfs
+
+
+@dataclass(frozen=True)
+class FrfScore:
+    """How predicted FRFs compare with true ones: means over unseen poses.
+
+    `frac`: Global FRAC of the direct FRFs; `frobenius`; `covered`: share of lines of all nine FRFs
+    within 2 sd; `covered_low`, `covered_high`: of the lower and the upper half of the band;
+    `alone`: Global FRAC of the identified simulation by itself.
+    """
+
+    frac: float
+    frobenius: float
+    covered: float
+    covered_low: float
+    covered_high: float
+    alone: float
+
+    @classmethod
+    def of(
+        cls, case: FrfCase, model: Model,
+        predict: Callable[[Model], tuple[np.ndarray, np.ndarray]] | None = None,
+    ) -> "FrfScore":  # fmt: skip
+        """Of a model at the unseen poses."""
+        if predict is None:
+            mean, sd = model.frf(case.unseen, case.lines_hz)
+        else:
+            mean, sd = predict(model)
+        inside = np.abs(mean - case.true_frf) <= 2 * sd
+        half = LINES // 2
+        learned, alone = model.low.learned or model.low.suspect, np.nan
+        if learned is not None:
+            simulation = learned.identified.simulation
+            alone = frac_of(case.true_frf, simulation.accelerance(case.unseen, case.lines_hz))
+        found = metrics.agreement(case.true_frf, mean)
+        return cls(
+            metrics.direct_mean(found.global_frac), metrics.direct_mean(found.frobenius),
+            float(inside.mean()), float(inside[..., :half].mean()),
+            float(inside[..., half:].mean()), alone,
+        )  # fmt: skip
+
+
+def frac_of(true: np.ndarray, predicted: np.ndarray) -> float:
+    """Global FRAC of the direct FRFs."""
+    return metrics.direct_mean(metrics.agreement(true, predicted).global_frac)
