@@ -1,7 +1,7 @@
 """Identification of a simulation's springs from measured FRFs, in seconds."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,9 +11,10 @@ from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
+from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, stack
+from planner.identification.measurement_model import Tolerances
 from planner.identification.objective import TOO_SOFT, Objective, stands
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
@@ -21,6 +22,7 @@ from planner.inference.least_squares import Minimum, inverse, minimise
 from planner.robot.elastic_model import ElasticModel, Matrices
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
+OPENINGS = 4  # rounds at most, in which what hits leave open follows the fit
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
@@ -67,6 +69,15 @@ class Progress:
 
 
 @dataclass(frozen=True, eq=False)
+class _Refined:
+    """Where an identification ended, with χ² per real value, in all and of each pose (n,)."""
+
+    end: Minimum
+    misfit: float
+    by_pose: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class _Problem:
     """All that stays the same from start to start.
 
@@ -84,6 +95,7 @@ class _Problem:
     progress: Callable[[Progress], None] | None
     effort: Effort
     barrier: Barrier | None
+    tolerances: Tolerances | None
 
     @property
     def inertial(self) -> bool:
@@ -96,7 +108,9 @@ class _Problem:
         count = len(p.parameters)
         elastic = self.elastic.carried_by(p.elasticity(x[:count]).stiffness)
         inertias = p.inertias(elastic.body_jacobians(self.q))
-        there = replace(self, matrices=elastic.matrices(self.q), inertias=inertias)
+        there = replace(
+            self, matrices=_matrices(elastic, self.q, self.tolerances), inertias=inertias
+        )
         return there, np.concatenate([there.standing(x[:count]), x[count:]])
 
     def standing(self, theta: np.ndarray) -> np.ndarray:
@@ -117,6 +131,12 @@ class _Problem:
         measured = stack(self.frfs, band, lines, MODEL_ERROR)
         parts = self.matrices, self.inertias, self.parametrisation
         return Objective(measured, *parts, logarithmic, inertia, barrier=self.barrier)
+
+    def prepared(self, objective: Objective, x: np.ndarray, tail: bool) -> Objective:
+        """With what the records cut off (if they have a tail) and leave open, as it is at x."""
+        if tail:
+            objective = objective.completed(x, self.effort.sloped)
+        return objective if self.tolerances is None else objective.opened(x, self.tolerances)
 
     def minimise(
         self, objective: Objective, x: np.ndarray, start: int, stage: str, steps: int
@@ -143,6 +163,7 @@ def identify(
     warm: Identification | None = None,
     progress: Callable[[Progress], None] | None = None,
     effort: Effort = THOROUGH,
+    tolerances: Tolerances | None = None,
 ) -> Identification:
     """Springs (and, where their priors are not 0, inertias) that explain FRFs at poses q.
 
@@ -153,7 +174,9 @@ def identify(
     taken as they are. No more are tried once one has reached the noise, or the best two of three
     or more have met. A `warm`
     identification of the same parameters is refined alone where it still fits. `band_hz` is
-    robot.toml's unless given. Raises InputError where FRFs and poses do not fit together.
+    robot.toml's unless given. What `tolerances` leave open of hits, measuring chain and readback
+    is integrated out; without them all are exact. Raises InputError where FRFs and poses do not
+    fit together.
     """
     started = time.perf_counter()
     q = np.atleast_2d(np.asarray(q, dtype=float))
@@ -162,8 +185,9 @@ def identify(
     p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
     inertias = p.inertias(elastic.body_jacobians(q))
     barrier = Barrier.around(elastic.inertia, p)
+    matrices = _matrices(elastic, q, tolerances)
     problem = _Problem(
-        tuple(frfs), q, elastic, band, elastic.matrices(q), inertias, p, progress, effort, barrier
+        tuple(frfs), q, elastic, band, matrices, inertias, p, progress, effort, barrier, tolerances
     )
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
@@ -172,6 +196,10 @@ def identify(
         best = _refine(*problem.carried(x))
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
+
+
+def _matrices(elastic: ElasticModel, q: np.ndarray, tolerances: Tolerances | None) -> Matrices:
+    return elastic.matrices(q) if tolerances is None else elastic.with_slopes(q)
 
 
 def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
@@ -183,21 +211,26 @@ def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
         )
 
 
-def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) -> np.ndarray:
-    """θ (k, P): the prior's median, then quasi-random between the bounds; or those given."""
+def _starting_points(
+    p: Parametrisation, starts: int | np.ndarray, seed: int
+) -> Iterator[np.ndarray]:
+    """θ (P,): the prior's median, then quasi-random between the bounds; or those given."""
     if not isinstance(starts, int):
-        return p.near(np.log(np.atleast_2d(starts)))
-    if starts == 1:
-        return p.mean[None]
-    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+        yield from p.near(np.log(np.atleast_2d(starts)))
+        return
+    yield p.mean
+    if starts > 1:
+        from scipy.stats import qmc  # scipy.stats takes most of a second to import
 
-    lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
-    sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
-    unit = sampler.random_base2(int(np.ceil(np.log2(starts))))[: starts - 1]
-    return np.vstack([p.mean, lower + unit * (upper - lower)])
+        lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
+        sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
+        unit = sampler.random_base2(int(np.ceil(np.log2(starts))))[: starts - 1]
+        yield from lower + unit * (upper - lower)
 
 
-def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
+def _search(
+    problem: _Problem, points: Iterable[np.ndarray]
+) -> tuple[np.ndarray, tuple[float, ...]]:
     """Best (θ, φ) of all starts, and the misfit of each."""
     found: list[Minimum] = []
     misfits: list[float] = []
@@ -233,51 +266,55 @@ def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
 def _plain(
     problem: _Problem, x: np.ndarray, number: int, lines: int, stage: str, completions: int
 ) -> tuple[Minimum, Objective]:
-    """Least plain residual from x; what the records lack is filled in again and again."""
+    """Least plain residual from x; what the records lack is filled in again and again.
+
+    So is what the measurement leaves open, both as they are where the last round ended.
+    """
     objective = problem.objective(1.0, lines, inertia=problem.inertial)
     tail = bool(np.isfinite(objective.measured.tail_s).any())
-    sloped = problem.effort.sloped
-    objective = objective.completed(x, sloped) if tail else objective
+    objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    for _ in range(completions if tail else 0):
-        objective = objective.completed(end.x, sloped)
+    rounds = max(completions if tail else 0, OPENINGS if problem.tolerances else 0)
+    for _ in range(rounds):
+        objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
         moved = end.x - before
         # Where the misfit exceeds the noise, so do the sds in which a move counts.
         settled = SETTLED * max(1.0, end.at.chi2 / max(objective.count, 1))
-        if objective.completion is None or moved @ end.at.normal @ moved < settled:
+        fixed = objective.completion is None and objective.left_open is None
+        if fixed or moved @ end.at.normal @ moved < settled:
             break
     return end, objective
 
 
-def _refine(problem: _Problem, x: np.ndarray) -> tuple[Minimum, float]:
-    """Minimum over springs and inertias on all lines from (θ, φ), and its misfit."""
+def _refine(problem: _Problem, x: np.ndarray) -> _Refined:
+    """Minimum over springs and inertias on all lines from (θ, φ)."""
     effort = problem.effort
     end, objective = _plain(problem, x, 0, effort.last_lines, "all lines", effort.last_completions)
-    return end, end.at.chi2 / max(objective.count, 1)
+    return _Refined(end, end.at.chi2 / max(objective.count, 1), objective.by_pose(end.x))
 
 
-def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | None:
+def _warm(problem: _Problem, warm: Identification) -> _Refined | None:
     """Refined from an earlier identification; None where that leads to a much worse misfit."""
     p = problem.parametrisation
     known = {e.name: np.log(e.value) for e in warm.estimates}
     known |= dict(zip(warm.nuisances, warm.mean[len(warm.estimates) :], strict=True))
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
-    end, misfit = _refine(*problem.carried(np.array([*p.near(np.array(theta)), *phi])))
-    good = misfit < STILL_GOOD * max(warm.misfit, 1.0)
-    return (end, misfit) if good or not problem.effort.doubtful else None
+    found = _refine(*problem.carried(np.array([*p.near(np.array(theta)), *phi])))
+    good = found.misfit < STILL_GOOD * max(warm.misfit, 1.0)
+    return found if good or not problem.effort.doubtful else None
 
 
 def _result(
     problem: _Problem,
     simulation: Simulation,
     q: np.ndarray,
-    best: tuple[Minimum, float],
+    best: _Refined,
     starts: tuple[float, ...],
     seconds: float,
 ) -> Identification:
-    end, misfit = best
+    end, misfit = best.end, best.misfit
     p, count = problem.parametrisation, len(problem.parametrisation.parameters)
     prior = np.asarray(block_diag(p.precision, np.eye(len(p.nuisances))))
     # Where the misfit is above the noise, the noise is at least as large as the misfit.
@@ -293,7 +330,7 @@ def _result(
         covariance,
         misfit,
         round(end.at.chi2 / misfit),
-        residuals(fitted, problem.frfs, q, problem.band_hz).by_pose,
+        best.by_pose,
         fit_similarity(fitted, problem.frfs, q, problem.band_hz),
         undetermined(p, covariance),
         starts,

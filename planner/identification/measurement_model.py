@@ -52,7 +52,8 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-OPEN = 26  # numbers a pose: 4 of each hit axis, 14 of the chain; one more of each joint
+HIT_NUMBERS = 12  # of a pose: 4 of each hit axis
+OPEN = HIT_NUMBERS + 14  # with those of the chain; one more of each joint
 
 
 def hit_basis(
@@ -102,10 +103,10 @@ def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.nda
     joints = 0 if turned.by_angle is None else turned.by_angle.shape[1]
     # All is written once, in place: such arrays are large.
     out = np.zeros((n, OPEN + joints, 3, 3, lines), dtype=complex)
-    by_axis = out[:, :12].reshape(n, 3, 4, 3, 3, lines)
+    by_axis = out[:, :HIT_NUMBERS].reshape(n, 3, 4, 3, 3, lines)
     # A miss along an axis changes the column of that axis only: a view of these.
     hit_basis(h, turned.moment, t, np.einsum("namiaf->namif", by_axis))
-    chain_basis(h, turned.turning, s, t, out[:, 12:OPEN])
+    chain_basis(h, turned.turning, s, t, out[:, HIT_NUMBERS:OPEN])
     if turned.by_angle is not None:
         np.multiply(turned.by_angle, t.joint_rad, out=out[:, OPEN:])
     return out
@@ -135,3 +136,70 @@ def marginal(residual: np.ndarray, jacobian: np.ndarray, b: np.ndarray) -> Margi
         2 * float(np.sum(np.log(np.diagonal(factor)))),
         np.linalg.solve(factor.T, r),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Integrated:
+    """χ² with all η integrated out, in all and of each pose (n,); half gradient, and normal."""
+
+    chi2: float
+    gradient: np.ndarray
+    normal: np.ndarray
+    by_pose: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOpen:
+    """B of n poses, weighted, as it is somewhere and held there: what a hit does hardly changes.
+
+    `own` (l, m) of each pose is whitened, so that integrating out subtracts the square of what is
+    projected on it; `common` (k, m) are numbers that all poses share: the chain of a campaign.
+    Were B to follow the parameters, larger FRFs would seem to fit better, having larger B.
+    """
+
+    own: tuple[np.ndarray, ...]
+    common: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, weighted: np.ndarray) -> "LeftOpen":
+        """Of `basis` (n, 26 + dof, 3, 3, F) times the weight of the residuals."""
+        own, common = [], []
+        for pose in weighted:
+            chain = slice(HIT_NUMBERS, OPEN)
+            mine = _real(np.concatenate([pose[:HIT_NUMBERS], pose[OPEN:]]))
+            factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
+            own.append(np.linalg.solve(factor, mine))
+            common.append(_real(pose[chain]))
+        return cls(tuple(own), tuple(common))
+
+    def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
+        """Of residuals (n, 3, 3, F) and their derivatives (n, d, 3, 3, F), both weighted."""
+        d, k = slope.shape[1], len(self.common[0])
+        chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
+        whole, shared = np.zeros((d + k, d + k)), np.empty((len(residual), k, k))
+        for i, (own, common) in enumerate(zip(self.own, self.common, strict=True)):
+            r, j = _real(residual[i][None])[0], np.concatenate([_real(slope[i]), common])
+            onto, moved = own @ r, own @ j.T
+            chi2[i] = r @ r - onto @ onto
+            gradients[i] = j @ r - moved.T @ onto
+            normal = j @ j.T - moved.T @ moved
+            shared[i] = normal[d:, d:]
+            whole += normal
+        pull = gradients.sum(axis=0)
+        # The common numbers at their best, and what that takes from all else.
+        solved = np.linalg.solve(
+            whole[d:, d:] + np.eye(k), np.column_stack([pull[d:], whole[d:, :d]])
+        )
+        eta, across = -solved[:, 0], solved[:, 1:]
+        by_pose = chi2 + 2 * gradients[:, d:] @ eta + np.einsum("nij,i,j->n", shared, eta, eta)
+        return Integrated(
+            float(chi2.sum() + pull[d:] @ eta),
+            pull[:d] + whole[:d, d:] @ eta,
+            whole[:d, :d] - whole[:d, d:] @ across,
+            by_pose,
+        )
+
+
+def _real(values: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts (l, 2 · 9F) of values (l, 3, 3, F)."""
+    return np.ascontiguousarray(values).reshape(len(values), -1).view(float)
