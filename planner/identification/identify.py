@@ -264,15 +264,23 @@ def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
 
 
 def _plain(
-    problem: _Problem, x: np.ndarray, number: int, lines: int, stage: str, completions: int
+    problem: _Problem,
+    x: np.ndarray,
+    number: int,
+    lines: int,
+    stage: str,
+    completions: int,
+    near: bool = False,
 ) -> tuple[Minimum, Objective]:
     """Least plain residual from x; what the records lack is filled in again and again.
 
-    So is what the measurement leaves open, both as they are where the last round ended.
+    So is what the measurement leaves open, both as they are where the last round ended. Where x is
+    `near`, what the data tell of hits and chain there can be believed from the first round.
     """
     objective = problem.objective(1.0, lines, inertia=problem.inertial)
     tail = bool(np.isfinite(objective.measured.tail_s).any())
-    objective = problem.prepared(objective, x, tail)
+    for _ in range(2 if near and problem.tolerances else 1):
+        objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
     rounds = max(completions if tail else 0, OPENINGS if problem.tolerances else 0)
     for _ in range(rounds):
@@ -290,7 +298,9 @@ def _plain(
 def _refine(problem: _Problem, x: np.ndarray) -> _Refined:
     """Minimum over springs and inertias on all lines from (θ, φ)."""
     effort = problem.effort
-    end, objective = _plain(problem, x, 0, effort.last_lines, "all lines", effort.last_completions)
+    end, objective = _plain(
+        problem, x, 0, effort.last_lines, "all lines", effort.last_completions, near=True
+    )
     return _Refined(end, end.at.chi2 / max(objective.count, 1), objective.by_pose(end.x))
 
 

@@ -53,7 +53,8 @@ class Tolerances:
 
 
 HIT_NUMBERS = 12  # of a pose: 4 of each hit axis
-OPEN = HIT_NUMBERS + 14  # with those of the chain; one more of each joint
+CHAIN_NUMBERS = 14
+OPEN = HIT_NUMBERS + CHAIN_NUMBERS  # and one more of each joint
 
 
 def hit_basis(
@@ -149,36 +150,63 @@ class Integrated:
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOpen:
-    """B of n poses, weighted, as it is somewhere and held there: what a hit does hardly changes.
+class Told:
+    """Estimates, in sds: `own` (n, 12 + dof) of each pose's hits and joints, `chain` (14,)."""
 
-    `own` (l, m) of each pose is whitened, so that integrating out subtracts the square of what is
-    projected on it; `common` (k, m) are numbers that all poses share: the chain of a campaign.
-    Were B to follow the parameters, larger FRFs would seem to fit better, having larger B.
+    own: np.ndarray
+    chain: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOpen:
+    """B of n poses, weighted, as it is somewhere and held there.
+
+    `own` (l, m) of each pose is whitened (by `factor`), so that integrating out subtracts the
+    square of what is projected on it; `common` (14, m) is of numbers that all poses share: the
+    chain of a campaign. `crossed` (n, 3, 3, F), weighted, is what goes beyond first order. Were B
+    to follow the parameters, larger FRFs would seem to fit better, having larger B.
     """
 
     own: tuple[np.ndarray, ...]
+    factor: tuple[np.ndarray, ...]
     common: tuple[np.ndarray, ...]
+    crossed: np.ndarray
 
     @classmethod
-    def of(cls, weighted: np.ndarray) -> "LeftOpen":
-        """Of `basis` (n, 26 + dof, 3, 3, F) times the weight of the residuals."""
-        own, common = [], []
-        for pose in weighted:
-            chain = slice(HIT_NUMBERS, OPEN)
+    def at(
+        cls,
+        h: np.ndarray,
+        turned: Turned,
+        s: np.ndarray,
+        weight: np.ndarray,
+        tolerances: Tolerances,
+        told: Told | None = None,
+    ) -> "LeftOpen":
+        """Of accelerances h (n, 3, 3, F) and the weight of residuals.
+
+        With `told`, what the chain makes of hits that miss, of second order, is that of these
+        estimates. (B itself must not follow them: it would then be fitted to the same noise.)
+        """
+        made = basis(h, turned, s, tolerances)
+        crossed = np.zeros_like(h) if told is None else _crossed(made, turned, s, tolerances, told)
+        made *= weight[:, None]
+        own, factors, common = [], [], []
+        for pose in made:
             mine = _real(np.concatenate([pose[:HIT_NUMBERS], pose[OPEN:]]))
             factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
             own.append(np.linalg.solve(factor, mine))
-            common.append(_real(pose[chain]))
-        return cls(tuple(own), tuple(common))
+            factors.append(factor)
+            common.append(_real(pose[HIT_NUMBERS:OPEN]))
+        return cls(tuple(own), tuple(factors), tuple(common), weight * crossed)
 
     def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
         """Of residuals (n, 3, 3, F) and their derivatives (n, d, 3, 3, F), both weighted."""
-        d, k = slope.shape[1], len(self.common[0])
+        residual = residual + self.crossed
+        d, k = slope.shape[1], CHAIN_NUMBERS
         chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
         whole, shared = np.zeros((d + k, d + k)), np.empty((len(residual), k, k))
         for i, (own, common) in enumerate(zip(self.own, self.common, strict=True)):
-            r, j = _real(residual[i][None])[0], np.concatenate([_real(slope[i]), common])
+            r, j = _real(residual[i, None])[0], np.concatenate([_real(slope[i]), common])
             onto, moved = own @ r, own @ j.T
             chi2[i] = r @ r - onto @ onto
             gradients[i] = j @ r - moved.T @ onto
@@ -187,9 +215,8 @@ class LeftOpen:
             whole += normal
         pull = gradients.sum(axis=0)
         # The common numbers at their best, and what that takes from all else.
-        solved = np.linalg.solve(
-            whole[d:, d:] + np.eye(k), np.column_stack([pull[d:], whole[d:, :d]])
-        )
+        right = np.column_stack([pull[d:], whole[d:, :d]])
+        solved = np.linalg.solve(whole[d:, d:] + np.eye(k), right)
         eta, across = -solved[:, 0], solved[:, 1:]
         by_pose = chi2 + 2 * gradients[:, d:] @ eta + np.einsum("nij,i,j->n", shared, eta, eta)
         return Integrated(
@@ -198,6 +225,34 @@ class LeftOpen:
             whole[:d, :d] - whole[:d, d:] @ across,
             by_pose,
         )
+
+    def told(self, residual: np.ndarray) -> Told:
+        """What weighted residuals (n, 3, 3, F) tell of the numbers."""
+        flat = _real(residual + self.crossed)
+        whole, pull = np.eye(CHAIN_NUMBERS), np.zeros(CHAIN_NUMBERS)
+        for own, common, r in zip(self.own, self.common, flat, strict=True):
+            moved = own @ common.T
+            whole += common @ common.T - moved.T @ moved
+            pull += common @ r - moved.T @ (own @ r)
+        chain = -np.linalg.solve(whole, pull)
+        left = [
+            -np.linalg.solve(factor.T, own @ (r + chain @ common))
+            for own, factor, common, r in zip(self.own, self.factor, self.common, flat, strict=True)
+        ]
+        return Told(np.array(left), chain)
+
+
+def _crossed(
+    made: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances, told: Told
+) -> np.ndarray:
+    """Of second order (n, 3, 3, F): what the chain makes of the misses, both as they are told."""
+    hits, joints = made[:, :HIT_NUMBERS], made[:, OPEN:]
+    missed = np.einsum("nl,nlijf->nijf", told.own[:, :HIT_NUMBERS], hits)
+    missed += np.einsum("nl,nlijf->nijf", told.own[:, HIT_NUMBERS:], joints)
+    turns = hit_basis(turned.turning, turned.twisting, t)
+    numbers = told.own[:, :HIT_NUMBERS].reshape(-1, 3, 4)
+    turning = np.einsum("nam,namif->niaf", numbers, turns)
+    return np.einsum("k,nkijf->nijf", told.chain, chain_basis(missed, turning, s, t))
 
 
 def _real(values: np.ndarray) -> np.ndarray:

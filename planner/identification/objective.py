@@ -14,7 +14,7 @@ from scipy.linalg import block_diag
 from planner.dynamics.gradient import Inertias, response_gradient, response_turned
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Integrated, LeftOpen, Tolerances, basis
+from planner.identification.measurement_model import Integrated, LeftOpen, Tolerances
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
 from planner.inference.least_squares import Quadratic
@@ -78,13 +78,19 @@ class Objective:
         return replace(self, completion=made, completed_at=x)
 
     def opened(self, x: np.ndarray, tolerances: Tolerances) -> "Objective":
-        """With what these tolerances of hits, chain and readback leave open, as it is at x."""
+        """With what these tolerances of hits, chain and readback leave open, as it is at x.
+
+        To second order, by what the data tell of it there, if it was opened before.
+        """
         p, count, s = self.parametrisation, len(self.parametrisation.parameters), self.measured.s
         springs, mass = p.elasticity(x[:count]), self._mass(x[count:])
         h, turned = response_turned(self.matrices, springs, s, mass)
-        weighted = basis(h, turned, s, tolerances)
-        weighted *= weight_of(self.measured, False)[:, None]
-        return replace(self, left_open=LeftOpen.of(weighted))
+        weight = weight_of(self.measured, False)
+        told = None
+        if self.left_open is not None:
+            lost = 0.0 if self.completion is None else self.completion.values
+            told = self.left_open.told(weight * (h - lost - self.measured.accelerance))
+        return replace(self, left_open=LeftOpen.at(h, turned, s, weight, tolerances, told))
 
     def by_pose(self, x: np.ndarray) -> np.ndarray:
         """χ² per real value (n,) of each pose at x, where that can be."""
