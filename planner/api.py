@@ -36,7 +36,7 @@ from planner.report.modal_analysis import DEFAULT_BAND_HZ, check_options, source
 from planner.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from planner.identification.identify import Progress
+    from planner.identification.staged_problem import Progress
 
 
 def analyse(

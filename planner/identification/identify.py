@@ -2,33 +2,29 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity
+from planner.identification.agreement import MOST_LINES, fit_similarity
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.measured_frfs import common_band, stack
+from planner.identification.measured_frfs import common_band
 from planner.identification.measurement_model import Tolerances
-from planner.identification.objective import TOO_SOFT, Objective, stands
+from planner.identification.objective import Objective
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
-from planner.inference.least_squares import Minimum, inverse, minimise
-from planner.robot.elastic_model import ElasticModel, Matrices
+from planner.identification.staged_problem import Progress, StagedProblem, matrices_for
+from planner.inference.least_squares import Minimum, inverse
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 OPENINGS = 4  # rounds at most, in which what hits leave open follows the fit
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
-LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
-STIFFER = float(np.log(1.5))  # by which the springs of a start grow until they carry the weight
-STIFFEST = 20  # such steps: a factor of 3,000
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
 
 
@@ -58,16 +54,6 @@ QUICK = Effort(
 )
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where an identification is: start (from 1), stage in words, iteration, misfit so far."""
-
-    start: int
-    stage: str
-    iteration: int
-    misfit: float
-
-
 @dataclass(frozen=True, eq=False)
 class _Refined:
     """Where an identification ended, with χ² per real value, in all and of each pose (n,)."""
@@ -75,80 +61,6 @@ class _Refined:
     end: Minimum
     misfit: float
     by_pose: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class _Problem:
-    """All that stays the same from start to start.
-
-    Matrices depend on the springs only in that these carry the weight: they are those of
-    robot.toml's until a search has found better ones.
-    """
-
-    frfs: tuple[Frf, ...]
-    q: np.ndarray
-    elastic: ElasticModel
-    band_hz: tuple[float, float]
-    matrices: Matrices
-    inertias: Inertias
-    parametrisation: Parametrisation
-    progress: Callable[[Progress], None] | None
-    effort: Effort
-    barrier: Barrier | None
-    tolerances: Tolerances | None
-
-    @property
-    def inertial(self) -> bool:
-        """Whether inertias are identified too."""
-        return bool(self.parametrisation.nuisances)
-
-    def carried(self, x: np.ndarray) -> tuple["_Problem", np.ndarray]:
-        """The same where the springs at x = (θ, φ) carry the weight, and x, made to stand there."""
-        p = self.parametrisation
-        count = len(p.parameters)
-        elastic = self.elastic.carried_by(p.elasticity(x[:count]).stiffness)
-        inertias = p.inertias(elastic.body_jacobians(self.q))
-        there = replace(
-            self, matrices=_matrices(elastic, self.q, self.tolerances), inertias=inertias
-        )
-        return there, np.concatenate([there.standing(x[:count]), x[count:]])
-
-    def standing(self, theta: np.ndarray) -> np.ndarray:
-        """θ (P,) with all springs as much stiffer as it takes to carry the robot's weight."""
-        p = self.parametrisation
-        stiffer = STIFFER * np.array([x.kind == "stiffness" for x in p.parameters])
-        for steps in range(STIFFEST + 1):
-            tried = p.near(theta + steps * stiffer)
-            if stands(self.matrices, p.elasticity(tried).stiffness):
-                return theta if steps == 0 else tried
-        raise InputError(TOO_SOFT)
-
-    def objective(
-        self, share: float, lines: int, logarithmic: bool = False, inertia: bool = False
-    ) -> Objective:
-        low, high = self.band_hz
-        band = low, low + share * (high - low)
-        measured = stack(self.frfs, band, lines, MODEL_ERROR)
-        parts = self.matrices, self.inertias, self.parametrisation
-        return Objective(measured, *parts, logarithmic, inertia, barrier=self.barrier)
-
-    def prepared(self, objective: Objective, x: np.ndarray, tail: bool) -> Objective:
-        """With what the records cut off (if they have a tail) and leave open, as it is at x."""
-        if tail:
-            objective = objective.completed(x, self.effort.sloped)
-        return objective if self.tolerances is None else objective.opened(x, self.tolerances)
-
-    def minimise(
-        self, objective: Objective, x: np.ndarray, start: int, stage: str, steps: int
-    ) -> Minimum:
-        count, tell = max(objective.count, 1), self.progress
-
-        def told(iteration: int, value: float) -> None:
-            assert tell is not None
-            tell(Progress(start, stage, iteration, 2 * value / count))
-
-        tolerance = LOG_TOLERANCE if objective.logarithmic else self.effort.tolerance
-        return minimise(objective, x, tolerance, steps, told if tell else None)
 
 
 def identify(
@@ -185,8 +97,8 @@ def identify(
     p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
     inertias = p.inertias(elastic.body_jacobians(q))
     barrier = Barrier.around(elastic.inertia, p)
-    matrices = _matrices(elastic, q, tolerances)
-    problem = _Problem(
+    matrices = matrices_for(elastic, q, tolerances)
+    problem = StagedProblem(
         tuple(frfs), q, elastic, band, matrices, inertias, p, progress, effort, barrier, tolerances
     )
     best = None if warm is None else _warm(problem, warm)
@@ -196,10 +108,6 @@ def identify(
         best = _refine(*problem.carried(x))
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
-
-
-def _matrices(elastic: ElasticModel, q: np.ndarray, tolerances: Tolerances | None) -> Matrices:
-    return elastic.matrices(q) if tolerances is None else elastic.with_slopes(q)
 
 
 def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
@@ -229,7 +137,7 @@ def _starting_points(
 
 
 def _search(
-    problem: _Problem, points: Iterable[np.ndarray]
+    problem: StagedProblem, points: Iterable[np.ndarray]
 ) -> tuple[np.ndarray, tuple[float, ...]]:
     """Best (θ, φ) of all starts, and the misfit of each."""
     found: list[Minimum] = []
@@ -248,7 +156,7 @@ def _search(
     return best.x, tuple(misfits)
 
 
-def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
+def _approach(problem: StagedProblem, theta: np.ndarray, number: int) -> np.ndarray:
     """(θ, φ) from where the plain residual leads home: logarithms in bands that widen."""
     low, high = problem.band_hz
     effort = problem.effort
@@ -264,7 +172,7 @@ def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
 
 
 def _plain(
-    problem: _Problem,
+    problem: StagedProblem,
     x: np.ndarray,
     number: int,
     lines: int,
@@ -295,7 +203,7 @@ def _plain(
     return end, objective
 
 
-def _refine(problem: _Problem, x: np.ndarray) -> _Refined:
+def _refine(problem: StagedProblem, x: np.ndarray) -> _Refined:
     """Minimum over springs and inertias on all lines from (θ, φ)."""
     effort = problem.effort
     end, objective = _plain(
@@ -304,7 +212,7 @@ def _refine(problem: _Problem, x: np.ndarray) -> _Refined:
     return _Refined(end, end.at.chi2 / max(objective.count, 1), objective.by_pose(end.x))
 
 
-def _warm(problem: _Problem, warm: Identification) -> _Refined | None:
+def _warm(problem: StagedProblem, warm: Identification) -> _Refined | None:
     """Refined from an earlier identification; None where that leads to a much worse misfit."""
     p = problem.parametrisation
     known = {e.name: np.log(e.value) for e in warm.estimates}
@@ -317,7 +225,7 @@ def _warm(problem: _Problem, warm: Identification) -> _Refined | None:
 
 
 def _result(
-    problem: _Problem,
+    problem: StagedProblem,
     simulation: Simulation,
     q: np.ndarray,
     best: _Refined,
