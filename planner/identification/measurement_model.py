@@ -43,7 +43,8 @@ class Tolerances:
         return cls(
             np.deg2rad(hits.angle_sd_deg), 1e-3 * hits.offset_sd_mm, sensor.gain_sd_percent / 100,
             sensor.cross_axis_sd_percent / 100, np.deg2rad(sensor.mounting_sd_deg),
-            1e-3 * sensor.position_sd_mm, joint_rad=np.deg2rad(readback.joint_sd_deg),
+            1e-3 * sensor.position_sd_mm, sensor.force_gain_sd_percent / 100,
+            joint_rad=np.deg2rad(readback.joint_sd_deg),
         )  # fmt: skip
 
     @property
