@@ -20,7 +20,8 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.identification.extended_structure import Structure, extended
 from planner.identification.held_out import identify_judged
-from planner.identification.parameters import Priors
+from planner.identification.measurement_model import Tolerances
+from planner.identification.parameters import CAD_INERTIAS, Priors
 from planner.modal.estimate_modes import estimate_modes
 from planner.modal.modes import ModalModel
 from planner.progress import Tell, quietly
@@ -35,10 +36,7 @@ from planner.report.modal_analysis import DEFAULT_BAND_HZ, check_options, source
 from planner.robot.robot import Robot
 
 if TYPE_CHECKING:
-    from planner.identification.identify import Progress
-
-# What the inertial parameters of a CAD model err by (relative sds, and metres).
-INERTIAS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
+    from planner.identification.staged_problem import Progress
 
 
 def analyse(
@@ -110,13 +108,14 @@ def identify(
 ) -> IdentificationReport:
     """Fit the elastic parameters of a robot's simulation to recorded FRFs of several poses.
 
-    The fit is judged at poses held out, and then done again with all of them.
+    The fit is judged at poses held out, and then done again with all of them. What hits, measuring
+    chain and readback leave open, as robot.toml states it, is integrated out.
 
     Args:
         dataset: FRFs at q (n, dof) in rad.
         robot: The robot whose [[compliance]] blocks are fitted.
         band_hz: Which part of the FRFs is fitted; by default robot.toml's.
-        inertias: Whether masses and inertias may err by 5 %, centres of mass by 1 cm.
+        inertias: Whether masses and inertias may err by 8 %, centres of mass by 1 cm.
         extend: Whether tilts of joints and floor that robot.toml leaves out are added.
         held_out: How many poses to judge by; by default one of four.
         starts: Starting points at most.
@@ -133,15 +132,17 @@ def identify(
     """
     started, band = time.perf_counter(), band_hz or robot.config.band_hz
     check_options(band_hz)
-    nominal, priors = Simulation(robot), INERTIAS if inertias else Priors()
+    nominal, priors = Simulation(robot), CAD_INERTIAS if inertias else Priors()
     with threadpool_limits(1):
         fitted = extended(nominal, priors) if extend else Structure(nominal, priors)
         judged = identify_judged(
-            dataset.frfs,
+            dataset.one_hit_frfs,
             dataset.q,
             fitted.simulation,
             fitted.priors,
             held_out,
+            dataset.frfs,
+            tolerances=Tolerances.of(robot.config),
             band_hz=band,
             starts=starts,
             seed=seed,

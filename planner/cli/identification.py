@@ -19,7 +19,7 @@ def identify(
         Path | None, typer.Option(metavar="ROBOT_TOML", help="Write the identified robot here.")
     ] = None,
     inertias: Annotated[
-        bool, typer.Option(help="Let masses and inertias err by 5 %, centres of mass by 1 cm.")
+        bool, typer.Option(help="Let masses and inertias err by 8 %, centres of mass by 1 cm.")
     ] = True,
     extend: Annotated[
         bool,

@@ -231,6 +231,18 @@ class Dataset:
         return _known(entry.measured.ended_frf for entry in self.measured)
 
     @property
+    def one_hit_frfs(self) -> tuple[Frf, ...]:
+        """The same, each of one hit in the middle of all, with the variance of the noise alone.
+
+        For fits that integrate over how hits miss. The decays that the records still cut off are
+        too small to matter.
+        """
+        found = _known(entry.measured.one_hit_frf for entry in self.measured)
+        return tuple(
+            replace(frf, tail_s=np.inf) if frf.exponential_rate_1_s > 0 else frf for frf in found
+        )
+
+    @property
     def modes(self) -> tuple[ModalModel | None, ...]:
         """Of each pose; None where no mode was found."""
         return tuple(entry.measured.modal for entry in self.measured)

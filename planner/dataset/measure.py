@@ -96,7 +96,15 @@ class MeasuredPose:
         plain = self.frf
         if plain is None or not np.isfinite(plain.tail_s):
             return plain
-        return self.kept("ended frf", Frf, lambda: self._ended(plain))
+        return self.kept("ended frf", Frf, lambda: self._ended(plain, "weighted"))
+
+    @cached_property
+    def one_hit_frf(self) -> Frf | None:
+        """The FRF of one hit in the middle of all, for a model of how hits miss; as `ended_frf`."""
+        plain = self.frf
+        if plain is None or not self.hits:
+            return plain
+        return self.kept("one hit frf", Frf, lambda: self._ended(plain, "one_hit"))
 
     @cached_property
     def decomposed(self) -> Decomposed:
@@ -166,12 +174,12 @@ class MeasuredPose:
             return Averaged(said, None, (renamed(str(error), self.sources),))
         return Averaged(said, frf, frf.remarks)
 
-    def _ended(self, plain: Frf) -> Frf:
+    def _ended(self, plain: Frf, estimator: str) -> Frf:
         from planner.frf.estimator import estimate
 
         stated = self.window_rate_1_s
         rate = max(0.0, OVER / plain.tail_s - stated)
-        return estimate(self.hits, self.band_hz, "weighted", rate, window_rate_1_s=stated)
+        return estimate(self.hits, self.band_hz, estimator, rate, window_rate_1_s=stated)
 
     def _decompose(self) -> Decomposed:
         from planner.modal.estimate_modes import estimate_modes

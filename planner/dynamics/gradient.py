@@ -81,12 +81,16 @@ def response(
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Of e elastic degrees of freedom: X (n, e, points, F) in rad/N at s (n, F)."""
+    """Of e elastic degrees of freedom: X (n, e, points, F) in rad/N at s (n, F).
+
+    `x_turn`, in rad per N·m at the hit point, is there where that was asked for.
+    """
 
     matrices: Matrices
     x_hit: np.ndarray
     x_sensor: np.ndarray
     s: np.ndarray
+    x_turn: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +116,12 @@ class Turned:
         return _joined([_synthesis(m.matrices.sensor_turn, m.x_hit, m.s) for m in self.motions])
 
     @cached_property
+    def twisting(self) -> np.ndarray:
+        """(n, 3s, 3h, F) in rad/s² per N·m: how the sensor turns with moments at the hit point."""
+        turns = [(m.matrices.sensor_turn, m.x_turn, m.s) for m in self.motions]
+        return _joined([_synthesis(rows, x, s) for rows, x, s in turns if x is not None])
+
+    @cached_property
     def by_angle(self) -> np.ndarray | None:
         """(n, dof, 3s, 3h, F) in m/s²/N per rad of each joint; None where slopes are not known."""
         found = [
@@ -131,10 +141,11 @@ def response_turned(
 ) -> tuple[np.ndarray, Turned]:
     """Accelerance (n, 3s, 3h, F) at s (n, F), and what goes with it."""
     points = matrices.hit.shape[1]
-    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
-    x = _solutions(matrices, elasticity, s, mass, both)
-    x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
-    return _synthesis(matrices.sensor, x_hit, s), Turned((Motion(matrices, x_hit, x_sensor, s),))
+    rows = np.concatenate([matrices.hit, matrices.sensor, matrices.hit_turn], axis=1)
+    x = _solutions(matrices, elasticity, s, mass, rows)
+    x_hit, x_sensor, x_turn = x[:, :, :points], x[:, :, points:-points], x[:, :, -points:]
+    turned = Turned((Motion(matrices, x_hit, x_sensor, s, x_turn),))
+    return _synthesis(matrices.sensor, x_hit, s), turned
 
 
 def response_gradient(

@@ -5,6 +5,11 @@ H1, whose power H2 and Hv correct; "weighted" takes w from each record's own noi
 pulse. H1 weighs hits by the square of their force: where the noise grows with the hit (range of
 the analyser, scatter of hand and place) the strongest hit alone decides, and the scatter of three
 hits says next to nothing of how well.
+
+"one_hit" is for a model of how hits miss: each hit has one share, by its signal to noise, in all
+channels and at all lines, so that the FRF is what a single hit with the mean of all misses gives;
+and its variance is that of the noise alone. With weights that differ from channel to channel each
+would show another mean miss, which no single hit explains.
 """
 
 import numpy as np
@@ -13,7 +18,7 @@ from planner.frf.frf import Frf
 from planner.frf.spectra import HitSpectra, Spectra, Windows, transform
 from planner.recording.records import Hit
 
-ESTIMATORS = "h1", "h2", "hv", "weighted"
+ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
 DROP_DB = 20.0  # of the force spectrum, where the pulse ceases to excite
 SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
 LEVEL_LINES = 15  # over which scatter of weighted hits is compared with what their noise explains
@@ -36,8 +41,9 @@ def estimate(
     Args:
         hits: All with the same sampling rate.
         band_hz: The lines reach a little beyond it.
-        estimator: "h1" (noise on the responses), "h2" (noise on the force), "hv" (both), or
-            "weighted" (each hit by its own noise; H1 where records hold no time before a pulse).
+        estimator: "h1" (noise on the responses), "h2" (noise on the force), "hv" (both),
+            "weighted" (each hit by its own noise) or "one_hit" (what a hit with the mean miss
+            gives); the last two are H1 where records hold no time before a pulse.
         exponential_rate_1_s: Of a window e^(−rate·t), t from the pulse, to lay over force and
             responses; the result is then exactly H at iω + rate, and says so.
         window_rate_1_s: Of such a window that the analyser has laid already.
@@ -68,7 +74,8 @@ def of_spectra(
     h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
     coherence, share = np.full(shape, np.nan), np.full((3, frequency.size), np.nan)
     counts = [0, 0, 0]
-    if estimator == "weighted" and not all(s.noise_known and s.noise.all() for s in spectra.hits):
+    by_noise = estimator in ("weighted", "one_hit")
+    if by_noise and not all(s.noise_known and s.noise.all() for s in spectra.hits):
         estimator = "h1"
     for axis in range(3):
         group = [s for s in spectra.hits if s.axis == axis]
@@ -101,6 +108,8 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
     sff = np.einsum("nr,nf->rf", weight, square)  # (3, F)
     sxx = np.einsum("nr,nrf->rf", weight, np.abs(response) ** 2)
     sxf = np.einsum("nr,nrf,nf->rf", weight, response, force.conj())
+    if estimator == "one_hit":
+        return _one_hit(group)
     h = _frf(sff, sxx, sxf, estimator)
     told = weight[:, :, None] * square[:, None] / sff  # (n, 3, F), sums to 1 over hits
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
@@ -124,6 +133,23 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
             variance = np.sum(parts, axis=0) / sff
     coherence = np.clip(np.abs(sxf) ** 2 / np.maximum(sff * sxx, 1e-300), 0.0, 1.0)
     return h, variance, coherence if len(group) > 1 else np.full(h.shape, np.nan), share
+
+
+def _one_hit(group: list[HitSpectra]) -> Estimated:
+    """Mean of the hits' own FRFs, each with one share."""
+    force = np.array([s.force for s in group])  # (n, F)
+    response = np.array([s.response for s in group])  # (n, 3, F)
+    square = np.abs(force) ** 2
+    strength = np.array(
+        [np.sum(power) * np.sum(1 / s.noise) for power, s in zip(square, group, strict=True)]
+    )
+    share = strength / strength.sum()
+    h = np.einsum("n,nrf->rf", share, response / force[:, None])
+    noise = np.array([s.noise for s in group])[..., None] / square[:, None]
+    doubt = np.array([s.force_noise for s in group])[:, None] / square
+    relative = np.einsum("n,nf->f", share**2, doubt)
+    variance = np.einsum("n,nrf->rf", share**2, noise) + np.abs(h) ** 2 * relative
+    return h, variance, np.full(variance.shape, np.nan), relative
 
 
 def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> np.ndarray:

@@ -22,12 +22,14 @@ FEWEST = 3  # poses of which one can be spared
 class JudgedIdentification:
     """Final identification on all poses, and what `trial`, which lacked some, made of these.
 
-    `held_out` holds their indices; where there are none, trial and similarities are None.
+    `before` and `after` it, at all poses. `held_out` holds the indices of those that the trial
+    lacked; where there are none, trial and similarities are None.
     """
 
     final: Identification
     trial: Identification | None
     before: Similarity
+    after: Similarity
     held_out: tuple[int, ...]
     held_out_before: Similarity | None
     held_out_after: Similarity | None
@@ -70,18 +72,22 @@ def identify_judged(
     simulation: Simulation,
     priors: Priors | None = None,
     held_out: int | None = None,
+    shown: Sequence[Frf] | None = None,
     **options: Any,
 ) -> JudgedIdentification:
     """Identify without the held-out poses, judge there, then refine on all poses.
 
-    Arguments as `identify`, whose other options are passed on; `held_out` is how many.
+    Arguments as `identify`, whose other options are passed on; `held_out` is how many. Judged is
+    by the FRFs `shown` of the same poses, where they are others than those that are fitted.
     """
     aside, band = set_aside(q, held_out), options.get("band_hz")
-    before, warm, judged = fit_similarity(simulation, frfs, q, band), None, (None, None)
+    shown = frfs if shown is None else shown
+    before, warm, judged = fit_similarity(simulation, shown, q, band), None, (None, None)
     if aside:
         kept = [i for i in range(len(q)) if i not in aside]
         warm = identify([frfs[i] for i in kept], q[kept], simulation, priors, **options)
-        there = [frfs[i] for i in aside], q[list(aside)], band
+        there = [shown[i] for i in aside], q[list(aside)], band
         judged = fit_similarity(simulation, *there), fit_similarity(warm.simulation, *there)
     final = identify(frfs, q, simulation, priors, warm=warm, **options)
-    return JudgedIdentification(final, warm, before, aside, *judged)
+    after = fit_similarity(final.simulation, shown, q, band)
+    return JudgedIdentification(final, warm, before, after, aside, *judged)

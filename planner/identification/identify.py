@@ -1,32 +1,30 @@
 """Identification of a simulation's springs from measured FRFs, in seconds."""
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
+from planner.identification.agreement import MOST_LINES, fit_similarity
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.measured_frfs import common_band, stack
-from planner.identification.objective import TOO_SOFT, Objective, stands
+from planner.identification.measured_frfs import common_band
+from planner.identification.measurement_model import Tolerances
+from planner.identification.objective import Objective
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
-from planner.inference.least_squares import Minimum, inverse, minimise
-from planner.robot.elastic_model import ElasticModel, Matrices
+from planner.identification.staged_problem import Progress, StagedProblem, matrices_for
+from planner.inference.least_squares import Minimum, inverse
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
+OPENINGS = 4  # rounds at most, in which what hits leave open follows the fit
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
-LOG_TOLERANCE = 1e-4
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
-STIFFER = float(np.log(1.5))  # by which the springs of a start grow until they carry the weight
-STIFFEST = 20  # such steps: a factor of 3,000
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
 
 
@@ -56,79 +54,13 @@ QUICK = Effort(
 )
 
 
-@dataclass(frozen=True)
-class Progress:
-    """Where an identification is: start (from 1), stage in words, iteration, misfit so far."""
-
-    start: int
-    stage: str
-    iteration: int
-    misfit: float
-
-
 @dataclass(frozen=True, eq=False)
-class _Problem:
-    """All that stays the same from start to start.
+class _Refined:
+    """Where an identification ended, with χ² per real value, in all and of each pose (n,)."""
 
-    Matrices depend on the springs only in that these carry the weight: they are those of
-    robot.toml's until a search has found better ones.
-    """
-
-    frfs: tuple[Frf, ...]
-    q: np.ndarray
-    elastic: ElasticModel
-    band_hz: tuple[float, float]
-    matrices: Matrices
-    inertias: Inertias
-    parametrisation: Parametrisation
-    progress: Callable[[Progress], None] | None
-    effort: Effort
-    barrier: Barrier | None
-
-    @property
-    def inertial(self) -> bool:
-        """Whether inertias are identified too."""
-        return bool(self.parametrisation.nuisances)
-
-    def carried(self, x: np.ndarray) -> tuple["_Problem", np.ndarray]:
-        """The same where the springs at x = (θ, φ) carry the weight, and x, made to stand there."""
-        p = self.parametrisation
-        count = len(p.parameters)
-        elastic = self.elastic.carried_by(p.elasticity(x[:count]).stiffness)
-        inertias = p.inertias(elastic.body_jacobians(self.q))
-        there = replace(self, matrices=elastic.matrices(self.q), inertias=inertias)
-        return there, np.concatenate([there.standing(x[:count]), x[count:]])
-
-    def standing(self, theta: np.ndarray) -> np.ndarray:
-        """θ (P,) with all springs as much stiffer as it takes to carry the robot's weight."""
-        p = self.parametrisation
-        stiffer = STIFFER * np.array([x.kind == "stiffness" for x in p.parameters])
-        for steps in range(STIFFEST + 1):
-            tried = p.near(theta + steps * stiffer)
-            if stands(self.matrices, p.elasticity(tried).stiffness):
-                return theta if steps == 0 else tried
-        raise InputError(TOO_SOFT)
-
-    def objective(
-        self, share: float, lines: int, logarithmic: bool = False, inertia: bool = False
-    ) -> Objective:
-        low, high = self.band_hz
-        band = low, low + share * (high - low)
-        measured = stack(self.frfs, band, lines, MODEL_ERROR)
-        parts = self.matrices, self.inertias, self.parametrisation
-        return Objective(measured, *parts, logarithmic, inertia, barrier=self.barrier)
-
-    def minimise(
-        self, objective: Objective, x: np.ndarray, start: int, stage: str, steps: int
-    ) -> Minimum:
-        count, tell = max(objective.count, 1), self.progress
-
-        def told(iteration: int, value: float) -> None:
-            assert tell is not None
-            tell(Progress(start, stage, iteration, 2 * value / count))
-
-        tolerance = LOG_TOLERANCE if objective.logarithmic else self.effort.tolerance
-        return minimise(objective, x, tolerance, steps, told if tell else None)
+    end: Minimum
+    misfit: float
+    by_pose: np.ndarray
 
 
 def identify(
@@ -143,6 +75,7 @@ def identify(
     warm: Identification | None = None,
     progress: Callable[[Progress], None] | None = None,
     effort: Effort = THOROUGH,
+    tolerances: Tolerances | None = None,
 ) -> Identification:
     """Springs (and, where their priors are not 0, inertias) that explain FRFs at poses q.
 
@@ -153,7 +86,9 @@ def identify(
     taken as they are. No more are tried once one has reached the noise, or the best two of three
     or more have met. A `warm`
     identification of the same parameters is refined alone where it still fits. `band_hz` is
-    robot.toml's unless given. Raises InputError where FRFs and poses do not fit together.
+    robot.toml's unless given. What `tolerances` leave open of hits, measuring chain and readback
+    is integrated out; without them all are exact. Raises InputError where FRFs and poses do not
+    fit together.
     """
     started = time.perf_counter()
     q = np.atleast_2d(np.asarray(q, dtype=float))
@@ -162,8 +97,9 @@ def identify(
     p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
     inertias = p.inertias(elastic.body_jacobians(q))
     barrier = Barrier.around(elastic.inertia, p)
-    problem = _Problem(
-        tuple(frfs), q, elastic, band, elastic.matrices(q), inertias, p, progress, effort, barrier
+    matrices = matrices_for(elastic, q, tolerances)
+    problem = StagedProblem(
+        tuple(frfs), q, elastic, band, matrices, inertias, p, progress, effort, barrier, tolerances
     )
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
@@ -183,21 +119,26 @@ def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
         )
 
 
-def _starting_points(p: Parametrisation, starts: int | np.ndarray, seed: int) -> np.ndarray:
-    """θ (k, P): the prior's median, then quasi-random between the bounds; or those given."""
+def _starting_points(
+    p: Parametrisation, starts: int | np.ndarray, seed: int
+) -> Iterator[np.ndarray]:
+    """θ (P,): the prior's median, then quasi-random between the bounds; or those given."""
     if not isinstance(starts, int):
-        return p.near(np.log(np.atleast_2d(starts)))
-    if starts == 1:
-        return p.mean[None]
-    from scipy.stats import qmc  # scipy.stats takes most of a second to import
+        yield from p.near(np.log(np.atleast_2d(starts)))
+        return
+    yield p.mean
+    if starts > 1:
+        from scipy.stats import qmc  # scipy.stats takes most of a second to import
 
-    lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
-    sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
-    unit = sampler.random_base2(int(np.ceil(np.log2(starts))))[: starts - 1]
-    return np.vstack([p.mean, lower + unit * (upper - lower)])
+        lower, upper = np.log([(x.lower, x.upper) for x in p.parameters]).T
+        sampler = qmc.Sobol(len(lower), scramble=True, rng=np.random.default_rng(seed))
+        unit = sampler.random_base2(int(np.ceil(np.log2(starts))))[: starts - 1]
+        yield from lower + unit * (upper - lower)
 
 
-def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
+def _search(
+    problem: StagedProblem, points: Iterable[np.ndarray]
+) -> tuple[np.ndarray, tuple[float, ...]]:
     """Best (θ, φ) of all starts, and the misfit of each."""
     found: list[Minimum] = []
     misfits: list[float] = []
@@ -215,7 +156,7 @@ def _search(problem: _Problem, points: np.ndarray) -> tuple[np.ndarray, tuple[fl
     return best.x, tuple(misfits)
 
 
-def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
+def _approach(problem: StagedProblem, theta: np.ndarray, number: int) -> np.ndarray:
     """(θ, φ) from where the plain residual leads home: logarithms in bands that widen."""
     low, high = problem.band_hz
     effort = problem.effort
@@ -231,53 +172,67 @@ def _approach(problem: _Problem, theta: np.ndarray, number: int) -> np.ndarray:
 
 
 def _plain(
-    problem: _Problem, x: np.ndarray, number: int, lines: int, stage: str, completions: int
+    problem: StagedProblem,
+    x: np.ndarray,
+    number: int,
+    lines: int,
+    stage: str,
+    completions: int,
+    near: bool = False,
 ) -> tuple[Minimum, Objective]:
-    """Least plain residual from x; what the records lack is filled in again and again."""
+    """Least plain residual from x; what the records lack is filled in again and again.
+
+    So is what the measurement leaves open, both as they are where the last round ended. Where x is
+    `near`, what the data tell of hits and chain there can be believed from the first round.
+    """
     objective = problem.objective(1.0, lines, inertia=problem.inertial)
     tail = bool(np.isfinite(objective.measured.tail_s).any())
-    sloped = problem.effort.sloped
-    objective = objective.completed(x, sloped) if tail else objective
+    for _ in range(2 if near and problem.tolerances else 1):
+        objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    for _ in range(completions if tail else 0):
-        objective = objective.completed(end.x, sloped)
+    rounds = max(completions if tail else 0, OPENINGS if problem.tolerances else 0)
+    for _ in range(rounds):
+        objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
         moved = end.x - before
         # Where the misfit exceeds the noise, so do the sds in which a move counts.
         settled = SETTLED * max(1.0, end.at.chi2 / max(objective.count, 1))
-        if objective.completion is None or moved @ end.at.normal @ moved < settled:
+        fixed = objective.completion is None and objective.left_open is None
+        if fixed or moved @ end.at.normal @ moved < settled:
             break
     return end, objective
 
 
-def _refine(problem: _Problem, x: np.ndarray) -> tuple[Minimum, float]:
-    """Minimum over springs and inertias on all lines from (θ, φ), and its misfit."""
+def _refine(problem: StagedProblem, x: np.ndarray) -> _Refined:
+    """Minimum over springs and inertias on all lines from (θ, φ)."""
     effort = problem.effort
-    end, objective = _plain(problem, x, 0, effort.last_lines, "all lines", effort.last_completions)
-    return end, end.at.chi2 / max(objective.count, 1)
+    end, objective = _plain(
+        problem, x, 0, effort.last_lines, "all lines", effort.last_completions, near=True
+    )
+    return _Refined(end, end.at.chi2 / max(objective.count, 1), objective.by_pose(end.x))
 
 
-def _warm(problem: _Problem, warm: Identification) -> tuple[Minimum, float] | None:
+def _warm(problem: StagedProblem, warm: Identification) -> _Refined | None:
     """Refined from an earlier identification; None where that leads to a much worse misfit."""
     p = problem.parametrisation
     known = {e.name: np.log(e.value) for e in warm.estimates}
     known |= dict(zip(warm.nuisances, warm.mean[len(warm.estimates) :], strict=True))
     theta = [known.get(x.name, m) for x, m in zip(p.parameters, p.mean, strict=True)]
     phi = [known.get(name, 0.0) for name in p.nuisances]
-    end, misfit = _refine(*problem.carried(np.array([*p.near(np.array(theta)), *phi])))
-    good = misfit < STILL_GOOD * max(warm.misfit, 1.0)
-    return (end, misfit) if good or not problem.effort.doubtful else None
+    found = _refine(*problem.carried(np.array([*p.near(np.array(theta)), *phi])))
+    good = found.misfit < STILL_GOOD * max(warm.misfit, 1.0)
+    return found if good or not problem.effort.doubtful else None
 
 
 def _result(
-    problem: _Problem,
+    problem: StagedProblem,
     simulation: Simulation,
     q: np.ndarray,
-    best: tuple[Minimum, float],
+    best: _Refined,
     starts: tuple[float, ...],
     seconds: float,
 ) -> Identification:
-    end, misfit = best
+    end, misfit = best.end, best.misfit
     p, count = problem.parametrisation, len(problem.parametrisation.parameters)
     prior = np.asarray(block_diag(p.precision, np.eye(len(p.nuisances))))
     # Where the misfit is above the noise, the noise is at least as large as the misfit.
@@ -293,7 +248,7 @@ def _result(
         covariance,
         misfit,
         round(end.at.chi2 / misfit),
-        residuals(fitted, problem.frfs, q, problem.band_hz).by_pose,
+        best.by_pose,
         fit_similarity(fitted, problem.frfs, q, problem.band_hz),
         undetermined(p, covariance),
         starts,

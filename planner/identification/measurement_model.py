@@ -43,7 +43,8 @@ class Tolerances:
         return cls(
             np.deg2rad(hits.angle_sd_deg), 1e-3 * hits.offset_sd_mm, sensor.gain_sd_percent / 100,
             sensor.cross_axis_sd_percent / 100, np.deg2rad(sensor.mounting_sd_deg),
-            1e-3 * sensor.position_sd_mm, joint_rad=np.deg2rad(readback.joint_sd_deg),
+            1e-3 * sensor.position_sd_mm, sensor.force_gain_sd_percent / 100,
+            joint_rad=np.deg2rad(readback.joint_sd_deg),
         )  # fmt: skip
 
     @property
@@ -52,9 +53,9 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-HIT_COLUMNS = 12  # open numbers of a pose's hits, 4 of each axis
-CHAIN_COLUMNS = 14  # those of the chain, which follow
-OPEN = HIT_COLUMNS + CHAIN_COLUMNS  # numbers that a pose leaves open; then one of each joint
+HIT_NUMBERS = 12  # of a pose: 4 of each hit axis
+CHAIN_NUMBERS = 14
+OPEN = HIT_NUMBERS + CHAIN_NUMBERS  # and one more of each joint
 
 
 def hit_basis(
@@ -82,7 +83,7 @@ def chain_basis(
 
     `out`, where it is given, holds zeros.
     """
-    out = np.zeros((h.shape[0], CHAIN_COLUMNS, *h.shape[1:]), dtype=complex) if out is None else out
+    out = np.zeros((h.shape[0], CHAIN_NUMBERS, *h.shape[1:]), dtype=complex) if out is None else out
     for i in range(3):
         for j in range(3):
             np.multiply(h[:, j], t.gain if i == j else t.across, out=out[:, 3 * i + j, i])
@@ -104,10 +105,10 @@ def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.nda
     joints = 0 if turned.by_angle is None else turned.by_angle.shape[1]
     # All is written once, in place: such arrays are large.
     out = np.zeros((n, OPEN + joints, 3, 3, lines), dtype=complex)
-    by_axis = out[:, :HIT_COLUMNS].reshape(n, 3, 4, 3, 3, lines)
+    by_axis = out[:, :HIT_NUMBERS].reshape(n, 3, 4, 3, 3, lines)
     # A miss along an axis changes the column of that axis only: a view of these.
     hit_basis(h, turned.moment, t, np.einsum("namiaf->namif", by_axis))
-    chain_basis(h, turned.turning, s, t, out[:, HIT_COLUMNS:OPEN])
+    chain_basis(h, turned.turning, s, t, out[:, HIT_NUMBERS:OPEN])
     if turned.by_angle is not None:
         np.multiply(turned.by_angle, t.joint_rad, out=out[:, OPEN:])
     return out
@@ -168,3 +169,124 @@ def marginal(residual: np.ndarray, jacobian: np.ndarray, b: np.ndarray) -> Margi
         2 * float(np.sum(np.log(np.diagonal(factor)))),
         np.linalg.solve(factor.T, r),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Integrated:
+    """χ² with all η integrated out, in all and of each pose (n,); half gradient, and normal."""
+
+    chi2: float
+    gradient: np.ndarray
+    normal: np.ndarray
+    by_pose: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Estimates, in sds: `own` (n, 12 + dof) of each pose's hits and joints, `chain` (14,)."""
+
+    own: np.ndarray
+    chain: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOpen:
+    """B of n poses, weighted, as it is somewhere and held there.
+
+    `own` (l, m) of each pose is whitened (by `factor`), so that integrating out subtracts the
+    square of what is projected on it; `common` (14, m) is of numbers that all poses share: the
+    chain of a campaign. `crossed` (n, 3, 3, F), weighted, is what goes beyond first order. Were B
+    to follow the parameters, larger FRFs would seem to fit better, having larger B.
+    """
+
+    own: tuple[np.ndarray, ...]
+    factor: tuple[np.ndarray, ...]
+    common: tuple[np.ndarray, ...]
+    crossed: np.ndarray
+
+    @classmethod
+    def at(
+        cls,
+        h: np.ndarray,
+        turned: Turned,
+        s: np.ndarray,
+        weight: np.ndarray,
+        tolerances: Tolerances,
+        told: Told | None = None,
+    ) -> "LeftOpen":
+        """Of accelerances h (n, 3, 3, F) and the weight of residuals.
+
+        With `told`, what the chain makes of hits that miss, of second order, is that of these
+        estimates. (B itself must not follow them: it would then be fitted to the same noise.)
+        """
+        made = basis(h, turned, s, tolerances)
+        crossed = np.zeros_like(h) if told is None else _crossed(made, turned, s, tolerances, told)
+        made *= weight[:, None]
+        own, factors, common = [], [], []
+        for pose in made:
+            mine = _real(np.concatenate([pose[:HIT_NUMBERS], pose[OPEN:]]))
+            factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
+            own.append(np.linalg.solve(factor, mine))
+            factors.append(factor)
+            common.append(_real(pose[HIT_NUMBERS:OPEN]))
+        return cls(tuple(own), tuple(factors), tuple(common), weight * crossed)
+
+    def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
+        """Of residuals (n, 3, 3, F) and their derivatives (n, d, 3, 3, F), both weighted."""
+        residual = residual + self.crossed
+        d, k = slope.shape[1], CHAIN_NUMBERS
+        chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
+        whole, shared = np.zeros((d + k, d + k)), np.empty((len(residual), k, k))
+        for i, (own, common) in enumerate(zip(self.own, self.common, strict=True)):
+            r, j = _real(residual[i, None])[0], np.concatenate([_real(slope[i]), common])
+            onto, moved = own @ r, own @ j.T
+            chi2[i] = r @ r - onto @ onto
+            gradients[i] = j @ r - moved.T @ onto
+            normal = j @ j.T - moved.T @ moved
+            shared[i] = normal[d:, d:]
+            whole += normal
+        pull = gradients.sum(axis=0)
+        # The common numbers at their best, and what that takes from all else.
+        right = np.column_stack([pull[d:], whole[d:, :d]])
+        solved = np.linalg.solve(whole[d:, d:] + np.eye(k), right)
+        eta, across = -solved[:, 0], solved[:, 1:]
+        by_pose = chi2 + 2 * gradients[:, d:] @ eta + np.einsum("nij,i,j->n", shared, eta, eta)
+        return Integrated(
+            float(chi2.sum() + pull[d:] @ eta),
+            pull[:d] + whole[:d, d:] @ eta,
+            whole[:d, :d] - whole[:d, d:] @ across,
+            by_pose,
+        )
+
+    def told(self, residual: np.ndarray) -> Told:
+        """What weighted residuals (n, 3, 3, F) tell of the numbers."""
+        flat = _real(residual + self.crossed)
+        whole, pull = np.eye(CHAIN_NUMBERS), np.zeros(CHAIN_NUMBERS)
+        for own, common, r in zip(self.own, self.common, flat, strict=True):
+            moved = own @ common.T
+            whole += common @ common.T - moved.T @ moved
+            pull += common @ r - moved.T @ (own @ r)
+        chain = -np.linalg.solve(whole, pull)
+        left = [
+            -np.linalg.solve(factor.T, own @ (r + chain @ common))
+            for own, factor, common, r in zip(self.own, self.factor, self.common, flat, strict=True)
+        ]
+        return Told(np.array(left), chain)
+
+
+def _crossed(
+    made: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances, told: Told
+) -> np.ndarray:
+    """Of second order (n, 3, 3, F): what the chain makes of the misses, both as they are told."""
+    hits, joints = made[:, :HIT_NUMBERS], made[:, OPEN:]
+    missed = np.einsum("nl,nlijf->nijf", told.own[:, :HIT_NUMBERS], hits)
+    missed += np.einsum("nl,nlijf->nijf", told.own[:, HIT_NUMBERS:], joints)
+    turns = hit_basis(turned.turning, turned.twisting, t)
+    numbers = told.own[:, :HIT_NUMBERS].reshape(-1, 3, 4)
+    turning = np.einsum("nam,namif->niaf", numbers, turns)
+    return np.einsum("k,nkijf->nijf", told.chain, chain_basis(missed, turning, s, t))
+
+
+def _real(values: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts (l, 2 · 9F) of values (l, 3, 3, F)."""
+    return np.ascontiguousarray(values).reshape(len(values), -1).view(float)

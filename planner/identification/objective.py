@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from planner.dynamics.gradient import Inertias, response_gradient
+from planner.dynamics.gradient import Inertias, response_gradient, response_turned
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import Measured
+from planner.identification.measurement_model import Integrated, LeftOpen, Tolerances
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
 from planner.inference.least_squares import Quadratic
@@ -47,7 +48,8 @@ def weight_of(m: Measured, logarithmic: bool) -> np.ndarray:
 class Objective:
     """χ²/2 of the data plus that of the prior, over θ (P springs), then φ (R nuisances in sds).
 
-    The prior weighs LOG_PRIOR times as much beside logarithms.
+    The prior weighs LOG_PRIOR times as much beside logarithms. What the measurement leaves open, as
+    it was `opened`, is integrated out; unless it was, hits and measuring chain are exact.
     """
 
     measured: Measured
@@ -59,6 +61,7 @@ class Objective:
     completion: Completion | None = None  # what the records lack, around `completed_at`
     completed_at: np.ndarray | None = None
     barrier: Barrier | None = None  # keeps inertias from what no body can have
+    left_open: LeftOpen | None = None
 
     def completed(self, x: np.ndarray, sloped: bool = True) -> "Objective":
         """With the decays that the records cut off, as they are at x and to first order near.
@@ -73,6 +76,26 @@ class Objective:
             slope = np.array([self.inertias.mass_change(one) for one in np.eye(len(x) - count)])
         made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd, slope, sloped)
         return replace(self, completion=made, completed_at=x)
+
+    def opened(self, x: np.ndarray, tolerances: Tolerances) -> "Objective":
+        """With what these tolerances of hits, chain and readback leave open, as it is at x.
+
+        To second order, by what the data tell of it there, if it was opened before.
+        """
+        p, count, s = self.parametrisation, len(self.parametrisation.parameters), self.measured.s
+        springs, mass = p.elasticity(x[:count]), self._mass(x[count:])
+        h, turned = response_turned(self.matrices, springs, s, mass)
+        weight = weight_of(self.measured, False)
+        told = None
+        if self.left_open is not None:
+            lost = 0.0 if self.completion is None else self.completion.values
+            told = self.left_open.told(weight * (h - lost - self.measured.accelerance))
+        return replace(self, left_open=LeftOpen.at(h, turned, s, weight, tolerances, told))
+
+    def by_pose(self, x: np.ndarray) -> np.ndarray:
+        """χ² per real value (n,) of each pose at x, where that can be."""
+        counts = 2 * np.count_nonzero(weight_of(self.measured, self.logarithmic), axis=(1, 2, 3))
+        return self._data(x).by_pose / np.maximum(counts, 1)
 
     def _mass(self, phi: np.ndarray) -> np.ndarray:
         if not self.free_inertia:
@@ -89,17 +112,37 @@ class Objective:
         p = self.parametrisation
         count = len(p.parameters)
         theta, phi = x[:count], x[count:]
-        mass, inertias = self._mass(phi), self.inertias if self.free_inertia else None
         away = np.concatenate([(theta - p.mean) / p.log_sd, phi])
         pull, precision = self._prior(theta, phi)
         beyond = self._beyond(phi)
-        possible = not self.free_inertia or positive(mass)
+        possible = not self.free_inertia or positive(self._mass(phi))
         possible = possible and stands(self.matrices, p.elasticity(theta).stiffness)
         if not possible or not np.isfinite(beyond[0]) or np.abs(away).max() > FARTHEST:
             nothing = np.zeros(len(x))
             return Quadratic(np.inf, nothing, np.diag(nothing), np.inf)
+        data = self._data(x)
+        spread = np.zeros((len(data.gradient), len(x)))
+        springs = len(p.held)
+        spread[:springs, :count] = p.spread
+        spread[springs:, count:] = np.eye(len(phi))
+        gradient = spread.T @ data.gradient + precision @ pull
+        normal = spread.T @ data.normal @ spread + precision
+        value = (data.chi2 + float(pull @ precision @ pull)) / 2 + beyond[0]
+        gradient[count:] += beyond[1]
+        normal[count:, count:] += beyond[2]
+        return Quadratic(value, gradient, normal, data.chi2)
+
+    def _data(self, x: np.ndarray) -> Integrated:
+        """Misfit at x by all springs' logarithms and φ."""
+        p = self.parametrisation
+        count = len(p.parameters)
+        inertias = self.inertias if self.free_inertia else None
         h, slope = response_gradient(
-            self.matrices, p.elasticity(theta), self.measured.s, mass, inertias
+            self.matrices,
+            p.elasticity(x[:count]),
+            self.measured.s,
+            self._mass(x[count:]),
+            inertias,
         )
         if self.completion is not None:
             lost, since = self.completion, x - self.completed_at
@@ -107,18 +150,10 @@ class Objective:
             h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, moved)
             slope[:, : len(moved)] -= lost.slope
         residual, slope = self._residual(h, slope)
-        gradient, normal = _normal_equations(residual, slope)
-        spread = np.zeros((len(gradient), len(x)))
-        springs = len(p.held)
-        spread[:springs, :count] = p.spread
-        spread[springs:, count:] = np.eye(len(phi))
-        chi2 = float(np.sum(residual.real**2 + residual.imag**2))
-        gradient = spread.T @ gradient + precision @ pull
-        normal = spread.T @ normal @ spread + precision
-        value = (chi2 + float(pull @ precision @ pull)) / 2 + beyond[0]
-        gradient[count:] += beyond[1]
-        normal[count:, count:] += beyond[2]
-        return Quadratic(value, gradient, normal, chi2)
+        if self.left_open is not None:
+            return self.left_open.integrated(residual, slope)
+        by_pose = np.sum(residual.real**2 + residual.imag**2, axis=(1, 2, 3))
+        return Integrated(float(by_pose.sum()), *_normal_equations(residual, slope), by_pose)
 
     def _prior(self, theta: np.ndarray, phi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far x is from the prior's mean, and the prior's precision."""

@@ -46,6 +46,10 @@ class Priors:
         return max(self.mass, self.inertia, self.com_m) > 0
 
 
+# What the inertial parameters of a CAD model err by: with cables, oil and covers left out.
+CAD_INERTIAS = Priors(mass=0.08, inertia=0.08, com_m=0.01)
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number to identify, shared by [[compliance]] blocks (counted from 0).

@@ -192,7 +192,7 @@ def identification_report(
     """Of an identification that was judged at poses held out."""
     dataset, judged = basis.dataset, basis.judged
     final, names = judged.final, dataset.poses
-    after, aside = FrfSimilarity.of(final.fit), FrfSimilarity.of(judged.held_out_after)
+    after, aside = FrfSimilarity.of(judged.after), FrfSimilarity.of(judged.held_out_after)
     held_out = HeldOutChange(
         aside.frac,
         aside.frobenius,

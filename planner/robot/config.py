@@ -114,9 +114,10 @@ class HitsTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a sensor is specified to, and how well it is known how it sits: sds."""
+    """What sensor and hammer are specified to, and how well the sensor's seat is known: sds."""
 
     gain_sd_percent: float = 2.0
+    force_gain_sd_percent: float = 3.0
     cross_axis_sd_percent: float = 3.0
     mounting_sd_deg: float = 2.0
     position_sd_mm: float = 10.0

@@ -26,6 +26,12 @@ def cell(tmp_path_factory):
     """robot.toml, a recordings folder of five poses, and the truth behind it."""
     root = tmp_path_factory.mktemp("cell")
     robot = make_arm(root / "robot")
+    # Hits are exact here, and the chain is a calibrated one: that is said, or sds allow for others.
+    with open(robot, "a", encoding="utf-8") as file:
+        file.write("\n[hits]\nangle_sd_deg = 0.1\noffset_sd_mm = 0.1\n")
+        file.write("[readback]\njoint_sd_deg = 0.01\n")
+        file.write("[sensor]\ngain_sd_percent = 0.2\nforce_gain_sd_percent = 0.2\n")
+        file.write("cross_axis_sd_percent = 0.2\nmounting_sd_deg = 0.1\nposition_sd_mm = 0.2\n")
     off = Deviation(seed=5, stiffness=0.2, damping=0.3, inertia=0.04, com_m=0.003)
     truth = load_truth(robot, off)
     low, high = np.deg2rad(np.array(JOINTS_DEG, dtype=float)).T

@@ -24,8 +24,8 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_USUAL,
 )
 from planner.identification.measurement_model import (
-    CHAIN_COLUMNS,
-    HIT_COLUMNS,
+    CHAIN_NUMBERS,
+    HIT_NUMBERS,
     OPEN,
     ChainTransfer,
     basis,
@@ -54,7 +54,7 @@ class InnerProducts:
         the chain that the fit itself tells.
         """
         tolerances = fit.misfit.tolerances
-        first = cls.around(fit, springs, np.zeros(0 if tolerances is None else CHAIN_COLUMNS))
+        first = cls.around(fit, springs, np.zeros(0 if tolerances is None else CHAIN_NUMBERS))
         if tolerances is None:
             return first
         return cls.around(fit, springs, first.worth(1.0).chain)
@@ -79,8 +79,8 @@ class InnerProducts:
         for i in range(len(h)):
             r, b, j = _real(residual[i][None]), _real(open_[i]), _real(sloped[i])
             varies = b.copy()
-            varies[HIT_COLUMNS:OPEN] *= CHAIN_VARIES
-            rows = np.concatenate([r, varies, j[loose], b[HIT_COLUMNS:OPEN], j])
+            varies[HIT_NUMBERS:OPEN] *= CHAIN_VARIES
+            rows = np.concatenate([r, varies, j[loose], b[HIT_NUMBERS:OPEN], j])
             made.append(rows @ rows.T)
         own = np.concatenate([np.zeros(open_.shape[1]), own[loose]])
         return cls(fit, np.array(made), own, chain)

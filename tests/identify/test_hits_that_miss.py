@@ -1,0 +1,151 @@
+"""Identification where hits miss, the chain is within tolerance and the readback rough."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.dynamics.gradient import response_turned
+from planner.dynamics.simulation import Simulation
+from planner.frf.estimator import of_spectra
+from planner.frf.spectra import HitSpectra, Spectra, Windows
+from planner.identification.identify import identify
+from planner.identification.measurement_model import CHAIN_NUMBERS, LeftOpen, Tolerances
+from planner.identification.parameters import CAD_INERTIAS
+from planner.robot.robot import Robot
+from planner.truth.deviation import Deviation
+from planner.truth.handling import Aim, Handling
+from planner.truth.model import load_truth
+from tests.support.known_robots import KR10
+from tests.support.measured_frfs import measured_frfs
+
+LINES = np.linspace(6.0, 60.0, 48)
+Q = KR10.poses(5, seed=2)
+USUAL = Handling(
+    angle_deg=1.0, offset_m=0.003, readback_deg=0.05, gain=0.015, cross_axis=0.01,
+    mounting_deg=1.0, position_m=0.004, force_gain=0.015, delay_s=3e-5,
+)  # fmt: skip
+
+
+class Handled:
+    """A truth as it is measured: one hit along each axis, all as `handling` leaves them."""
+
+    def __init__(self, truth, handling, seed):
+        self.rng = np.random.default_rng(seed)
+        self.handling, self.chain = handling, handling.chain(self.rng)
+        self.truth = replace(truth, sensor_offset_m=self.chain.offset_m)
+
+    def accelerance(self, q, hz):
+        off = np.deg2rad(self.handling.readback_deg) * self.rng.standard_normal(len(q))
+        aims = self.handling.aims([0, 1, 2], self.rng)
+        h = np.stack(
+            [struck(self.truth, q + off, a.wrench(k), hz) for k, a in enumerate(aims)], axis=1
+        )
+        late = np.exp(-2j * np.pi * hz * self.chain.delay_s)
+        return np.einsum("ij,jkf->ikf", self.chain.matrix, h) * late / self.chain.force_gain
+
+
+def struck(truth, q, wrench, hz):
+    """Accelerance (3, F) to a unit wrench (6,), by the other engine."""
+    poles, shapes, entry, hit, sensor = truth.modal(q)
+    drive = np.vstack([hit, truth.turning(q)]).T @ wrench
+    iw = 2j * np.pi * hz
+    return iw**2 * ((sensor @ shapes) @ ((entry @ drive)[:, None] / (iw - poles[:, None])))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return KR10.write(tmp_path_factory.mktemp("kr10"))
+
+
+def test_identification_reaches_the_noise_and_its_sds_hold(folder):
+    truth = load_truth(folder, Deviation(stiffness=0.15, damping=0.2, inertia=0.05, seed=5))
+    frfs = measured_frfs(Handled(truth, USUAL, 1), Q, LINES, 0.005)
+    given = frfs, Q, Simulation(Robot.load(folder)), CAD_INERTIAS
+    exact = identify(*given, band_hz=(6.0, 60.0), starts=1)
+    found = identify(*given, band_hz=(6.0, 60.0), starts=1, tolerances=Tolerances())
+    assert exact.misfit > 5
+    assert found.misfit == pytest.approx(1.0, abs=0.2)
+    assert found.misfit_by_pose == pytest.approx(np.ones(5), abs=0.4)
+    springs = [e for e in found.estimates if e.kind == "stiffness" and e.identifiable]
+    off = [np.log(e.value / truth.springs[e.blocks[0]].stiffness) / e.log_sd for e in springs]
+    assert len(off) >= 5
+    assert np.max(np.abs(off)) < 3.0
+
+
+def opened(folder, told=None):
+    simulation = Simulation(Robot.load(folder))
+    q, s = Q[:2], np.tile(2j * np.pi * LINES, (2, 1))
+    h, turned = response_turned(simulation.elastic.with_slopes(q), simulation.elasticity, s)
+    return h, LeftOpen.at(h, turned, s, np.full(h.shape, 30.0), Tolerances(), told)
+
+
+def test_what_poses_share_is_integrated_out_once(folder):
+    """Against the dense covariance of all poses together."""
+    h, left_open = opened(folder)
+    rng = np.random.default_rng(0)
+    shape = 2, 3, *h.shape[1:]
+    slope = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
+    residual = 0.1 * slope[:, 0] + rng.standard_normal(h.shape)
+    found = left_open.integrated(residual, slope)
+    own = [factor @ b for factor, b in zip(left_open.factor, left_open.own, strict=True)]
+    common = np.concatenate(left_open.common, axis=1)
+    b = np.zeros((2 * len(own[0]) + CHAIN_NUMBERS, common.shape[1]))
+    half, size = len(own[0]), own[0].shape[1]
+    b[:half, :size], b[half : 2 * half, size:], b[2 * half :] = own[0], own[1], common
+    r = residual.reshape(-1).view(float)
+    j = np.ascontiguousarray(np.moveaxis(slope, 1, 0)).reshape(3, -1).view(float)
+    solved = np.linalg.solve(np.eye(b.shape[1]) + b.T @ b, np.column_stack([r, j.T]))
+    assert found.chi2 == pytest.approx(r @ solved[:, 0])
+    assert found.gradient == pytest.approx(j @ solved[:, 0])
+    assert found.normal == pytest.approx(j @ solved[:, 1:])
+    eta = -(b @ solved[:, 0])
+    told = left_open.told(residual)
+    assert told.own.reshape(-1) == pytest.approx(eta[: 2 * half], abs=1e-9)
+    assert told.chain == pytest.approx(eta[2 * half :], abs=1e-9)
+    left = (r + eta @ b).reshape(2, -1)
+    by_pose = np.sum(left**2, axis=1) + np.sum(told.own**2, axis=1)
+    assert found.by_pose == pytest.approx(by_pose)
+
+
+def test_what_a_chain_makes_of_misses_is_told_to_second_order(folder):
+    truth, t = load_truth(folder), Tolerances()
+    aim = Aim(np.array([0.03, -0.02, 0.0]), np.array([0.004, 0.003, 0.0]))
+    place, mixing = (0.004, -0.006, 0.005), np.eye(3) + 0.02 * np.arange(9.0).reshape(3, 3) / 9
+    moved = replace(truth, sensor_offset_m=place)
+    h, left_open = opened(folder)
+    told = left_open.told(np.zeros(h.shape))
+    told.own[:, 8:12] = [0.03 / t.angle_rad, -0.02 / t.angle_rad, 4 / 5, 3 / 5]
+    told.chain[:9] = ((mixing - np.eye(3)) / np.where(np.eye(3), t.gain, t.across)).reshape(-1)
+    told.chain[9:12] = np.array(place) / t.position_m
+    crossed = opened(folder, told)[1].crossed[:, :, 2] / 30.0
+    straight = Aim().wrench(2)
+    for q, found in zip(Q[:2], crossed, strict=True):
+        both = mixing @ struck(moved, q, aim.wrench(2), LINES)
+        missed = struck(truth, q, aim.wrench(2), LINES)
+        chain = mixing @ struck(moved, q, straight, LINES)
+        expected = both - missed - chain + struck(truth, q, straight, LINES)
+        # What the chain makes of its own place is of second order too, but no matter of hits.
+        assert np.abs(found - expected).max() < 0.05 * np.abs(expected).max()
+
+
+def test_one_hit_is_what_all_channels_saw():
+    """However differently noisy the channels are, the miss that they show is the same."""
+    rng = np.random.default_rng(3)
+    frequency = np.linspace(5.0, 60.0, 20)
+    h = rng.standard_normal((2, 3, 20)) + 1j * rng.standard_normal((2, 3, 20))
+    force = np.array([[1.0], [2.0]]) * (1 + 0.3 * rng.random((2, 20)))
+    noise = np.array([[1e-4, 1e-2, 1e-3], [1e-2, 1e-4, 1e-3]])
+    hits = tuple(
+        HitSpectra(0, force[i], h[i] * force[i], 1e-8, 0.01, noise[i], True) for i in range(2)
+    )
+    spectra = Spectra(frequency, hits, 2.0, 0.06, ())
+    made = of_spectra(spectra, (5.0, 60.0), Windows(), "one_hit")
+    share = (made.accelerance[:, 0] - h[1]) / (h[0] - h[1])
+    assert share == pytest.approx(np.full((3, 20), share[0, 0].real))
+    expected = np.sum(force**2, axis=1) * np.sum(1 / noise, axis=1)
+    assert share[0, 0].real == pytest.approx(expected[0] / expected.sum())
+    share = share[0, 0].real
+    own = share**2 * noise[0][:, None] / force[0] ** 2
+    own = own + (1 - share) ** 2 * noise[1][:, None] / force[1] ** 2
+    assert made.variance[:, 0] == pytest.approx(own, rel=0.05)
