@@ -44,6 +44,19 @@ class Residuals:
         return np.sum(square, axis=1) / np.maximum(2 * np.sum(used, axis=1), 1)
 
 
+def agreement(
+    simulation: Simulation,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float] | None = None,
+    lines: int = MOST_LINES,
+) -> tuple[Residuals, Similarity]:
+    """`residuals` and `fit_similarity` on at most so many `lines` a pose, simulated once."""
+    measured = _stacked(simulation, frfs, band_hz, lines)
+    h = _simulated(simulation, measured, q)
+    return _residuals_of(measured, h), similarity_of(measured, h)
+
+
 def fit_similarity(
     simulation: Simulation,
     frfs: Sequence[Frf],
@@ -74,16 +87,23 @@ def residuals(
 ) -> Residuals:
     """What a simulation leaves unexplained of FRFs at q (n, dof) in rad, in robot.toml's band."""
     measured = _stacked(simulation, frfs, band_hz)
-    difference = _simulated(simulation, measured, q) - measured.accelerance
+    return _residuals_of(measured, _simulated(simulation, measured, q))
+
+
+def _residuals_of(measured: Measured, h: np.ndarray) -> Residuals:
+    difference = h - measured.accelerance
     values = np.where(measured.used, np.sqrt(2) * difference / measured.sd, np.nan)
     return Residuals(measured.frequency_hz, values)
 
 
 def _stacked(
-    simulation: Simulation, frfs: Sequence[Frf], band_hz: tuple[float, float] | None
+    simulation: Simulation,
+    frfs: Sequence[Frf],
+    band_hz: tuple[float, float] | None,
+    lines: int = MOST_LINES,
 ) -> Measured:
     band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
-    return stack(frfs, band, MOST_LINES, MODEL_ERROR)
+    return stack(frfs, band, lines, MODEL_ERROR)
 
 
 def _simulated(simulation: Simulation, measured: Measured, q: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import MODEL_ERROR, MOST_LINES, fit_similarity, residuals
+from planner.identification.agreement import MODEL_ERROR, MOST_LINES, agreement
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, stack
 from planner.identification.objective import TOO_SOFT, Objective, stands
@@ -33,7 +33,8 @@ STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is
 class Effort:
     """How exact an identification is: lines a pose and completions of cut-off records.
 
-    Each for a start and for the last fit; iterations end where a step gains less than `tolerance`.
+    Each for a start and for the last fit, which is judged on as many lines; iterations end where a
+    step gains less than `tolerance`.
     """
 
     lines: int = 160
@@ -284,6 +285,8 @@ def _result(
     covariance = inverse(data + np.diag(scale))
     change = p.inertia_change(end.x[count:]) if p.nuisances else None
     fitted = simulation.changed(p.elasticity(end.x[:count]), change)
+    lines = problem.effort.last_lines
+    left, similarity = agreement(fitted, problem.frfs, q, problem.band_hz, lines)
     return Identification(
         fitted,
         estimates(p, end.x[:count], covariance),
@@ -292,8 +295,8 @@ def _result(
         covariance,
         misfit,
         round(end.at.chi2 / misfit),
-        residuals(fitted, problem.frfs, q, problem.band_hz).by_pose,
-        fit_similarity(fitted, problem.frfs, q, problem.band_hz),
+        left.by_pose,
+        similarity,
         undetermined(p, covariance),
         starts,
         end.converged,
