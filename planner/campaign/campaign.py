@@ -3,25 +3,18 @@
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import msgspec
-import numpy as np
 
-from planner.campaign import model_cache, store
-from planner.campaign.config import (
-    CampaignConfig,
-    ModesTable,
-    config_from_builtins,
-    load_campaign_config,
-)
+from planner.campaign import store
+from planner.campaign.config import load_campaign_config
 from planner.campaign.events import (
     REFUSED,
     AnyEvent,
     Configured,
     Confirmed,
     Entry,
-    HitRecord,
     Imported,
     Proposal,
     Proposed,
@@ -31,38 +24,18 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.journal import Journal
-from planner.campaign.state import CampaignState, Measurement, fold, last_act
-from planner.dataset.screened_files import Source
-from planner.dataset.store import Store
+from planner.campaign.reads import CampaignReads, as_logged, frf_key
+from planner.campaign.state import last_act
 from planner.errors import InputError
 from planner.version import __version__
 
-# Imported where they are needed: with what is kept of a model, `status` needs none of them.
 if TYPE_CHECKING:
-    from planner.campaign.cell import Cell
     from planner.campaign.deliveries import Delivery
     from planner.campaign.importing import ImportReport
-    from planner.campaign.model import Model
-    from planner.dataset.dataset import Dataset, Progress
-    from planner.dataset.hit_columns import HitColumns
-    from planner.frf.frf import Frf
-    from planner.surrogate.frf_bands import ModalPrediction
-
-T = TypeVar("T")
 
 
-class Campaign:
+class Campaign(CampaignReads):
     """A campaign folder, opened. Reads never write; every act is on the disk when it returns."""
-
-    def __init__(self, directory: Path, models: Store | None = None):
-        """Open a folder; `models` keeps fitted models, by default in the user's cache folder."""
-        self.directory = directory.resolve()
-        self._kept = model_cache.user_models() if models is None else models
-        self._journal = Journal(self.directory / store.LOG)
-        self._cells: dict[str, Cell] = {}
-        self._models: dict[tuple[str, int], Model] = {}
-        self._frfs: dict[tuple, Frf] = {}
 
     @classmethod
     def new(cls, directory: Path, robot_toml: Path, campaign_toml: Path | None) -> "Campaign":
@@ -72,185 +45,6 @@ class Campaign:
         """
         store.create_folder(directory, robot_toml, campaign_toml, _first_entry)
         return cls(directory)
-
-    # -- what is known -------------------------------------------------------------------------
-
-    @property
-    def entries(self) -> tuple[Entry, ...]:
-        """The log."""
-        return self._journal.entries
-
-    @property
-    def torn_bytes(self) -> int:
-        """Length of a torn last line, which the next act sets aside."""
-        return self._journal.torn_bytes
-
-    @property
-    def state(self) -> CampaignState:
-        """The fold over the log, with changes made by hand to the configuration."""
-        state = fold(self.entries)
-        if state.configured is None:
-            raise InputError(
-                f"{self.directory} holds an empty log; start the campaign again with planner new."
-            )
-        return state
-
-    @property
-    def cell(self) -> "Cell":
-        """Robot, simulation and workspace as configured now."""
-        from planner.campaign.cell import Cell
-
-        configured = self._configured()
-        key = _text(configured)
-        if key not in self._cells:
-            config = config_from_builtins(configured.config)
-            self._cells[key] = Cell.load(
-                self.directory / config.robot,
-                config,
-                geometric_stiffness=configured.geometric_stiffness,
-            )
-        return self._cells[key]
-
-    @property
-    def robot_toml(self) -> Path:
-        """The robot's robot.toml in the campaign's folder."""
-        return self.directory / self.cell.config.robot
-
-    @property
-    def model(self) -> "Model":
-        """The model after all measurements; fitted once per state, then kept on disk."""
-        state, configured = self.state, self._configured()
-        key = _text(configured), state.model_version
-        if key not in self._models:
-            name = self._model_name(configured, state)
-            found = model_cache.kept_model(self._kept, name)
-            if found is None:
-                found = self._fitted(state)
-                model_cache.keep_model(self._kept, name, found)
-            self._cells[key[0]] = found.cell  # with the candidates that were worked out for it
-            self._models = {key: found}
-        return self._models[key]
-
-    def _model_name(self, configured: Configured, state: CampaignState) -> str:
-        return model_cache.key("model", self.directory, configured, state.used)
-
-    def of_model(self, what: str, kind: type[T], make: Callable[["Model"], T]) -> T:
-        """What follows from the model, kept on disk: where it is, the model is not loaded.
-
-        Args:
-            what: Name of it, one for each `make`.
-            kind: Dataclass that msgspec can encode; arrays are allowed.
-            make: Makes it from the model.
-        """
-        used = self.state.used
-        name = model_cache.key(what, self.directory, self._configured(), used)
-        return self._kept.result(name, kind, lambda: make(self.model))
-
-    def _fitted(self, state: CampaignState) -> "Model":
-        from planner.campaign.model import build
-
-        model = build(self.cell, state, self.frf_of, self.columns_of)
-        _ = model.frequency_sd_percent  # kept with it: every command needs it
-        return model
-
-    def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
-        """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
-        from planner.dataset.measure import frf_of
-
-        key = _frf_key(measurement.accepted, table)
-        if key not in self._frfs:
-            sources = tuple(self.source_of(hit) for hit in measurement.accepted)
-            self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
-        return self._frfs[key]
-
-    def columns_of(self, measurement: Measurement, table: ModesTable) -> "HitColumns":
-        """What each accepted hit of a measured pose says by itself."""
-        from planner.dataset.hit_columns import columns_of
-
-        sources = tuple(self.source_of(hit) for hit in measurement.accepted)
-        return columns_of(sources, table.band_hz, table.window_rate_1_s)
-
-    def dataset(
-        self,
-        band_hz: tuple[float, float],
-        *,
-        window_rate_1_s: float = 0.0,
-        progress: "Progress" = lambda text: None,
-    ) -> "Dataset":
-        """The accepted recordings of all poses in use, in the order of import.
-
-        Raises InputError where there are none.
-        """
-        from planner.dataset.dataset import Dataset, Recording
-
-        found = [
-            Recording(measurement.pose, np.deg2rad(measurement.joints_deg), self.source_of(hit))
-            for measurement in self.state.used
-            for hit in measurement.accepted
-        ]
-        if not found:
-            raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
-        return Dataset.of(
-            found,
-            band_hz,
-            window_rate_1_s=window_rate_1_s,
-            progress=progress,
-            name=str(self.directory),
-        )
-
-    def orphans(self) -> list[str]:
-        """Recordings stored without an import: the program was stopped in between."""
-        known = {
-            hit.sha256
-            for e in self.entries
-            if isinstance(e.event, Imported | Refused)
-            for hit in e.event.hits
-        }
-        kept = (self.directory / store.RECORDINGS).glob("[0-9a-f]*")
-        return sorted(p.name for p in kept if p.suffix != ".robot" and p.name[:64] not in known)
-
-    def _configured(self) -> Configured:
-        """What campaign.toml and the robot folder say now (the log follows with the next act)."""
-        config = load_campaign_config(self.directory / store.CONFIG)
-        hashes = store.robot_hashes(self.directory)
-        begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        return Configured(_as_logged(config), hashes, __version__, begun.geometric_stiffness)
-
-    # -- what is expected ----------------------------------------------------------------------
-
-    def predict(self, q_rad: np.ndarray) -> "ModalPrediction":
-        """Frequencies (Hz) and damping ratios (n, count), with sds, at poses q (n, dof) in rad."""
-        return self.model.predict(np.atleast_2d(q_rad))
-
-    def frf(
-        self, q_rad: np.ndarray, frequency_hz: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """FRFs at poses, with their uncertainty.
-
-        Args:
-            q_rad: Joint angles (n, dof) in rad, in the order of the robot's joints.
-            frequency_hz: Lines (F,) in Hz; by default `frequency_lines`.
-
-        Returns:
-            Mean (n, 3, 3, F), complex, and sd (n, 3, 3, F) of the accelerance in m/s²/N: response
-            axis, then hit axis.
-        """
-        lines, model = self.frequency_lines if frequency_hz is None else frequency_hz, self.model
-        known = model.knows_frfs
-        found = model.frf(np.atleast_2d(q_rad), lines)
-        if not known:
-            name = self._model_name(self._configured(), self.state)
-            model_cache.keep_model(self._kept, name, model)
-        return found
-
-    @property
-    def frequency_lines(self) -> np.ndarray:
-        """Lines (F,) in Hz over campaign.toml's band."""
-        from planner.frf.frequency_lines import frequency_lines
-
-        return frequency_lines(self.cell.config.modes.band_hz)
-
-    # -- acts ----------------------------------------------------------------------------------
 
     def next(self, count: int = 1, acquisition: str | None = None) -> tuple[Proposal, ...]:
         """The next poses to measure; the same ones until something changes.
@@ -440,7 +234,7 @@ class Campaign:
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]
         if measured.frf is not None:
-            self._frfs[_frf_key(measurement.accepted, self.cell.config.modes)] = measured.frf
+            self._frfs[frf_key(measurement.accepted, self.cell.config.modes)] = measured.frf
         model = self.model
         return ImportReport(
             pose=pose,
@@ -462,11 +256,6 @@ class Campaign:
             question=event.question,
         )
 
-    def source_of(self, hit: HitRecord) -> Source:
-        """The kept copy of a recording."""
-        path = store.recording_path(self.directory, hit.sha256, hit.suffix)
-        return Source(path, hit.file, hit.hit, hit.repeat)
-
 
 class _Acting:
     """The campaign's lock, its log read afresh and its configuration followed."""
@@ -487,20 +276,6 @@ class _Acting:
         self._lock.__exit__(None, None, None)
 
 
-def _frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:
-    """What an FRF depends on."""
-    return (*(hit.sha256 for hit in hits), table.band_hz, table.window_rate_1_s)
-
-
-def _text(configured: Configured) -> str:
-    return msgspec.json.encode(configured).decode()
-
-
-def _as_logged(config: CampaignConfig) -> dict:
-    """The configuration as it reads back from the log, so that the two can be compared."""
-    return msgspec.json.decode(msgspec.json.encode(config))
-
-
 def _first_entry(directory: Path) -> bytes:
     """The log of a new campaign, once robot and workspace have been held against each other."""
     from datetime import UTC, datetime
@@ -513,5 +288,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(_as_logged(config), hashes, __version__, geometric_stiffness=True)
+    event = Configured(as_logged(config), hashes, __version__, geometric_stiffness=True)
     return encode_line("", Entry(1, now, event))[0]

@@ -15,6 +15,7 @@ import numpy as np
 from planner.campaign.events import MeasuredMode, Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
+from planner.inference.assignment import least_cost
 
 LEAST = 4  # measured poses before which the model's sd is not to be relied on
 # Off is what lies further than both. Right poses are within 2.2 sd where the simulation fits
@@ -70,15 +71,13 @@ def compare(
     expected_hz: np.ndarray, sd_hz: np.ndarray, modes: tuple[MeasuredMode, ...]
 ) -> Comparison:
     """Expected (count,) with sd in Hz against measured modes, paired so that most agree."""
-    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
-
     found = [(m.frequency_hz, m.frequency_sd_hz) for m in modes if m.likely]
     hz, own = np.array(found).reshape(-1, 2).T
     off = np.log(hz[None, :] / expected_hz[:, None])
     sd = np.hypot((sd_hz / expected_hz)[:, None], (own / hz)[None, :])
     # Capped: a mode that was not found costs one pair, not a shift of all pairs above it.
     cost = np.minimum(np.abs(off) / sd, FAR_SD) + np.abs(off)
-    rows, columns = linear_sum_assignment(np.where(np.isfinite(cost), cost, 2 * FAR_SD))
+    rows, columns = least_cost(np.where(np.isfinite(cost), cost, 2 * FAR_SD))
     paired = Comparison(*np.full((2, len(expected_hz)), np.nan))
     paired.off[rows], paired.sd[rows] = off[rows, columns], sd[rows, columns]
     return paired
@@ -99,20 +98,25 @@ def question(
     answered = known is not None and known.question is not None
     if answered or len(model.labelled) < LEAST or not any(m.likely for m in modes):
         return None
+    (here,) = _compared(model, [joints_deg], modes)
+    if not here.contradicts(model.low.taught):
+        return None
     others = {m.pose: m.joints_deg for m in state.used}
     others |= {name: state.proposals[name].joints_deg for name in state.open}
     others.pop(pose, None)
-    expected = model.predict(np.deg2rad([joints_deg, *others.values()]))
-    found = [
-        compare(hz, sd, modes)
-        for hz, sd in zip(expected.frequency_hz, expected.frequency_sd_hz, strict=True)
-    ]
-    here, elsewhere = found[0], dict(zip(others, found[1:], strict=True))
-    if not here.contradicts(model.low.taught):
-        return None
-    fitting = {name: c.log_density for name, c in elsewhere.items() if c.fits}
+    elsewhere = zip(others, _compared(model, [*others.values()], modes), strict=True)
+    fitting = {name: c.log_density for name, c in elsewhere if c.fits}
     fits = max(fitting, key=lambda name: fitting[name]) if fitting else ""
     return _asked(pose, here, fits)
+
+
+def _compared(
+    model: Model, poses_deg: list[tuple[float, ...]], modes: tuple[MeasuredMode, ...]
+) -> list[Comparison]:
+    """What is expected at each of at least one pose against the same measured modes."""
+    expected = model.predict(np.deg2rad(poses_deg))
+    each = zip(expected.frequency_hz, expected.frequency_sd_hz, strict=True)
+    return [compare(hz, sd, modes) for hz, sd in each]
 
 
 def _asked(pose: str, here: Comparison, fits: str) -> Question:

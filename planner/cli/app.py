@@ -9,6 +9,7 @@ from planner.cli.answer import AsJson, refusals, respond, warn
 from planner.cli.comparison import compare
 from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
+from planner.cli.modes import modes
 from planner.cli.proving import prove
 from planner.cli.study import study
 
@@ -250,53 +251,7 @@ def replay(
     return respond(answer, as_json, 0 if answer.reproduced else 1)
 
 
-@app.command()
-def modes(
-    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Hits of one pose.")],
-    band_hz: Annotated[
-        tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Band in Hz.")
-    ] = None,
-    force: Annotated[
-        str | None, typer.Option(metavar="CHANNEL", help="Force channel, if not labelled.")
-    ] = None,
-    quantity: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND", help="Of unlabelled FRFs: accelerance, mobility or receptance."
-        ),
-    ] = None,
-    estimator: Annotated[str, typer.Option(help="h1, h2 or hv.")] = "h1",
-    window_rate_1_s: Annotated[
-        float,
-        typer.Option("--window-rate", metavar="1/S", help="Of the analyser's exponential window."),
-    ] = 0.0,
-    robot: Annotated[
-        Path | None,
-        typer.Option(metavar="ROBOT_TOML", help="Whose simulation guides labels over poses."),
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw the analysis into this folder.")
-    ] = None,
-    format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
-    rrd: Rrd = None,
-    as_json: AsJson = False,
-) -> int:
-    """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv."""
-    from planner.cli.progress import reporting
-    from planner.report.modal_analysis import modal_report
-    from planner.report.plot_files import Pictures
-    from planner.report.survey import several_poses, survey
-
-    pictures = Pictures(plot, format_, rrd)
-    if several_poses(paths):
-        given = paths[0], band_hz, robot, estimator, quantity, window_rate_1_s
-        with reporting("identifying", quiet=as_json) as progress:
-            answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
-    else:
-        answer = modal_report(paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s)
-    return respond(answer, as_json, refusals(answer.refused))
-
-
+app.command()(modes)
 app.command()(identify)
 app.command()(diagnose)
 app.command()(prove)

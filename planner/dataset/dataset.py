@@ -3,9 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import groupby
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +11,7 @@ from planner.dataset.level_columns import Column, column
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store, user_store
+from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, stays_of
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
@@ -26,46 +25,6 @@ from planner.recording.records import Hit
 LAID = 2.0
 
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Visit:
-    """Hits at one pose without leaving it: q (dof,) in rad, `order` 0 to 1 through the campaign.
-
-    Its hits are good by themselves. Some may disagree with their repeats: that is what screens
-    look for.
-    """
-
-    pose: str
-    q: np.ndarray
-    order: float
-    hits: tuple[Hit, ...]
-
-
-class Recording(NamedTuple):
-    """One file: the pose at which it was recorded, its readback q (dof,) in rad, where it lies."""
-
-    pose: str
-    q: np.ndarray
-    source: Source
-
-
-class Stay(NamedTuple):
-    """A visit before its files are read: which entry, which of its files, and as in `Visit`."""
-
-    entry: int
-    files: tuple[int, ...]
-    q: np.ndarray
-    order: float
-
-
-@dataclass(frozen=True, eq=False)
-class PoseEntry:
-    """What has an FRF of its own: as a rule a pose with all its visits; q (dof,) in rad."""
-
-    pose: str
-    q: np.ndarray
-    measured: MeasuredPose
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +127,7 @@ class Dataset:
             raise RefusedError(f"{name}: no pose has a hit that can be used: {reason}")
         return cls(
             tuple(entries),
-            _stays(recordings),
+            stays_of(recordings),
             band_hz,
             window_rate_1_s,
             refused,
@@ -312,23 +271,6 @@ class Dataset:
             ]
             out.append(tuple(found))
         return tuple(out)
-
-
-def _stays(recordings: Sequence[Recording]) -> tuple[Stay, ...]:
-    """Neighbouring recordings of one pose are a visit."""
-    numbers: dict[str, int] = {}
-    files: dict[str, int] = {}
-    runs = [list(run) for _, run in groupby(recordings, key=lambda recording: recording.pose)]
-    found = []
-    for place, run in enumerate(runs):
-        pose = run[0].pose
-        first = files.get(pose, 0)
-        files[pose] = first + len(run)
-        entry = numbers.setdefault(pose, len(numbers))
-        q = np.mean([recording.q for recording in run], axis=0)
-        order = place / max(len(runs) - 1, 1)
-        found.append(Stay(entry, tuple(range(first, files[pose])), q, order))
-    return tuple(found)
 
 
 def _known(frfs: Iterable[Frf | None]) -> tuple[Frf, ...]:

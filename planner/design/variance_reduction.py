@@ -1,9 +1,10 @@
-"""How much measuring a candidate lowers the variance over a target, in closed form and compiled.
+"""How much measuring a candidate lowers the variance over a target, in closed form.
 
 Measuring at c lowers the variance at u by cov(u, c)²/(var(c) + noise) (Sacks et al. 1989; Cohn
 1996). The posterior covariance is a kernel of x plus an inner product of few features (the
-simulation's slope and bias, minus what was measured and what is planned), so that one compiled
-loop over blocks of candidates makes it, squares it and sums it without keeping it.
+simulation's slope and bias, minus what was measured and what is planned), so that a loop over
+blocks of candidates, compiled where they are many, makes it, squares it and sums it without
+keeping it.
 """
 
 from collections.abc import Sequence
@@ -13,9 +14,12 @@ import numpy as np
 
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.inference.parallel import side_by_side
+from planner.surrogate.kernels import parse
 
 BLOCK_CANDIDATES = 128  # at a time: their covariances with the target stay in the cache
 BLOCKS_PER_CALL = 64  # where there are many; calls of equal shape are compiled once
+# Up to so many NumPy takes as long as what is compiled, and JAX half a second to import.
+PLAIN_CANDIDATES = 1_000
 MANY_CANDIDATES = 20_000  # from which all but the best are done in single precision
 BEST_CANDIDATES = 1_000  # that are then done in double precision
 FEATURE_MULTIPLE = 2  # the number of features is rounded up to a multiple of it: fewer compilations
@@ -55,22 +59,18 @@ def _label(
     outputs: FrequencyOutputs, target: Target, precision: type[np.floating], poses: Poses, k: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Reduction (n,) by label k and the variance (n,) of measuring it, mean over the samples."""
-    # By JAX, which takes most of a second to import.
-    from planner.design.squared_covariances import squared_covariances
-
     weight = target.importance[:, k]
     if not weight.any() or not len(poses):
         return np.zeros(len(poses)), np.ones(len(poses))
     a, va = _features(outputs, k, poses, sign=-1.0)
     b, _ = _features(outputs, k, target.poses, sign=1.0)
     scale = va + outputs.noise[k]
-    n = len(poses)
-    step = (
-        BLOCK_CANDIDATES * BLOCKS_PER_CALL
-        if n > 4 * BLOCK_CANDIDATES * BLOCKS_PER_CALL
-        else BLOCK_CANDIDATES
-    )
-    kernel = outputs.posterior.kernel
+    n, kernel = len(poses), outputs.posterior.kernel
+    squared, step = plain_squared_covariances, BLOCK_CANDIDATES
+    if n > PLAIN_CANDIDATES:
+        from planner.design.squared_covariances import squared_covariances as squared
+
+        step *= BLOCKS_PER_CALL if n > 4 * BLOCK_CANDIDATES * BLOCKS_PER_CALL else 1
     rows = (_filled(poses.x, step), np.stack([_filled(one, step) for one in a]))
     x, a = (one.astype(precision) for one in rows)
     rest = (outputs.posterior.theta[k], target.poses.x, b, weight)
@@ -79,10 +79,22 @@ def _label(
     for s, theta in enumerate(thetas):
         for i in range(0, len(x), step):
             part = slice(i, i + step)
-            done[s, part] = squared_covariances(
-                kernel, theta, x[part], a[s, part], xu, b[s], weight
-            )
+            done[s, part] = squared(kernel, theta, x[part], a[s, part], xu, b[s], weight)
     return np.mean(done[:, :n] / scale, axis=0), np.mean(scale, axis=0)
+
+
+def plain_squared_covariances(
+    kernel: str,
+    theta: np.ndarray,
+    x: np.ndarray,
+    a: np.ndarray,
+    xu: np.ndarray,
+    b: np.ndarray,
+    weight: np.ndarray,
+) -> np.ndarray:
+    """Σ_u weight_u cov(c, u)² (n,) of one block of candidates c, by NumPy."""
+    delta = parse(kernel, x.shape[1])
+    return (delta.covariance(np, theta, x, xu) + a @ b.T) ** 2 @ weight
 
 
 def _features(

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from planner.dynamics.vibration import SimulatedModes, normal_modes
+from planner.inference.assignment import least_cost
 
 # Between poses whose shapes are compared. Modes that exchange their shapes over less than this
 # are taken to cross; over more, to veer and keep their order. In longer steps veering looks like
@@ -44,6 +44,8 @@ class Families:
         They are followed in steps of STEP_RAD along the minimum spanning tree of those poses
         that are at least as far apart.
         """
+        from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree  # 0.2 s
+
         self._undamped = undamped
         self._hubs = _hubs(np.vstack([reference, poses]))
         distance = np.linalg.norm(self._hubs[:, None] - self._hubs[None], axis=2)
@@ -93,11 +95,9 @@ def _path(start: np.ndarray, end: np.ndarray) -> np.ndarray:
 
 def _follow(a: _Modes, i: int, b: _Modes, j: int) -> np.ndarray:
     """For each mode of pose i of `a` the one of pose j of `b` that is most like it."""
-    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
-
     alike = (a.shape[i].T @ b.mass[j] @ b.shape[j]) ** 2
     apart = np.log(b.frequency_hz[j] / a.frequency_hz[i][:, None]) / FREQUENCY_STEP
-    return linear_sum_assignment(apart**2 - alike)[1]
+    return least_cost(apart**2 - alike)[1]
 
 
 def rearranged(
@@ -122,12 +122,10 @@ def rearranged(
 
 def _partners(damped_hz: np.ndarray, undamped_hz: np.ndarray) -> np.ndarray:
     """For each undamped mode the damped one nearest in frequency, −1 without; one to one."""
-    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
-
     known = np.flatnonzero(np.isfinite(damped_hz))
     out = np.full(len(undamped_hz), -1)
     apart = np.abs(np.log(undamped_hz[:, None] / damped_hz[known]))
-    rows, columns = linear_sum_assignment(apart)
+    rows, columns = least_cost(apart)
     out[rows] = known[columns]
     return out
 

@@ -49,9 +49,13 @@ def fit_similarity(
     frfs: Sequence[Frf],
     q: np.ndarray,
     band_hz: tuple[float, float] | None = None,
+    lines: int = MOST_LINES,
 ) -> Similarity:
-    """Global FRAC and Frobenius similarity of a simulation to FRFs at q (n, dof) in rad."""
-    measured = _stacked(simulation, frfs, band_hz)
+    """Global FRAC and Frobenius similarity of a simulation to FRFs at q (n, dof) in rad.
+
+    On at most so many `lines` a pose.
+    """
+    measured = _stacked(simulation, frfs, band_hz, lines)
     return similarity_of(measured, _simulated(simulation, measured, q))
 
 
@@ -74,16 +78,23 @@ def residuals(
 ) -> Residuals:
     """What a simulation leaves unexplained of FRFs at q (n, dof) in rad, in robot.toml's band."""
     measured = _stacked(simulation, frfs, band_hz)
-    difference = _simulated(simulation, measured, q) - measured.accelerance
+    return _residuals_of(measured, _simulated(simulation, measured, q))
+
+
+def _residuals_of(measured: Measured, h: np.ndarray) -> Residuals:
+    difference = h - measured.accelerance
     values = np.where(measured.used, np.sqrt(2) * difference / measured.sd, np.nan)
     return Residuals(measured.frequency_hz, values)
 
 
 def _stacked(
-    simulation: Simulation, frfs: Sequence[Frf], band_hz: tuple[float, float] | None
+    simulation: Simulation,
+    frfs: Sequence[Frf],
+    band_hz: tuple[float, float] | None,
+    lines: int = MOST_LINES,
 ) -> Measured:
     band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
-    return stack(frfs, band, MOST_LINES, MODEL_ERROR)
+    return stack(frfs, band, lines, MODEL_ERROR)
 
 
 def _simulated(simulation: Simulation, measured: Measured, q: np.ndarray) -> np.ndarray:

@@ -32,7 +32,8 @@ STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is
 class Effort:
     """How exact an identification is: lines a pose and completions of cut-off records.
 
-    Each for a start and for the last fit; iterations end where a step gains less than `tolerance`.
+    Each for a start and for the last fit, which is judged on as many lines; iterations end where a
+    step gains less than `tolerance`.
     """
 
     lines: int = 160
@@ -249,7 +250,7 @@ def _result(
         misfit,
         round(end.at.chi2 / misfit),
         best.by_pose,
-        fit_similarity(fitted, problem.frfs, q, problem.band_hz),
+        fit_similarity(fitted, problem.frfs, q, problem.band_hz, problem.effort.last_lines),
         undetermined(p, covariance),
         starts,
         end.converged,

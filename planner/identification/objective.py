@@ -72,7 +72,7 @@ class Objective:
         springs, mass = self.parametrisation.elasticity(x[:count]), self._mass(x[count:])
         m = self.measured
         slope = None
-        if self.free_inertia:
+        if self.free_inertia and sloped:
             slope = np.array([self.inertias.mass_change(one) for one in np.eye(len(x) - count)])
         made = completion(self.matrices, springs, mass, m.s, m.tail_s, m.sd, slope, sloped)
         return replace(self, completion=made, completed_at=x)
@@ -146,9 +146,11 @@ class Objective:
         )
         if self.completion is not None:
             lost, since = self.completion, x - self.completed_at
-            moved = np.concatenate([p.spread @ since[:count], since[count:]])
-            h = h - lost.values - np.einsum("npijf,p->nijf", lost.slope, moved)
-            slope[:, : len(moved)] -= lost.slope
+            h = h - lost.values
+            if lost.slope is not None:
+                moved = np.concatenate([p.spread @ since[:count], since[count:]])
+                h -= np.einsum("npijf,p->nijf", lost.slope, moved)
+                slope[:, : len(moved)] -= lost.slope
         residual, slope = self._residual(h, slope)
         if self.left_open is not None:
             return self.left_open.integrated(residual, slope)

@@ -23,11 +23,11 @@ class Completion:
     """What the records lack at given springs: `values` (n, 3, 3, F) in m/s²/N.
 
     `slope` (n, 2e or 3e, + R, 3, 3, F) is with respect to the springs' logarithms, then to R
-    inertial parameters.
+    inertial parameters; None where the values are taken to hold everywhere.
     """
 
     values: np.ndarray
-    slope: np.ndarray
+    slope: np.ndarray | None
 
 
 def cut_off(solved: Poles, s: np.ndarray, tail_s: np.ndarray) -> np.ndarray:
@@ -54,7 +54,7 @@ def completion(
     mass_slope: np.ndarray | None = None,
     sloped: bool = True,
 ) -> Completion | None:
-    """Completion at springs and mass matrices (n, e, e); its slope by differences, or 0.
+    """Completion at springs and mass matrices (n, e, e); its slope by differences, or None.
 
     `mass_slope` (R, n, e, e): of the masses with respect to parameters that follow the springs.
 
@@ -77,9 +77,7 @@ def completion(
     if np.all(np.abs(values) < NEGLIGIBLE * sd):
         return None
     if not sloped:
-        size = len(kinds) * len(elasticity.stiffness)
-        size += 0 if mass_slope is None else len(mass_slope)
-        return Completion(values, np.zeros((len(values), size, *values.shape[1:])))
+        return Completion(values, None)
     for kind in kinds:
         for j, value in enumerate(getattr(elasticity, kind)):
             moved = getattr(elasticity, kind).copy()

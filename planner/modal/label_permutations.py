@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from planner.modal.mac import mac
 from planner.modal.modes import Mode
@@ -39,6 +38,8 @@ class Tree:
     @classmethod
     def of(cls, x: np.ndarray, root: int) -> "Tree":
         """The shortest tree of poses at x (n, d)."""
+        from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree  # 0.2 s
+
         apart = np.linalg.norm(x[:, None] - x[None], axis=2) + 1e-9  # 0 would be no edge
         order, parent = breadth_first_order(minimum_spanning_tree(apart), root, directed=False)
         return cls(order, np.where(parent < 0, -1, parent))

@@ -7,6 +7,8 @@ modes; free ones may exchange them.
 
 import numpy as np
 
+from planner.inference.assignment import least_cost
+
 # Matchings are summed over subsets of the measured modes; beyond this many, the dearest are out.
 MOST = 12
 HOPELESS = -40.0  # gain below which a match is left out of the sum (odds of 2e-9)
@@ -19,10 +21,8 @@ def best(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
     """
     if ordered:
         return _best_ordered(gain)
-    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
-
     chosen = np.full(gain.shape[0], -1)
-    rows, columns = linear_sum_assignment(-np.maximum(gain, 0.0))
+    rows, columns = least_cost(-np.maximum(gain, 0.0))
     for row, column in zip(rows, columns, strict=True):
         if gain[row, column] > 0:
             chosen[row] = column

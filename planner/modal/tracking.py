@@ -15,6 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from planner.inference.assignment import least_cost
 from planner.modal.label_permutations import name_chances
 from planner.modal.mac import align, unexpected_cost
 from planner.modal.mode_matching import best, chances
@@ -96,9 +97,7 @@ def _named(poses: Sequence[Sequence[Mode]], guide: Guide, x: np.ndarray) -> Trac
     ranked = _columns(guide, order)
     placed = _matched(poses, ranked, x, ordered=True)
     chance = name_chances(placed.modes, np.argsort(order, axis=1), x, guide.reference)
-    from scipy.optimize import linear_sum_assignment  # takes 0.2 s to import
-
-    place = np.array([linear_sum_assignment(-c)[1] for c in chance])
+    place = np.array([least_cost(-c)[1] for c in chance])
     rows, labels = np.arange(len(poses))[:, None], np.arange(order.shape[1])
     sure = placed.probability[rows, place]
     modes = [tuple(row[b] for b in p) for row, p in zip(placed.modes, place, strict=True)]

@@ -1,7 +1,6 @@
 """How hard the hits were: peaks and force levels."""
 
 import numpy as np
-from scipy.cluster.hierarchy import fcluster, linkage
 
 from planner.recording.records import Hit
 
@@ -33,6 +32,8 @@ def levels(peaks_n: np.ndarray) -> list[np.ndarray]:
     """
     if len(peaks_n) < 2:
         return [peaks_n]
+    from scipy.cluster.hierarchy import fcluster, linkage  # takes 0.2 s to import
+
     logarithms = np.log(np.maximum(peaks_n, np.finfo(float).tiny))
     tree = linkage(logarithms[:, None], "average")
     which = fcluster(tree, np.log(SAME_LEVEL), "distance")

@@ -85,6 +85,14 @@ def test_parameters_are_refitted_as_foretold(surrogate):
         )
 
 
+def test_few_candidates_are_told_as_by_what_is_compiled(surrogate, monkeypatch):
+    outputs, poses = over(surrogate, X, 30)
+    plain = reduction(outputs, poses, outputs.workspace)
+    monkeypatch.setattr(module, "PLAIN_CANDIDATES", 0)
+    compiled = reduction(outputs, poses, outputs.workspace)
+    np.testing.assert_allclose(plain, compiled, rtol=1e-9)
+
+
 def test_of_many_candidates_the_best_are_exact(surrogate, monkeypatch):
     outputs, poses = over(surrogate, X, 30)
     exact = reduction(outputs, poses, outputs.workspace)
