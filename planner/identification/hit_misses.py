@@ -25,10 +25,11 @@ AIM = 0.5
 # 0.3, 0.5 and 1 % give intervals of 95 % for offsets that cover 92, 93 and 96 %.
 RELATIVE = 0.005
 SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # of the discrepancy, relative to modal shapes
-FEWEST_LINES, LINES = 16, 400  # a pose, and of all poses that tell the common numbers together
+FEWEST_LINES, LINES = 16, 192  # a pose, and of all poses that tell the common numbers together
 STEPS = 4  # linearisations
 STRIDE = 0.3  # prior sd of a step, in logarithms of springs and sds of inertias: it is damped
 SHORTER = 0.3  # of the stride, after a step that led uphill
+SETTLED = 1.0  # nats that a step gains: no further one is worth its time
 OWN, AIMED, CHAIN = 4, 12, 14  # numbers of a hit, of all aims, of the chain
 
 
@@ -116,10 +117,13 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
             tried = common.at(x, heard, [visits[i] for i in few], lines)
         except np.linalg.LinAlgError:
             tried = None  # no robot can have such inertias
-        if tried is None or tried.solved(size).here < best.solved(size).here:
+        gain = -np.inf if tried is None else tried.solved(size).here - best.solved(size).here
+        if tried is None or gain < 0:
             stride *= SHORTER
-        else:
-            best = tried
+            continue
+        best = tried
+        if gain < SETTLED:
+            break
     size = max(SIZES, key=lambda s: best.solved(s).evidence)
     solved = best.solved(size)
     others = [common.visit(best.simulation, best.chain, visits[i], lines) for i in range(few.start)]

@@ -78,7 +78,7 @@ def test_what_hits_have_in_common_is_said():
     assert habits([hit("+y", (0.3, 0.3), (1.0, 1.0))] * 3) == ()
 
 
-CELLS = (("kr10", 1, 41), ("irb6640", 1, 42), ("kr210", 3, 43))
+CELLS = (("kr10", 1, 51), ("irb6640", 1, 52), ("kr210", 3, 53))
 
 
 @pytest.mark.slow
