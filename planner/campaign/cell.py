@@ -59,7 +59,7 @@ class Cell:
     @property
     def tolerances(self) -> Tolerances:
         """Of hits and measuring chain, as robot.toml or campaign.toml state them."""
-        return Tolerances.of(self.robot.config.hits, self.robot.config.sensor)
+        return Tolerances.of(self.robot.config)
 
     @cached_property
     def candidates(self) -> Candidates:

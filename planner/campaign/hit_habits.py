@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.identification.measurement_model import ACROSS
 from planner.recording.records import AXES
 
 SURE = 2.0  # sds from which what hits have in common is told
@@ -35,8 +34,8 @@ class HitMiss:
     @property
     def across(self) -> tuple[str, str]:
         """Letters of the two directions across its axis."""
-        first, second = ACROSS[AXES.index(self.hit[1])]
-        return AXES[first], AXES[second]
+        axis = AXES.index(self.hit[1])
+        return AXES[(axis + 1) % 3], AXES[(axis + 2) % 3]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ import numpy as np
 
 from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
 from planner.campaign.log_conversion import from_mode, to_mode
-from planner.campaign.low_fidelity import Learned
+from planner.campaign.low_fidelity import Learned, LowFidelity, learn
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns
+from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.hit_misses import (
     AIMED,
@@ -65,27 +66,29 @@ class CampaignMisses:
         return tuple(_pose(visited, told) for visited, told in both)
 
     def corrected(self, measurement: Measurement) -> Measurement:
-        """With residues as hits without a miss would give them, and what is unsure in their sds.
-
-        Poles and shapes of response do not depend on where and how the robot is hit.
-        """
-        names = [visited.pose for visited in self.visited]
-        if self.told is None or measurement.pose not in names or not measurement.modes:
-            return measurement
-        number = names.index(measurement.pose)
-        visited, told = self.visited[number], self.told.visits[number]
-        modes = [to_mode(mode) for mode in measurement.modes]
-        if self.told.discrepancy > TOO_WRONG:
-            made = [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
-        else:
-            made = self._without_misses(modes, visited, told)
+        """With residues as `without_misses` gives them."""
+        modes = self.without_misses(measurement.pose, [to_mode(m) for m in measurement.modes])
         kept = [
             msgspec.structs.replace(old, residue=from_mode(new).residue)
-            for old, new in zip(measurement.modes, made, strict=True)
+            for old, new in zip(measurement.modes, modes, strict=True)
         ]
         return replace(measurement, modes=tuple(kept))
 
-    def _without_misses(self, modes: list[Mode], visited: Visited, told: VisitMisses) -> list[Mode]:
+    def without_misses(self, pose: str, modes: Sequence[Mode]) -> list[Mode]:
+        """Modes with residues as hits without a miss would give them.
+
+        What stays unsure is in their sds. Poles and shapes of response do not depend on where and
+        how the robot is hit. Where the simulation is too wrong to tell, residues are as measured.
+        """
+        names = [visited.pose for visited in self.visited]
+        if self.told is None or pose not in names or not modes:
+            return list(modes)
+        visited, told = self.visited[names.index(pose)], self.told.visits[names.index(pose)]
+        if self.told.discrepancy > TOO_WRONG:
+            return [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
+        return self._moved(modes, visited, told)
+
+    def _moved(self, modes: Sequence[Mode], visited: Visited, told: VisitMisses) -> list[Mode]:
         assert self.told is not None
         frf, simulation = visited.frf, self.told.simulation
         lines = laplace(frf.frequency_hz, frf.exponential_rate_1_s, frf.tail_s)
@@ -107,16 +110,25 @@ class CampaignMisses:
 
 
 def tell(
-    visited: Sequence[Visited], learned: Learned, t: Tolerances, band_hz: tuple[float, float]
+    visited: Sequence[Visited], learned: Learned | None, t: Tolerances, band_hz: tuple[float, float]
 ) -> CampaignMisses:
     """Misses of the hits of all poses, by the simulation as it was identified from them."""
     those = tuple(one for one in visited if len(one.columns.axis))
-    if not those:
+    if learned is None or not those:
         return CampaignMisses((), None, t, band_hz)
     simulation = learned.structure.simulation
     known = Known(simulation, parametrise(simulation, learned.priors), learned.identified.mean)
     told = tell_misses([VisitHits(one.q, one.columns) for one in those], known, t, TELL_BY)
     return CampaignMisses(those, told, t, band_hz)
+
+
+def told_by(
+    nominal: Simulation, visited: Sequence[Visited], t: Tolerances, band_hz: tuple[float, float]
+) -> CampaignMisses:
+    """As `tell`, by a simulation that is identified from the same FRFs first."""
+    q = np.array([one.q for one in visited])
+    learned = learn(LowFidelity(1, nominal), [one.frf for one in visited], q, band_hz).learned
+    return tell(visited, learned, t, band_hz)
 
 
 def visits_of(

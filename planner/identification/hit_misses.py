@@ -4,7 +4,7 @@ Every hit's column of the FRF matrix is, to first order, linear in what is not k
 of its own (`measurement_model`), an aim common to all hits along an axis, the measuring chain, the
 readback of its pose, the simulation's parameters, and a discrepancy of the simulation at its pose
 whose size is inferred. All have normal priors. What belongs to one pose is eliminated pose by
-pose; what is common remains, and is linearised again where it moved.
+pose; what is common remains: parameters and chain are linearised again where they moved.
 """
 
 from collections.abc import Sequence
@@ -21,12 +21,15 @@ from planner.modal.residues import laplace
 
 # An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
 AIM = 0.5
-RELATIVE = 0.005  # of an FRF: what no column describes (curvature, rounding of first order)
+# Of an FRF: what no column describes, such as terms of second order. On generated cells (708 hits)
+# intervals of 95 % then cover 97 % of tilts and 95 % of offsets.
+RELATIVE = 0.005
 SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # of the discrepancy, relative to modal shapes
-FEWEST_LINES, LINES = 16, 400  # a pose, and of all poses that tell the common numbers together
+FEWEST_LINES, LINES = 16, 192  # a pose, and of all poses that tell the common numbers together
 STEPS = 4  # linearisations
 STRIDE = 0.3  # prior sd of a step, in logarithms of springs and sds of inertias: it is damped
 SHORTER = 0.3  # of the stride, after a step that led uphill
+SETTLED = 1.0  # nats that a step gains: no further one is worth its time
 OWN, AIMED, CHAIN = 4, 12, 14  # numbers of a hit, of all aims, of the chain
 
 
@@ -104,29 +107,37 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
     """
     few = range(max(0, len(visits) - tell_by), len(visits))
     lines = int(np.clip(LINES // max(len(few), 1), FEWEST_LINES, LINES))
-    common, stride, x = _Common(known, t), STRIDE, known.x
-    best = common.at(x, [visits[i] for i in few], lines)
+    common, stride = _Common(known, t), STRIDE
+    best = common.at(known.x, np.zeros(CHAIN), [visits[i] for i in few], lines)
     size = max(SIZES, key=lambda s: best.solved(s).evidence)
     for _ in range(STEPS - 1):
-        step = best.solved(size).step(stride)
+        chain, step = best.solved(size).step(stride)
+        x, heard = known.near(best.x + step), best.chain + chain
         try:
-            tried = common.at(known.near(best.x + step), [visits[i] for i in few], lines)
+            tried = common.at(x, heard, [visits[i] for i in few], lines)
         except np.linalg.LinAlgError:
             tried = None  # no robot can have such inertias
-        if tried is None or tried.solved(size).here < best.solved(size).here:
+        gain = -np.inf if tried is None else tried.solved(size).here - best.solved(size).here
+        if tried is None or gain < 0:
             stride *= SHORTER
-        else:
-            best = tried
+            continue
+        best = tried
+        if gain < SETTLED:
+            break
     size = max(SIZES, key=lambda s: best.solved(s).evidence)
     solved = best.solved(size)
-    others = [common.visit(best.simulation, visits[i], lines) for i in range(few.start)]
+    others = [common.visit(best.simulation, best.chain, visits[i], lines) for i in range(few.start)]
     told = [solved.misses(one) for one in (*others, *best.visits)]
     scale = np.repeat([t.angle_rad, t.offset_m], 2)
-    found = tuple(_in_units(mean, covariance, scale) for mean, covariance in told)
+    found = tuple(_in_units(mean, covariance, scale, size) for mean, covariance in told)
     return Misses(found, best.simulation, size)
 
 
-def _in_units(mean: np.ndarray, covariance: np.ndarray, scale: np.ndarray) -> VisitMisses:
+def _in_units(
+    mean: np.ndarray, covariance: np.ndarray, scale: np.ndarray, size: float
+) -> VisitMisses:
+    # What a miss does is simulated too, and as wrong as the rest of the simulation.
+    covariance = covariance + np.diag((size * mean) ** 2)
     every = np.tile(scale, len(mean) // OWN)
     return VisitMisses((mean * every).reshape(-1, OWN), covariance * np.outer(every, every))
 
@@ -164,21 +175,27 @@ class _Common:
     known: Known
     t: Tolerances
 
-    def at(self, x: np.ndarray, visits: Sequence[VisitHits], lines: int) -> "_Point":
+    def at(
+        self, x: np.ndarray, chain: np.ndarray, visits: Sequence[VisitHits], lines: int
+    ) -> "_Point":
         simulation = self.known.simulation(x)
-        made = tuple(self.visit(simulation, visit, lines) for visit in visits)
-        mean = np.concatenate([np.zeros(AIMED + CHAIN), self.known.mean - x])
+        made = tuple(self.visit(simulation, chain, visit, lines) for visit in visits)
+        mean = np.concatenate([np.zeros(AIMED), -chain, self.known.mean - x])
         sd = np.concatenate([np.ones(AIMED + CHAIN), self.known.sd])
-        return _Point(x, simulation, made, mean, sd)
+        return _Point(x, chain, simulation, made, mean, sd)
 
-    def visit(self, simulation: Simulation, visit: VisitHits, most: int) -> _Visit:
+    def visit(
+        self, simulation: Simulation, chain: np.ndarray, visit: VisitHits, most: int
+    ) -> _Visit:
         columns = visit.columns
         count = len(columns.frequency_hz)
         kept = np.arange(count)
         if count > most:
             kept = np.linspace(0, count - 1, most).round().astype(int)
         lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
-        made = simulated_visit(simulation, self.known.parametrisation, visit.q, lines, self.t)
+        made = simulated_visit(
+            simulation, self.known.parametrisation, visit.q, lines, self.t, chain
+        )
         return _normal_equations(
             columns.axis, columns.accelerance[:, :, kept], columns.variance[:, :, kept], made
         )
@@ -186,9 +203,13 @@ class _Common:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """All visits linearised at x (D,); `mean` and `sd` of what is common are counted from there."""
+    """All visits linearised at parameters x (D,) and `chain` (14,).
+
+    Prior `mean` and `sd` of what is common to all are counted from there.
+    """
 
     x: np.ndarray
+    chain: np.ndarray
     simulation: Simulation
     visits: tuple[_Visit, ...]
     mean: np.ndarray
@@ -220,23 +241,24 @@ class _Solved:
     def _gain(self, chosen: slice) -> float:
         half = np.linalg.cholesky(self.normal[chosen, chosen])
         onto = np.linalg.solve(half, self.right[chosen])
-        return float(onto @ onto) / 2 - float(np.sum(np.log(np.diagonal(half))))
-
-    @property
-    def evidence(self) -> float:
-        """Log marginal likelihood of the linearised model."""
-        return self.rest + self._gain(slice(None))
+        return float(onto @ onto) / 2
 
     @property
     def here(self) -> float:
-        """The same with the parameters where they are: what a step is judged by."""
-        return self.rest + self._gain(slice(AIMED + CHAIN))
+        """Log likelihood and prior with chain and parameters where they are, aims at their best."""
+        return self.rest + self._gain(slice(AIMED))
 
-    def step(self, stride: float) -> np.ndarray:
-        """Change (D,) of the parameters, damped."""
+    @property
+    def evidence(self) -> float:
+        """Log marginal likelihood of the model linearised there."""
+        return self.rest + self._gain(slice(None)) - float(np.linalg.slogdet(self.normal)[1]) / 2
+
+    def step(self, stride: float) -> tuple[np.ndarray, np.ndarray]:
+        """Change of the chain (14,) and of the parameters (D,), damped."""
         damping = np.zeros(len(self.right))
         damping[AIMED + CHAIN :] = 1 / stride**2
-        return np.linalg.solve(self.normal + np.diag(damping), self.right)[AIMED + CHAIN :]
+        moved = np.linalg.solve(self.normal + np.diag(damping), self.right)[AIMED:]
+        return moved[:CHAIN], moved[CHAIN:]
 
     def misses(self, visit: _Visit) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4n,) and covariance (4n, 4n) of the hits' whole misses, in prior sds."""

@@ -70,20 +70,48 @@ def misses_at(simulation: Simulation, q: np.ndarray, lines: Lines, t: Tolerances
     return hit_basis(h[None, :3, :3], h[None, :3, 3:], t)[0]
 
 
+def _heard(made: SimulatedVisit, chain: np.ndarray, s: np.ndarray, t: Tolerances) -> SimulatedVisit:
+    """What a chain that errs by `chain` (14,), in prior sds, makes of what an exact one shows."""
+    within = np.full((3, 3), t.across) + (t.gain - t.across) * np.eye(3)
+    matrix = np.eye(3) + within * chain[:9].reshape(3, 3)
+    force, late = 1 + t.force_gain * chain[12], np.exp(-t.delay_s * chain[13] * s)
+
+    def seen(columns: np.ndarray) -> np.ndarray:
+        return force * late * np.einsum("ik,...kjf->...ijf", matrix, columns)
+
+    place = made.chain[9:12]
+    moved = made.accelerance + np.einsum("k,kijf->ijf", chain[9:12], place)
+    h = seen(moved)
+    columns = np.zeros_like(made.chain)
+    for i in range(3):
+        for j in range(3):
+            columns[3 * i + j, i] = within[i, j] * force * late * moved[j]
+    columns[9:12], columns[12], columns[13] = (
+        seen(place),
+        t.force_gain / force * h,
+        -t.delay_s * s * h,
+    )
+    misses = force * late * np.einsum("ik,alkf->alif", matrix, made.misses)
+    return SimulatedVisit(
+        h, misses, columns, seen(made.readback), seen(made.discrepancy), seen(made.slope)
+    )
+
+
 def simulated_visit(
     simulation: Simulation,
     parametrisation: Parametrisation,
     q: np.ndarray,
     lines: Lines,
     t: Tolerances,
+    chain: np.ndarray,
 ) -> SimulatedVisit:
-    """Of a pose q (dof,) in rad, at lines of the s-plane."""
+    """Of a pose q (dof,) in rad, at lines of the s-plane, where the chain errs by `chain` (14,)."""
     off = np.deg2rad(READBACK_DEG) * np.eye(len(q))
     solved = SolvedPoses.of(simulation, np.concatenate([q[None], q + off]))
     whole = solved.response(0, lines)
     h, moment, turning = whole[:3, :3], whole[:3, 3:], whole[3:, :3]
     moved = [solved.response(1 + k, lines)[:3, :3] - h for k in range(len(q))]
-    return SimulatedVisit(
+    exact = SimulatedVisit(
         h,
         hit_basis(h[None], moment[None], t)[0],
         chain_basis(h[None], turning[None], lines.x[None], t)[0],
@@ -91,6 +119,7 @@ def simulated_visit(
         _discrepancy(solved.poles[0], solved.residues[0, :, :3, :3], lines, h),
         _slope(simulation, parametrisation, q, lines.x),
     )
+    return _heard(exact, chain, lines.x, t)
 
 
 def _slope(simulation: Simulation, p: Parametrisation, q: np.ndarray, s: np.ndarray) -> np.ndarray:

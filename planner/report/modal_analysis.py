@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 from rich.console import Group
 
 from planner.campaign.events import Amplitude
@@ -34,7 +35,10 @@ UNSET = msgspec.UNSET
 
 @dataclass(frozen=True)
 class IdentifiedMode:
-    """A mode with its sds; `shape` is [re, im] per response, `probability` that it is physical."""
+    """A mode with its sds; `shape` is [re, im] per response, `probability` that it is physical.
+
+    `residue` is [re, im, sd] in m/(N·s) of each response to each hit, row by row.
+    """
 
     frequency_hz: float
     frequency_sd_hz: float
@@ -42,14 +46,17 @@ class IdentifiedMode:
     damping_sd: float
     shape: tuple[tuple[float, float], ...]
     probability: float
+    residue: tuple[tuple[float, float, float], ...]
 
     @classmethod
     def of(cls, mode: Mode) -> "IdentifiedMode":
         """Of a mode of a modal model."""
         shape = tuple((float(s.real), float(s.imag)) for s in mode.shape)
+        both = zip(np.ravel(mode.residue), np.ravel(mode.residue_sd), strict=True)
+        residue = tuple((float(r.real), float(r.imag), float(sd)) for r, sd in both)
         return cls(
             mode.frequency_hz, mode.frequency_sd_hz, mode.damping_ratio, mode.damping_sd, shape,
-            mode.probability,
+            mode.probability, residue,
         )  # fmt: skip
 
     @property

@@ -8,9 +8,13 @@ import numpy as np
 from rich.console import Group
 from rich.text import Text
 
-from planner.dataset.measure import measure
+from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.misses import CampaignMisses, Visited, told_by
+from planner.dataset.hit_columns import columns_of
+from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import RefusedError
+from planner.identification.measurement_model import Tolerances
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import TABLE, joint_columns, read_recordings
@@ -36,6 +40,7 @@ class SurveyedMode:
     damping_sd: float
     shape: tuple[tuple[float, float], ...]
     probability: float
+    residue: tuple[tuple[float, float, float], ...]
 
     @classmethod
     def of(cls, mode: Mode, label: int | None = None, sure: float | None = None) -> "SurveyedMode":
@@ -70,6 +75,8 @@ class SurveyReport(Answer):
     simulated: bool
     plots: tuple[str, ...] = ()
     rrd: str | None = None
+    hit_errors: tuple[HitMiss, ...] = ()
+    habits: tuple[str, ...] = ()
     tracks: Tracks | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
     simulated_hz: np.ndarray | None = field(
         default=None, repr=False, metadata=NOT_IN_JSON
@@ -108,6 +115,7 @@ class SurveyReport(Answer):
             others = "  ".join(mode.cell for mode in pose.unlabelled)
             made.add_row(pose.pose, *(by_label.get(label, "–") for label in labels), others)
         parts = [made, Text("  ?: the label is less than 90 % sure."), *drawn(self.plots)]
+        parts += [Text(f"  {habit}") for habit in self.habits]
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
@@ -134,6 +142,7 @@ def survey(
     table = _table(folder, robot_toml)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
     found, refused, simulated = [], [], False
+    visited: list[Visited] = []
     for number, name in enumerate(names):
         progress(f"pose {name}, {number} of {len(names)} done")
         rows = [row for row in table.rows if row.pose == name]
@@ -143,6 +152,8 @@ def survey(
         ]
         simulated |= any(v.simulated for v in measured.verdicts)
         found.append(measured.modal.modes if measured.modal else ())
+        if robot_toml is not None and measured.frf is not None:
+            visited.append(_visited(name, rows, measured))
     if not any(found):
         raise RefusedError(
             f"{folder}: no pose gives a mode between {band[0]:g} and "
@@ -150,11 +161,14 @@ def survey(
         )
     first = {row.pose: row for row in reversed(table.rows)}
     q = np.deg2rad(np.array([first[name].joints_deg for name in names]))
+    misses = _misses(visited, robot_toml, band)
+    found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
     tracks, expected = _labelled(found, q, robot_toml)
     poses = tuple(_pose(name, tracks, i) for i, name in enumerate(names))
+    hits = tuple(hit for pose in misses.poses for hit in pose.hits)
     return SurveyReport(
-        poses, poses[0].modes, band, tuple(refused), (), simulated, tracks=tracks,
-        simulated_hz=expected,
+        poses, poses[0].modes, band, tuple(refused), (), simulated, hit_errors=hits,
+        habits=habits(hits), tracks=tracks, simulated_hz=expected,
     )  # fmt: skip
 
 
@@ -168,6 +182,29 @@ def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
 
 def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
     return tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in rows if r.file)
+
+
+def _visited(pose: str, rows: list[PoseRow], measured: MeasuredPose) -> Visited:
+    """A pose whose FRF is known, with what each accepted hit says."""
+    sources = tuple(v.source for v in measured.verdicts if v.accepted)
+    columns = columns_of(sources, measured.band_hz, measured.window_rate_1_s)
+    files, q = tuple(source.name for source in sources), np.deg2rad(rows[0].joints_deg)
+    assert measured.frf is not None
+    return Visited(pose, files, q, columns, measured.frf)
+
+
+def _misses(
+    visited: list[Visited], robot_toml: Path | None, band: tuple[float, float]
+) -> CampaignMisses:
+    """By the robot's simulation, identified from these recordings; none without a robot."""
+    if robot_toml is None or not visited:
+        return CampaignMisses((), None, Tolerances(), band)
+    from planner.dynamics.simulation import Simulation
+    from planner.robot.robot import Robot
+
+    robot = Robot.load(robot_toml)
+    tolerances = Tolerances.of(robot.config)
+    return told_by(Simulation(robot), visited, tolerances, band)
 
 
 def _labelled(
