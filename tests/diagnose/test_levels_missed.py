@@ -40,7 +40,8 @@ def linear(tmp_path_factory):
 @pytest.fixture(scope="module")
 def hardening(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hardening")
-    return made(12, folder, FEW, HARDENING, robot="kr210", joint="joint_2")
+    how = replace(FEW, axes="xz")
+    return made(12, folder, how, HARDENING, robot="kr210", joint="joint_2")
 
 
 def test_a_linear_robot_is_proportional_though_hits_miss(linear):
