@@ -6,7 +6,7 @@ the measurement's own variance plus a nugget τ². The hyperparameters θ (see `
 averaged (see `importance`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg.lapack import dtrtri
@@ -28,13 +28,18 @@ SINGULAR_REMARK = (
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p)."""
+    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p).
+
+    `nugget_shared` (m,) is the share of log τ's variance that the outputs have in common; (1,): all
+    alike.
+    """
 
     mean: np.ndarray
     bias_sd: np.ndarray
     slope_sd: np.ndarray
     theta_mean: np.ndarray
     theta_sd: np.ndarray
+    nugget_shared: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +61,23 @@ class Posterior:
     remarks: tuple[str, ...] = ()
 
     def predict(
-        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+        self,
+        x: np.ndarray,
+        low: np.ndarray,
+        outputs: np.ndarray | None = None,
+        nugget: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m).
+        """Mean and sd (q, m) of the outputs at x (q, d) with centred low (q, m).
 
-        `outputs` (indices) asks for some of them only.
+        `outputs` (indices) asks for some of them only. The sd is that of the noise-free output;
+        with `nugget`, that of one more value without measurement noise of its own.
         """
         asked = range(len(self.mask)) if outputs is None else outputs.tolist()
         mean, sd = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
             mixture = self.predictive(j, x, low[:, j])
+            if nugget:
+                mixture = mixture.widened(np.exp(self.theta[j, :, 1, None]))
             mean[:, i], sd[:, i] = mixture.mean, mixture.sd
         return mean, sd
 
@@ -149,7 +161,7 @@ def fit(
                 lambda z, j=jitter: log_likelihoods(
                     kernel, padded, y, prior.bias_sd, prior.slope_sd, j, theta(z)
                 ),
-                normal, m, kept, start,
+                normal, m, kept, start, prior.nugget_shared,
             )  # fmt: skip
             whiten = _whitening(kernel, padded, prior, jitter, theta(z))
         except np.linalg.LinAlgError:

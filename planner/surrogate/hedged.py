@@ -39,13 +39,18 @@ class HedgedAR1:
         """See `AR1.split`; of the likelier models."""
         return self.likelier.split(low)
 
-    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        mean, sd = self.likelier.predict(x, low)
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, nugget: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there).
+
+        For `nugget` see `Posterior.predict`.
+        """
+        mean, sd = self.likelier.predict(x, low, nugget=nugget)
         unsure = np.flatnonzero(self.weight < NEARLY_CERTAIN)
         if not len(unsure):
             return mean, sd
-        other, other_sd = self.other.predict(x, low, unsure)
+        other, other_sd = self.other.predict(x, low, unsure, nugget)
         w, apart = self.weight[unsure], other - mean[:, unsure]
         variance = w * sd[:, unsure] ** 2 + (1 - w) * (other_sd**2 + w * apart**2)
         mean[:, unsure] += (1 - w) * apart

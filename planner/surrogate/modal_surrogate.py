@@ -7,6 +7,7 @@ mode's own size. Logarithms keep frequencies and damping positive.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -31,6 +32,9 @@ DAMPING_PRIOR_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nu
 RESIDUE_PRIOR_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
+# Visits to a pose scatter by 0 to 1 % of ln f (temperature, clamping, readback) beyond what EMA
+# states. Modes scatter alike, but not by the same amount.
+SCATTER_PRIOR = {"nugget": 0.002, "nugget_spread": 1.0, "nugget_shared": 0.7}
 SAMPLES, KEPT = 256, 32
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
@@ -57,6 +61,7 @@ class Surrogate:
     damping: KernelAverage  # log ζ of every label
     residue: HedgedAR1 | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
+    visits: bool = True  # whether sds of frequencies are those of a visit to the pose
 
     @property
     def count(self) -> int:
@@ -86,7 +91,7 @@ class Surrogate:
     def predict(self, x: np.ndarray, simulated: SimulatedModes) -> ModalPrediction:
         """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted."""
         q, k = len(x), self.count
-        mean, sd = self.primary.predict(x, _log(simulated.frequency_hz))
+        mean, sd = self.primary.predict(x, _log(simulated.frequency_hz), self.visits)
         log_zeta, zeta_sd = self.damping.predict(
             np.clip(x, *DAMPING_RANGE), _log(simulated.damping_ratio)
         )
@@ -134,6 +139,7 @@ def fit_primary(
     discrepancy: np.ndarray | None = None,
     left_out_hz: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
+    visits: bool = True,
 ) -> HedgedAR1:
     """Fit ln f of every label.
 
@@ -144,14 +150,18 @@ def fit_primary(
         left_out_hz: frequencies (n, k) that the simulation gave each pose before it was fitted to
             that pose, by which it is judged.
         belief: probability of the simulation before these frequencies.
+        visits: whether the scatter from visit to visit is looked for, as large as that of real
+            cells and in all modes together.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
-    judged = None if left_out_hz is None else (_log(left_out_hz), (FREQUENCY_PRIOR,) * k)
+    scatter = partial(replace, **SCATTER_PRIOR) if visits else lambda prior: prior
+    ordinary, alone = scatter(FREQUENCY_PRIOR), scatter(FREQUENCY_PRIOR_ALONE)
+    judged = None if left_out_hz is None else (_log(left_out_hz), (ordinary,) * k)
     return fit_hedged(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
-        tuple(_frequency_priors(k, discrepancy)),
-        (FREQUENCY_PRIOR_ALONE,) * k,
+        tuple(map(scatter, _frequency_priors(k, discrepancy))),
+        (alone,) * k,
         _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
         SAMPLES,
         KEPT,
