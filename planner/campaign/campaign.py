@@ -107,6 +107,7 @@ class Campaign:
                 self.directory / config.robot,
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
+                visit_scatter=configured.visit_scatter,
             )
         return self._cells[key]
 
@@ -203,7 +204,8 @@ class Campaign:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        return Configured(_as_logged(config), hashes, __version__, begun.geometric_stiffness)
+        kept = begun.geometric_stiffness, begun.visit_scatter
+        return Configured(_as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------
 
@@ -497,5 +499,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(_as_logged(config), hashes, __version__, geometric_stiffness=True)
+    event = Configured(_as_logged(config), hashes, __version__, True, True)
     return encode_line("", Entry(1, now, event))[0]

@@ -53,6 +53,7 @@ class Posterior:
     low: np.ndarray  # (m, c) centred
     mask: np.ndarray  # (m, c)
     theta: np.ndarray  # (m, k, p)
+    slope_sd: np.ndarray  # (m, k) of ρ'
     whiten: np.ndarray  # (m, k, c, c) inverse of the Cholesky factor
     weights: np.ndarray  # (m, k, c) K⁻¹(y − mean)
     prior: Prior
@@ -106,13 +107,14 @@ class Posterior:
 
     def slopes(self, j: int) -> np.ndarray:
         """Posterior mean (k,) of ρ' of output j, per sample."""
-        return self.prior.slope_sd[j] ** 2 * (self.weights[j] @ (self.low[j] * self.mask[j]))
+        return self.slope_sd[j] ** 2 * (self.weights[j] @ (self.low[j] * self.mask[j]))
 
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
         prior = self.prior
-        linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * np.outer(la, lb)
+        slope = self.slope_sd[j][:, None, None]
+        linear = prior.bias_sd[j] ** 2 + slope**2 * np.outer(la, lb)
         return self._delta.covariance(np, self.theta[j], xa, xb) + linear
 
     @property
@@ -122,7 +124,7 @@ class Posterior:
     def _own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
         """Prior variances (k, q)."""
         prior = self.prior
-        linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * low**2
+        linear = prior.bias_sd[j] ** 2 + self.slope_sd[j][:, None] ** 2 * low**2
         return self._delta.variance(np, self.theta[j], x) + linear
 
     def _cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -169,9 +171,10 @@ def fit(
         weights = (np.swapaxes(whiten, 2, 3) @ (whiten @ y[:, None, :, None]))[..., 0]
         evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
         remarks = (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
+        slope_sd = np.repeat(prior.slope_sd[:, None], kept, axis=1)
         return Posterior(
-            padded.x, padded.low, padded.mask, theta(z), whiten, weights, prior, kernel, evidence,
-            remarks,
+            padded.x, padded.low, padded.mask, theta(z), slope_sd, whiten, weights, prior, kernel,
+            evidence, remarks,
         )  # fmt: skip
     raise InputError(
         "No Gaussian process fits the measured modes; set aside poses that are measured twice "

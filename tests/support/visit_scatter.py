@@ -112,9 +112,7 @@ def visited(name: str, simulation: str, n: int, scatter: float, seed: int) -> Vi
     measured = robot.truth[used] + visits((n, MODES), scatter, rng)
     measured += EMA_SD * rng.standard_normal((n, MODES))
     shown = robot.truth[new] + visits((len(new), MODES), scatter, rng)
-    return Visited(
-        observations(robot.x[used], measured, low[used]), robot.x[new], low[new], shown
-    )
+    return Visited(observations(robot.x[used], measured, low[used]), robot.x[new], low[new], shown)
 
 
 def observations(x: np.ndarray, measured: np.ndarray, low: np.ndarray) -> ModalObservations:
