@@ -63,7 +63,6 @@ def _averaged(models: list[AR1], asked: np.ndarray) -> AR1:
         shape = m, kept, *[1] * (arrays[0].ndim - 2)
         return np.choose(chosen.reshape(shape), arrays)
 
-    mixed = logsumexp(evidence, axis=0) - np.log(np.where(asked, len(models), 1))
     posterior = replace(
         first,
         # Length scales of no discrepancy mean nothing.
@@ -73,7 +72,8 @@ def _averaged(models: list[AR1], asked: np.ndarray) -> AR1:
         slope_sd=picked([p.slope_sd for p in posteriors]),
         whiten=picked([p.whiten for p in posteriors]),
         weights=picked([p.weights for p in posteriors]),
-        log_evidence=mixed,
+        # Each is believed as much as a GP that ignores the simulation, with which this is compared.
+        log_evidence=logsumexp(evidence, axis=0),
         remarks=tuple(dict.fromkeys(remark for p in posteriors for remark in p.remarks)),
     )
     return replace(models[0], posterior=posterior)

@@ -11,6 +11,7 @@ from tests.support.surrogates import observed, simulated, true_hz
 from tests.support.visit_scatter import (
     MODES,
     OFF,
+    ROBOTS,
     observations,
     visited,
 )
@@ -26,8 +27,8 @@ def scatter_percent(fitted):
 @pytest.mark.parametrize("n", [3, 12])
 def test_intervals_hold_new_visits_beside_an_identified_simulation(n, scatter):
     inside, before = [], []
-    for robot in ("kr10", "plain"):
-        for seed in range(5):
+    for robot in ROBOTS:
+        for seed in range(4):
             case = visited(robot, "identified", n, scatter, seed)
             for visits, shares in ((True, inside), (False, before)):
                 fitted = fit_primary(case.seen, *KNOWN, visits)
