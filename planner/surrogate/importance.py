@@ -94,7 +94,7 @@ def _learned_together(z: np.ndarray, log_weight: np.ndarray, shared: np.ndarray)
     given = -0.5 * (apart**2 / (1 - most) + np.log(1 - most)) + 0.5 * z[:, :, None] ** 2
     evidence = logsumexp(log_weight[:, :, None] + given, axis=1)  # (m, nodes)
     others = evidence.sum(axis=0) - evidence - 0.5 * SHARED_NODES**2
-    return logsumexp(given + others[:, None, :], axis=2)
+    return np.asarray(logsumexp(given + others[:, None, :], axis=2))
 
 
 def _log_weight(points: np.ndarray, like: np.ndarray, proposals: list[Gaussians]) -> np.ndarray:
