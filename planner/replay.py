@@ -56,13 +56,18 @@ class _Cells:
         self._cells: dict[bytes, Cell] = {}
 
     def of(self, configured: Configured) -> Cell:
-        stiffened = configured.geometric_stiffness
-        key = msgspec.json.encode((configured.config, configured.robot, stiffened))
+        stiffened, scatters = configured.geometric_stiffness, configured.visit_scatter
+        key = msgspec.json.encode((configured.config, configured.robot, stiffened, scatters))
         if key not in self._cells:
             config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
             store.restore_robot(self._campaign.directory, configured.robot, root / store.ROBOT)
-            self._cells[key] = Cell.load(root / config.robot, config, geometric_stiffness=stiffened)
+            self._cells[key] = Cell.load(
+                root / config.robot,
+                config,
+                geometric_stiffness=stiffened,
+                visit_scatter=scatters,
+            )
         return self._cells[key]
 
 

@@ -1,6 +1,6 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -29,6 +29,8 @@ class Cell:
     robot: Robot
     simulation: Simulation | None
     workspace: Workspace
+    # Whether the scatter of frequencies from visit to visit is learned.
+    visit_scatter: bool = field(default=True, kw_only=True)
 
     @classmethod
     def load(
@@ -38,17 +40,18 @@ class Cell:
         robot: Robot | None = None,
         *,
         geometric_stiffness: bool = True,
+        visit_scatter: bool = True,
     ) -> "Cell":
         """Load the robot and hold the workspace against it; InputError where they disagree.
 
         `robot` is the one of robot_toml, where it was loaded already. `geometric_stiffness` holds
-        where robot.toml does not say.
+        where robot.toml does not say. `visit_scatter` is off for campaigns that began without.
         """
         check_name(config.acquisition.name)
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
-        return cls(config, robot, simulation, workspace)
+        return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:

@@ -16,13 +16,15 @@ class Configured(Event, frozen=True, tag="configured"):
 
     `config` is campaign.toml; `robot` maps each file of the robot folder to its sha256.
     `geometric_stiffness` is what holds where robot.toml does not say: campaigns whose log does
-    not say either began when gravity's own stiffness was left out, and go on like that.
+    not say either began when gravity's own stiffness was left out, and go on like that. So it is
+    with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned.
     """
 
     config: dict
     robot: dict[str, str]
     planner: str
     geometric_stiffness: bool = False
+    visit_scatter: bool = False
 
 
 class Proposal(msgspec.Struct, frozen=True):

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
+# Scatter from visit to visit is told from so many poses on, where it is larger than usual.
+SCATTER_POSES, TOLD_SCATTER_PERCENT = 5, 0.3
 # Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
 # that are none.
 MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
@@ -56,7 +58,10 @@ class Model:
     frfs: tuple[Frf, ...] = ()  # of the labelled poses
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
-        """Frequencies and damping at poses q (n, dof) in rad."""
+        """Frequencies and damping at poses q (n, dof) in rad, as a visit there would show them.
+
+        The modal analysis' own sd of what it will measure there is not part of the sds.
+        """
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
 
     @cached_property
@@ -66,9 +71,13 @@ class Model:
 
     @cached_property
     def workspace_prediction(self) -> ModalPrediction:
-        """Modes at the candidate poses, which stand for the workspace."""
+        """Modes at the candidate poses, which stand for the workspace; means over visits.
+
+        Their sds leave out the scatter from visit to visit, which no further pose lowers.
+        """
         candidates = self.cell.candidates
-        return self._predict(candidates.q, candidates.features, self.simulated_candidates)
+        said = self.simulated_candidates
+        return self._predict(candidates.q, candidates.features, said, visit=False)
 
     def expected(self, index: int) -> ModalPrediction:
         """Modes (1, count) at the candidate of that index."""
@@ -137,9 +146,10 @@ class Model:
         features: np.ndarray,
         simulated: SimulatedModes,
         surrogate: Surrogate | None = None,
+        visit: bool = True,
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
-        found = (surrogate or self.surrogate).predict(features, simulated)
+        found = (surrogate or self.surrogate).predict(features, simulated, visit)
         share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
         sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
         return replace(found, frequency_sd_hz=sd)
@@ -191,6 +201,14 @@ class Model:
                     f"The measurements speak against the simulation of mode {', '.join(left)}: "
                     f"predicted without it."
                 )
+        if self.cell.visit_scatter and len(self.labelled) >= SCATTER_POSES:
+            percent = 100 * float(np.sqrt(np.mean(self.surrogate.visit_scatter**2)))
+            if percent > TOLD_SCATTER_PERCENT:
+                found.append(
+                    f"Frequencies scatter by {percent:.1g} % (sd) from visit to visit, more than "
+                    f"the modal analysis states: predicted sds include it, further poses do not "
+                    f"lower it. Check temperature, clamping and readback."
+                )
         return tuple(found)
 
     @property
@@ -232,7 +250,11 @@ def build(
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
     surrogate = fit_surrogate(
-        best.seen, primary=best.primary, residues=False, taught=best.low.taught
+        best.seen,
+        primary=best.primary,
+        residues=False,
+        taught=best.low.taught,
+        visits=cell.visit_scatter,
     )
     kept = tuple(frf.within(table.band_hz) for frf in frfs)
     return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses, kept)
@@ -253,7 +275,7 @@ class _Guided:
         labelled = label(cell, used, low)
         seen = observations(cell, labelled, low)
         known = low.discrepancy(frequencies(labelled)) if labelled else None
-        primary = fit_primary(seen, known, low.left_out, belief=low.belief)
+        primary = fit_primary(seen, known, low.left_out, low.belief, cell.visit_scatter)
         return cls(low, used, labelled, seen, primary)
 
     @property

@@ -79,6 +79,7 @@ class CampaignReads:
                 self.directory / config.robot,
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
+                visit_scatter=configured.visit_scatter,
             )
         return self._cells[key]
 
@@ -190,7 +191,8 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        return Configured(as_logged(config), hashes, __version__, begun.geometric_stiffness)
+        kept = begun.geometric_stiffness, begun.visit_scatter
+        return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------
 

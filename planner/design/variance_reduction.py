@@ -104,7 +104,7 @@ def _features(
 
     `sign` −1 on one side takes off what is measured.
     """
-    post, prior = outputs.posterior, outputs.posterior.prior
+    post = outputs.posterior
     low = poses.low[:, k]
     known = np.flatnonzero(post.mask[k])
     cross = post._prior(k, post.x[known], post.low[k][known], poses.x, low)
@@ -112,8 +112,8 @@ def _features(
     if len(outputs.planned):
         white = np.concatenate([white, outputs.whitened_planned(k, poses)], axis=1)
     own = post._own(k, poses.x, low) - np.sum(white**2, axis=1)
-    linear = np.stack([np.full(len(low), prior.bias_sd[k]), prior.slope_sd[k] * low])
-    linear = np.broadcast_to(linear, (len(white), *linear.shape))
+    slope = post.slope_sd[k][:, None] * low
+    linear = np.stack([np.full(slope.shape, post.prior.bias_sd[k]), slope], axis=1)
     both = np.swapaxes(np.concatenate([linear, sign * white], axis=1), 1, 2)
     empty = np.zeros((*both.shape[:2], -both.shape[2] % FEATURE_MULTIPLE))
     return np.concatenate([both, empty], axis=2), np.maximum(own, 0.0)

@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ExpectedMode:
-    """A mode as the model predicts it."""
+    """A mode as the model predicts it.
+
+    `sd_hz` is what a new visit to the pose would show, the scatter from visit to visit included;
+    the modal analysis' own sd of that measurement is not.
+    """
 
     frequency_hz: float
     sd_hz: float

@@ -18,9 +18,10 @@ from planner.surrogate.training_data import TrainingData, pad
 class OutputPrior:
     """Weakly informative prior of one kind of output, in the output's own unit.
 
-    Medians of amplitude σ of δ and of the nugget τ, with log-sd `spread` each; length scales have
-    median `length`·√d, log-sd `length_spread`, in coordinates scaled to [0, 1]. `mean` applies
-    without simulation only.
+    Medians of amplitude σ of δ and of the nugget τ, with log-sd `spread` each, or
+    `nugget_spread`; length scales have median `length`·√d, log-sd `length_spread`, in coordinates
+    scaled to [0, 1]. `mean` applies without simulation only. `nugget_shared` is the share of
+    log τ's variance that it has in common with the other outputs.
     """
 
     bias_sd: float
@@ -31,12 +32,17 @@ class OutputPrior:
     length: float = 0.8
     spread: float = 1.0
     length_spread: float = 0.8
+    nugget_spread: float | None = None
+    nugget_shared: float = 0.0
 
     def of_theta(self, kernel: Kernel) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (p,) of a kernel's hyperparameters θ, which are logarithms."""
-        return kernel.prior(
+        mean, sd = kernel.prior(
             self.amplitude, self.nugget, self.length, self.spread, self.length_spread
         )
+        if self.nugget_spread is not None:
+            sd[1] = self.nugget_spread
+        return mean, sd
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,17 +58,22 @@ class AR1:
     unknown_sd: np.ndarray
 
     def predict(
-        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+        self,
+        x: np.ndarray,
+        low: np.ndarray,
+        outputs: np.ndarray | None = None,
+        nugget: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there).
 
-        `outputs` (indices) asks for some of the columns only.
+        `outputs` (indices) asks for some of the columns only; for `nugget` see
+        `Posterior.predict`.
         """
         base, offset = self.split(low)
         blind = (self.uses_low[None, :] & ~np.isfinite(low)) * self.unknown_sd[None, :]
         if outputs is not None:
             base, blind = base[:, outputs], blind[:, outputs]
-        mean, sd = self.posterior.predict(x, offset, outputs)
+        mean, sd = self.posterior.predict(x, offset, outputs, nugget)
         return mean + base, np.hypot(sd, blind)
 
     def split(self, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -134,4 +145,5 @@ def _stack(priors: list[OutputPrior], uses_low: np.ndarray, kernel: Kernel) -> P
         slope_sd=np.array([p.slope_sd for p in priors]) * uses_low,
         theta_mean=np.array([mean for mean, _ in theta]),
         theta_sd=np.array([sd for _, sd in theta]),
+        nugget_shared=np.array([p.nugget_shared for p in priors]),
     )

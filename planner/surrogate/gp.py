@@ -6,7 +6,7 @@ the measurement's own variance plus a nugget τ². The hyperparameters θ (see `
 averaged (see `importance`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg.lapack import dtrtri
@@ -28,13 +28,18 @@ SINGULAR_REMARK = (
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p)."""
+    """Prior of m outputs: mean (m,), sd of b and ρ' (m,), θ's mean and sd (m, p).
+
+    `nugget_shared` (m,) is the share of log τ's variance that the outputs have in common; (1,): all
+    alike.
+    """
 
     mean: np.ndarray
     bias_sd: np.ndarray
     slope_sd: np.ndarray
     theta_mean: np.ndarray
     theta_sd: np.ndarray
+    nugget_shared: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +53,7 @@ class Posterior:
     low: np.ndarray  # (m, c) centred
     mask: np.ndarray  # (m, c)
     theta: np.ndarray  # (m, k, p)
+    slope_sd: np.ndarray  # (m, k) of ρ'
     whiten: np.ndarray  # (m, k, c, c) inverse of the Cholesky factor
     weights: np.ndarray  # (m, k, c) K⁻¹(y − mean)
     prior: Prior
@@ -56,16 +62,23 @@ class Posterior:
     remarks: tuple[str, ...] = ()
 
     def predict(
-        self, x: np.ndarray, low: np.ndarray, outputs: np.ndarray | None = None
+        self,
+        x: np.ndarray,
+        low: np.ndarray,
+        outputs: np.ndarray | None = None,
+        nugget: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) of the outputs, noise-free, at x (q, d) with centred low (q, m).
+        """Mean and sd (q, m) of the outputs at x (q, d) with centred low (q, m).
 
-        `outputs` (indices) asks for some of them only.
+        `outputs` (indices) asks for some of them only. The sd is that of the noise-free output;
+        with `nugget`, that of one more value without measurement noise of its own.
         """
         asked = range(len(self.mask)) if outputs is None else outputs.tolist()
         mean, sd = np.empty((len(x), len(asked))), np.empty((len(x), len(asked)))
         for i, j in enumerate(asked):
             mixture = self.predictive(j, x, low[:, j])
+            if nugget:
+                mixture = mixture.widened(np.exp(self.theta[j, :, 1, None]))
             mean[:, i], sd[:, i] = mixture.mean, mixture.sd
         return mean, sd
 
@@ -94,13 +107,14 @@ class Posterior:
 
     def slopes(self, j: int) -> np.ndarray:
         """Posterior mean (k,) of ρ' of output j, per sample."""
-        return self.prior.slope_sd[j] ** 2 * (self.weights[j] @ (self.low[j] * self.mask[j]))
+        return self.slope_sd[j] ** 2 * (self.weights[j] @ (self.low[j] * self.mask[j]))
 
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
         prior = self.prior
-        linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * np.outer(la, lb)
+        slope = self.slope_sd[j][:, None, None]
+        linear = prior.bias_sd[j] ** 2 + slope**2 * np.outer(la, lb)
         return self._delta.covariance(np, self.theta[j], xa, xb) + linear
 
     @property
@@ -110,7 +124,7 @@ class Posterior:
     def _own(self, j: int, x: np.ndarray, low: np.ndarray) -> np.ndarray:
         """Prior variances (k, q)."""
         prior = self.prior
-        linear = prior.bias_sd[j] ** 2 + prior.slope_sd[j] ** 2 * low**2
+        linear = prior.bias_sd[j] ** 2 + self.slope_sd[j][:, None] ** 2 * low**2
         return self._delta.variance(np, self.theta[j], x) + linear
 
     def _cross(self, j: int, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -149,7 +163,7 @@ def fit(
                 lambda z, j=jitter: log_likelihoods(
                     kernel, padded, y, prior.bias_sd, prior.slope_sd, j, theta(z)
                 ),
-                normal, m, kept, start,
+                normal, m, kept, start, prior.nugget_shared,
             )  # fmt: skip
             whiten = _whitening(kernel, padded, prior, jitter, theta(z))
         except np.linalg.LinAlgError:
@@ -157,9 +171,10 @@ def fit(
         weights = (np.swapaxes(whiten, 2, 3) @ (whiten @ y[:, None, :, None]))[..., 0]
         evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
         remarks = (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
+        slope_sd = np.repeat(prior.slope_sd[:, None], kept, axis=1)
         return Posterior(
-            padded.x, padded.low, padded.mask, theta(z), whiten, weights, prior, kernel, evidence,
-            remarks,
+            padded.x, padded.low, padded.mask, theta(z), slope_sd, whiten, weights, prior, kernel,
+            evidence, remarks,
         )  # fmt: skip
     raise InputError(
         "No Gaussian process fits the measured modes; set aside poses that are measured twice "

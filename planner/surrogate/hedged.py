@@ -4,6 +4,7 @@ A simulation whose modes are in another order, or that lacks physics, makes AR1 
 than a GP. So the two are averaged with their evidence as weights (Hoeting et al. 1999).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,13 +40,18 @@ class HedgedAR1:
         """See `AR1.split`; of the likelier models."""
         return self.likelier.split(low)
 
-    def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        mean, sd = self.likelier.predict(x, low)
+    def predict(
+        self, x: np.ndarray, low: np.ndarray, nugget: bool = False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there).
+
+        For `nugget` see `Posterior.predict`.
+        """
+        mean, sd = self.likelier.predict(x, low, nugget=nugget)
         unsure = np.flatnonzero(self.weight < NEARLY_CERTAIN)
         if not len(unsure):
             return mean, sd
-        other, other_sd = self.other.predict(x, low, unsure)
+        other, other_sd = self.other.predict(x, low, unsure, nugget)
         w, apart = self.weight[unsure], other - mean[:, unsure]
         variance = w * sd[:, unsure] ** 2 + (1 - w) * (other_sd**2 + w * apart**2)
         mean[:, unsure] += (1 - w) * apart
@@ -62,19 +68,21 @@ def fit_hedged(
     kept: int = 32,
     judged: tuple[np.ndarray, tuple[OutputPrior, ...]] | None = None,
     belief: float = PRIOR_BELIEF,
+    fit_fused: Callable[..., AR1] = fit_ar1,
 ) -> HedgedAR1:
     """Fit m outputs; arguments as of `fit_ar1`.
 
     `judged` are low-fidelity values (n, m) and their priors by which the simulation is judged, for
     a simulation that was fitted to these very measurements: what it gave each pose before it was
     fitted to that pose. `belief` is the simulation's probability before these data.
+    `fit_fused` fits with the simulation, arguments as of `fit_ar1`.
     """
-    fused = fit_ar1(data, with_low, without_low, centre, samples, kept)
+    fused = fit_fused(data, with_low, without_low, centre, samples, kept)
     believed = fused
     if judged is not None:
         low, prior = judged
         unseen = replace(data, low=np.where(np.isfinite(low), low, data.low))
-        believed = fit_ar1(unseen, prior, without_low, centre, samples, kept)
+        believed = fit_fused(unseen, prior, without_low, centre, samples, kept)
     nothing = np.full(len(centre), np.nan)
     ignored = replace(data, low=np.full_like(data.low, np.nan))
     alone = fit_ar1(ignored, with_low, without_low, nothing, samples, kept)
@@ -97,7 +105,7 @@ def _choose(first: np.ndarray, a: AR1, b: AR1) -> AR1:
     p, q = a.posterior, b.posterior
     pairs = zip(vars(p.prior).values(), vars(q.prior).values(), strict=True)
     prior = Prior(*(pick(u, v) for u, v in pairs))
-    names = ("low", "mask", "theta", "whiten", "weights", "log_evidence")
+    names = ("low", "mask", "theta", "slope_sd", "whiten", "weights", "log_evidence")
     picked = {name: pick(getattr(p, name), getattr(q, name)) for name in names}
     posterior = replace(p, prior=prior, remarks=p.remarks + q.remarks, **picked)
     return AR1(

@@ -14,6 +14,8 @@ from scipy.special import logsumexp, ndtri, softmax
 from planner import cache_folder, content_hash
 from planner.dataset.store import Store
 
+MOST_SHARED = 0.95  # points of one output are too few to stand for a narrower one
+SHARED_NODES = np.linspace(-4.0, 4.0, 33)  # of what outputs share, in its own sd
 PROPOSAL_INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
@@ -50,13 +52,15 @@ def _normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
 
 def sample(
     score: Callable[[np.ndarray], np.ndarray], normal: list[np.ndarray], outputs: int, kept: int,
-    start: Gaussians | None = None,
+    start: Gaussians | None = None, shared: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """`kept` points z (m, kept, p) of equal weight from N(0, 1) × exp(score); log of its integral.
 
     `score` takes z (m, s, p) and returns (m, s). The first set (s, p) of `normal` are points from
     the prior, each further one is moved to a Gaussian around what weighs most so far; `start` is
-    the first of these Gaussians, if there is one. LinAlgError if an output has no finite score.
+    the first of these Gaussians, if there is one. `shared` (m,) is the share of the prior variance
+    of the second coordinate that all outputs have in common, so that each also learns from the
+    others (the integral stays its own). LinAlgError if an output has no finite score.
     """
     points = np.broadcast_to(normal[0], (outputs, *normal[0].shape))
     like = score(points)
@@ -74,7 +78,23 @@ def sample(
         like = np.concatenate([like, score(moved)], axis=1)
     log_weight = _log_weight(points, like, proposals)
     evidence = logsumexp(log_weight, axis=1) - np.log(points.shape[1])
+    if shared is not None and shared.any():
+        log_weight = log_weight + _learned_together(points[:, :, 1], log_weight, shared)
     return _resampled(points, softmax(log_weight, axis=1), kept), evidence
+
+
+def _learned_together(z: np.ndarray, log_weight: np.ndarray, shared: np.ndarray) -> np.ndarray:
+    """What the other outputs add to the log weights (m, s) of z (m, s).
+
+    z_k = √shared_k·μ + √(1 − shared_k)·ε_k: μ is integrated out on a grid, each output's evidence
+    given μ being what its points say, weighed anew.
+    """
+    most = np.minimum(shared, MOST_SHARED)[:, None, None]
+    apart = z[:, :, None] - np.sqrt(most) * SHARED_NODES
+    given = -0.5 * (apart**2 / (1 - most) + np.log(1 - most)) + 0.5 * z[:, :, None] ** 2
+    evidence = logsumexp(log_weight[:, :, None] + given, axis=1)  # (m, nodes)
+    others = evidence.sum(axis=0) - evidence - 0.5 * SHARED_NODES**2
+    return np.asarray(logsumexp(given + others[:, None, :], axis=2))
 
 
 def _log_weight(points: np.ndarray, like: np.ndarray, proposals: list[Gaussians]) -> np.ndarray:

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dynamics.vibration import SimulatedModes
-from planner.surrogate.ar1 import OutputPrior
+from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.hedged import PRIOR_BELIEF, HedgedAR1, fit_hedged
 from planner.surrogate.kernel_average import KernelAverage, fit_shapes
+from planner.surrogate.plain_discrepancy import fit_plain_or_free
 from planner.surrogate.training_data import TrainingData
 
 # Stiffnesses off by ±30 % move frequencies by 15 %; EMA repeats a frequency to about 0.1 %.
@@ -31,6 +32,10 @@ DAMPING_PRIOR_TAUGHT = OutputPrior(bias_sd=0.1, slope_sd=0.1, amplitude=0.03, nu
 RESIDUE_PRIOR_TAUGHT = OutputPrior(bias_sd=0.03, slope_sd=0.1, amplitude=0.03, nugget=0.01)
 TYPICAL_RESIDUE = 1e-5  # m/(N·s), a robot's, where neither data nor simulation say anything
 FITTED_NUGGET = 1e-3  # of ln f beside an identified simulation
+# Visits to a pose scatter by 0 to 1 % of ln f (temperature, clamping, readback) beyond what EMA
+# states: median of the scatter, its log-sd, and the share of the latter's square that modes have
+# in common, chosen on generated cells.
+VISIT_SCATTER, VISIT_SCATTER_SPREAD, VISIT_SCATTER_SHARED = 0.003, 1.0, 0.7
 SAMPLES, KEPT = 256, 32
 RESIDUE_SAMPLES, RESIDUE_KEPT = 64, 8
 
@@ -57,6 +62,7 @@ class Surrogate:
     damping: KernelAverage  # log ζ of every label
     residue: HedgedAR1 | None  # real and imaginary parts, scaled; None: they were not asked for
     scale: np.ndarray  # (k,) m/(N·s)
+    visits: bool = True  # whether the scatter from visit to visit is learned
 
     @property
     def count(self) -> int:
@@ -71,6 +77,11 @@ class Surrogate:
         return tuple(dict.fromkeys(remark for fit in fits for remark in fit.remarks))
 
     @property
+    def visit_scatter(self) -> np.ndarray:
+        """(k,) sd of ln f from visit to visit, beyond what the modal analysis states."""
+        return np.sqrt(self.primary.posterior.nugget_variance())
+
+    @property
     def frequency_trust(self) -> np.ndarray:
         """(k,) weight of the simulation in each label's frequency."""
         return np.where(self.primary.uses_low, self.primary.weight, 1 - self.primary.weight)
@@ -83,10 +94,16 @@ class Surrogate:
         """Centred low fidelity (q, k) of the frequency outputs."""
         return self.primary.split(_log(simulated.frequency_hz))[1]
 
-    def predict(self, x: np.ndarray, simulated: SimulatedModes) -> ModalPrediction:
-        """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted."""
+    def predict(
+        self, x: np.ndarray, simulated: SimulatedModes, visit: bool = True
+    ) -> ModalPrediction:
+        """Modes at x (q, d) where the simulation says `simulated`; NaN residues if not fitted.
+
+        Frequencies' sds are what a `visit` to the pose would show, scatter included, or else those
+        of the pose's mean over many visits, which is what further poses narrow down.
+        """
         q, k = len(x), self.count
-        mean, sd = self.primary.predict(x, _log(simulated.frequency_hz))
+        mean, sd = self.primary.predict(x, _log(simulated.frequency_hz), self.visits and visit)
         log_zeta, zeta_sd = self.damping.predict(
             np.clip(x, *DAMPING_RANGE), _log(simulated.damping_ratio)
         )
@@ -134,6 +151,7 @@ def fit_primary(
     discrepancy: np.ndarray | None = None,
     left_out_hz: np.ndarray | None = None,
     belief: float = PRIOR_BELIEF,
+    visits: bool = True,
 ) -> HedgedAR1:
     """Fit ln f of every label.
 
@@ -144,19 +162,27 @@ def fit_primary(
         left_out_hz: frequencies (n, k) that the simulation gave each pose before it was fitted to
             that pose, by which it is judged.
         belief: probability of the simulation before these frequencies.
+        visits: whether the scatter from visit to visit is looked for, in all modes together. If
+            not, this is the model of campaigns that began before it was.
     """
     k = seen.frequency_hz.shape[1]
     y, low = _log(seen.frequency_hz), _log(seen.simulated.frequency_hz)
-    judged = None if left_out_hz is None else (_log(left_out_hz), (FREQUENCY_PRIOR,) * k)
+    with_low = _frequency_priors(k, discrepancy)
+    ordinary, alone = FREQUENCY_PRIOR, FREQUENCY_PRIOR_ALONE
+    if visits:
+        with_low = [_scattering(prior) for prior in with_low]
+        ordinary, alone = _scattering(ordinary), _scattering(alone)
+    judged = None if left_out_hz is None else (_log(left_out_hz), (ordinary,) * k)
     return fit_hedged(
         TrainingData(seen.x, y, seen.frequency_sd_hz / np.exp(y), low),
-        tuple(_frequency_priors(k, discrepancy)),
-        (FREQUENCY_PRIOR_ALONE,) * k,
+        tuple(with_low),
+        (alone,) * k,
         _centre(low, np.full(k, FREQUENCY_PRIOR_ALONE.mean)),
         SAMPLES,
         KEPT,
         judged,
         belief,
+        fit_plain_or_free if visits else fit_ar1,
     )
 
 
@@ -176,6 +202,7 @@ def fit_surrogate(
     primary: HedgedAR1 | None = None,
     residues: bool = True,
     taught: bool = False,
+    visits: bool = True,
 ) -> Surrogate:
     """Fit all outputs to the measured modes (n may be 0: then the prior speaks).
 
@@ -185,12 +212,13 @@ def fit_surrogate(
         residues: whether residues are fitted too, which takes two thirds of the time.
         taught: whether the simulation was identified from these measurements' own FRFs and fits
             them, so that damping and residues are nearly its own.
+        visits: as of `fit_primary`.
     """
     if primary is None:
-        primary = fit_primary(seen)
+        primary = fit_primary(seen, visits=visits)
     scale = _scale(seen)
     residue = _fit_residues(seen, scale, taught) if residues else None
-    return Surrogate(primary, fit_damping(seen, taught), residue, scale)
+    return Surrogate(primary, fit_damping(seen, taught), residue, scale, visits)
 
 
 def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> HedgedAR1:
@@ -205,6 +233,16 @@ def _fit_residues(seen: ModalObservations, scale: np.ndarray, taught: bool) -> H
         np.zeros(18 * k),
         RESIDUE_SAMPLES,
         RESIDUE_KEPT,
+    )
+
+
+def _scattering(prior: OutputPrior) -> OutputPrior:
+    """The prior of frequencies that scatter from visit to visit."""
+    return replace(
+        prior,
+        nugget=VISIT_SCATTER,
+        nugget_spread=VISIT_SCATTER_SPREAD,
+        nugget_shared=VISIT_SCATTER_SHARED,
     )
 
 

@@ -38,8 +38,8 @@ def posterior(outputs: int) -> Posterior:
     none = np.zeros(outputs)
     prior = Prior(none, none, none, theta, theta)
     return Posterior(
-        x, np.zeros((outputs, N)), np.ones((outputs, N)), theta[:, None], whiten[:, None],
-        np.zeros((outputs, 1, N)), prior, "matern52", none,
+        x, np.zeros((outputs, N)), np.ones((outputs, N)), theta[:, None],
+        np.zeros((outputs, 1)), whiten[:, None], np.zeros((outputs, 1, N)), prior, "matern52", none,
     )  # fmt: skip
 
 

@@ -104,13 +104,18 @@ def test_a_robot_with_collision_geometry_is_not_told_of(robot, tmp_path):
     assert ask("next", begun(tmp_path, robot))["remarks"] == []
 
 
-def written_earlier(cell: Path) -> Path:
-    """The log as versions wrote it that left gravity's stiffness out: it does not mention it."""
+GRAVITY, SCATTER = b',"geometric_stiffness":true', b',"visit_scatter":true'
+
+
+def written_earlier(cell: Path, left_out: tuple[bytes, ...]) -> Path:
+    """The log as versions wrote it that left this out of the model: they do not mention it."""
     path, check, lines = cell / "log.jsonl", "", []
     for entry in parse(path.read_bytes()).entries:
         line, _ = encode_line(check, entry)
-        body = line.split(b'"entry":', 1)[1].replace(b',"geometric_stiffness":true', b"")
-        assert body != line.split(b'"entry":', 1)[1]
+        body = line.split(b'"entry":', 1)[1]
+        for later in left_out:
+            assert later in body
+            body = body.replace(later, b"")
         line, check = _chained(check, body[:-2])
         lines.append(line)
     path.write_bytes(b"".join(lines))
@@ -124,12 +129,13 @@ def _chained(check: str, body: bytes) -> tuple[bytes, str]:
 
 def test_a_campaign_goes_on_with_the_gravity_that_it_began_with(robot, tmp_path):
     left_out = make_plain_arm(tmp_path / "out", "geometric_stiffness = false")
-    without = ask("next", begun(tmp_path / "without", left_out))["proposals"]
-    fresh = begun(tmp_path / "fresh", robot)
+    begun_without = written_earlier(begun(tmp_path / "without", left_out), (SCATTER,))
+    without = ask("next", begun_without)["proposals"]
+    fresh = written_earlier(begun(tmp_path / "fresh", robot), (SCATTER,))
     with_it = ask("next", fresh)["proposals"]
     assert with_it[0]["expected"] != without[0]["expected"]
 
-    earlier = written_earlier(begun(tmp_path / "earlier", robot))
+    earlier = written_earlier(begun(tmp_path / "earlier", robot), (GRAVITY, SCATTER))
     assert ask("next", earlier)["proposals"] == without
     toml = earlier / "campaign.toml"
     toml.write_text(toml.read_text() + "[stop]\nmeasurements_max = 20\n")
@@ -144,4 +150,15 @@ def test_a_campaign_goes_on_with_the_gravity_that_it_began_with(robot, tmp_path)
     assert after[0]["expected"] == with_it[0]["expected"]
     configured = [e.event for e in Campaign(earlier).entries if isinstance(e.event, Configured)]
     assert [event.geometric_stiffness for event in configured] == [False] * 3
+    assert [event.visit_scatter for event in configured] == [False] * 3
     assert all(s["check"] in ("kept", "identical") for s in ask("replay", earlier)["steps"])
+
+
+def test_a_campaign_goes_on_without_the_scatter_that_it_began_without(robot, tmp_path):
+    fresh = begun(tmp_path / "fresh", robot)
+    earlier = written_earlier(begun(tmp_path / "earlier", robot), (SCATTER,))
+    now, before = (ask("next", cell)["proposals"] for cell in (fresh, earlier))
+    assert now[0]["expected"] != before[0]["expected"]
+    for cell, learned in ((fresh, True), (earlier, False)):
+        assert all(s["check"] in ("kept", "identical") for s in ask("replay", cell)["steps"])
+        assert Campaign(cell).cell.visit_scatter is learned

@@ -1,0 +1,158 @@
+"""Frequencies of five true robots (MuJoCo) that scatter from visit to visit, and two peers.
+
+A visit's ln f is the pose's plus scatter, half of its variance common to all modes, half each
+mode's own; EMA adds a noise whose sd it states. What is scored are new visits at other poses.
+"""
+
+import tempfile
+import warnings
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import SimulatedModes
+from planner.robot.robot import Robot
+from planner.surrogate.modal_surrogate import ModalObservations
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.model import load_truth
+from tests.support.known_robots import KNOWN_ROBOTS
+from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
+
+KR240 = Path(__file__).parents[2] / "campaigns" / "kr240_plane" / "robot" / "robot.toml"
+KR240_DEG = ((-60, 60), (-110, -40), (40, 120), (-60, 60), (20, 80), (-90, 90))
+MODES, POOL, NEW_VISITS = 4, 150, 100
+EMA_SD = 1e-3  # of ln f
+OFF = 0.003  # rms of ln f that an identified simulation is off by, smoothly over the poses
+FLOOR_STIFFNESS = 25.0  # of the truth's floor over the stiffest stated joint
+
+
+@dataclass(frozen=True, eq=False)
+class TrueRobot:
+    """Poses x (POOL, d) in [0, 1] and ln f (POOL, MODES): the truth's and three simulations'.
+
+    "stated" has the structure but for the floor, and stiffnesses off by 15 %; "identified" is off
+    by OFF; "foreign" is another robot's.
+    """
+
+    x: np.ndarray
+    truth: np.ndarray
+    simulated: dict[str, np.ndarray]
+
+
+ROBOTS = (*KNOWN_ROBOTS, "plain", "kr240")
+
+
+@cache
+def true_robot(name: str) -> TrueRobot:
+    """One of ROBOTS; a second of MuJoCo the first time."""
+    seed = ROBOTS.index(name)
+    folder = Path(tempfile.mkdtemp())
+    if name in KNOWN_ROBOTS:
+        toml, box = KNOWN_ROBOTS[name].write(folder, 2), KNOWN_ROBOTS[name].joints_deg
+    elif name == "plain":
+        toml, box = make_plain_arm(folder), JOINTS_DEG
+    else:
+        toml, box = KR240, KR240_DEG
+    robot = Robot.load(toml)
+    stiffness = FLOOR_STIFFNESS * max(c.stiffness for c in robot.config.compliance)
+    floor = tuple(
+        Spring("joint_1" if name == "plain" else "base", axis, stiffness, 3e-4 * stiffness)
+        for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    )
+    true = load_truth(toml, Deviation(seed + 1, 0.15, 0.15, 0.05, 0.005, extra=floor))
+    rng = np.random.default_rng(seed)
+    low, high = np.deg2rad(np.transpose(box))
+    x = rng.random((POOL, len(low)))
+    q = low + x * (high - low)
+    truth = np.log([true.modes(pose, MODES)[0] for pose in q])
+    stated = np.log(Simulation(robot).modes(q, MODES).frequency_hz)
+    simulated = {
+        "stated": stated,
+        "identified": truth + OFF * _smooth(x, rng),
+        "offset": truth + 0.05 * rng.standard_normal(MODES) + OFF / 3 * _smooth(x, rng),
+        "foreign": np.log(20 + 8 * np.sin(3 * x[:, :1] + np.arange(MODES))),
+    }
+    return TrueRobot(x, truth, simulated)
+
+
+def _smooth(x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """(n, MODES) of rms 1: sums of waves over the box."""
+    directions = 2.0 * rng.standard_normal((MODES, 8, x.shape[1]))
+    waves = np.cos(np.einsum("mwd,nd->nmw", directions, x) + 2 * np.pi * rng.random((MODES, 8)))
+    total = waves.sum(axis=2)
+    return total / np.sqrt(np.mean(total**2, axis=0))
+
+
+def visits(shape: tuple[int, int], scatter: float, rng: np.random.Generator) -> np.ndarray:
+    """What visits add to ln f (n, k): half of the variance is common to a visit's modes."""
+    common, own = rng.standard_normal((shape[0], 1)), rng.standard_normal(shape)
+    return scatter * np.sqrt(0.5) * (common + own)
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """Measured poses, and new visits elsewhere: x (u, d), simulated ln f and what they show."""
+
+    seen: ModalObservations
+    x: np.ndarray
+    simulated: np.ndarray
+    shown: np.ndarray
+
+
+def visited(name: str, simulation: str, n: int, scatter: float, seed: int) -> Visited:
+    """A robot measured at n poses, and NEW_VISITS (less what there is not) at others."""
+    robot = true_robot(name)
+    rng = np.random.default_rng([seed, n, ROBOTS.index(name)])
+    order = rng.permutation(POOL)
+    used, new = order[:n], order[n : n + NEW_VISITS]
+    low = robot.simulated[simulation]
+    measured = robot.truth[used] + visits((n, MODES), scatter, rng)
+    measured += EMA_SD * rng.standard_normal((n, MODES))
+    shown = robot.truth[new] + visits((len(new), MODES), scatter, rng)
+    return Visited(observations(robot.x[used], measured, low[used]), robot.x[new], low[new], shown)
+
+
+def observations(x: np.ndarray, measured: np.ndarray, low: np.ndarray) -> ModalObservations:
+    """ln f (n, k) measured and simulated, as the surrogate wants them; damping says nothing."""
+    n, k = measured.shape
+    nothing, residue = np.full((n, k), np.nan), np.full((n, k, 3, 3), np.nan + 0j)
+    hz = np.exp(measured)
+    return ModalObservations(
+        x, hz, EMA_SD * hz, nothing, nothing, residue, np.full((n, k, 3, 3), np.nan),
+        modes_of(low),
+    )  # fmt: skip
+
+
+def modes_of(low: np.ndarray) -> SimulatedModes:
+    """A simulation that gives ln f (n, k), and says nothing of the rest."""
+    return SimulatedModes(
+        np.exp(low), np.full(low.shape, np.nan), np.full((*low.shape, 3, 3), np.nan + 0j)
+    )
+
+
+def peer(case: Visited, with_simulation: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and sd (u, k) of new visits by scikit-learn's GP (maximum likelihood, noise included).
+
+    Of ln f itself, or of the logarithm of its ratio to the simulation's.
+    """
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+
+    y = np.log(case.seen.frequency_hz)
+    base, new = (np.log(case.seen.simulated.frequency_hz), case.simulated)
+    if not with_simulation:
+        base, new = np.zeros_like(base), np.zeros_like(new)
+    mean, sd = np.empty(new.shape), np.empty(new.shape)
+    for k in range(y.shape[1]):
+        kernel = ConstantKernel(0.5) * Matern(1.0, (0.1, 30.0), nu=2.5) + WhiteKernel(0.3)
+        gp = GaussianProcessRegressor(kernel, normalize_y=True, n_restarts_optimizer=1,
+                                      random_state=0)  # fmt: skip
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            gp.fit(case.seen.x, y[:, k] - base[:, k])
+            mean[:, k], sd[:, k] = gp.predict(case.x, return_std=True)
+    return mean + new, sd
