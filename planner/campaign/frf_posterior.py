@@ -16,7 +16,13 @@ from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.predict import misfit_at
 from planner.dynamics.gradient import Turned
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import OPEN, basis, marginal
+from planner.identification.measurement_model import (
+    CHAIN_NUMBERS,
+    HIT_NUMBERS,
+    OPEN,
+    basis,
+    marginal,
+)
 from planner.identification.objective import FARTHEST
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import (
@@ -29,15 +35,13 @@ from planner.inference.least_squares import (
     inverse,
     propose,
 )
-from planner.robot.elastic_model import Matrices
 
 # The relative sd of what no simulation follows beside hits and chain: small
 # imperfections, readback. Of generated cases those that lack nothing are predicted as well by 0.003
 # to 0.03, those that lack something better the larger it is.
 MODEL_ERROR = 0.01
 LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
-HITS = 12  # columns of the basis that belong to a pose's own hits
-CHAIN = OPEN - HITS  # those that belong to the chain
+CHAIN = CHAIN_NUMBERS  # numbers of the chain, which are the same at all poses
 # Of the tolerance of gains, how much is left of it: of generated cases in which physics lacked, the
 # scale of FRFs was off by 4 to 5 % at all poses alike where z left 2 % open.
 COMMON = 0.5
@@ -81,11 +85,13 @@ class ChainMisfit:
         return np.append(self.misfit.sd, np.ones(CHAIN))
 
     def parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The robot's FRFs (n, 3, 3, F), derivatives by z, and what hits may add (n, 12, …)."""
+        """The robot's FRFs (n, 3, 3, F), derivatives by z, and what poses leave open (n, 18, …)."""
         x = z[:-CHAIN]
         h, slope, turned = self.misfit.parts(x)
         open_ = self._open(h, turned)
-        return h, np.concatenate([slope, open_[:, HITS:]], axis=1), open_[:, :HITS]
+        chain = open_[:, HIT_NUMBERS:OPEN]
+        own = np.concatenate([open_[:, :HIT_NUMBERS], open_[:, OPEN:]], axis=1)
+        return h, np.concatenate([slope, chain], axis=1), own
 
     def _open(self, h: np.ndarray, turned: Turned) -> np.ndarray:
         s, simulation = self.misfit.setting.s, self.misfit.setting.simulation
@@ -124,7 +130,7 @@ class ChainMisfit:
             measured=Measured(*(getattr(m, field.name)[poses] for field in fields(m))),
             setting=replace(s, q=s.q[poses], s=s.s[poses], jacobians=s.jacobians[poses]),
             inertias=replace(inertias, jacobians=inertias.jacobians[poses]),
-            matrices=Matrices(*(getattr(matrices, f.name)[poses] for f in fields(matrices))),
+            matrices=matrices.at(poses),
         )
         return ChainMisfit(some)
 
@@ -227,7 +233,7 @@ def _beside(one: ChainMisfit, z: np.ndarray, precision: np.ndarray) -> LeftOutFr
     predicted = shown(h[0], slope[0], z)
     off = np.where(m.used[0], m.accelerance[0] - predicted, 0.0)
     b, r = _real(weight * hits[0]), _real(weight * off)[0]
-    eta = np.linalg.solve(np.eye(HITS) + b @ b.T, b @ r)
+    eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
     return LeftOutFrf(
         m.frequency_hz[0], m.accelerance[0], m.sd[0], predicted,
         _spread(_root(precision), slope[0]), np.tensordot(eta, hits[0], axes=1),

@@ -24,7 +24,7 @@ class AngleSlopes:
     sensor: np.ndarray
     stiffness: np.ndarray
 
-    def at(self, poses: slice) -> "AngleSlopes":
+    def at(self, poses: slice | np.ndarray) -> "AngleSlopes":
         """Of some of the poses."""
         return AngleSlopes(*(getattr(self, name)[poses] for name in self.__dataclass_fields__))
 

@@ -42,7 +42,7 @@ class Matrices:
     sensor_turn: np.ndarray
     by_angle: AngleSlopes | None = None
 
-    def at(self, poses: slice) -> "Matrices":
+    def at(self, poses: slice | np.ndarray) -> "Matrices":
         """Of some of the poses."""
         names = [name for name in self.__dataclass_fields__ if name != "by_angle"]
         slopes = None if self.by_angle is None else self.by_angle.at(poses)

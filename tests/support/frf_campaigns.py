@@ -19,12 +19,16 @@ from planner.frf.frf import Frf
 from planner.modal.estimate_modes import estimate_modes
 from planner.recording.records import Hit
 from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, EFFECTS, PEAK_N, SCATTER
+from planner.truth.cases import DAMPING_S, PEAK_N
+from planner.truth.conceal import EFFECTS
+from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY, Handling, together
 from planner.truth.hits import AXES, Hammer
 from planner.truth.model import Truth, load_truth
 from planner.truth.scene import PULSE_S, Scene
 from planner.truth.secret import HitVisit, Secret, hit_poses
+
+SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
 # What a simulation lacks: an effect of the truth's library; "" nothing.
 LACKING = {

@@ -10,7 +10,8 @@ from planner.dynamics.simulation import Simulation
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.arms import ARMS
-from planner.truth.cases import DAMPING_S, PEAK_N, SCATTER
+from planner.truth.cases import DAMPING_S, PEAK_N
+from planner.truth.deviation import Deviation
 from planner.truth.effects import LINEAR
 from planner.truth.handling import EVERYDAY, Handling, together
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, pulse
@@ -19,6 +20,8 @@ from planner.truth.model import Truth, load_truth
 from planner.truth.nonlinear import Port, StruckPose, _linear, along
 from planner.truth.scene import Scene
 from planner.truth.secret import HitVisit, Secret, StiffnessDrift, hit_poses
+
+SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
 HAND = replace(EVERYDAY, angle_deg=2.0, offset_m=0.005)
 

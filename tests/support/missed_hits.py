@@ -8,12 +8,15 @@ import numpy as np
 from planner.campaign.hit_habits import HitMiss
 from planner.campaign.model import Model
 from planner.truth.arms import ARMS
-from planner.truth.cases import PEAK_N, SCATTER
+from planner.truth.cases import PEAK_N
+from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY, Aim, Handling, MeasuringChain, together
 from planner.truth.hits import AXES, Hammer, write_recordings
 from planner.truth.model import Truth, load_truth
 from planner.truth.scene import PULSE_S
 from planner.truth.secret import HitVisit, Secret, hit_poses
+
+SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 
 HAND = replace(EVERYDAY, angle_deg=2.0, offset_m=0.005)  # beside the chain and aims of a real cell
 NOISE = 0.01  # of the responses, relative to the largest
