@@ -33,14 +33,15 @@ from planner.identification.measured_frfs import common_band
 from planner.identification.parameters import place_name
 from planner.identification.truncated_decay import cut_off
 from planner.robot.config import Compliance
+from planner.robot.robot import Robot
+
+Spring = tuple[Compliance, dict[str, tuple[float, float]]]  # and its priors' bounds, by name
 
 # χ² per value above which more structure is looked for: where nothing lacked on generated cells it
 # was 0.3 to 0.6, for hands and sensors are mostly better than their tolerances; where a link bends,
 # 0.6 to 0.9 hid FRFs as much as twice as far off as need be.
 FITS = 0.65
-SWINGS = (
-    1.0  # the same, above which something that swings on a link is looked for: it takes longest
-)
+SWINGS = 1.0  # the same, above which something that swings on a link is looked for: that takes long
 PATIENT = replace(
     QUICK, stages=STAGES, lines=32, last_lines=32, log_lines=24, log_steps=40, last_completions=0
 )
@@ -124,6 +125,7 @@ def widened(structure: Structure) -> Structure:
             axes = (*across(way / length), way / length)
             springs += [_spring(link, axis, BEND * max(own)) for axis in axes]
     springs = [(b, limits) for b, limits in springs if place_name(b) not in listed]
+    springs = _movable(robot, springs)
     bounds = dict(structure.priors.bounds)
     for _, limits in springs:
         bounds |= limits
@@ -133,6 +135,20 @@ def widened(structure: Structure) -> Structure:
     return Structure(
         simulation, replace(structure.priors, bounds=bounds), structure.added + len(added)
     )
+
+
+def _movable(robot: Robot, springs: list[Spring]) -> list[Spring]:
+    """Those that move an inertia of their own: a base's turn is joint 1's own, where axes agree."""
+    kept: list[Spring] = []
+    for spring in springs:
+        blocks = *robot.config.compliance, *(b for b, _ in kept), spring[0]
+        config = msgspec.structs.replace(robot.config, compliance=blocks)
+        try:
+            _ = Simulation(replace(robot, config=config)).elastic
+        except InputError:
+            continue
+        kept.append(spring)
+    return kept
 
 
 def _links(simulation: Simulation) -> list[tuple[str, str, np.ndarray]]:
@@ -147,9 +163,7 @@ def _links(simulation: Simulation) -> list[tuple[str, str, np.ndarray]]:
     return found
 
 
-def _spring(
-    joint: str, axis: np.ndarray, scale: float, slide: bool = False
-) -> tuple[Compliance, dict[str, tuple[float, float]]]:
+def _spring(joint: str, axis: np.ndarray, scale: float, slide: bool = False) -> Spring:
     low, high = (scale * factor for factor in STIFFNESS)
     least, most = low * DAMPING_S[0], high * DAMPING_S[1]
     medians = float(np.sqrt(low * high)), float(np.sqrt(least * most))

@@ -22,8 +22,6 @@ from planner.truth.secret import Artefact
 from tests.support.small_cases import SCATTER, small_case, unlike
 
 TILTS = tuple(Spring("base", axis, 2.5e5, 200.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
-BEARING = tuple(Spring("joint_2", axis, 6e4, 40.0) for axis in ((1.0, 0, 0), (0, 0, 1.0)))
-BENDING = tuple(Spring("link_3", axis, 3e4, 15.0) for axis in ((0, 1.0, 0), (0, 0, 1.0)))
 HOSE = AttachedResonator("link_3", (0.2, 0.0, 0.1), (0.0, 0.6, 0.8), 1.2, 24.0, 0.02)
 TURNED = Rotation.from_rotvec(np.deg2rad([0, 0, 15])).as_matrix()
 
@@ -45,10 +43,12 @@ CASES = {
     "weak joint": Concealed(
         unlike(scaled=(ScaledJoint("joint_3", 0.4),)), said=(("joint_stiffness", "joint_3"),)
     ),
-    "tilting bearing": Concealed(
-        unlike(extra=BEARING), said=(("transverse_compliance", "joint_2"),)
+    "quiet channel": Concealed(
+        artefact=Artefact(gain=(1.0, 0.75, 1.0)), said=(("sensor_gain", "sensor_y"),)
     ),
-    "bending link": Concealed(unlike(extra=BENDING), said=(("link_flexibility", "link_3"),)),
+    "turned channel": Concealed(
+        artefact=Artefact(gain=(1.0, 1.0, -1.0)), said=(("polarity", "sensor_z"),)
+    ),
     "forgotten mass": Concealed(
         unlike(added=(AttachedMass("link_4", (0.1, 0.05, 0.1), 4.0),)),
         said=(("added_mass", "link_4"),),

@@ -18,6 +18,7 @@ from planner.truth.hits import AXES, OVERSAMPLING, Hammer, pulse
 from planner.truth.laws import Elastic, Friction, JointLaw
 from planner.truth.model import Truth, load_truth
 from planner.truth.nonlinear import Port, StruckPose, _linear, along
+from planner.truth.propagate import driven
 from planner.truth.scene import Scene
 from planner.truth.secret import HitVisit, Secret, StiffnessDrift, hit_poses
 
@@ -131,10 +132,12 @@ def _angle(truth: Truth, poses: np.ndarray, joint: str, how: Protocol, hammer: H
     force = np.array([pulse(strong, rng) for _ in how.axes])
     axes, step_s = [AXES.index(a) for a in how.axes], 1 / (hammer.sampling_rate_hz * OVERSAMPLING)
     port = Port(Cubic(0.0, 1.0), joint=joint)
-    swings = [
-        np.abs(_linear(StruckPose(truth, q, force, along(axes)), (port,), step_s).angles).max()
-        for q in poses
-    ]
+    swings = []
+    for q in poses:
+        linear = _linear(StruckPose(truth, q, force, along(axes)), (port,))
+        moved = np.array([driven(pole, linear.forces, step_s) for pole in linear.poles])
+        angles = linear.outputs[0] @ (moved * linear.driven[:, :, None]).reshape(len(moved), -1)
+        swings.append(np.abs(angles.real).max())
     return float(np.max(swings))
 
 
