@@ -34,13 +34,12 @@ class Cubic(Elastic):
     cubic: float
     farthest: float
 
-    @property
-    def slope(self) -> float:
+    def slope(self, step_s: float) -> float:
         return 3 * abs(self.cubic) * self.farthest**2
 
     def at(self, angle: np.ndarray) -> np.ndarray:
         near = np.clip(angle, -self.farthest, self.farthest)
-        return self.cubic * near**3 + self.slope * np.sign(self.cubic) * (angle - near)
+        return self.cubic * (near**3 + 3 * self.farthest**2 * (angle - near))
 
 
 @dataclass(frozen=True)
