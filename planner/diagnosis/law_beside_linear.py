@@ -21,6 +21,7 @@ from planner.diagnosis.thresholds import (
     UNKNOWN,
 )
 from planner.diagnosis.write_explained import explained_simulation
+from planner.errors import InputError
 from planner.progress import Tell, quietly
 
 # What a joint's own law looks like on average: but not as closely as what is really there.
@@ -62,7 +63,10 @@ def beside(
     pays = found.refitted.per_value > PAYS * linear.fit.per_value
     if not pays and found.verdict != "explained":
         return None
-    explained = explained_simulation(found, linear)
+    try:
+        explained = explained_simulation(found, linear)
+    except InputError:  # of bodies that no robot has: it explains nothing
+        return None
     again = force_levels.screen(recorded, explained, single=True, tell=tell)
     law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)
     if law is None or law.misfit * LAW_BETTER > min(f.misfit for f in before):

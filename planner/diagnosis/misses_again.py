@@ -12,6 +12,7 @@ from planner.diagnosis.screens import force_levels
 from planner.diagnosis.screens.hit_errors import taken_out
 from planner.diagnosis.thresholds import AT_NOISE, UNKNOWN
 from planner.diagnosis.write_explained import explained_simulation
+from planner.errors import InputError
 from planner.progress import Tell, quietly
 
 
@@ -29,7 +30,10 @@ def asked_again(
         return None
     if found.verdict != "explained" or first.fit.per_value > AT_NOISE:
         return None
-    simulation = explained_simulation(found, first)
+    try:
+        simulation = explained_simulation(found, first)
+    except InputError:  # of bodies that no robot has: it explains nothing
+        return None
     again = force_levels.screen(hits, simulation, single=True, tell=tell)
     if any(f.effect == UNKNOWN for f in again):
         return None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from planner.errors import InputError
 from planner.robot.robot import BASE, Robot
 
 SMALL = "resonator"  # and its number: a body of its own too
@@ -107,7 +108,7 @@ def _halves(
 
     The outer one is about that point. Mass, centre and moments of both together are the body's;
     they are as heavy, and their centres as far apart, as the halves of a uniform block, or by
-    `further` (3,) farther.
+    `further` (3,) farther. Raises InputError where the halves' moments would not be positive.
     """
     body = pin.Inertia.FromDynamicParameters(values)
     along = half / np.linalg.norm(half)
@@ -118,6 +119,11 @@ def _halves(
     apart = apart if further is None else apart + further
     between = body.mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
     moments = (body.inertia - between) / 2
+    if np.linalg.eigvalsh(moments)[0] <= 0:
+        raise InputError(
+            f"A link of {body.mass:.3g} kg that bends has moments of inertia that no halves "
+            f"can have; correct its <inertial> in the URDF."
+        )
     inner = pin.Inertia(body.mass / 2, body.lever - apart, moments)
     outer = pin.Inertia(body.mass / 2, body.lever + apart - half, moments)
     return np.array(inner.toDynamicParameters()), np.array(outer.toDynamicParameters())

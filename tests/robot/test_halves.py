@@ -3,10 +3,12 @@
 import re
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from planner.errors import InputError
 from planner.robot.robot import Robot
-from planner.robot.virtual_joints import virtual_model
+from planner.robot.virtual_joints import _halves, virtual_model
 from planner.truth.arms import ARMS
 
 LENGTH, WIDTH, HEIGHT, MASS = 1.2, 0.5, 0.3, 90.0
@@ -66,3 +68,9 @@ def test_halves_together_are_the_link_whichever_way_it_leans(tmp_path):
     moved += outer[0] * (cut @ cut * np.eye(3) - np.outer(cut, cut))
     order = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]
     np.testing.assert_allclose(both + [moved[ij] for ij in order], whole[4:], rtol=1e-9, atol=1e-9)
+
+
+def test_a_body_whose_halves_would_have_no_moments_is_refused():
+    body = pin.Inertia(1.0, np.zeros(3), np.diag([1e-3, 1e-3, 1e-3])).toDynamicParameters()
+    with pytest.raises(InputError, match="moments of inertia"):
+        _halves(np.array(body), np.array([0.5, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
