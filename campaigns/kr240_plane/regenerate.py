@@ -15,7 +15,8 @@ import numpy as np
 from planner.truth import inverse
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.hits import record_poses
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 
 HERE = Path(__file__).parent
 # Table A1 of Busch et al. 2022, mended: see NOTES.md.

@@ -31,8 +31,12 @@ from planner.modal.residues import laplace
 from planner.recording.records import AXES
 
 TELL_BY = 8  # poses, the last ones, that tell what is common to all: nobody waits between hits
-# Relative size of what the simulation gets wrong from which it corrects no residue.
+# Relative size of what the simulation gets wrong, from which it tells no hit and corrects no
+# residue; chosen.
 TOO_WRONG = 0.1
+# Root mean square of the misses, in their sds before any data, from which they are not a hand's but
+# what the simulation lacks: on an arm whose floor gave way unknown to it, it was 8 to 12; chosen.
+NO_HAND = 4.0
 AROUND = 0.5, 1.6  # of the band's edges: where other poles matter in it
 UNIT = Tolerances(angle_rad=1.0, offset_m=1.0)
 
@@ -58,9 +62,18 @@ class CampaignMisses:
     band_hz: tuple[float, float]
 
     @property
+    def trusted(self) -> bool:
+        """Whether the simulation is right enough to tell how hits missed."""
+        if self.told is None or self.told.discrepancy > TOO_WRONG:
+            return False
+        sd = np.repeat([self.tolerances.angle_rad, self.tolerances.offset_m], 2)
+        away = np.concatenate([visit.mean / sd for visit in self.told.visits])
+        return bool(np.sqrt(np.mean(away**2)) < NO_HAND)
+
+    @property
     def poses(self) -> tuple[PoseMisses, ...]:
-        """Hit by hit."""
-        if self.told is None:
+        """Hit by hit; none where the simulation is too wrong to tell."""
+        if self.told is None or not self.trusted:
             return ()
         both = zip(self.visited, self.told.visits, strict=True)
         return tuple(_pose(visited, told) for visited, told in both)
@@ -84,7 +97,7 @@ class CampaignMisses:
         if self.told is None or pose not in names or not modes:
             return list(modes)
         visited, told = self.visited[names.index(pose)], self.told.visits[names.index(pose)]
-        if self.told.discrepancy > TOO_WRONG:
+        if not self.trusted:
             return [_unsure(mode, visited.columns, self.tolerances) for mode in modes]
         return self._moved(modes, visited, told)
 

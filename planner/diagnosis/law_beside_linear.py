@@ -20,8 +20,7 @@ from planner.diagnosis.thresholds import (
     PAYS,
     UNKNOWN,
 )
-from planner.diagnosis.write_explained import explained_simulation
-from planner.errors import InputError
+from planner.diagnosis.write_explained import possible_simulation
 from planner.progress import Tell, quietly
 
 # What a joint's own law looks like on average: but not as closely as what is really there.
@@ -63,9 +62,8 @@ def beside(
     pays = found.refitted.per_value > PAYS * linear.fit.per_value
     if not pays and found.verdict != "explained":
         return None
-    try:
-        explained = explained_simulation(found, linear)
-    except InputError:  # of bodies that no robot has: it explains nothing
+    explained = possible_simulation(found, linear)
+    if explained is None:
         return None
     again = force_levels.screen(recorded, explained, single=True, tell=tell)
     law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)

@@ -11,8 +11,7 @@ from planner.diagnosis.linear_diagnosis import Diagnosis
 from planner.diagnosis.screens import force_levels
 from planner.diagnosis.screens.hit_errors import taken_out
 from planner.diagnosis.thresholds import AT_NOISE, UNKNOWN
-from planner.diagnosis.write_explained import explained_simulation
-from planner.errors import InputError
+from planner.diagnosis.write_explained import possible_simulation
 from planner.progress import Tell, quietly
 
 
@@ -30,9 +29,8 @@ def asked_again(
         return None
     if found.verdict != "explained" or first.fit.per_value > AT_NOISE:
         return None
-    try:
-        simulation = explained_simulation(found, first)
-    except InputError:  # of bodies that no robot has: it explains nothing
+    simulation = possible_simulation(found, first)
+    if simulation is None:
         return None
     again = force_levels.screen(hits, simulation, single=True, tell=tell)
     if any(f.effect == UNKNOWN for f in again):

@@ -40,6 +40,14 @@ def explained_simulation(diagnosis: Diagnosis, accepted: Candidate) -> Simulatio
     return nominal.with_effects(changes.springs, effects, changes.bodies, changes.inertia_change)
 
 
+def possible_simulation(diagnosis: Diagnosis, accepted: Candidate) -> Simulation | None:
+    """As `explained_simulation`; None where the explanation needs bodies that no robot has."""
+    try:
+        return explained_simulation(diagnosis, accepted)
+    except InputError:
+        return None
+
+
 def write_explained(folder: Path, robot: Robot, diagnosis: Diagnosis, accepted: Candidate) -> Path:
     """Write folder/robot.toml and the URDF beside it; returns robot.toml's path.
 

@@ -17,7 +17,8 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedResonator, Deviation
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 
 BAND_HZ = (5.0, 30.0)
 SWEEP_DEG = (70.0, 120.0)

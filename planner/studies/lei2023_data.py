@@ -11,7 +11,8 @@ from planner.demo import shipped
 from planner.errors import InputError
 from planner.truth import inverse
 from planner.truth.deviation import Deviation
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 4), np.linspace(-0.3, 0.3, 4), 0.8
 TURN_DEG = np.linspace(-60, 60, 7)

@@ -20,7 +20,8 @@ from planner.studies.report import PaperClaim, Report, Table, r_squared
 from planner.truth import inverse
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 
 POSTURES, HELD_OUT = 254, 15
 MODES, TABLED = 6, 4  # modes 5 and 6 are there for the FRFs up to 40 Hz

@@ -26,7 +26,8 @@ from planner.truth.conceal import NothingShowsError, kinds
 from planner.truth.deviation import Scatter
 from planner.truth.hits import Hammer, SimulatedHit, write_predict
 from planner.truth.imperfections import Imperfect, imperfect
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from planner.truth.nats import Conditions, Lacking, lacking, nats
 from planner.truth.scene import PULSE_S, Drawn, Scene
 from planner.truth.secret import Secret, frfs, once, quiet_hits

@@ -10,8 +10,8 @@ from planner.truth.detect import clarity
 from planner.truth.effects import LINEAR, NONLINEAR, OTHER
 from planner.truth.everyday_effects import EVERYDAY_EFFECTS
 from planner.truth.hits import Hammer
+from planner.truth.load import load_truth
 from planner.truth.mishaps import ARTEFACTS, OUTSIDERS
-from planner.truth.model import load_truth
 from planner.truth.outsiders import MORE_OUTSIDERS
 from planner.truth.scene import Draw, Drawn, Scene, log_uniform
 from planner.truth.secret import Secret

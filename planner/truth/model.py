@@ -7,23 +7,18 @@ robot.toml says geometric_stiffness = false.
 """
 
 import copy
-import tomllib
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 
-from planner.errors import InputError
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.loss_factors import branches
-from planner.truth.mjcf import Builder
 from planner.truth.propagate import driven
-from planner.truth.springs import check, compensation, springs
+from planner.truth.springs import compensation
 
 SAG_STEPS = 30  # at most; each gains a digit or more where springs carry the weight at all
 TURN = 1e-4  # rad (or m), of the differences that give gravity's stiffness: exact to 1e-8
@@ -303,63 +298,10 @@ class Truth:
         return out
 
 
-def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
-    """The true robot behind a robot folder.
-
-    Raises InputError without MuJoCo, and where the folder cannot be read or does not fit together.
-    """
-    try:
-        import mujoco
-    except ImportError:
-        raise InputError(
-            "Simulated recordings need MuJoCo; install it with: pip install 'planner[truth]'"
-        ) from None
-    deviation = deviation or Deviation()
-    table, root = _read(robot_toml)
-    check(table, root, deviation, robot_toml)
-    rng = np.random.default_rng(deviation.seed)
-    found, own = springs(table, root, deviation, rng)
-    builder = Builder(root, table, found, deviation, rng)
-    # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
-    mujoco.set_mju_user_warning(lambda text: None)
-    model = mujoco.MjModel.from_xml_string(builder.xml())
-    model.opt.gravity[:] = table.get("gravity", (0.0, 0.0, -9.81))
-    held = [model.joint(name).dofadr[0] for name in builder.joint_names]
-    elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(found))]
-    lower, upper = np.array(builder.limits).T
-    return Truth(
-        table["name"],
-        tuple(builder.joint_names),
-        found,
-        deviation,
-        f"MuJoCo {mujoco.__version__}, seed {deviation.seed}",
-        lower,
-        upper,
-        model,
-        mujoco.MjData(model),
-        np.array(held),
-        np.array(elastic),
-        own,
-        bool(table.get("geometric_stiffness", True)),
-        len(table["compliance"]),
-    )
-
-
 def _cross(vector: tuple[float, float, float]) -> np.ndarray:
     """(3, 3): what turns ω into v × ω."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def _read(robot_toml: Path) -> tuple[dict, ElementTree.Element]:
-    try:
-        table = tomllib.loads(robot_toml.read_text(encoding="utf-8"))
-        root = ElementTree.parse(robot_toml.parent / table["urdf"]).getroot()
-    except (OSError, ValueError, KeyError, ElementTree.ParseError) as error:
-        raise InputError(
-            f"{robot_toml} or its URDF cannot be read ({error!r}); correct it."
-        ) from None
-    return table, root
 
 
 def _full_mass(model: object, data: object) -> np.ndarray:

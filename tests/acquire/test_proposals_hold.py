@@ -11,7 +11,7 @@ from planner.campaign.config import config_from_builtins
 from planner.robot.collision import Collisions
 from planner.robot.inverse_kinematics import solve
 from planner.truth.inverse import joint_angles, tool_rotation
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import IRB6640, KR10, KR210
 from tests.support.robots import JOINTS_DEG, make_arm
 

@@ -10,6 +10,7 @@ import pytest
 from planner import Dataset, Robot, analyse, diagnose, identify
 from planner.cli.run import run
 from planner.diagnosis import linear_diagnosis
+from planner.diagnosis.effects import library
 from planner.errors import InputError, RefusedError
 from planner.modal.modes import ModalModel
 from planner.recording.hits import hits_from
@@ -92,8 +93,7 @@ def test_identify_says_what_the_command_says_and_more(recorded, dataset, capsys)
 def diagnosed(dataset, recorded):
     """With a single effect in the library: what all of them find is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
-        whole = linear_diagnosis.library
-        few = [e for e in whole(recorded_simulation(recorded)) if e.name == "base_compliance"]
+        few = [e for e in library(recorded_simulation(recorded)) if e.name == "base_compliance"]
         patch.setattr(linear_diagnosis, "library", lambda simulation: few[:1])
         offered = {"there": dataset.q[0] + 0.1}
         return diagnose(dataset, recorded[2], offered=offered)

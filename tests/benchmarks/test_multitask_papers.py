@@ -13,7 +13,7 @@ from planner.studies.models.fidelity_levels import Samples
 from planner.studies.models.multitask import fit_multitask
 from planner.studies.models.single_output_gp import fit_gp
 from planner.truth.deviation import Deviation
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KNOWN_ROBOTS
 
 MODES, TASKS, POSTURES, FOLDS = 9, 11, 112, 5

@@ -11,7 +11,7 @@ from planner.identification.measured_frfs import stack
 from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import birk_bounds, birk_folder, measured_frfs
 from tests.support.timing import seconds

@@ -14,7 +14,7 @@ from planner.modal.tracking import Guide, track
 from planner.surrogate.modal_surrogate import fit_surrogate
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.direct_solution import direct_accelerance
 from tests.support.surrogates import observed, simulated
 from tests.support.timing import seconds

@@ -25,7 +25,7 @@ from pathlib import Path
 from tests.support.outside import make_cell, record
 from planner.cli.run import run
 from planner.truth.deviation import Deviation
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 
 root, wanted = Path(sys.argv[1]), int(sys.argv[2])
 truth = load_truth(root / "robot" / "robot.toml", Deviation(seed=3, stiffness=0.12, inertia=0.04))

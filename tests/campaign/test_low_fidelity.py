@@ -13,7 +13,7 @@ from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedResonator, Deviation
 from planner.truth.hits import Hammer
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 from tests.support.true_modes import hits_at
 

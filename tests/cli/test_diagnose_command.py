@@ -5,7 +5,7 @@ import pytest
 
 from planner.truth.deviation import Spring
 from planner.truth.handling import EVERYDAY
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.secret import Artefact
 from tests.support.known_robots import KR10
 from tests.support.outside import told

@@ -13,7 +13,7 @@ from planner.identification.agreement import fit_similarity
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.outside import HAMMER, planner
 from tests.support.outside import answer as planner_json
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm

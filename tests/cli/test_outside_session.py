@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.outside import answer, make_cell, planner, record
 from tests.support.robots import JOINTS_DEG
 

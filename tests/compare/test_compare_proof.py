@@ -14,7 +14,7 @@ import pytest
 from planner.truth.arms import KR10
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.outside import planner
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(7200)]

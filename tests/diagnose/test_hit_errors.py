@@ -22,7 +22,7 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, MeasuringChain
 from planner.truth.hits import Hammer, write_recordings
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
 

@@ -19,7 +19,7 @@ from planner.studies.busch2020_data import ACROSS, BEYOND_DEG, DRESS_PACK, poses
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.hits import Hammer
 from planner.truth.laws import Hardening
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene, across, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses

@@ -20,7 +20,7 @@ from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
 from planner.truth.laws import Friction, Hardening
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.nonlinear import Port
 from planner.truth.scene import Scene
 from planner.truth.secret import HitVisit, Secret, hit_poses

@@ -82,7 +82,7 @@ def figures(found: Agreement) -> list[float]:
 def truth_of_the_campaign():
     import importlib.util
 
-    from planner.truth.model import load_truth
+    from planner.truth.load import load_truth
 
     folder = shipped("kr240_plane")
     spec = importlib.util.spec_from_file_location("regenerate", folder / "regenerate.py")

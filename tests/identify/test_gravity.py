@@ -17,7 +17,8 @@ from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from tests.support.plain_arm import make_plain_arm
 
 # Stretched upwards, where gravity softens most.

@@ -14,7 +14,7 @@ from planner.identification.agreement import fit_similarity
 from planner.identification.held_out import identify_judged, set_aside
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
 

@@ -15,7 +15,7 @@ from planner.identification.parameters import CAD_INERTIAS
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, Handling
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
 

@@ -20,7 +20,8 @@ from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
 

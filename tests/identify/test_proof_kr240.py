@@ -19,7 +19,7 @@ from planner.identification.parameters import Priors
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
 from planner.truth.hits import record_poses
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.measured_frfs import measured_frfs
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]

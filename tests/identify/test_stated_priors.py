@@ -8,7 +8,7 @@ from planner.errors import InputError
 from planner.identification.identify import identify
 from planner.identification.parameters import Priors, parametrise
 from planner.robot.robot import Robot
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KR10
 from tests.support.measured_frfs import measured_frfs
 

@@ -13,7 +13,7 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedMass, Deviation, Spring
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.direct_solution import direct_accelerance
 from tests.support.known_robots import KR10
 from tests.support.pendulums import pendulum_urdf

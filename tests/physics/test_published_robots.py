@@ -16,7 +16,7 @@ from planner.report.frf_map import frf_map
 from planner.report.frf_plots import save
 from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 
 ROBOTS = [
     ("kr240_busch2020", "robot"), ("kr240_busch2020", "robot_b"), ("kr240_busch2022", "robot"),

@@ -16,7 +16,7 @@ from planner.dynamics.simulation import Simulation
 from planner.modal.tracking import Guide, Tracks, track
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.random_ways import (
     CAMPAIGN,
     SOFT_FLOOR,

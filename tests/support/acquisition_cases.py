@@ -17,7 +17,8 @@ from planner.frf.frf import Frf
 from planner.frf.metrics import global_frac
 from planner.modal.modes import Mode
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from tests.support.known_robots import IRB6640, KR10, KR210
 
 ROBOTS = {"KR10": KR10, "IRB 6640": IRB6640, "KR210": KR210}

@@ -13,7 +13,7 @@ from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KnownRobot
 
 RATE_1_S = 1.5  # exponential window: decays are over when the record ends

@@ -21,7 +21,8 @@ from planner.modal.estimate_modes import estimate_modes
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
 from planner.truth.hits import Hammer
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from tests.support.known_robots import IRB6640, KR10, KR210, KnownRobot
 from tests.support.true_modes import hits_at
 

@@ -24,7 +24,8 @@ from planner.truth.conceal import EFFECTS
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY, Handling, together
 from planner.truth.hits import AXES, Hammer
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from planner.truth.scene import PULSE_S, Scene
 from planner.truth.secret import HitVisit, Secret, hit_poses
 

@@ -16,7 +16,8 @@ from planner.truth.effects import LINEAR
 from planner.truth.handling import EVERYDAY, Handling, together
 from planner.truth.hits import AXES, OVERSAMPLING, Hammer, pulse
 from planner.truth.laws import Elastic, Friction, JointLaw
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, _linear, along
 from planner.truth.propagate import driven
 from planner.truth.scene import Scene

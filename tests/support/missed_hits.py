@@ -12,7 +12,8 @@ from planner.truth.cases import PEAK_N
 from planner.truth.deviation import Deviation
 from planner.truth.handling import EVERYDAY, Aim, Handling, MeasuringChain, together
 from planner.truth.hits import AXES, Hammer, write_recordings
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from planner.truth.scene import PULSE_S
 from planner.truth.secret import HitVisit, Secret, hit_poses
 

@@ -13,7 +13,8 @@ import numpy as np
 from planner.cli.run import run
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from tests.support.robots import campaign_text, make_arm
 
 PLANNER = (sys.executable, "-c", "from planner.cli import main; main()")

@@ -13,7 +13,8 @@ from planner.dynamics.mode_families import Families
 from planner.modal.modes import Mode
 from planner.modal.tracking import Tracks
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from tests.support.known_robots import KR10
 from tests.support.true_modes import Measured, undamped
 

@@ -12,7 +12,7 @@ import numpy as np
 from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.fusion_problems import Problem
 from tests.support.known_robots import KNOWN_ROBOTS
 

@@ -31,7 +31,7 @@ from planner.truth.cases import PEAK_N
 from planner.truth.deviation import Deviation
 from planner.truth.effects import LINEAR, NONLINEAR
 from planner.truth.hits import Hammer
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.scene import Drawn, Scene
 from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.acquisition_cases import LINES, MODES, ROBOTS, Case

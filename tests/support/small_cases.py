@@ -8,7 +8,7 @@ import numpy as np
 from planner.truth.deviation import Deviation
 from planner.truth.handling import LABORATORY, Handling
 from planner.truth.hits import Hammer, write_predict, write_recordings
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.secret import Artefact, HitVisit, Secret, hit_poses
 from tests.support.known_robots import KR10
 

@@ -17,7 +17,7 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.robot.robot import Robot
 from planner.surrogate.modal_surrogate import ModalObservations
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KNOWN_ROBOTS
 from tests.support.plain_arm import JOINTS_DEG, make_plain_arm
 

@@ -16,7 +16,7 @@ from planner.truth.cases import Case, make_case
 from planner.truth.conceal import DRIVES, EFFECTS, kinds
 from planner.truth.deviation import Deviation, ScaledJoint, StiffnessRipple
 from planner.truth.laws import Backlash, Hardening
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret
 from planner.truth.world import CLEAN

@@ -11,8 +11,8 @@ from planner.truth.arms import ARMS
 from planner.truth.cases import DAMPING_S, PEAK_N, make_case
 from planner.truth.conceal import EVERYDAY, kinds
 from planner.truth.imperfections import imperfect
+from planner.truth.load import load_truth
 from planner.truth.mishaps import OUTSIDERS
-from planner.truth.model import load_truth
 from planner.truth.nats import lacking
 from planner.truth.nonlinear import StruckPose, along, respond
 from planner.truth.outsiders import MORE_OUTSIDERS

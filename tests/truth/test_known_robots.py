@@ -5,7 +5,7 @@ import pytest
 
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KNOWN_ROBOTS
 
 PER_ROBOT = 40

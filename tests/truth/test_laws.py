@@ -12,7 +12,8 @@ from planner.errors import InputError
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer
 from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, along, respond
 from planner.truth.secret import Secret, frfs, once
 from tests.support.known_robots import KR10

@@ -10,7 +10,7 @@ from planner.truth.deviation import AttachedMass, Deviation, ScaledJoint, Scatte
 from planner.truth.handling import EVERYDAY, LABORATORY, Handling
 from planner.truth.hits import Hammer, noise_power, noisy
 from planner.truth.laws import Backlash
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from planner.truth.nats import Conditions, Lacking, Nats, lacking, nats
 from planner.truth.nonlinear import Port
 from planner.truth.secret import Secret, quiet_hits

@@ -13,8 +13,8 @@ from planner.truth.deviation import (
     Spring,
     StiffnessRipple,
 )
+from planner.truth.load import load_truth
 from planner.truth.loss_factors import LOSS_BAND_HZ, branches
-from planner.truth.model import load_truth
 from planner.truth.springs import compensation
 from tests.support.known_robots import KR10, KR210
 

@@ -15,7 +15,8 @@ from planner.truth.deviation import (
 )
 from planner.truth.hits import Hammer
 from planner.truth.laws import Contact
-from planner.truth.model import Truth, load_truth
+from planner.truth.load import load_truth
+from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, structural_accelerance
 from planner.truth.secret import (
     Artefact,

@@ -12,7 +12,7 @@ from planner.demo import shipped
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.truth.hits import Hammer, simulate_hit
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 
 FOLDER = shipped("kr240_plane")
 # Busch et al. 2020, appendix: rotational joint stiffness for x, y, z in N·m/rad, as printed.

@@ -13,7 +13,7 @@ from planner.robot.robot import Robot
 from planner.robot.workspace import Workspace
 from planner.truth import inverse
 from planner.truth.deviation import AttachedMass, Deviation, Spring
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KNOWN_ROBOTS, KR10
 from tests.support.pendulums import pendulum_urdf
 

@@ -9,7 +9,7 @@ import pyuff
 from planner.recording.folder import read_recordings
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses, simulate_hit, write_predict
-from planner.truth.model import load_truth
+from planner.truth.load import load_truth
 from tests.support.known_robots import KR10, KR210, kr10_folder, kr210_folder
 
 QUIET = Hammer(noise=0.0, force_noise=0.0, record_s=10.0, readback_deg=0.0)

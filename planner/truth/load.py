@@ -1,0 +1,66 @@
+"""The true robot of a robot folder: reads URDF and robot.toml itself and builds MuJoCo's model."""
+
+import tomllib
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.truth.deviation import Deviation
+from planner.truth.mjcf import Builder
+from planner.truth.model import Truth
+from planner.truth.springs import check, springs
+
+
+def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
+    """The true robot behind a robot folder.
+
+    Raises InputError without MuJoCo, and where the folder cannot be read or does not fit together.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError(
+            "Simulated recordings need MuJoCo; install it with: pip install 'planner[truth]'"
+        ) from None
+    deviation = deviation or Deviation()
+    table, root = _read(robot_toml)
+    check(table, root, deviation, robot_toml)
+    rng = np.random.default_rng(deviation.seed)
+    found, own = springs(table, root, deviation, rng)
+    builder = Builder(root, table, found, deviation, rng)
+    # MuJoCo checks the springs' dynamics without their stiffness and warns into a file.
+    mujoco.set_mju_user_warning(lambda text: None)
+    model = mujoco.MjModel.from_xml_string(builder.xml())
+    model.opt.gravity[:] = table.get("gravity", (0.0, 0.0, -9.81))
+    held = [model.joint(name).dofadr[0] for name in builder.joint_names]
+    elastic = [model.joint(f"spring_{i}").dofadr[0] for i in range(len(found))]
+    lower, upper = np.array(builder.limits).T
+    return Truth(
+        table["name"],
+        tuple(builder.joint_names),
+        found,
+        deviation,
+        f"MuJoCo {mujoco.__version__}, seed {deviation.seed}",
+        lower,
+        upper,
+        model,
+        mujoco.MjData(model),
+        np.array(held),
+        np.array(elastic),
+        own,
+        bool(table.get("geometric_stiffness", True)),
+        len(table["compliance"]),
+    )
+
+
+def _read(robot_toml: Path) -> tuple[dict, ElementTree.Element]:
+    try:
+        table = tomllib.loads(robot_toml.read_text(encoding="utf-8"))
+        root = ElementTree.parse(robot_toml.parent / table["urdf"]).getroot()
+    except (OSError, ValueError, KeyError, ElementTree.ParseError) as error:
+        raise InputError(
+            f"{robot_toml} or its URDF cannot be read ({error!r}); correct it."
+        ) from None
+    return table, root
