@@ -81,7 +81,7 @@ def diagnose(
         raise InputError(TOO_SOFT)
     tell("refitting the simulation", 0.0)
     refitted = settle(problem, fit(problem, Effect("")))
-    all_ = library(simulation) if effects is None else effects
+    all_ = library(simulation, problem.layout.sensors) if effects is None else effects
     found = search(problem, refitted, all_, tell, bent=bent)
     return _diagnosis(problem, found, all_, started)
 
@@ -96,7 +96,8 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
     problem = replace(before.problem, frfs=tuple(frfs), q=np.atleast_2d(q))
     tied = [c.fit for c in before.undecided if c.fit is not None and c.fit.effect.at]
     fits = tuple(carried_on(problem, f, f.effect) for f in (before.refitted, *tied))
-    return _diagnosis(problem, Found(fits, ()), library(problem.simulation), started)
+    all_ = library(problem.simulation, problem.layout.sensors)
+    return _diagnosis(problem, Found(fits, ()), all_, started)
 
 
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
