@@ -22,7 +22,7 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     spindle, both in the frame of the FRFs; the spindle turns clockwise seen from behind it.
     `kt_n_m2` and `kr_n_m2` are the tangential and radial force per area of the chip's section,
     `kr_n_m2` positive where it pushes the cutter away. `pitch_deg` are the angles from each tooth
-    to the next (none: all alike), `helix_deg` how far the teeth are wound. `kt_sd_percent` and
+    to the one ahead of it (none: all alike), `helix_deg` how far the teeth are wound. `kt_sd_percent` and
     `kr_sd_percent` say how well the coefficients are known.
     """
 
@@ -72,7 +72,7 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def pitches_rad(self) -> np.ndarray:
-        """(teeth,) angles from each tooth to the one that follows it."""
+        """(teeth,) angles from each tooth to the one ahead of it, which cuts before."""
         if self.pitch_deg is None:
             return np.full(self.teeth, 2 * np.pi / self.teeth)
         return np.deg2rad(self.pitch_deg)

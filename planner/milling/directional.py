@@ -13,6 +13,7 @@ import numpy as np
 from planner.milling.cut import Cut
 
 IN_CUT = 1e-9  # rad: what an angle may miss the cut's ends by
+AVERAGED = 60  # slices of a helix over which its lag is averaged
 
 
 @dataclass(frozen=True)
@@ -72,3 +73,23 @@ def tooth_matrix(cut: Cut, k: Coefficients, tip_rad: np.ndarray, depth_m: float)
         return np.where(inside[..., None, None], outer, 0.0)
     high, low = np.clip(tip, start, end), np.clip(tip - lag, start, end)
     return (_integral(high, k) - _integral(low, k)) / lag
+
+
+def step_matrices(cut: Cut, k: Coefficients, count: int, depth_m: float) -> np.ndarray:
+    """(count, 2, 2) in N/m²: of all teeth, averaged over equal steps of a tooth's period.
+
+    The first step begins where a tooth enters the cut.
+    """
+    start, end = cut.immersion_rad
+    edges = start + np.arange(count + 1) * 2 * np.pi / (cut.teeth * count)
+    tips = edges + 2 * np.pi / cut.teeth * np.arange(cut.teeth)[:, None]
+    lag, slices = cut.lag_rad_m * depth_m, AVERAGED if cut.lag_rad_m * depth_m > IN_CUT else 1
+    lags = lag * (np.arange(slices) + 0.5) / slices
+    total = np.zeros((count, 2, 2))
+    for behind in lags:
+        turned = np.mod(tips[:, :-1] - behind - start, 2 * np.pi) + start
+        ahead = turned + np.diff(tips, axis=1)
+        for turn in (0.0, 2 * np.pi):
+            a, b = (np.clip(angle - turn, start, end) for angle in (turned, ahead))
+            total += (_integral(b, k) - _integral(a, k)).sum(axis=0)
+    return total / slices / np.diff(edges)[:, None, None]

@@ -216,7 +216,7 @@ def _uneven(
     now = np.zeros((len(first), len(first)))
     before = np.zeros_like(now)
     angle, element = points.angle[first], points.element[first]
-    delay = np.roll(cut.pitches_rad, 1)  # to the tooth ahead
+    delay = cut.pitches_rad  # to the tooth ahead, which cut before
     nodes = lobatto(degree).nodes
     for p in range(0, len(first), 2):
         for tooth in found.teeth[element[p]]:

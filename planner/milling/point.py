@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.milling.lobes import FINER, Machine, multipliers
+from planner.milling.machine import Machine, multipliers
 
+FINER = 1.5  # factor on the points, until they suffice
 EXACT = 1e-7  # relative change of |µ| up to which points per period are added
 MOST_CHIPS = 600  # points of a period: beyond them eigenvalues take minutes
 
@@ -22,7 +23,7 @@ def multiplier(machine: Machine, rpm: float, depth_m: float) -> Multiplier:
     """At a speed in rpm and a depth in m, with points added until it stays."""
     factor, before = FINER, np.inf
     while True:
-        built = machine.monodromies(rpm, machine.grid(rpm, factor))(np.array([depth_m]))
+        built = machine.monodromies(rpm, factor)(np.array([depth_m]))
         size = float(np.abs(multipliers(built)[0]))
         error = abs(size - before)
         if error < EXACT * size or built[0].shape[0] * FINER > MOST_CHIPS:

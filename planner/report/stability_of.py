@@ -8,7 +8,8 @@ import numpy as np
 from planner.errors import InputError
 from planner.milling.cut import load_cut
 from planner.milling.directional import Coefficients
-from planner.milling.lobes import Machine, losses
+from planner.milling.lobes import losses
+from planner.milling.machine import Machine
 from planner.milling.mode_file import load_mode_file
 from planner.milling.point import multiplier
 from planner.report.stability import StabilityReport

@@ -7,7 +7,7 @@ import numpy as np
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes, real_modes
 from planner.milling.directional import Coefficients
-from planner.milling.lobes import Machine
+from planner.milling.machine import Machine
 
 # Insperger and Stépán's mode, as Ding et al. (2010) use it.
 HERTZ, ZETA, KILOGRAM = 922.0, 0.011, 0.03993
