@@ -22,8 +22,8 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     spindle, both in the frame of the FRFs; the spindle turns clockwise seen from behind it.
     `kt_n_m2` and `kr_n_m2` are the tangential and radial force per area of the chip's section,
     `kr_n_m2` positive where it pushes the cutter away. `pitch_deg` are the angles from each tooth
-    to the one ahead of it (none: all alike), `helix_deg` how far the teeth are wound. `kt_sd_percent` and
-    `kr_sd_percent` say how well the coefficients are known.
+    to the one ahead of it (none: all alike), `helix_deg` how far the teeth are wound.
+    `kt_sd_percent` and `kr_sd_percent` say how well the coefficients are known.
     """
 
     teeth: int

@@ -72,9 +72,14 @@ def _with_peaks(at: Monodromies, seen: list[Level]) -> list[Level]:
     return sorted([*seen, *more], key=lambda level: level.depth)
 
 
-def refined(at: Monodromies, low: Level, high: Level) -> tuple[float, float]:
-    """Depth at which |µ| is one between two, and the slope of log |µ| there (Illinois rule)."""
-    weight, last = (1.0, 1.0), None
+def refined(
+    at: Monodromies, low: Level, high: Level, width: float = REFINED
+) -> tuple[float, float]:
+    """Depth at which |µ| is one between two, and the slope of log |µ| there (Illinois rule).
+
+    `width` is the relative one of the last bracket.
+    """
+    weight, last, slope = (1.0, 1.0), None, 1.0
     for _ in range(MOST_ROUNDS):
         a, b = low.size * weight[0], high.size * weight[1]
         depth = high.depth - b * (high.depth - low.depth) / (b - a)
@@ -87,9 +92,10 @@ def refined(at: Monodromies, low: Level, high: Level) -> tuple[float, float]:
         else:
             low, weight = new, (1.0, weight[1] / 2 if last is False else 1.0)
         last = above
-        if high.depth - low.depth < REFINED * high.depth or abs(new.size) < AT_ONE:
+        slope = (high.size - low.size) / (high.depth - low.depth)
+        close = width * high.depth
+        if high.depth - low.depth < close or abs(new.size) < max(AT_ONE, slope * close / 10):
             break
-    slope = (high.size - low.size) / (high.depth - low.depth)
     return (low if abs(low.size) < high.size else high).depth, slope
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
+from planner.milling.cutter_frf import PlaneFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients, mean_matrix
 from planner.milling.period import Grid, Period, period
@@ -22,11 +23,15 @@ MOST_DEGREE = 32
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """Modes in the plane of the cut, the cut, and the coefficients that hold."""
+    """Modes in the plane of the cut, the cut, and the coefficients that hold.
+
+    With `frf`, from which the modes are, the zeroth order takes these FRFs as they are.
+    """
 
     modes: CutterModes
     cut: Cut
     coefficients: Coefficients
+    frf: PlaneFrf | None = None
 
     def grid(self, rpm: float, factor: float = 1.0) -> Grid:
         """As fine as the fastest mode asks for at this speed, times a factor."""
@@ -56,9 +61,12 @@ class Machine:
         ]
 
     def floor(self) -> Curves:
-        """Zeroth-order curves, over lines that resolve every mode."""
-        lines = resolving_lines(self.modes)
+        """Zeroth-order curves: of the FRFs, or over lines that resolve every mode."""
         mean = mean_matrix(self.cut, self.coefficients)
+        if self.frf is not None:
+            lines = self.frf.frequency_hz
+            return curves(lines, self.frf.receptance.transpose(2, 0, 1), mean)
+        lines = resolving_lines(self.modes)
         return curves(lines, self.modes.receptance(lines), mean)
 
 

@@ -41,6 +41,14 @@ class ModeFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             np.array([m.direction for m in self.mode]),
         )
 
+    @property
+    def relative_sds(self) -> np.ndarray:
+        """(n, 3) of frequency, damping and residue, whose size falls as the mass rises."""
+        return np.array([
+            [m.frequency_sd_hz / m.frequency_hz, m.damping_sd / m.damping_ratio,
+             m.mass_sd_percent / 100] for m in self.mode
+        ])  # fmt: skip
+
 
 def load_mode_file(path: Path) -> ModeFile:
     """Read and check a file of modes; InputError with one sentence where it is wrong."""

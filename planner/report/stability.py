@@ -34,6 +34,7 @@ class StabilityReport(Answer):
     multiplier_error: Any = msgspec.UNSET
     remarks: tuple[str, ...] = ()
     plots: Any = msgspec.UNSET
+    rrd: Any = msgspec.UNSET
 
     def text(self) -> Group:
         """A table of speeds, at most so many, then what else there is to say."""
