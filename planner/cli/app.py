@@ -11,6 +11,7 @@ from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.proving import prove
+from planner.cli.stability import stability
 from planner.cli.study import study
 
 app = typer.Typer(
@@ -257,6 +258,7 @@ app.command()(diagnose)
 app.command()(prove)
 app.command()(compare)
 app.command()(study)
+app.command()(stability)
 
 
 @app.command()
