@@ -148,14 +148,14 @@ def _frf_record(
 ) -> FrfRecord:
     frequency = np.asarray(sets[0]["x"], dtype=float)
     values, coherence, kinds = [], [], set()
-    found = {(int(c["rsp_dir"]), int(c["ref_dir"])): c for c in coherences}
+    found = {_place(c): c for c in coherences}
     for s in sets:
         if len(s["x"]) != len(frequency) or not np.allclose(s["x"], frequency):
             raise InputError(f"{path} mixes FRFs over different frequency lines; export one grid.")
         quantity, unit, factor = _unit_of_ratio(s)
         kinds.add((quantity, unit))
         values.append(np.asarray(s["data"], dtype=complex) * factor)
-        match = found.get((int(s["rsp_dir"]), int(s["ref_dir"])))
+        match = found.get(_place(s))
         same = match is not None and len(match["data"]) == len(frequency)
         coherence.append(
             np.real(match["data"]) if match and same else np.full(len(frequency), np.nan)
@@ -175,7 +175,23 @@ def _frf_record(
         np.array(coherence),
         remarks,
         _simulated(sets),
+        _nodes(sets, "rsp"),
+        _nodes(sets, "ref"),
     )
+
+
+def _place(s: dict[str, Any]) -> tuple[int, ...]:
+    """Where it was felt and hit: nodes and directions."""
+    return tuple(int(s[f"{end}_{what}"]) for end in ("rsp", "ref") for what in ("node", "dir"))
+
+
+def _nodes(sets: list[dict[str, Any]], end: str) -> tuple[str, ...]:
+    """Names of the nodes at one end ("rsp", "ref"): numbers, else the entities' names."""
+    numbers = [str(int(s[f"{end}_node"])) for s in sets]
+    if any(number != "0" for number in numbers):
+        return tuple(numbers)
+    names = [str(s[f"{end}_ent_name"]).strip() for s in sets]
+    return tuple("0" if name.upper() in ("", "NONE", "NULL") else name for name in names)
 
 
 def _unit_of_ratio(s: dict[str, Any]) -> tuple[str, str, float]:
