@@ -6,7 +6,7 @@ second point x, second point y), with H = Σ right·leftᵀ / (iω − λ) + con
 where the second point was for that mode (Lei et al. 2023, eq. 15).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +18,7 @@ from planner.frf.quantities import convert
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.rotations import TwoPoints, two_point_receptance
+from planner.milling.smoothing import smoothed
 from planner.milling.tool import Tool
 from planner.recording.read import read
 from planner.recording.records import AXES, FrfRecord
@@ -139,7 +140,11 @@ def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
         raise InputError(f"{path}: {_lacks(lacking)}; {MEASURE}.")
     values = np.array([[found[(*a, *b)] for b in wanted] for a in wanted])
     seen = TwoPoints(frequency, directions, values, noise * np.abs(values))
-    return two_point_receptance(seen, tool, back)
+    found = two_point_receptance(seen, tool, back)
+    if noise > 0:
+        return smoothed(found)
+    text = "How noisy the FRFs are is not stated: no sd counts it; say so by --noise PERCENT."
+    return replace(found, remarks=(text,))
 
 
 def _lacks(lacking: list[tuple]) -> str:
