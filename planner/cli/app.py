@@ -12,6 +12,7 @@ from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.proving import prove
+from planner.cli.stability import stability
 from planner.cli.study import study
 
 app = typer.Typer(
@@ -259,6 +260,7 @@ app.command()(prove)
 app.command()(compare)
 app.command()(study)
 app.command()(couple)
+app.command()(stability)
 
 
 @app.command()

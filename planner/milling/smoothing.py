@@ -1,9 +1,8 @@
 """Measured receptances as few common modes: what noise adds from line to line is taken out.
 
 Rotations are small differences of measured motions, so noise is what limits them most. All FRFs of
-one structure share their poles: vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery
-14, 1999; relaxed, 21, 2006) finds where these are, maximum likelihood refines them, and there are
-as many as the noise tells from nothing.
+one structure share their poles: vector fitting finds where these are, maximum likelihood refines
+them, and there are as many as the noise tells from nothing.
 """
 
 from dataclasses import dataclass, replace
@@ -11,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.milling.coupling import TipReceptance
+from planner.modal.rational_fit import rational_fit
 from planner.modal.refine import Refined, refine
 from planner.modal.residues import basis, basis_slope, laplace
 
 PAIRS = (4, 6, 8, 10, 12, 15, 19, 24)  # of conjugate poles that are tried
 PATIENCE = 2  # numbers of pairs in turn that may gain nothing
-STEPS, STILL = 20, 1e-4  # of moving poles, and by how much of themselves they rest
 FIRST_DAMPING = 0.01
 # χ² per degree of freedom up to which a fit counts as one to the noise, and may be used.
 FITS = 1.3
@@ -62,22 +61,21 @@ def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothe
     values (F, n, n) at lines (F,) in Hz, sd of the same shape. None where there are too few lines.
     """
     count, square = len(values), (2 * np.pi * frequency_hz) ** 2
-    accelerance = np.moveaxis(-values * square[:, None, None], 0, -1)
-    variance = np.moveaxis(sd * square[:, None, None], 0, -1) ** 2
-    scale = 2 * np.pi * frequency_hz[-1]
-    # √(E|δ|²/2) is the sd of each real value.
-    data, weight = values.reshape(count, -1).T, np.sqrt(2) / sd.reshape(count, -1).T
+    receptance, entries = np.moveaxis(values, 0, -1), values[0].size
+    accelerance = -receptance * square
+    variance = (np.moveaxis(sd, 0, -1) * square) ** 2
     best, least, worse = None, np.inf, 0
     for pairs in PAIRS:
-        unknown = 2 * pairs + TERMS
-        if 2 * count < LINES_PER_NUMBER * unknown or worse >= PATIENCE:
+        if 2 * count < LINES_PER_NUMBER * (2 * pairs + TERMS) or worse >= PATIENCE:
             break
-        start = _relocated(2j * np.pi * frequency_hz / scale, data, weight, pairs) * scale
-        penalty = 2 * (len(data) + 1) * np.log(2 * data.size)
+        even = 2 * np.pi * np.geomspace(frequency_hz[0], frequency_hz[-1], pairs + 2)[1:-1]
+        first = even * (-FIRST_DAMPING + 1j)
+        start = rational_fit(frequency_hz, receptance, first).poles
+        penalty = 2 * (entries + 1) * np.log(2 * values.size)
         found = _refined(frequency_hz, accelerance, variance, start, penalty)
         unknown = 2 * len(found.poles) + TERMS
-        criterion = found.chi2 + (unknown * len(data) + 2 * len(found.poles)) * np.log(
-            2 * data.size
+        criterion = found.chi2 + (unknown * entries + 2 * len(found.poles)) * np.log(
+            2 * values.size
         )
         worse = 0 if criterion < least else worse + 1
         if criterion < least:
@@ -144,70 +142,5 @@ def _values(
     return np.reshape(fitted, variance.shape), spread.reshape(variance.shape)
 
 
-def _first(s: np.ndarray, pairs: int) -> np.ndarray:
-    """Poles spread evenly, on a logarithmic scale, over the lines."""
-    omega = np.geomspace(s[0].imag * 1.05, s[-1].imag * 0.98, pairs)
-    return omega * (-FIRST_DAMPING + 1j)
-
-
-def _basis(s: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    """(F, 2p) of unit real and imaginary parts of residues of poles with positive frequency."""
-    up, down = 1 / (s[:, None] - poles), 1 / (s[:, None] - poles.conj())
-    return np.concatenate([up + down, 1j * (up - down)], axis=1)
-
-
-def _rest(s: np.ndarray) -> np.ndarray:
-    """(F, 6): modes below and above the lines, with complex sizes as they are damped."""
-    terms = np.stack([s[0] ** 2 / s**2, np.ones_like(s), s**2], axis=1)
-    return np.concatenate([terms, 1j * terms], axis=1)
-
-
 def _real(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values.real, values.imag], axis=0)
-
-
-def _relocated(s: np.ndarray, data: np.ndarray, weight: np.ndarray, pairs: int) -> np.ndarray:
-    """Poles (pairs,) after steps of vector fitting to data (k, F), until they rest."""
-    poles = _first(s, pairs)
-    for _ in range(STEPS):
-        moved = _step(s, data, weight, poles)
-        change = np.abs(np.sort_complex(moved) - np.sort_complex(poles)) / np.abs(poles)
-        poles = moved
-        if np.max(change) < STILL:
-            break
-    return poles
-
-
-def _step(s: np.ndarray, data: np.ndarray, weight: np.ndarray, poles: np.ndarray) -> np.ndarray:
-    common = _basis(s, poles)
-    own = np.concatenate([common, _rest(s)], axis=1)
-    sigma = np.concatenate([common, np.ones((len(s), 1))], axis=1)
-    blocks = []
-    for values, heavy in zip(data, weight, strict=True):
-        a = _real(heavy[:, None] * np.concatenate([own, -values[:, None] * sigma], axis=1))
-        r = np.asarray(np.linalg.qr(a, mode="r"))
-        blocks.append(r[own.shape[1] :, own.shape[1] :])
-    # Relaxed: the sum of the real part of σ over the lines is not zero.
-    total = np.sum(sigma.real, axis=0)
-    size = np.sqrt(np.mean([np.sum(b**2) for b in blocks])) / np.linalg.norm(total)
-    a = np.concatenate([*blocks, size * total[None]])
-    b = np.append(np.zeros(len(a) - 1), size * len(s))
-    norm = np.linalg.norm(a, axis=0)
-    solved = np.linalg.lstsq(a / norm, b, rcond=None)[0] / norm
-    level = solved[-1] if abs(solved[-1]) > 1e-8 else 1e-8
-    return _zeros(poles, solved[:-1] / level)
-
-
-def _zeros(poles: np.ndarray, residues: np.ndarray) -> np.ndarray:
-    """Zeros of σ = 1 + Σ residues · basis, turned to decay; they are the next poles."""
-    p = len(poles)
-    a = np.block([[np.diag(poles.real), np.diag(poles.imag)],
-                  [np.diag(-poles.imag), np.diag(poles.real)]])  # fmt: skip
-    b = np.concatenate([2 * np.ones(p), np.zeros(p)])
-    found = np.linalg.eigvals(a - np.outer(b, residues))
-    found = np.where(found.real > 0, -found.conj(), found)
-    swinging = found[found.imag > 1e-9 * np.abs(found)]
-    real = np.sort(found[np.abs(found.imag) <= 1e-9 * np.abs(found)].real)
-    # Two real poles become a pair again, strongly damped: the number of pairs stays.
-    pairs = [complex(-abs(x), abs(x) * 0.1) for x in np.sqrt(real[::2] * real[1::2])]
-    return np.sort_complex(np.concatenate([swinging, pairs]))
