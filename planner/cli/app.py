@@ -7,6 +7,7 @@ import typer
 
 from planner.cli.answer import AsJson, refusals, respond, warn
 from planner.cli.comparison import compare
+from planner.cli.couple import couple
 from planner.cli.diagnosis import diagnose
 from planner.cli.identification import identify
 from planner.cli.modes import modes
@@ -258,6 +259,7 @@ app.command()(diagnose)
 app.command()(prove)
 app.command()(compare)
 app.command()(study)
+app.command()(couple)
 app.command()(stability)
 
 
