@@ -168,6 +168,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
+# Of springs (N·m/rad, N/m) and dampers: 10⁷ times a heavy robot's.
+LARGEST_STIFFNESS = 1e14
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
 
 
@@ -251,13 +253,15 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
     first: dict[str, Compliance] = {}
     for number, block in enumerate(config.compliance, 1):
         entry = f"{path}: [[compliance]] number {number} ({block.joint})"
-        if not 0 < block.stiffness < float("inf"):
+        if not 0 < block.stiffness <= LARGEST_STIFFNESS:
             raise InputError(
-                f"{entry} has stiffness {block.stiffness}; it must be above 0 N·m/rad."
+                f"{entry} has stiffness {block.stiffness}; it must be above 0 N·m/rad and at most "
+                f"{LARGEST_STIFFNESS:g} (leave out what does not give)."
             )
-        if not 0 <= block.damping < float("inf"):
+        if not 0 <= block.damping <= LARGEST_STIFFNESS:
             raise InputError(
-                f"{entry} has damping {block.damping}; it must be 0 N·m·s/rad or more."
+                f"{entry} has damping {block.damping}; it must be 0 N·m·s/rad or more, and at most "
+                f"{LARGEST_STIFFNESS:g}."
             )
         length = sum(a * a for a in block.axis) ** 0.5
         if not abs(length - 1) < 1e-3:
