@@ -11,7 +11,9 @@ from planner.robot.robot import BASE
 # Springs of the arms in campaigns/ lie between 5 and 500 Hz.
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1e4
 SAG_RAD, FALLS_RAD = 0.02, 0.5  # under its own weight: what a spring may give, what none can carry
-RATIO = 1.0  # damping ratio of one spring alone; bearings and gears have 0.01 to 0.1
+RATIO = (
+    5.0  # damping ratio of one spring alone; published fits have up to 3.5 at a wrist's last joint
+)
 SPARE_HZ = 0.5  # a band that begins this near to a mode cuts its peak
 
 

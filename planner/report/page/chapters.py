@@ -91,7 +91,7 @@ def measured(facts: Facts) -> Markup:
         parts = [table(header, rows), readback]
     refused = [(r.pose, r.file, r.reason) for r in facts.status.refused]
     if refused:
-        parts += [tag("h3", f"Refused: {len(refused)} recordings, kept and not used"),
+        parts += [tag("h3", f"Refused, kept and not used: {len(refused)}"),
                   _words(("pose", "file", "why"), refused)]  # fmt: skip
     held = [(h.measured.pose, h.question.question.text) for h in facts.status.held]
     if held:
@@ -105,13 +105,13 @@ def measured(facts: Facts) -> Markup:
     return section("What was measured, and what was refused", *parts, id_="measured")
 
 
-def _pose(m: Measurement, starred: bool) -> list[str]:
+def _pose(m: Measurement, starred: bool) -> list[object]:
     modes = [mode for mode in m.modes if mode.likely]
     mark = (" ★" if starred else "") + (" (withdrawn)" if m.withdrawn else "")
     return [
         m.pose + mark, str(len(m.accepted)), str(len(m.hits) - len(m.accepted)),
-        ", ".join(pm(x.frequency_hz, x.frequency_sd_hz, ".3f") for x in modes) or "none",
-        ", ".join(number(100 * x.damping_ratio) for x in modes) or "–",
+        [pm(x.frequency_hz, x.frequency_sd_hz, ".3f") for x in modes],
+        [number(100 * x.damping_ratio) for x in modes],
         m.time[:16].replace("T", " "),
     ]  # fmt: skip
 
@@ -156,7 +156,7 @@ def reproduce(facts: Facts) -> Markup:
     folder = campaign.directory.name
     commands = "\n".join(
         (
-            f"pip install planner=={__version__}",
+            f"# with planner {__version__}:",
             f"planner replay {folder}      # every step again from the log: identical?",
             f"planner status {folder}      # the numbers of this report",
             f"planner report {folder}      # this report",

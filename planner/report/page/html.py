@@ -40,11 +40,19 @@ def bullets(texts: Iterable[object]) -> Markup:
 
 
 def table(header: Sequence[object], rows: Iterable[Sequence[object]], caption: str = "") -> Markup:
-    """A table whose first column is text and the others numbers."""
+    """A table whose first column is text and the others numbers; a cell may be a list of them."""
     head = tag("thead", tag("tr", *(tag("th", cell) for cell in header)))
-    body = tag("tbody", *(tag("tr", *(tag("td", cell) for cell in row)) for row in rows))
+    body = tag("tbody", *(tag("tr", *map(_cell, row)) for row in rows))
     said = [tag("caption", caption)] if caption else []
     return tag("div", tag("table", *said, head, body), class_="scroll")
+
+
+def _cell(cell: object) -> Markup:
+    if not isinstance(cell, list):
+        return tag("td", cell)
+    # Lines break between numbers, not inside them.
+    spans = [tag("span", f"{one}{',' if i < len(cell) else ''}") for i, one in enumerate(cell, 1)]
+    return tag("td", Markup(" ".join(spans)) if spans else "–", class_="wide")
 
 
 def picture(png: bytes, says: str) -> Markup:
@@ -85,7 +93,8 @@ th, td { border-bottom: 1px solid var(--line); padding: 3px 10px; text-align: ri
 th { background: #f2f5f8; } th:first-child, td:first-child { text-align: left; }
 table.words td, table.words th { text-align: left; white-space: normal;
   overflow-wrap: anywhere; }
-table.words th { min-width: 70px; } td.wide { white-space: normal; min-width: 180px; }
+table.words th { min-width: 70px; } td.wide { white-space: normal; min-width: 150px; }
+td.wide span { white-space: nowrap; }
 figure { margin: 12px 0; } img { max-width: 100%; height: auto; }
 figcaption { color: var(--soft); font-size: 13px; }
 pre { background: #f4f6f8; padding: 10px 14px; overflow-x: auto; font-size: 13px;
