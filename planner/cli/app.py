@@ -9,7 +9,7 @@ from planner.cli.answer import AsJson, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
 from planner.cli.diagnosis import diagnose
-from planner.cli.handing_on import report
+from planner.cli.handing_on import export, report
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.proving import prove
@@ -272,6 +272,7 @@ def replay(
 
 app.command()(check)
 app.command()(report)
+app.command()(export)
 app.command()(modes)
 app.command()(identify)
 app.command()(diagnose)

@@ -1,4 +1,4 @@
-"""What a campaign found, for others (`planner report`)."""
+"""What a campaign found, for others (`planner report`, `planner export`)."""
 
 from pathlib import Path
 from typing import Annotated
@@ -34,3 +34,34 @@ def report(
         progress("the report")
         answer = write_report(Campaign(directory), out, diagnosis)
     return respond(answer, as_json)
+
+
+def export(
+    directory: CampaignFolder,
+    kind: Annotated[
+        str,
+        typer.Argument(
+            metavar="KIND",
+            help="Poses to drive to: krl, rapid, urscript, poses (CSV). Results: uff (58 and 55), "
+            "mat, csv, model (one small file).",
+        ),
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Where it goes (default: DIR/export).")
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(metavar="POSES_CSV", help="These poses instead of open or measured ones."),
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Write proposals for the robot's controller, or results for other programs.
+
+    Axes, signs and offsets of the controller stand in robot.toml, [controller].
+
+    Example: planner export cell7 krl --out usb
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.report.handing_on.export import export as write
+
+    return respond(write(Campaign(directory), kind, out, poses), as_json)

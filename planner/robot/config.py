@@ -1,6 +1,7 @@
 """robot.toml: what URDF cannot say."""
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -135,6 +136,21 @@ class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     matters_percent: float = 3.0
 
 
+class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the robot's controller counts its axes: its angle is sign · the URDF's + offset.
+
+    `joints` are the URDF's in the controller's order (none: the URDF's own), `signs` and
+    `offsets_deg` go with it. `external` names those that are no axes of the arm (E1, E2, …).
+    Programs drive at `speed_percent` of the controller's full speed.
+    """
+
+    joints: tuple[str, ...] = ()
+    signs: tuple[Literal[1, -1], ...] = ()
+    offsets_deg: tuple[float, ...] = ()
+    external: tuple[str, ...] = ()
+    speed_percent: float = 10.0
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
@@ -165,6 +181,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor: SensorTable = SensorTable()
     readback: ReadbackTable = ReadbackTable()
     diagnose: DiagnoseTable = DiagnoseTable()
+    controller: ControllerTable = ControllerTable()
 
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
@@ -237,6 +254,11 @@ def _check(config: RobotConfig, path: Path) -> None:
     check_sds(config.sensor, f"{path}: [sensor]")
     check_sds(config.readback, f"{path}: [readback]")
     check_sds(config.diagnose, f"{path}: [diagnose]")
+    if not 0 < config.controller.speed_percent <= 100:
+        raise InputError(
+            f"{path}: [controller] speed_percent is {config.controller.speed_percent}; it must lie "
+            f"above 0 and at most at 100."
+        )
     margin = config.collision.margin_m
     if not 0 <= margin < 1:
         raise InputError(

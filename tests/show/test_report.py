@@ -9,7 +9,7 @@ from planner.campaign.campaign import Campaign
 from planner.cli.run import run
 from planner.report.campaign_report import write_report
 from planner.report.text import SIMULATED
-from tests.support.named_campaign import DOLLAR, SCRIPT, named_campaign
+from tests.support.named_campaign import DOLLAR, SCRIPT
 
 LARGEST_BYTES = 5_000_000
 ALONE = {"img", "meta", "br"}  # elements without an end
@@ -38,10 +38,9 @@ class Reader(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
+def report(named, tmp_path_factory):
     """The campaign, its report's answer, and the file as it was read."""
-    folder = tmp_path_factory.mktemp("report")
-    campaign = named_campaign(folder)
+    folder, campaign = tmp_path_factory.mktemp("report"), named
     answer = write_report(campaign, folder / "out" / "report.html", None)
     html = (folder / "out" / "report.html").read_text()
     reader = Reader()
