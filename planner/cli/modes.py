@@ -38,7 +38,10 @@ def modes(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv."""
+    """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv.
+
+    Example: planner modes exports/P001/*.uff --plot pictures
+    """
     from planner.cli.progress import reporting
     from planner.report.modal_analysis import modal_report
     from planner.report.plot_files import Pictures

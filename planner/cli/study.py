@@ -19,7 +19,10 @@ def study(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Do a paper's study again on simulated recordings: tables, pictures, what holds."""
+    """Do a paper's study again on simulated recordings: tables, pictures, what holds.
+
+    Example: planner study busch2022 --out figures
+    """
     from planner.cli.progress import counting
     from planner.studies import registry
     from planner.studies.answer import StudyAnswer
