@@ -81,7 +81,9 @@ class Campaign(CampaignReads):
         with self._acting():
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
-            deliveries = sort_paths(paths, self.cell.robot.joint_names, pose, default)
+            deliveries = sort_paths(
+                paths, self.cell.robot.joint_names, self.cell.robot.points, pose, default
+            )
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in paths if path.is_file())
             reports = []

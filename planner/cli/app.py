@@ -8,12 +8,14 @@ import typer
 from planner.cli.answer import AsJson, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
+from planner.cli.couple import couple
 from planner.cli.diagnosis import diagnose
 from planner.cli.documentation import manual, schema
 from planner.cli.handing_on import export, report
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.proving import prove
+from planner.cli.stability import stability
 from planner.cli.study import study
 from planner.errors import InputError
 
@@ -311,6 +313,8 @@ app.command()(compare)
 app.command()(study)
 app.command()(schema)
 app.command()(manual)
+app.command()(couple)
+app.command()(stability)
 
 
 @app.command()

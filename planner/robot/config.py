@@ -100,6 +100,23 @@ class Obstacle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+class PointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A point that may be hit, or carry a sensor of `mass_kg` with the axes named.
+
+    Its frame lies at `position_m` in that of a link (or another frame of the URDF), turned by
+    roll, pitch and yaw. `node` is its number in universal files. One called "tcp" or "sensor" is
+    where the tool is hit, or its sensor sits, and needs no link.
+    """
+
+    name: str
+    link: str = ""
+    position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rpy_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    axes: tuple[str, ...] = ("x", "y", "z")
+    mass_kg: float = 0.0
+    node: int | None = None
+
+
 class CollisionTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Pairs of links (or link and obstacle) that may touch, and the distance to keep."""
 
@@ -176,6 +193,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     compliance: tuple[Compliance, ...] = ()
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
+    point: tuple[PointTable, ...] = ()
     collision: CollisionTable = CollisionTable()
     effects: tuple[EffectTable, ...] = ()
     resonator: tuple[Resonator, ...] = ()

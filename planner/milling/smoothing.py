@@ -1,0 +1,146 @@
+"""Measured receptances as few common modes: what noise adds from line to line is taken out.
+
+Rotations are small differences of measured motions, so noise is what limits them most. All FRFs of
+one structure share their poles: vector fitting finds where these are, maximum likelihood refines
+them, and there are as many as the noise tells from nothing.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.milling.coupling import TipReceptance
+from planner.modal.rational_fit import rational_fit
+from planner.modal.refine import Refined, refine
+from planner.modal.residues import basis, basis_slope, laplace
+
+PAIRS = (4, 6, 8, 10, 12, 15, 19, 24)  # of conjugate poles that are tried
+PATIENCE = 2  # numbers of pairs in turn that may gain nothing
+FIRST_DAMPING = 0.01
+# χ² per degree of freedom up to which a fit counts as one to the noise, and may be used.
+FITS = 1.3
+SWINGS = 0.3  # damping ratio from which a pole of the start stands for no mode
+ABOVE = 1.5  # of the last line's frequency: where a mode above the lines is first looked for
+NO_TRACE = 1e-8  # of scaled normal equations: eigenvalues below are rounding
+LINES_PER_NUMBER = 3.0  # real values for each unknown number of an entry, at least
+TERMS = 6  # of modes outside the lines, for each entry
+
+
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """Receptances (F, n, n) of common poles (p,) in rad/s, their sd, χ² per degree of freedom."""
+
+    poles: np.ndarray
+    receptance: np.ndarray
+    sd: np.ndarray
+    chi2: float
+
+
+def smoothed(tip: TipReceptance) -> TipReceptance:
+    """The same from smoothed measured values, and a remark; as it is where no sd is stated.
+
+    Also as it is, and said so, where no such fit comes near the noise.
+    """
+    if not np.all(tip.sd > 0):
+        return tip
+    found = fit(tip.frequency_hz, tip.measured, tip.sd)
+    if found is None or found.chi2 > FITS:
+        text = "The FRFs are used line by line: few common modes do not follow them to their noise."
+        return replace(tip, remarks=(*tip.remarks, text))
+    text = (
+        f"The FRFs are those of {len(found.poles)} common modes fitted to them, "
+        f"misfit {np.sqrt(found.chi2):.2f} of their noise."
+    )
+    remarks = (*tip.remarks, text)
+    return replace(tip, measured=found.receptance, sd=found.sd, remarks=remarks)
+
+
+def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothed | None:
+    """The fit by the number of poles that the Bayesian information criterion likes best.
+
+    values (F, n, n) at lines (F,) in Hz, sd of the same shape. None where there are too few lines.
+    """
+    count, square = len(values), (2 * np.pi * frequency_hz) ** 2
+    receptance, entries = np.moveaxis(values, 0, -1), values[0].size
+    accelerance = -receptance * square
+    variance = (np.moveaxis(sd, 0, -1) * square) ** 2
+    best, least, worse = None, np.inf, 0
+    for pairs in PAIRS:
+        if 2 * count < LINES_PER_NUMBER * (2 * pairs + TERMS) or worse >= PATIENCE:
+            break
+        even = 2 * np.pi * np.geomspace(frequency_hz[0], frequency_hz[-1], pairs + 2)[1:-1]
+        first = even * (-FIRST_DAMPING + 1j)
+        start = rational_fit(frequency_hz, receptance, first).poles
+        penalty = 2 * (entries + 1) * np.log(2 * values.size)
+        found = _refined(frequency_hz, accelerance, variance, start, penalty)
+        unknown = 2 * len(found.poles) + TERMS
+        criterion = found.chi2 + (unknown * entries + 2 * len(found.poles)) * np.log(
+            2 * values.size
+        )
+        worse = 0 if criterion < least else worse + 1
+        if criterion < least:
+            best, least = found, criterion
+    if best is None:
+        return None
+    fitted, spread = _values(frequency_hz, best, variance)
+    shaped = (np.moveaxis(a, -1, 0) / square[:, None, None] for a in (-fitted, spread))
+    return Smoothed(best.poles, *shaped, best.chi2 / max(best.degrees, 1))
+
+
+def _refined(
+    frequency_hz: np.ndarray, accelerance: np.ndarray, variance: np.ndarray, poles: np.ndarray,
+    penalty: float,
+) -> Refined:  # fmt: skip
+    """The likeliest poles from a start, those left out whose χ² is not worth the penalty."""
+    swing = poles[-poles.real < SWINGS * np.abs(poles)]
+    # One stands for the nearest mode above the lines: the rest's few terms do not follow it.
+    poles = np.append(swing, ABOVE * 2 * np.pi * frequency_hz[-1] * (-FIRST_DAMPING + 1j))
+    while True:
+        found = refine(laplace(frequency_hz), accelerance, variance, poles, _decaying)
+        needed = found.significance > penalty
+        if np.all(needed) or len(poles) == 1:
+            return found
+        # One after the other: of two that stand for the same mode neither seems needed.
+        poles = np.delete(found.poles, np.argmin(found.significance))
+
+
+def _decaying(poles: np.ndarray) -> bool:
+    return bool(np.all(poles.real < 0) and np.all(poles.imag > 0))
+
+
+def _values(
+    frequency_hz: np.ndarray, found: Refined, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerance (n, n, F) of a fit, and the root of E|error|² that the noise leaves in it.
+
+    Residues are each entry's own; the poles, which all entries share, err as all of them let them.
+    """
+    lines, m = laplace(frequency_hz), len(found.poles)
+    columns, slope = basis(lines, found.poles).T, basis_slope(lines, found.poles).T
+    weight = np.sqrt(2 / variance.reshape(-1, variance.shape[-1]))
+    fitted, both, slopes = [], [], []
+    for heavy, c in zip(weight, found.point.coefficients, strict=True):
+        a = _real(heavy[:, None] * columns)
+        q, _ = np.linalg.qr(a / np.linalg.norm(a, axis=0))
+        real, imag = slope[:, :m], slope[:, m:]
+        # ∂H/∂Re p = Re R·first + Im R·second, ∂H/∂Im p = Re R·second − Im R·first
+        turned = [c[:m] * real + c[m : 2 * m] * imag, c[:m] * imag - c[m : 2 * m] * real]
+        moved = _real(heavy[:, None] * np.concatenate(turned, axis=1))
+        slopes.append(moved - q @ (q.T @ moved))
+        both.append(np.sum(q**2, axis=1))
+        fitted.append(columns @ c)
+    normal = np.sum([m.T @ m for m in slopes], axis=0)
+    size = np.sqrt(np.maximum(np.diagonal(normal), 1e-300))
+    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
+    # A direction in which poles move without a trace is one of poles that nothing needs.
+    root = vectors / np.sqrt(np.maximum(values, NO_TRACE)) / size[:, None]
+    whole = np.array(
+        [b + np.sum((d @ root) ** 2, axis=1) for b, d in zip(both, slopes, strict=True)]
+    )
+    count = len(frequency_hz)
+    spread = np.sqrt(whole[:, :count] + whole[:, count:]) / weight
+    return np.reshape(fitted, variance.shape), spread.reshape(variance.shape)
+
+
+def _real(values: np.ndarray) -> np.ndarray:
+    return np.concatenate([values.real, values.imag], axis=0)
