@@ -174,6 +174,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
     `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
     m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
+    `held` says where joints stay that do not move in the tests, as rails and turntables:
+    NAME_m = 1.2 for a sliding one, NAME_deg = 30 for a turning one.
 
     Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
     gravity's own stiffness, of the size of weight times height, is added.
@@ -187,6 +189,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor_frame: str
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
+    held: dict[str, float] = {}
     geometric_stiffness: bool | None = None  # a bool once `load_config` has read it
     stiffness_sd_percent: float | None = None
     stiffness_bias_sd_percent: float | None = None
