@@ -41,7 +41,10 @@ def modes(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder."""
+    """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
+
+    Example: planner modes exports/P001/*.uff --plot pictures
+    """
     from planner.cli.progress import reporting
     from planner.report.matrix_analysis import matrix_report
     from planner.report.modal_analysis import modal_report
