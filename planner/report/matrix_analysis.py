@@ -26,7 +26,8 @@ class MatrixShape:
     """A mode of a matrix of FRFs; `shape` is [re, im] per degree of freedom, in their order.
 
     In kg^-1/2 (unit modal mass) where `scaled`, else of unit length; `shape_sd` is of real and
-    imaginary part each. `modal_mass_kg` belongs to the shape with largest component 1.
+    imaginary part each. `modal_mass_kg` belongs to the shape with largest component 1,
+    `scatter_hz` is how the frequency differs from set to set (sd).
     """
 
     frequency_hz: float
@@ -40,6 +41,7 @@ class MatrixShape:
     mpc: float
     mpd_deg: float
     modal_mass_kg: float
+    scatter_hz: float
 
     @classmethod
     def of(cls, mode: MatrixMode) -> "MatrixShape":
@@ -49,7 +51,7 @@ class MatrixShape:
             tuple((float(s.real), float(s.imag)) for s in mode.shape),
             tuple(float(sd) for sd in mode.shape_sd),
             mode.scaled, mode.probability, mode.collinearity, mode.deviation_deg,
-            mode.modal_mass_kg,
+            mode.modal_mass_kg, mode.scatter_hz,
         )  # fmt: skip
 
 
@@ -128,8 +130,8 @@ def matrix_report(
         references=tuple(named(dof) for dof in matrix.references),
         frfs=matrix.count,
         band_hz=found.band_hz,
-        fit_error=found.fit_error,
-        order=found.order,
+        fit_error=found.found.fit_error,
+        order=found.found.order,
         refused=refused,
         accepted=tuple(str(path) for path in held),
         remarks=found.remarks,
