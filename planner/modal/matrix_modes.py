@@ -9,13 +9,20 @@ from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
 from planner.modal.pole_identification import natural, probability, support
-from planner.modal.rank_one_fit import Entries, fit_shape
+from planner.modal.rank_one_fit import Entries, fit_halves, fit_shape
 from planner.modal.residues import realign
-from planner.modal.shape_measures import phase_collinearity, phase_deviation_deg
+from planner.modal.shape_measures import (
+    phase_collinearity,
+    phase_deviation_deg,
+    real_normal_modes,
+)
 from planner.recording.dof import Dof
 
 # A band that the user does not state begins at this line: the first ones hold offsets and drift.
 FIRST_LINE = 3
+# Rows and columns are fitted apart where together they leave χ² this many times too large, and
+# apart this many times less.
+ASYMMETRIC = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +130,14 @@ def _mode(found: MatrixPoles, k: int, entries: Entries, points: int, scaled: boo
     covariance = found.scale[k] * fit.covariance[np.ix_(index, index)]
     frequency, damping, sd = natural(pole, covariance)
     variance = found.scale[k] * fit.residue_variance[:, k]
-    fitted = fit_shape(entries, fit.residue[:, k], variance, pole.imag)
+    given = entries, fit.residue[:, k], variance, pole.imag
+    fitted = fit_shape(*given)
+    if fitted.misfit > ASYMMETRIC:
+        halves = fit_halves(*given)
+        fitted = halves if halves.misfit < fitted.misfit / ASYMMETRIC else fitted
     group, odd = entries.groups
     scaled = scaled and bool(np.all(odd[group[:points]]))
-    shape, shape_sd = fitted.shape[:points], fitted.sd[:points]
+    shape, shape_sd = _shrunk(fitted.shape[:points], fitted.sd[:points])
     if scaled:
         shape = shape * (np.sign(shape[np.argmax(np.abs(shape))].real) or 1.0)
     else:
@@ -141,6 +152,31 @@ def _mode(found: MatrixPoles, k: int, entries: Entries, points: int, scaled: boo
     )  # fmt: skip
 
 
+def _shrunk(shape: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A shape whose hardly determined points are drawn towards zero, and its sds.
+
+    Points move about as far as the well determined half of them does (normal prior): where poles
+    of a set nearly coincide, its residues alone would be anything.
+    """
+    known = sd <= np.median(sd)
+    power = float(np.mean(np.abs(shape[known]) ** 2))
+    share = power / np.maximum(power + 2 * sd**2, 1e-300)
+    return shape * share, sd * np.sqrt(share)
+
+
 def _support(found: MatrixPoles, pole: complex) -> float:
     """Share of the upper model orders that have this pole."""
     return support(pole, found.diagram.sets)
+
+
+def with_normal_modes(found: MatrixModes) -> MatrixModes:
+    """With the real normal modes behind the complex shapes; frequencies and damping stay."""
+    poles = np.array([mode.pole for mode in found.modes])
+    shapes = np.stack([mode.shape for mode in found.modes], axis=1)
+    _, real = real_normal_modes(poles, shapes)
+    modes = []
+    for mode, shape in zip(found.modes, real.T, strict=True):
+        mass = 1 / float(np.max(np.abs(shape)) ** 2) if mode.scaled else float("nan")
+        modes.append(replace(mode, shape=shape.astype(complex), modal_mass_kg=mass))
+    remark = "Shapes are real normal modes; MPC and MPD are those of the complex ones."
+    return replace(found, modes=tuple(modes), remarks=(*found.remarks, remark))
