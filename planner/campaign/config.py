@@ -143,6 +143,11 @@ def _check(config: CampaignConfig, path: Path) -> None:
         )
     low_high += w.joints_deg or w.position_m or []
     low_high += [w.rotation_deg] if w.rotation_deg else []
+    heights = config.acquisition.hammer_height_m
+    low_high += [heights] if heights else []
+    for zone in config.forbidden:
+        low_high += zone.position_m or zone.joints_deg or []
+    low_high += [config.goal.band_hz] if config.goal.band_hz else []
     for low, high in low_high:
         if not (abs(low) < 1e6 and abs(high) < 1e6 and low <= high):
             raise InputError(f"{path}: range [{low}, {high}] must be finite, lower bound first.")
@@ -162,6 +167,9 @@ def _check(config: CampaignConfig, path: Path) -> None:
         ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
         ("[acquisition] candidates", config.acquisition.candidates, 10, 20_000),
         ("[stop] measurements_max", config.stop.measurements_max, 1, 1000),
+        ("[stop] measurements_min", config.stop.measurements_min, 0, 1000),
+        ("[stop] frequency_sd_percent", config.stop.frequency_sd_percent, 1e-6, 100.0),
+        ("[acquisition] singularity_margin", config.acquisition.singularity_margin, 0.0, 1.0),
     ]
     for name, value, low, high in limits:
         if not low <= value <= high:

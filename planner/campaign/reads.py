@@ -20,6 +20,7 @@ from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.errors import InputError
+from planner.recording.points import PointNames, StatedPoints
 from planner.version import __version__
 
 # Imported where they are needed: with what is kept of a model, `status` needs none of them.
@@ -173,7 +174,10 @@ class CampaignReads:
     def source_of(self, hit: HitRecord) -> Source:
         """The kept copy of a recording."""
         path = store.recording_path(self.directory, hit.sha256, hit.suffix)
-        return Source(path, hit.file, hit.hit, hit.repeat)
+        names = self.cell.robot.points
+        said = hit.hit_point or hit.response_points or names != PointNames()
+        stated = StatedPoints(hit.hit_point, hit.response_points, names=names)
+        return Source(path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints())
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""

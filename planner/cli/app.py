@@ -6,14 +6,17 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, refusals, respond, warn
+from planner.cli.checking import check
 from planner.cli.comparison import compare
 from planner.cli.couple import couple
 from planner.cli.diagnosis import diagnose
+from planner.cli.handing_on import export, report
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.proving import prove
 from planner.cli.stability import stability
 from planner.cli.study import study
+from planner.errors import InputError
 
 app = typer.Typer(
     name="planner",
@@ -43,16 +46,32 @@ def _root(
 @app.command()
 def new(
     directory: Directory,
-    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    robot: Annotated[
+        Path | None, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")
+    ] = None,
     campaign: Annotated[
         Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
     ] = None,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Write robot.toml, campaign.toml and a URDF to change."),
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Start a campaign."""
-    from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import NewCampaign
+    """Start a campaign, or write files to begin one with.
 
+    The robot is checked: what looks wrong is said, what cannot work is refused.
+
+    Example: planner new cell7 --robot robot/robot.toml --campaign campaign.toml
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.campaign.example import write_example
+    from planner.report.campaign_acts import ExampleFolder, NewCampaign
+
+    if example == (robot is not None):
+        raise InputError("planner new needs either --robot ROBOT_TOML or --example; give one.")
+    if robot is None:
+        return respond(ExampleFolder(*write_example(directory)), as_json)
     return respond(NewCampaign.of(Campaign.new(directory, robot, campaign)), as_json)
 
 
@@ -253,6 +272,9 @@ def replay(
     return respond(answer, as_json, 0 if answer.reproduced else 1)
 
 
+app.command()(check)
+app.command()(report)
+app.command()(export)
 app.command()(modes)
 app.command()(identify)
 app.command()(diagnose)

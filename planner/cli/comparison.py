@@ -57,11 +57,11 @@ def compare(
     if simulation not in (None, *SIMULATIONS):
         raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
     loaded = Robot.load(robot)
-    rows = read_recordings(recordings, loaded.joint_names).rows
+    rows = read_recordings(recordings, loaded.joint_names, loaded.points).rows
     config = decide(loaded, [row.joints_deg for row in rows], campaign, simulation)
     folder = out or _cache_folder()
     with bars(quiet=as_json) as progress:
-        poses = recorded(recordings, loaded.joint_names, config.modes, workers, progress)
+        poses = recorded(recordings, loaded, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)
         found = conduct(bench, study, folder, scheduler, workers, progress)

@@ -67,6 +67,7 @@ def identify(
             band,
             window_rate_1_s=window_rate_1_s,
             progress=progress,
+            points=nominal.points,
         )
         answer = fit(
             dataset,

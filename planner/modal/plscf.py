@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
 
+from planner.modal.refine import proportional
+
 # Relative ridge on the normal matrices: a band that leaves part of the circle empty makes them
 # singular to rounding, and only to rounding.
 RIDGE = 1e-12
@@ -79,6 +81,8 @@ def _normal(
     """
     outputs, inputs, lines = frf.shape
     w = np.ones((outputs, lines)) if weight is None else weight / np.mean(weight)
+    if proportional(w):
+        return _normal_of_one_profile(z, frf * np.sqrt(w[:, :1, None] / w[0, 0]), w[0], order)
     lags = z[None, :] ** np.arange(order + 1)[:, None]
     index = np.arange(order + 1)
     lag = index[None, :] - index[:, None]  # column power minus row power
@@ -99,6 +103,28 @@ def _normal(
         )
         total += t[lag + order].transpose(0, 2, 1, 3)
     return total, reduced
+
+
+def _normal_of_one_profile(
+    z: np.ndarray, frf: np.ndarray, weight: np.ndarray, order: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same where one weight (F,) holds for all outputs: they share one numerator's matrix."""
+    outputs, inputs, lines = frf.shape
+    lags = z[None, :] ** np.arange(order + 1)[:, None]
+    index = np.arange(order + 1)
+    lag = index[None, :] - index[:, None]
+    r = (lags @ weight).real
+    gram = r[np.abs(lag)]
+    gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
+    factor = cholesky(gram + RIDGE * r[0] * np.eye(order + 1), lower=True)
+    weighted = (weight * frf).reshape(-1, lines)
+    s = _two_sided(lags, weighted.T).real.reshape(-1, outputs, inputs)
+    coupled = -s[lag + order].reshape(order + 1, -1)  # rows, then columns × outputs × inputs
+    reduced = solve_triangular(factor, coupled, lower=True)
+    reduced = reduced.reshape(order + 1, order + 1, outputs, inputs).transpose(2, 0, 1, 3)
+    products = np.einsum("oif,ojf->ijf", frf.conj(), weight * frf).reshape(-1, lines)
+    t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
+    return t[lag + order].transpose(0, 2, 1, 3), np.ascontiguousarray(reduced)
 
 
 def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:

@@ -58,7 +58,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
     if start.size == 0:
         return None
     fitted = fit(data, start)
-    modes = _modes(data, fitted, sets)
+    modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))
     return PoleIdentification(modes, data, found, fitted, relative, top) if modes else None
@@ -74,7 +74,8 @@ def ladder(top: int) -> tuple[int, ...]:
     return tuple(sorted(orders | {top}))
 
 
-def _modes(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+    """The poles of a fit that are established, with standard deviations and probabilities."""
     refined = fitted.refined
     m = refined.poles.size
     scale = scales(data, fitted)

@@ -145,7 +145,10 @@ def _evaluate(
     gram, cross, square = products(columns, data, weight)
     size = np.sqrt(np.einsum("ekk->ek", gram))[:, :p]
     scaled = gram[:, :p, :p] / size[:, :, None] / size[:, None, :]
-    inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
+    # Entries whose weights are in proportion share one matrix.
+    shared = 1 if proportional(weight) else len(scaled)
+    inverse = np.linalg.pinv(scaled[:shared], rcond=1e-13, hermitian=True)
+    inverse = np.repeat(inverse, len(scaled) // shared, axis=0)
     inverse /= size[:, :, None] * size[:, None, :]
     coefficients = np.einsum("ekl,el->ek", inverse, cross[:, :p])
     chi2 = float(np.sum(square) - np.einsum("ek,ek->", coefficients, cross[:, :p]))
@@ -176,12 +179,18 @@ def products(
     wide = np.concatenate([weight, weight], axis=1)
     values = np.concatenate([data.real, data.imag], axis=1)
     cross = (wide * values) @ both.T
-    common = np.all(weight == weight[:, :1])
-    if common:
-        gram = weight[:, 0, None, None] * (both @ both.T)
+    if proportional(weight):
+        profile = wide[0] / wide[0, 0]
+        gram = weight[:, 0, None, None] * ((both * profile) @ both.T)
     else:
         gram = np.stack([(both * row) @ both.T for row in wide])
     return gram, cross, square
+
+
+def proportional(weight: np.ndarray) -> bool:
+    """Whether the weights (entries, F) are a level for each entry times one profile of lines."""
+    product = weight[:, :1] * weight[:1] / weight[0, 0]
+    return bool(np.allclose(weight, product, rtol=1e-12, atol=0))
 
 
 def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:

@@ -117,19 +117,21 @@ def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
             f"{path} mixes records of different sampling or length; export one hit with one rate."
         )
     common = {int(s["ref_dir"]) for s in sets if int(s["ref_dir"])}
+    hit_nodes = {int(s["ref_node"]) for s in sets if int(s["ref_dir"]) and int(s["ref_node"])}
     channels, remarks = [], []
     for s in sets:
         quantity, unit, factor = _unit(path, s)
-        direction = int(s["rsp_dir"])
+        direction, node = int(s["rsp_dir"]), int(s["rsp_node"])
         if quantity == "force":
             direction = int(s["ref_dir"]) or (common.pop() if len(common) == 1 else direction)
+            node = int(s["ref_node"]) or (hit_nodes.pop() if len(hit_nodes) == 1 else node)
         if not unit:
             label = str(s["ordinate_axis_units_lab"]).strip()
             remarks.append(f"The unit {label or 'of a record'} is not known.")
         name = str(s["rsp_ent_name"]).strip()
         name = name if name.upper() != "NONE" else f"{quantity} {direction:+d}"
         samples = np.asarray(s["data"], dtype=float) * factor
-        channels.append(Channel(name, quantity, unit, direction, samples))
+        channels.append(Channel(name, quantity, unit, direction, samples, str(node)))
     rate = next(iter(grids))[1]
     return TimeRecord(path, rate, tuple(channels), tuple(remarks), _simulated(sets))
 

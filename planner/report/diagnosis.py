@@ -12,7 +12,7 @@ from rich.text import Text
 from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 
@@ -160,7 +160,9 @@ class DiagnosisReport(Answer):
         mark = SIMULATED_TITLE if self.simulated else ""
         figures = diagnosis_figures(found, self.explained.recorded.poses, mark)
         plots = Pictures(folder).write(figures, robot.name)["plots"]
-        return replace(self, robot=str(path), plots=plots)
+        written = replace(self, robot=str(path), plots=plots)
+        (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
+        return written
 
     def text(self) -> Group:
         """Verdict, findings, where, candidates, agreement, and the hit that would tell more."""

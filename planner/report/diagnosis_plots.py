@@ -14,6 +14,7 @@ from planner.diagnosis.linear_diagnosis import Diagnosis
 from planner.diagnosis.residual_location import Where, where
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
+from planner.report.plot_text import plain_text
 
 MOST = 4  # poses whose FRFs are shown, those that differed most
 SIDES = (
@@ -69,7 +70,7 @@ def _overlay(
         panel.grid(True, which="both", alpha=0.25)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     panels[-1].set_xlabel("frequency (Hz)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(plain_text(title), fontsize=10)
     return figure
 
 
@@ -89,7 +90,7 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
         panel.set_xlabel(what)
         panel.set_ylabel("mean square residual (1: noise)", fontsize=8)
         panel.legend()
-    poses.set_xticks(np.arange(len(names)), names, rotation=60, fontsize=7)
+    poses.set_xticks(np.arange(len(names)), [plain_text(n) for n in names], rotation=60, fontsize=7)
     for panel, place, label in ((left, before, "refitted"), (right, after, "explained")):
         panel.imshow(np.log10(np.maximum(place.by_direction, 0.1)), cmap="magma", vmin=-1, vmax=3)
         for i in range(3):

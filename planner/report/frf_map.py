@@ -6,6 +6,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
+from planner.report.plot_text import plain_text
+
 FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn alike
 DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
@@ -46,7 +48,7 @@ def frf_map(
         panel.set_xlabel(pose_label)
         panel.set_yscale("log" if log_frequency else "linear")
     panels[0].set_ylabel("frequency (Hz)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(plain_text(title), fontsize=10)
     return figure
 
 

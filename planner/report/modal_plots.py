@@ -26,6 +26,7 @@ from planner.report.plot_marks import (
     number_modes,
     panels,
 )
+from planner.report.plot_text import plain_text
 
 SINGULAR = ("black", "0.4", "0.65")
 STABLE = {"marker": "o", "color": "tab:green", "ms": 3.5, "ls": ""}
@@ -268,7 +269,7 @@ def frequency_figure(
         style = {"color": colour, "lw": 1.4, "marker": "o", "ms": 4, "capsize": 3}
         panel.errorbar(x[order], frequency_hz[order, k], error, **style)
     if named:
-        panel.set_xticks(x, place, rotation=90 if len(place) > 12 else 0)
+        panel.set_xticks(x, [plain_text(p) for p in place], rotation=90 if len(place) > 12 else 0)
     panel.set_xlabel(axis)
     panel.set_ylabel("natural frequency (Hz)")
     panel.grid(True, alpha=0.25)

@@ -10,6 +10,7 @@ from scipy.optimize import isotonic_regression
 
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
+from planner.report.plot_text import plain_text
 
 MODE, USABLE = "tab:blue", "tab:green"
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
@@ -21,7 +22,7 @@ def panels(
     """A figure (size in inches) with panels (rows, columns) that share the frequency axis."""
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(plain_text(title), fontsize=11)
     return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
 
 

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from planner.errors import InputError
 
+LARGEST, FARTHEST_M = 1e7, 1e3  # kg, kg·m, kg·m² of what turns; between joints: no robot has it
 FIXED, TURNING = ("fixed",), ("revolute", "continuous")
 
 
@@ -213,8 +214,25 @@ def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
                 )
 
 
+def _said(values: np.ndarray) -> str:
+    return "(" + ", ".join(f"{v:.3g}" for v in values) + ")"
+
+
 def _check_inertias(model: pin.Model, urdf: Path) -> None:
-    for name, inertia in list(zip(model.names, model.inertias, strict=True))[1:]:
+    for name, inertia, place in zip(
+        list(model.names)[1:], list(model.inertias)[1:], list(model.jointPlacements)[1:],
+        strict=True,
+    ):  # fmt: skip
+        numbers = np.array(inertia.toDynamicParameters())
+        if not np.all(np.abs([*numbers, *inertia.lever]) < LARGEST):
+            raise InputError(
+                f"{urdf}: the links that turn with {name} have mass {inertia.mass:.4g} kg and "
+                f"centre of mass {_said(inertia.lever)} m; give kg, m and kg·m²."
+            )
+        if not np.all(np.abs(place.translation) < FARTHEST_M):
+            raise InputError(
+                f"{urdf}: joint {name} is {_said(place.translation)} m from the one before; give m."
+            )
         moments = np.linalg.eigvalsh(inertia.inertia)
         if inertia.mass < 0 or moments[0] < -1e-9 * abs(moments[-1]):
             raise InputError(

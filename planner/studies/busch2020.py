@@ -34,7 +34,7 @@ class BeyondPrediction:
     sd: np.ndarray
 
 
-def study(progress: Tell) -> Report:
+def study(progress: Tell, small: bool = False) -> Report:
     """R² beyond 105° of every model, with every, every 2nd, 3rd and 4th experiment."""
     first = sweep(ROBOTS[0])
     predicted = {

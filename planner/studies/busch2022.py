@@ -12,6 +12,7 @@ import numpy as np
 from planner.progress import Tell
 from planner.studies.busch2022_data import (
     COUNTS,
+    FEW_COUNTS,
     FREQUENCY_MODELS,
     FUSIONS,
     KERNELS,
@@ -42,25 +43,26 @@ class Output:
     fits: dict[str, Fit]
 
 
-def study(progress: Tell) -> Report:
+def study(progress: Tell, small: bool = False) -> Report:
     """All figures, and whether what the paper found in its own holds here."""
+    counts, splits = (FEW_COUNTS, 1) if small else (COUNTS, SPLITS)
     seen = load(progress)
     modes = seen.modes
     progress("frequencies", 0.2)
     frequencies = [_frequency(seen, k) for k in range(modes.frequency_hz.shape[1])]
-    seven = _scores(seen, frequencies, 15)
+    seven = _scores(seen, frequencies, 15, splits)
     eight = []
-    for i, count in enumerate(COUNTS):
-        progress(f"frequencies with {count} poses", 0.3 + 0.4 * i / len(COUNTS))
-        eight.append(_scores(seen, [_only(o, FUSIONS) for o in frequencies], count))
+    for i, count in enumerate(counts):
+        progress(f"frequencies with {count} poses", 0.3 + 0.4 * i / len(counts))
+        eight.append(_scores(seen, [_only(o, FUSIONS) for o in frequencies], count, splits))
     eight = np.array(eight)
     progress("damping ratios", 0.7)
     damping = zip(100 * modes.damping_ratio.T, 100 * modes.damping_sd.T, strict=True)
-    ten = _scores(seen, [Output(y, sd, _kernels(KERNELS)) for y, sd in damping], 15)
+    ten = _scores(seen, [Output(y, sd, _kernels(KERNELS)) for y, sd in damping], 15, splits)
     eleven = []
     for i, name in enumerate(RESIDUES):
         progress(f"residues {name}", 0.75 + 0.2 * i / len(RESIDUES))
-        eleven.append(_scores(seen, _residues(seen, name), 15))
+        eleven.append(_scores(seen, _residues(seen, name), 15, splits))
     eleven = np.array(eleven)
     progress("FRFs", 0.95)
     twelve = figure_12(seen)
@@ -68,16 +70,16 @@ def study(progress: Tell) -> Report:
         "busch2022",
         "SIMULATED: the shipped campaign kr240_plane, 35 poses recorded in MuJoCo with a hammer's "
         "noise, modes as the planner finds them.",
-        _tables(seven, eight, ten, eleven),
-        findings(seven, eight, ten, eleven, twelve),
-        pictures(seven, eight, ten, eleven) | {"busch2022_figure_12": twelve.figure},
+        _tables(seven, eight, ten, eleven, counts),
+        findings(seven, eight, ten, eleven, twelve, counts),
+        pictures(seven, eight, ten, eleven, counts) | {"busch2022_figure_12": twelve.figure},
     )
 
 
-def _scores(seen: AnalysedPoses, outputs: list[Output], count: int) -> np.ndarray:
+def _scores(seen: AnalysedPoses, outputs: list[Output], count: int, splits: int) -> np.ndarray:
     """Medians over splits (outputs, models, 3) of R², RMSE and the 95 % interval's coverage."""
-    runs = np.empty((SPLITS, len(outputs), len(outputs[0].fits), 3))
-    for seed in range(SPLITS):
+    runs = np.empty((splits, len(outputs), len(outputs[0].fits), 3))
+    for seed in range(splits):
         train, test = split(seen.x, seed)
         for k, output in enumerate(outputs):
             for i, fit in enumerate(output.fits.values()):
@@ -140,13 +142,14 @@ def _table(
 
 
 def _tables(
-    seven: np.ndarray, eight: np.ndarray, ten: np.ndarray, eleven: np.ndarray
-) -> tuple[Table, ...]:
+    seven: np.ndarray, eight: np.ndarray, ten: np.ndarray, eleven: np.ndarray,
+    counts: tuple[int, ...],
+) -> tuple[Table, ...]:  # fmt: skip
     title = "Figure 11: RMSE of residues {}, over the mode's size"
     return (
         _table("busch2022_figure_7_r2", "Figure 7: R² of frequencies", seven, 0),
         _table("busch2022_figure_7_rmse", "Figure 7: RMSE of frequencies in Hz", seven, 1),
-        _figure_8_table(eight),
+        _figure_8_table(eight, counts),
         _table("busch2022_figure_10_r2", "Figure 10: R² of damping ratios", ten, 0, KERNELS),
         _table("busch2022_figure_10_rmse", "Figure 10: RMSE of damping in %", ten, 1, KERNELS),
         *(
@@ -157,9 +160,9 @@ def _tables(
     )  # fmt: skip
 
 
-def _figure_8_table(eight: np.ndarray) -> Table:
+def _figure_8_table(eight: np.ndarray, counts: tuple[int, ...]) -> Table:
     middle = np.median(eight, axis=1)  # over modes: (counts, models, 3)
     columns = [f"{name} {what}" for name in FUSIONS for what in ("R²", "RMSE", "inside")]
-    rows = [(f"{n} poses", *map(float, row.ravel())) for n, row in zip(COUNTS, middle, strict=True)]
+    rows = [(f"{n} poses", *map(float, row.ravel())) for n, row in zip(counts, middle, strict=True)]
     title = "Figure 8: R², RMSE in Hz and share inside the 95 % interval, medians over modes"
     return Table("busch2022_figure_8", title, ("", *columns), tuple(rows))

@@ -20,6 +20,7 @@ KERNELS = ("bias", "linear", "quadratic", "cubic", "rbf")
 FUSIONS = ("rbf", "AR1", "NARGP")
 FREQUENCY_MODELS = (*KERNELS[1:], *FUSIONS[1:])
 COUNTS = tuple(range(3, 16))  # training sets B_3 … B_15 of the paper
+FEW_COUNTS = (3, 7, 15)  # of the small version
 RESIDUES = tuple(f"{d} {part}" for d in ("xx", "yy") for part in ("real", "imaginary"))
 TRAINED = 15
 TRIED_DESIGNS = 200  # Latin hypercubes; that with the largest least distance is taken

@@ -2,18 +2,21 @@
 
 import numpy as np
 
-from planner.studies.busch2022_data import COUNTS, FREQUENCY_MODELS, FUSIONS, KERNELS
+from planner.studies.busch2022_data import FREQUENCY_MODELS, FUSIONS, KERNELS
 from planner.studies.busch2022_frf import Rebuilt
 from planner.studies.report import PaperClaim
 
+FEW = 5  # poses at most that are called few
+
 
 def findings(
-    seven: np.ndarray, eight: np.ndarray, ten: np.ndarray, eleven: np.ndarray, twelve: Rebuilt
-) -> tuple[PaperClaim, ...]:
+    seven: np.ndarray, eight: np.ndarray, ten: np.ndarray, eleven: np.ndarray, twelve: Rebuilt,
+    counts: tuple[int, ...],
+) -> tuple[PaperClaim, ...]:  # fmt: skip
     """From scores (outputs, models, 3): R², RMSE, coverage; in 8 by count, in 11 by residue."""
     return (
         *_about_figure_7(seven),
-        *_about_figure_8(eight),
+        *_about_figure_8(eight, counts),
         *_about_the_rest(ten, eleven),
         _about_frfs(twelve),
     )
@@ -39,9 +42,9 @@ def _about_figure_7(seven: np.ndarray) -> tuple[PaperClaim, ...]:
     )
 
 
-def _about_figure_8(eight: np.ndarray) -> tuple[PaperClaim, ...]:
-    few = np.median(eight[:3], axis=(0, 1))  # 3 to 5 poses: (models, 3)
-    ready = [_first_above(eight[:, :, i, 0]) for i in range(3)]
+def _about_figure_8(eight: np.ndarray, counts: tuple[int, ...]) -> tuple[PaperClaim, ...]:
+    few = np.median(eight[[n <= FEW for n in counts]], axis=(0, 1))  # 3 to 5 poses: (models, 3)
+    ready = [_first_above(eight[:, :, i, 0], counts) for i in range(3)]
     rough = [_roughness(eight[:, :, i, 1]) for i in (1, 2)]
     return (
         PaperClaim(
@@ -70,11 +73,11 @@ def _about_figure_8(eight: np.ndarray) -> tuple[PaperClaim, ...]:
     )
 
 
-def _first_above(r2: np.ndarray) -> int:
+def _first_above(r2: np.ndarray, counts: tuple[int, ...]) -> int:
     """Least count from which the median mode's R² (counts, modes) stays at 0.9."""
     good = np.median(r2, axis=1) >= 0.9
     below = np.flatnonzero(~good)
-    return COUNTS[min(int(below[-1]) + 1, len(COUNTS) - 1)] if len(below) else COUNTS[0]
+    return counts[min(int(below[-1]) + 1, len(counts) - 1)] if len(below) else counts[0]
 
 
 def _roughness(rmse: np.ndarray) -> float:

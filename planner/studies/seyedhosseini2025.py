@@ -50,7 +50,7 @@ class PostureData:
     truth: Truth
 
 
-def study(progress: Tell) -> Report:
+def study(progress: Tell, small: bool = False) -> Report:
     """Errors and coverage at the last 15 postures, correlations, and FRFs."""
     progress("254 postures", 0.0)
     with tempfile.TemporaryDirectory() as folder:

@@ -26,7 +26,7 @@ def report(request, tmp_path):
     for finding in made.findings:
         print(("holds: " if finding.holds else "DOES NOT HOLD: ") + finding.paper, finding.here)
     files = write(made, Path(os.environ.get("STUDY_FOLDER", tmp_path)))
-    assert len(files) == len(made.tables) + len(made.figures)
+    assert len(files) == len(made.tables) + 1 + len(made.figures)  # and the claims
     assert all(Path(file).stat().st_size > 0 for file in files)
     return made
 

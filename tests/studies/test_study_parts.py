@@ -100,7 +100,7 @@ def test_a_report_is_written_as_tables_and_pictures(tmp_path):
     table = Table("t", "T", ("a", "b"), (("x", 1.5),))
     made = Report("busch2022", "data", (table,), (PaperClaim("p", "h", True),), {"f": figure})
     files = write(made, tmp_path)
-    assert [f.rsplit("/", 1)[1] for f in files] == ["t.csv", "f.png"]
+    assert [f.rsplit("/", 1)[1] for f in files] == ["t.csv", "busch2022_claims.csv", "f.png"]
     assert (tmp_path / "t.csv").read_text().split() == ["a,b", "x,1.5"]
     assert made.table("t") is table
     assert write(made, None) == []

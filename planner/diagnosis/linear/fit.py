@@ -19,12 +19,13 @@ from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.identify import QUICK, STAGES, Effort, identify
-from planner.identification.measured_frfs import Measured, stack
+from planner.identification.measured_frfs import Measured, layout_of, matrices_at, stack
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
+from planner.recording.points import Layout
 from planner.robot.elastic_model import Matrices
 
 PRIORS = Priors(
@@ -75,10 +76,15 @@ class Problem:
     priors: Priors = PRIORS
     exact: bool = False
 
+    @property
+    def layout(self) -> Layout:
+        """The points between which FRFs were measured."""
+        return layout_of(self.frfs)
+
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
         body, measured = _prepared(self, effect), _measured(self, grade)
-        setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
+        setting = Setting(body.simulation, self.q, measured.s, body.jacobians, self.layout)
         inertias, p = body.inertias, body.parametrisation
         tolerances = None if self.exact else tolerances_of(self.simulation)
         kind = grade.logarithmic, grade.inertial, tolerances
@@ -111,7 +117,7 @@ def _prepared(problem: Problem, effect: Effect) -> _Prepared:
     simulation = effect.structure(problem.simulation)
     p = parametrise(simulation, effect.priors(simulation, problem.priors))
     jacobians = simulation.elastic.body_jacobians(problem.q)
-    matrices = simulation.elastic.with_slopes(problem.q)
+    matrices = matrices_at(simulation.elastic, problem.q, problem.frfs, sloped=True)
     return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
 
 
