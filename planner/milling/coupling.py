@@ -21,6 +21,7 @@ from planner.milling.tool import Tool
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # Above this a 1 % error of every measured FRF is more than a tenth of the coupled one.
 AMPLIFICATION_LIMIT = 10.0
+SHARE = 1e-9  # of an axis in another: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +70,8 @@ class TipReceptance:
 class CoupledFrf:
     """Receptances (6, 6, F) at the tip of the target tool, their sd, and how noise grew.
 
-    In the axes of the FRFs. The motions not `kept` were not measured: they are taken as held, so
-    that theirs are 0. `amplification` (F,) is the relative error of the 3 × 3 of motions per force,
+    In the axes of the FRFs. The motions not `kept` were not measured: they are taken as held, and
+    theirs are NaN. `amplification` (F,) is the relative error of the 3 × 3 of motions per force,
     in the Frobenius norm, for relative errors of one unit in every measured value, each by itself.
     """
 
@@ -192,8 +193,14 @@ def _uncertain(
 
 
 def _whole(values: np.ndarray, kept: tuple[int, ...], frame: np.ndarray) -> np.ndarray:
-    """(F, k, k) as (6, 6, F) in the axes in which `frame` is given, 0 where nothing is known."""
+    """(F, k, k) as (6, 6, F) in the axes in which `frame` is given, NaN where nothing is known."""
     out = np.zeros((len(values), 6, 6), values.dtype)
     out[np.ix_(range(len(values)), kept, kept)] = values
     turn = np.kron(np.eye(2), frame)
-    return np.moveaxis(turn @ out @ turn.T, 0, -1)
+    whole = np.moveaxis(turn @ out @ turn.T, 0, -1)
+    # A direction is not known where motions that were not kept have a share in it.
+    lacking = [k for k in range(6) if k not in kept]
+    unknown = np.any(np.abs(turn[:, lacking]) > SHARE, axis=1)
+    whole[unknown] = np.nan
+    whole[:, unknown] = np.nan
+    return whole

@@ -14,7 +14,7 @@ from planner.recording.read import read
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
-SECOND = 1e-6  # share of a residue's first part below which there is no second
+SECOND = 1e-3  # share of the FRF at a mode below which a residue's second part does not count
 LEAST_LINES = 16
 FAR = 3.0  # times the highest line
 
@@ -31,6 +31,7 @@ class CutterFrf:
     frequency_hz: np.ndarray
     receptance: np.ndarray
     sd: np.ndarray | None = None
+    simulated: bool = False
 
     def in_plane(self, cut: Cut) -> "PlaneFrf":
         """In the plane of the cut; InputError where an axis that this needs is not known."""
@@ -49,7 +50,7 @@ class CutterFrf:
             # Errors of different entries are taken as independent of each other.
             square = _turned(np.nan_to_num(self.sd) ** 2, cut.plane**2)
             sd = np.sqrt(square.real)
-        return PlaneFrf(self.name, self.frequency_hz, h, sd)
+        return PlaneFrf(self.name, self.frequency_hz, h, sd, self.simulated)
 
 
 def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
@@ -68,10 +69,18 @@ class PlaneFrf:
     frequency_hz: np.ndarray
     receptance: np.ndarray
     sd: np.ndarray | None = None
+    simulated: bool = False
 
-    def fitted(self) -> RationalFit:
-        """As poles and residues."""
-        return rational_fit(self.frequency_hz, self.receptance)
+    def fitted(self) -> CutterModes:
+        """As modes."""
+        fit = rational_fit(self.frequency_hz, self.receptance)
+        return as_modes(fit, float(self.frequency_hz[-1]))
+
+    def error(self, modes: CutterModes) -> float:
+        """Root mean square over lines of ‖H − modes‖/‖H‖."""
+        off = self.receptance - modes.receptance(self.frequency_hz).transpose(1, 2, 0)
+        share = np.linalg.norm(off, axis=(0, 1)) / np.linalg.norm(self.receptance, axis=(0, 1))
+        return float(np.sqrt(np.mean(share**2)))
 
 
 def as_modes(fit: RationalFit, highest_hz: float) -> CutterModes:
@@ -84,7 +93,8 @@ def as_modes(fit: RationalFit, highest_hz: float) -> CutterModes:
     rest = fit.rest - 2 * np.real(fit.residues[far] / fit.poles[far, None, None]).sum(axis=0)
     for pole, residue in zip(fit.poles[~far], fit.residues[~far], strict=True):
         left, sizes, right = np.linalg.svd(residue)
-        for k in range(1 + int(sizes[1] > SECOND * sizes[0])):
+        there = np.linalg.norm(fit.response(np.array([pole.imag / (2 * np.pi)])))
+        for k in range(1 + int(sizes[1] > SECOND * there * -pole.real)):
             poles.append(pole)
             shapes.append(left[:, k] * sizes[k])
             drives.append(right[k])

@@ -64,27 +64,25 @@ def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothe
     receptance, entries = np.moveaxis(values, 0, -1), values[0].size
     accelerance = -receptance * square
     variance = (np.moveaxis(sd, 0, -1) * square) ** 2
-    best, least, worse = None, np.inf, 0
+    best, least, worse, each = None, np.inf, 0, np.log(2 * values.size)
     for pairs in PAIRS:
         if 2 * count < LINES_PER_NUMBER * (2 * pairs + TERMS) or worse >= PATIENCE:
             break
         even = 2 * np.pi * np.geomspace(frequency_hz[0], frequency_hz[-1], pairs + 2)[1:-1]
         first = even * (-FIRST_DAMPING + 1j)
         start = rational_fit(frequency_hz, receptance, first).poles
-        penalty = 2 * (entries + 1) * np.log(2 * values.size)
-        found = _refined(frequency_hz, accelerance, variance, start, penalty)
-        unknown = 2 * len(found.poles) + TERMS
-        criterion = found.chi2 + (unknown * entries + 2 * len(found.poles)) * np.log(
-            2 * values.size
-        )
+        found = _refined(frequency_hz, accelerance, variance, start, 2 * (entries + 1) * each)
+        modes = len(found.poles)
+        criterion = found.chi2 + ((2 * modes + TERMS) * entries + 2 * modes) * each
         worse = 0 if criterion < least else worse + 1
         if criterion < least:
             best, least = found, criterion
     if best is None:
         return None
     fitted, spread = _values(frequency_hz, best, variance)
-    shaped = (np.moveaxis(a, -1, 0) / square[:, None, None] for a in (-fitted, spread))
-    return Smoothed(best.poles, *shaped, best.chi2 / max(best.degrees, 1))
+    off = np.moveaxis(spread / square, -1, 0)
+    moved = np.moveaxis(-fitted / square, -1, 0)
+    return Smoothed(best.poles, moved, off, best.chi2 / max(best.degrees, 1))
 
 
 def _refined(

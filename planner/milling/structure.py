@@ -6,7 +6,7 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.cutter_frf import CutterFrf, PlaneFrf, as_modes
+from planner.milling.cutter_frf import CutterFrf, PlaneFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients, mean_matrix
 from planner.milling.machine import Machine, check_structure
@@ -62,15 +62,16 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     """From FRFs and their sd: modes are fitted, and how well is said."""
     plane = frf.in_plane(cut)
     check_band(plane, cut)
-    fit = plane.fitted()
-    modes = as_modes(fit, float(plane.frequency_hz[-1]))
+    modes = plane.fitted()
     check_structure(modes)
+    error = plane.error(modes)
     spread, given = explaining(modes, plane)
+    count = len(np.unique(modes.poles))
     remarks = [
-        f"{len(fit.poles)} modes fitted to {frf.name} are off by {100 * fit.error:.2g} % of the "
-        f"FRFs (root mean square over the lines)."
+        f"{count} modes fitted to {frf.name} are off by {100 * error:.2g} % of the FRFs (root mean "
+        f"square over the lines)."
     ]
-    if fit.error > POOR_FIT and cut.method != "zeroth_order":
+    if error > POOR_FIT and cut.method != "zeroth_order":
         remarks.append('The fit is poor; method = "zeroth_order" takes the FRFs as they are.')
     if frf.sd is None:
         remarks.append("These FRFs come without sd: they are taken as exact.")

@@ -24,7 +24,7 @@ def coupling_figure(
 
     Below, line by line, how many times relative errors of the measured FRFs grew.
     """
-    moved = [k for k in range(3) if np.any(coupled.receptance[k, k])]
+    moved = [k for k in range(3) if np.all(np.isfinite(coupled.receptance[k, k]))]
     n = len(moved)
     layout = {"height_ratios": [1.0] * n + [0.7]}
     figure, grid = panels((4.6 * n + 2.0, 2.9 * n + 2.2), title, n + 1, n, gridspec_kw=layout)

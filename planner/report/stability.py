@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.report.answer import Answer
-from planner.report.text import number, table
+from planner.report.text import SIMULATED, number, table
 
 MOST_ROWS = 24  # of speeds that the text shows
 
@@ -33,6 +33,7 @@ class StabilityReport(Answer):
     multiplier: Any = msgspec.UNSET
     multiplier_error: Any = msgspec.UNSET
     remarks: tuple[str, ...] = ()
+    simulated: bool = False
     plots: Any = msgspec.UNSET
     rrd: Any = msgspec.UNSET
 
@@ -57,4 +58,5 @@ class StabilityReport(Answer):
             lines.append(f"At the point |µ| = {self.multiplier:.6f}: {verdict}.")
         if self.plots is not msgspec.UNSET:
             lines += ["Pictures:", *(f"  {plot}" for plot in self.plots)]
-        return Group(made, Text("\n".join(lines)))
+        said = Group(made, Text("\n".join(lines)))
+        return Group(said, SIMULATED) if self.simulated else said

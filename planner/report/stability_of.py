@@ -16,6 +16,7 @@ from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limi
 from planner.progress import Tell, quietly, within
 from planner.report.plot_files import Pictures
 from planner.report.stability import StabilityReport
+from planner.report.text import SIMULATED_TITLE
 
 LOBES_SHARE = 0.2  # of the time, where samples follow
 
@@ -50,7 +51,8 @@ def stability_of(
     if pictures is not None and pictures.wanted:
         from planner.report.stability_plot import lobes_figure
 
-        figure = lobes_figure(cut, found, drawn, point)
+        mark = SIMULATED_TITLE if answer.simulated else ""
+        figure = lobes_figure(cut, found, drawn, point, mark)
         answer = replace(answer, **pictures.write({"stability": figure}, asked.source.name))
     return answer
 
@@ -81,7 +83,8 @@ def _of_campaign(directory: Path, pose: str | None) -> CutterFrf:
         )
     q = np.deg2rad(np.array([known[pose]]))
     mean, sd = campaign.frf(q)
-    return of_accelerance(f"{directory}, pose {pose}", campaign.frequency_lines, mean[0], sd[0])
+    frf = of_accelerance(f"{directory}, pose {pose}", campaign.frequency_lines, mean[0], sd[0])
+    return replace(frf, simulated=any(m.simulated for m in state.recorded))
 
 
 def _answer(
@@ -108,6 +111,7 @@ def _answer(
         method=cut.method,
         depth_error=np.array([loss.error for loss in found]),
         remarks=tuple(remarks),
+        simulated=structure.frf is not None and structure.frf.simulated,
     )
 
 

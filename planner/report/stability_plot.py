@@ -16,8 +16,9 @@ ROOM = 1.25  # of the picture above the highest limit
 
 
 def lobes_figure(
-    cut: Cut, found: Sequence[Loss], drawn: SampledLimits | None, point: tuple[float, float] | None
-) -> Figure:
+    cut: Cut, found: Sequence[Loss], drawn: SampledLimits | None,
+    point: tuple[float, float] | None, mark: str = "",
+) -> Figure:  # fmt: skip
     """Depth limits in mm over speeds in rpm, with probabilities; below it the chatter frequency."""
     rpm, depth = cut.speeds_rpm, 1e3 * np.array([loss.depth_m for loss in found])
     figure = Figure(figsize=(9.0, 6.5), layout="constrained")
@@ -42,7 +43,7 @@ def lobes_figure(
     upper.set_ylabel("axial depth (mm)")
     upper.grid(True, alpha=0.3)
     figure.legend(loc="outside upper center", ncols=3, fontsize=9)
-    figure.suptitle(_title(cut), fontsize=11)
+    upper.set_title(mark + _title(cut), fontsize=11)
     _frequencies(lower, rpm, found)
     if point is not None:
         lower.axvline(point[0], color=POINT, lw=0.8, ls=":")
