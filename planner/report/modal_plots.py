@@ -90,8 +90,15 @@ def stabilisation_figure(
     orders.set_ylabel("model order")
     orders.yaxis.set_major_locator(MaxNLocator(integer=True))
     label_modes(panel, modal)
-    handles = [*panel.get_lines()[: len(singular)], *orders.get_lines()]
+    handles: list[Any] = [*panel.get_lines()[: len(singular)], *orders.get_lines()]
     handles.append(Line2D([], [], color=MODE, label="mode"))
+    for beyond in (
+        (panel.get_xlim()[0], modal.band_hz[0]),
+        (modal.band_hz[1], panel.get_xlim()[1]),
+    ):
+        if beyond[0] < beyond[1]:
+            panel.axvspan(*beyond, color="0.92", lw=0, zorder=0)
+    handles.append(Patch(color="0.92", label="outside the band"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
     return figure
 
@@ -143,7 +150,7 @@ def matrix_figure(
         size, phase = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
         for panel in (size, phase):
-            mark_band(panel, frf)
+            mark_band(panel, frf, i, columns[k])
         _magnitude(size, frf, h, sd)
         _phase(phase, frf.frequency_hz, h, sd)
         size.plot(found.data.frequency_hz, np.abs(fitted[i, k]), **FITTED)
@@ -212,7 +219,7 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     figure, grid = panels((13.0, 7.5), title, 3, len(columns))
     for i, k in np.ndindex(3, len(columns)):
         panel, values = grid[i, k], frf.coherence[i, columns[k]]
-        mark_band(panel, frf)
+        mark_band(panel, frf, i, columns[k])
         if np.any(np.isfinite(values)):
             panel.plot(frf.frequency_hz, values, color=MEASURED, lw=1.0)
         else:

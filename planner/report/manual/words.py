@@ -54,6 +54,13 @@ P001,-7.120,9.867,-29.147,-8.117,55.299,0.000,+x,1,data/P001_x_1.uff
 P001,-7.120,9.867,-29.147,-8.117,55.299,0.000,+y,1,data/P001_y_1.uff
 P001,-7.120,9.867,-29.147,-8.117,55.299,0.000,-z,1,data/P001_z_1.uff"""
 
+ASK_TELL = """from planner import AskTell
+
+loop = AskTell("robot/robot.toml", "campaign.toml")     # or its tables as a dict
+proposal = loop.ask()[0]
+loop.tell(proposal.joints_deg, frf=frf)     # planner.frf.frf.Frf; or modes=[{"frequency_hz": …}]
+loop.predict([[0, 10, -30, 0, 50, 0]])      # degrees"""
+
 POSES_CSV = f"""pose,{ANGLES}
 milling_1,-7,10,-29,-8,55,0"""
 
@@ -185,7 +192,10 @@ def paragraphs_of_python() -> tuple[Markup, ...]:
     """Beside the code."""
     return (
         paragraphs(
-            "Angles in names that end in _deg are degrees, in _rad (and q) radians. records() of a "
-            "campaign gives rows that pandas.DataFrame takes."
+            "Angles in names that end in _deg are degrees, in _rad (and q) radians. "
+            "campaign.records() and predict_records(q) give rows that pandas.DataFrame takes.",
+            "Where a script measures by itself and has modes or FRFs instead of files, AskTell "
+            "proposes and learns in memory (angles in degrees throughout):",
         ),
+        tag("pre", ASK_TELL),
     )
