@@ -19,18 +19,23 @@ def truth():
     return lei2023_data.true_robot(1)
 
 
-def test_the_sweep_has_the_papers_points():
-    seen = busch2020_data.sweep(1)
-    assert seen.simulated.size == 12_801
-    assert seen.amplitude.size == 2_622
+@pytest.fixture(scope="module")
+def swept():
+    return busch2020_data.sweep(1)
+
+
+def test_the_sweep_has_the_papers_points(swept):
+    assert swept.simulated.size == 12_801
+    assert swept.amplitude.size == 2_622
+    seen = swept
     assert seen.angles_deg.max() == 105
     assert busch2020_data.BEYOND_DEG.min() > 105
     assert np.array_equal(seen.every(3).angles_deg, seen.angles_deg[::3])
 
 
-def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks():
+def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks(swept):
     """In the band, across the arm: two simulated, three true ones (and in-plane ones in both)."""
-    seen, truth = busch2020_data.sweep(1), busch2020_data.true_robot(1)
+    seen, truth = swept, busch2020_data.true_robot(1)
     for angle in (70.0, 105.0, 120.0):
         simulated = seen.modes(np.array([angle]), 6)
         f, _, residue = truth.modes(busch2020_data.poses(np.array([angle]))[0], 6)
