@@ -74,10 +74,17 @@ def rubbing(truth: Truth, share: float = RUBBING) -> tuple[Port, ...]:
     return tuple(ports)
 
 
-def everyday(truth: Truth, seed: int, handling: Handling = EVERYDAY) -> Secret:
-    """What is not as in the books: friction, damping that scatters, a chain within tolerance."""
+def everyday(
+    truth: Truth, seed: int, handling: Handling = EVERYDAY, ports: tuple[Port, ...] = ()
+) -> Secret:
+    """What is not as in the books: friction, damping that scatters, a chain within tolerance.
+
+    `ports` are further laws of joints.
+    """
     chain = handling.chain(np.random.default_rng([seed, 3]))
-    return Secret(truth.deviation, rubbing(truth), drift=DampingScatter(BRAKES, seed), chain=chain)
+    return Secret(
+        truth.deviation, (*rubbing(truth), *ports), drift=DampingScatter(BRAKES, seed), chain=chain
+    )
 
 
 def strike(

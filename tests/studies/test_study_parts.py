@@ -5,12 +5,16 @@ import pytest
 
 from planner.errors import InputError
 from planner.studies import (
+    birk2025,
+    birk2025_data,
+    birk2025_design,
     busch2020_data,
     busch2022_data,
     lei2023_data,
     registry,
     seyedhosseini2025,
 )
+from planner.studies.busch2022_frf import saltelli
 from planner.studies.report import PaperClaim, Report, Table, check_folder, write
 
 
@@ -120,6 +124,48 @@ def test_bad_input_is_one_sentence(tmp_path):
         check_folder(file)
     with pytest.raises(InputError, match="name another folder"):
         check_folder(file / "below")
+
+
+def test_the_most_informative_points_come_first():
+    """Of D-optimal points the first few tell more than as many neighbours on one path."""
+    simulation = birk2025._simulation("12P")
+    truth = birk2025_data.true_robot()
+    q, path = birk2025_data.poses(truth, 6)
+    assert list(path[:6]) == ["S1"] * 6
+    chosen = birk2025_design.best_points(simulation, (), q, 4, 1.0, (5.0, 200.0))
+    assert len(set(chosen.tolist())) == 4
+    told = [
+        birk2025_design.determined(simulation, (), q, rows, 1.0, (5.0, 200.0))
+        for rows in (chosen, np.array([0, 1, 2, 3]))
+    ]
+    assert told[0] >= told[1]
+    covariance, information = birk2025_design._open(simulation, (), q, 1.0, (5.0, 200.0))
+
+    def gain(rows):
+        whole = np.eye(len(covariance)) + covariance @ information[rows].sum(axis=0)
+        return np.linalg.slogdet(whole)[1]
+
+    assert all(gain([chosen[0]]) >= gain([i]) for i in range(len(q)))
+    assert gain(chosen) > gain([0, 1, 2, 3])
+
+
+def test_the_truth_of_birk_is_of_another_class():
+    truth = birk2025_data.true_robot()
+    assert len(truth.deviation.beams) == 3
+    assert len(birk2025_data.gears(truth)) == 6
+    stated = birk2025._simulation("24P").elasticity.stiffness
+    own = np.array([spring.stiffness for spring in truth.springs[: len(stated)]])
+    assert np.std(np.log(own / stated)) > 0.1
+
+
+def test_saltellis_points_are_two_halves_of_one_sequence():
+    points = saltelli(3, 1000)
+    assert points.shape == (1000, 3)
+    assert points.min() > 0
+    assert points.max() < 1
+    # Far more even than random numbers: their mean errs by 1/√12,000 = 0.009.
+    np.testing.assert_allclose(points.mean(axis=0), 0.5, atol=0.003)
+    assert abs(np.corrcoef(points[:500, 0], points[500:, 0])[0, 1]) < 0.1
 
 
 def test_studies_are_found_by_their_former_names_too():
