@@ -24,6 +24,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged, frf_key
 from planner.campaign.state import last_act
 from planner.errors import InputError
@@ -163,6 +164,10 @@ class Campaign(CampaignReads):
             self._append(Undone(entry.seq))
             return entry
 
+    def holding(self):
+        """A context in which nobody else can act in this campaign; InputError names who does."""
+        return self._journal.holding(wait_s=1.0)
+
     # -- inside --------------------------------------------------------------------------------
 
     def _acting(self):
@@ -266,6 +271,7 @@ class _Acting:
 
     def __enter__(self) -> None:
         self._lock.__enter__()
+        remove_parts(self._campaign.directory / store.RECORDINGS)
         try:
             self._campaign._log_configuration()
         except BaseException:

@@ -1,5 +1,6 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -51,6 +52,7 @@ class Cell:
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
+        _check_angles(robot, config)
         return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter)
 
     @cached_property
@@ -108,11 +110,6 @@ class Cell:
         for zone in self.config.forbidden:
             at = found.position_m if zone.position_m else np.rad2deg(found.q)
             box = np.array(zone.position_m or zone.joints_deg, dtype=float)
-            if len(box) != at.shape[1]:
-                raise InputError(
-                    f"[[forbidden]] joints_deg has {len(box)} ranges, the robot {at.shape[1]} "
-                    f"joints; give one range a joint."
-                )
             allowed &= ~np.all((at >= box[:, 0]) & (at <= box[:, 1]), axis=1)
         return allowed
 
@@ -131,22 +128,41 @@ class Cell:
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad; InputError if the robot cannot stand there."""
-        if len(joints_deg) != len(self.robot.joint_names):
+        return _checked_pose(self.robot, joints_deg, where)
+
+
+def _checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
+    """The pose (dof,) in rad; InputError if the robot cannot stand there."""
+    if len(joints_deg) != len(robot.joint_names):
+        raise InputError(
+            f"{where}: {len(joints_deg)} joint angles are given, the robot has "
+            f"{len(robot.joint_names)} joints; correct the columns."
+        )
+    q = np.deg2rad(np.asarray(joints_deg, dtype=float))
+    tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
+    over = np.maximum(robot.lower_rad - q, q - robot.upper_rad)
+    worst = int(np.argmax(over))
+    if over[worst] > tolerance:
+        low, high = np.rad2deg([robot.lower_rad[worst], robot.upper_rad[worst]])
+        raise InputError(
+            f"{where}: {robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
+            f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
+        )
+    return q
+
+
+def _check_angles(robot: Robot, config: CampaignConfig) -> None:
+    """Hold the joint angles that campaign.toml names against the robot; InputError."""
+    for pose in config.acquisition.own_poses_deg or ():
+        _checked_pose(robot, pose, "campaign.toml, [acquisition] own_poses_deg")
+    for pose in config.goal.joints_deg or ():
+        _checked_pose(robot, pose, "campaign.toml, [goal] joints_deg")
+    for zone in config.forbidden:
+        if zone.joints_deg is not None and len(zone.joints_deg) != len(robot.joint_names):
             raise InputError(
-                f"{where}: {len(joints_deg)} joint angles are given, the robot has "
-                f"{len(self.robot.joint_names)} joints; correct the columns."
+                f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the "
+                f"robot {len(robot.joint_names)} joints; give one range a joint."
             )
-        q = np.deg2rad(np.asarray(joints_deg, dtype=float))
-        tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
-        over = np.maximum(self.robot.lower_rad - q, q - self.robot.upper_rad)
-        worst = int(np.argmax(over))
-        if over[worst] > tolerance:
-            low, high = np.rad2deg([self.robot.lower_rad[worst], self.robot.upper_rad[worst]])
-            raise InputError(
-                f"{where}: {self.robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
-                f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
-            )
-        return q
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:

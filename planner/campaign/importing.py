@@ -88,14 +88,21 @@ def keep_files(
 ) -> KeptFiles:
     """Keep the raw files; those imported before at this pose are only named.
 
-    A file that the engineer refused is new only where it is itself among the `named` paths.
+    A file that the engineer refused is new only where it is itself among the `named` paths; one
+    that cannot be read is left out.
     Raises InputError for a recording that belongs to another pose already.
     """
     owner = {h.sha256: m.pose for m in state.recorded for h in m.hits}
     fresh: dict[str, Kept] = {}
     already, left_out = [], []
     for source in delivery.sources:
-        digest = store.sha256(store.read_bytes(source.path))
+        try:
+            digest = store.sha256(store.read_bytes(source.path))
+        except InputError as error:  # one bad file does not keep the others out
+            left_out.append(
+                HitRecord(source.name, "", "", source.hit, source.repeat, False, str(error))
+            )
+            continue
         if owner.get(digest, delivery.pose) != delivery.pose:
             raise InputError(
                 f"{source.path} was imported before as a recording of pose {owner[digest]}; "

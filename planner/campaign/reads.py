@@ -45,6 +45,7 @@ class CampaignReads:
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
         self._frfs: dict[tuple, Frf] = {}
+        self._verified: set[Path] = set()  # kept recordings whose content was held against its hash
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -171,8 +172,11 @@ class CampaignReads:
         )
 
     def source_of(self, hit: HitRecord) -> Source:
-        """The kept copy of a recording."""
+        """The kept copy of a recording; InputError where it is not what was imported."""
         path = store.recording_path(self.directory, hit.sha256, hit.suffix)
+        if path not in self._verified:
+            store.read_kept(path, hit.sha256, hit.file)
+            self._verified.add(path)
         return Source(path, hit.file, hit.hit, hit.repeat)
 
     def orphans(self) -> list[str]:

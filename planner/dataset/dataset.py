@@ -67,7 +67,7 @@ class Dataset:
             store: Where FRFs and modes are looked up and kept; by default the user's.
 
         Raises:
-            InputError: The table is wrong, or a pose mixes time histories and exported FRFs.
+            InputError: The table is wrong.
             RefusedError: No pose has a hit that can be used.
         """
         found = [

@@ -10,7 +10,7 @@ import numpy as np
 from planner import content_hash
 from planner.dataset.screened_files import ScreenedFiles, Source, Verdict, read_files, renamed
 from planner.dataset.store import Store, user_store
-from planner.errors import InputError, RefusedError
+from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.homogeneity import Homogeneity, homogeneity
 from planner.modal.modes import ModalModel
@@ -69,10 +69,7 @@ class MeasuredPose:
 
     @cached_property
     def averaged(self) -> Averaged:
-        """FRF of all good hits, or of exported FRFs, and a verdict on each file.
-
-        Raises InputError where time histories and exported FRFs are mixed.
-        """
+        """FRF of all good hits, or of exported FRFs where there are no hits; a verdict a file."""
         return self.kept("frf", Averaged, self._average)
 
     @cached_property
@@ -162,10 +159,6 @@ class MeasuredPose:
         said = files.verdicts
         if not files.agreeing and not files.records:
             return Averaged(said, None, ("No usable hit: nothing was estimated.",))
-        if files.agreeing and files.records:
-            raise InputError(
-                "The files of this pose mix time histories and exported FRFs; import one kind only."
-            )
         try:
             frf = _frf(
                 files.agreeing, files.records, self.band_hz, self.estimator, self.window_rate_1_s

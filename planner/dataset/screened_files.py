@@ -1,5 +1,6 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -53,8 +54,30 @@ def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> Scr
         verdicts.append(verdict)
         hits.append(found)
         records += frfs
+    if any(hits):
+        _refuse_others(verdicts, hits, records)
     agreeing = _agreeing(hits, verdicts, band_hz)
     return ScreenedFiles(tuple(verdicts), tuple(hits), agreeing, tuple(records))
+
+
+def _refuse_others(
+    verdicts: list[Verdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
+) -> None:
+    """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
+    rates = Counter(round(hit.sampling_rate_hz, 6) for found in hits for hit in found)
+    usual = rates.most_common(1)[0][0]
+    for number, (verdict, found) in enumerate(zip(verdicts, hits, strict=True)):
+        other = next((h for h in found if round(h.sampling_rate_hz, 6) != usual), None)
+        text = ""
+        if other is not None:
+            text = f"sampled at {other.sampling_rate_hz:g} Hz, the others at {usual:g} Hz"
+        elif verdict.accepted and not found:
+            text = "it holds FRFs, the pose's other files time histories"
+        if text:
+            reason = f"{verdict.source.name} cannot be averaged: {text}; export all alike."
+            verdicts[number] = replace(verdict, accepted=False, reason=reason)
+            hits[number] = ()
+    records.clear()
 
 
 def _read_one(

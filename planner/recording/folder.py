@@ -200,7 +200,7 @@ def _file(path: Path, folder: Path, number: int, name: str) -> Path:
         file = (folder / name).resolve()
         inside = file.is_relative_to(folder)
         found = inside and file.is_file()
-    except (OSError, ValueError):
+    except (OSError, ValueError, RuntimeError):  # RuntimeError: links that lead to themselves
         raise InputError(f"{path}, row {number}: {name!r} is no file name; correct it.") from None
     if not inside:
         raise InputError(

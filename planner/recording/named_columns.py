@@ -67,6 +67,11 @@ def _time(path: Path, named: Named) -> TimeRecord:
     if time_name is not None:
         factor = (lookup(named.units.get(time_name, "s")) or ("", "s", 1.0))[2]
         rate_hz = sampling_rate(path, named.columns[time_name] * factor)
+        if rate is not None and not abs(_positive(path, rate) / rate_hz - 1) < UNEVEN:
+            raise InputError(
+                f"{path} states a sampling rate of {rate} Hz, its time column one of "
+                f"{rate_hz:.6g} Hz; correct the one that is wrong."
+            )
     elif rate is not None:
         rate_hz = _positive(path, rate)
     else:
@@ -130,9 +135,10 @@ def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
 
 
 def _unit_of_name(name: str) -> str:
-    bracket = re.search(r"[(\[]([^)\]]+)[)\]]\s*$", name)
-    if bracket:
-        return bracket[1]
+    plain = name.rstrip()
+    opened = max(plain.rfind("("), plain.rfind("["))
+    if opened >= 0 and plain.endswith((")", "]")):
+        return plain[opened + 1 : -1]
     for suffix in sorted(_SUFFIXES, key=len, reverse=True):
         if name.lower().endswith(f"_{suffix}"):
             return _SUFFIXES[suffix]
@@ -151,6 +157,13 @@ def _frf(path: Path, named: Named) -> FrfRecord:
     columns = {name.lower(): np.asarray(values) for name, values in named.columns.items()}
     if "frequency_hz" not in columns:
         raise InputError(f"{path} holds FRFs but no column frequency_hz; export it too.")
+    for name, column in columns.items():
+        known = _FRF.match(name) or name.startswith("coherence_")
+        if known and len(column) != len(columns["frequency_hz"]):
+            raise InputError(
+                f"{path}: column {name} has {len(column)} values for "
+                f"{len(columns['frequency_hz'])} frequencies; export them together."
+            )
     values: dict[tuple[str, str, str], np.ndarray] = {}
     for name, column in columns.items():
         match = _FRF.match(name)

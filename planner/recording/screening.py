@@ -11,6 +11,8 @@ from planner.recording.records import AXES, Fault, Hit
 # the last they are the same. Chosen.
 UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
+LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
+NOTHING = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
 
 
 @dataclass(frozen=True)
@@ -29,9 +31,9 @@ class ScreeningLimits:
 def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]:
     """Faults of one hit by itself; those with `refuse` make it unusable."""
     limits, pulse = limits or ScreeningLimits(), hit.pulse
-    if pulse.peak_n == 0 or not np.any(hit.acceleration_m_s2):
+    if pulse.peak_n < NOTHING or np.max(np.abs(hit.acceleration_m_s2)) < NOTHING:
         return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
-    faults = [*_weak(hit, limits), *_clipping(hit, limits)]
+    faults = [*_short(hit, limits), *_weak(hit, limits), *_clipping(hit, limits)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
     return (
@@ -41,6 +43,20 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
         *_double(hit, limits),
         *_soft(hit, limits),
     )
+
+
+def _short(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+    low, high = limits.band_hz
+    record_s = len(hit.force_n) / hit.sampling_rate_hz
+    if (high - low) * record_s >= LEAST_LINES:
+        return []
+    return [
+        Fault(
+            "too_short",
+            f"The record of {record_s:.3g} s resolves nothing between {low:g} and {high:g} Hz; "
+            f"record for longer, or correct the unit of the time.",
+        )
+    ]
 
 
 def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
@@ -186,9 +202,10 @@ def screen_repeats(
     another may be the structure: that is for the diagnosis to say.
     """
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    if len({len(hit.force_n) for hit in hits}) > 1:
-        return tuple(faults)
-    frfs = np.array([_frf(hit, band_hz) for hit in hits])
+    if not hits:
+        return ()
+    shortest = min(len(hit.force_n) for hit in hits)
+    frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
     axes = np.array([hit.axis_index for hit in hits])
     level = _levels(hits)
     centres = {axis: _centre(frfs[axes == axis]) for axis in set(axes.tolist())}
@@ -273,12 +290,14 @@ def _centre(frfs: np.ndarray) -> np.ndarray:
     return np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
 
 
-def _frf(hit: Hit, band_hz: tuple[float, float]) -> np.ndarray:
-    frequency = np.fft.rfftfreq(len(hit.force_n), 1 / hit.sampling_rate_hz)
+def _frf(hit: Hit, samples: int, band_hz: tuple[float, float]) -> np.ndarray:
+    """FRF (3·F,) of a hit's first samples over the band's lines."""
+    frequency = np.fft.rfftfreq(samples, 1 / hit.sampling_rate_hz)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    force = np.fft.rfft(hit.sign * (hit.force_n - np.median(hit.force_n)))[inside]
+    force = hit.sign * (hit.force_n - np.median(hit.force_n))
+    force = np.fft.rfft(force[:samples])[inside]
     mean = np.median(hit.acceleration_m_s2, axis=1, keepdims=True)
-    response = np.fft.rfft(hit.acceleration_m_s2 - mean, axis=1)[:, inside]
+    response = np.fft.rfft((hit.acceleration_m_s2 - mean)[:, :samples], axis=1)[:, inside]
     floor = 1e-3 * np.max(np.abs(force))
     return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from rich.markup import escape
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
@@ -33,11 +32,11 @@ class NewCampaign(Answer):
 
     def text(self) -> str:
         """What was started, and how it goes on."""
-        remarks = "".join(f"{escape(remark)}\n" for remark in self.remarks)
+        remarks = "".join(f"{remark}\n" for remark in self.remarks)
         return (
-            f"Campaign in {escape(self.campaign)}: robot {escape(self.robot)}, "
+            f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"
-            f"{remarks}Next: planner next {escape(self.campaign)}"
+            f"{remarks}Next: planner next {self.campaign}"
         )
 
 
@@ -67,7 +66,7 @@ class WithdrawnPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {escape(self.withdrawn)} is set aside; its recordings are kept."
+        return f"Pose {self.withdrawn} is set aside; its recordings are kept."
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ class SkippedPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {escape(self.skipped)} will not be offered again."
+        return f"Pose {self.skipped} will not be offered again."
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,4 +91,4 @@ class ConfirmedPose(Answer):
     def text(self) -> str:
         """One sentence."""
         sd = ", ".join(f"{v:.1f} %" for v in self.frequency_sd_percent)
-        return f"The hits of pose {escape(self.confirmed)} are used; sd of frequencies: {sd}."
+        return f"The hits of pose {self.confirmed} are used; sd of frequencies: {sd}."

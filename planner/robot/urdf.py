@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from planner.errors import InputError
 
+LARGEST = 1e7  # kg, m or kg·m²: no link of an arm reaches it; a wrong unit may
 FIXED, TURNING = ("fixed",), ("revolute", "continuous")
 
 
@@ -86,16 +87,32 @@ def find_mesh(urdf: Path, name: str) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def copy_meshes(urdf: Path, target: Path) -> None:
-    """Copy the meshes that a URDF names to where the same URDF, at `target`, looks for them."""
+def copy_meshes(urdf: Path, target: Path) -> tuple[str, ...]:
+    """Copy the meshes that a URDF names to beside the same URDF at `target`.
+
+    Nothing is read outside the folders in which meshes are looked for, nor written outside that of
+    `target`; returns the names of meshes that would be.
+    """
     names = re.findall(r"<mesh\b[^>]*\bfilename\s*=\s*[\"']([^\"']+)", urdf.read_text("utf-8"))
-    for name in names:
+    left = []
+    for name in dict.fromkeys(names):
         file = _mesh_file(name)
-        for folder, there in zip(mesh_folders(urdf), mesh_folders(target), strict=True):
-            found, copy = Path(folder) / file, Path(there) / file
-            if not Path(file).is_absolute() and found.is_file() and not copy.exists():
+        if Path(file).is_absolute():
+            continue  # found by the same name from everywhere
+        for folder in mesh_folders(urdf):
+            found, copy = Path(folder) / file, target.parent / file
+            if not found.is_file():
+                continue
+            if not (_inside(found, Path(folder)) and _inside(copy, target.parent)):
+                left.append(name)
+            elif not copy.exists():
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(found, copy)
+    return tuple(dict.fromkeys(left))
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())
 
 
 def _mesh_file(name: str) -> str:
@@ -215,6 +232,13 @@ def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
 
 def _check_inertias(model: pin.Model, urdf: Path) -> None:
     for name, inertia in list(zip(model.names, model.inertias, strict=True))[1:]:
+        sizes = (inertia.mass, *inertia.lever, *inertia.inertia.ravel())
+        if not np.all(np.abs(sizes) < LARGEST):
+            raise InputError(
+                f"{urdf}: the links that turn with {name} have mass {inertia.mass:.4g} kg, their "
+                f"centre of mass at {np.round(inertia.lever, 3).tolist()} m and moments up to "
+                f"{np.abs(inertia.inertia).max():.4g} kg·m²; give kg, m and kg·m²."
+            )
         moments = np.linalg.eigvalsh(inertia.inertia)
         if inertia.mass < 0 or moments[0] < -1e-9 * abs(moments[-1]):
             raise InputError(

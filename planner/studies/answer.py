@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from rich.console import Group, RenderableType
-from rich.markup import escape
+from rich.text import Text
 
 from planner.report.answer import Answer
 from planner.report.text import table
@@ -29,17 +29,17 @@ class StudyAnswer(Answer):
 
     def text(self) -> Group:
         """All tables, then finding by finding."""
-        parts: list[RenderableType] = [f"[bold magenta]{escape(self.data)}[/]"]
+        parts: list[RenderableType] = [Text(self.data, style="bold magenta")]
         for entry in self.tables:
             made = table(entry.title, *entry.columns)
             for row in entry.rows:
                 made.add_row(*map(_cell, row))
             parts.append(made)
         for finding in self.findings:
-            verdict = "[green]holds[/]" if finding.holds else "[red]does not hold[/]"
-            parts.append(f"{verdict}: {escape(finding.paper)}\n    {escape(finding.here)}")
+            verdict = ("holds", "green") if finding.holds else ("does not hold", "red")
+            parts.append(Text.assemble(verdict, f": {finding.paper}\n    {finding.here}"))
         if self.files:
-            parts.append(f"{len(self.files)} files in {escape(str(Path(self.files[0]).parent))}")
+            parts.append(f"{len(self.files)} files in {Path(self.files[0]).parent}")
         return Group(*parts)
 
 
