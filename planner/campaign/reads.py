@@ -177,7 +177,7 @@ class CampaignReads:
         if path not in self._verified:
             store.read_kept(path, hit.sha256, hit.file)
             self._verified.add(path)
-        return Source(path, hit.file, hit.hit, hit.repeat)
+        return Source(path, hit.file, hit.hit, hit.repeat, hit.part)
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""

@@ -96,7 +96,7 @@ def columns_of(
         for number, source in enumerate(sources):
             records = read(source.path)
             if not any(isinstance(record, FrfRecord) for record in records):
-                found = hits_from(records, axis=source.hit)
+                found = hits_from(source.of(records), axis=source.hit)
                 hits += found
                 file += [number] * len(found)
         if not hits:

@@ -148,7 +148,7 @@ class MeasuredPose:
 
     def _key(self, what: str) -> str:
         """Hash of the files' content and of all else that a result depends on."""
-        told = [(s.name, s.path.suffix, s.hit, s.repeat) for s in self.sources]
+        told = [(s.name, s.path.suffix, s.hit, s.repeat, s.part) for s in self.sources]
         how = self.band_hz, self.estimator, self.window_rate_1_s
         return content_hash.digest(
             what, program(), content_hash.of(told), content_hash.of(how), self._contents
@@ -240,7 +240,7 @@ def frf_of(
             records = read(source.path)
             found = [record for record in records if isinstance(record, FrfRecord)]
             frfs += found
-            hits += () if found else hits_from(records, axis=source.hit)
+            hits += () if found else hits_from(source.of(records), axis=source.hit)
         return _frf(tuple(hits), tuple(frfs), band_hz, "h1", window_rate_1_s)
 
     return pose.kept("accepted frf", Frf, make)

@@ -10,12 +10,30 @@ from planner.recording.records import FrfRecord, Hit, Record
 
 @dataclass(frozen=True)
 class Source:
-    """One file and what the table of recordings says about it (None: nothing)."""
+    """One file and what the table of recordings says about it (None: nothing).
+
+    `part` is which of the file's hits it is, from 1; 0: all that the file holds.
+    """
 
     path: Path
     name: str
     hit: str | None = None
     repeat: int | None = None
+    part: int = 0
+
+    def of(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
+        """Of a file's records those that are meant."""
+        if not self.part:
+            return records
+        times = [record for record in records if not isinstance(record, FrfRecord)]
+        return tuple(times[self.part - 1 : self.part])
+
+    def parts(self, count: int) -> "tuple[Source, ...]":
+        """Each of the file's hits by itself, where there are several."""
+        if count < 2:
+            return (self,)
+        named = [(k, f"{self.name} (hit {k})") for k in range(1, count + 1)]
+        return tuple(replace(self, name=name, part=k) for k, name in named)
 
 
 @dataclass(frozen=True)
@@ -93,18 +111,24 @@ def _read_one(
         if frfs:
             simulated = any(record.simulated for record in frfs)
             return Verdict(source, True, "", source.hit, simulated), (), frfs
-        found = hits_from(records, axis=source.hit)
+        found = hits_from(source.of(records), axis=source.hit)
     except PlannerError as error:
         return Verdict(source, False, renamed(str(error), (source,))), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)
-    faults = [fault for hit in found for fault in screen(hit, limits)]
-    remarks = tuple(f.text for f in faults if not f.refuse)
+    judged = [(hit, screen(hit, limits)) for hit in found]
+    remarks = [f.text for _, faults in judged for f in faults if not f.refuse]
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
-    refusing = [fault for fault in faults if fault.refuse]
-    if refusing:
-        text = " ".join(fault.text for fault in refusing)
-        return Verdict(source, False, text, axis, simulated, remarks), (), []
-    hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in found)
+    refused = [
+        " ".join(f.text for f in faults if f.refuse)
+        for _, faults in judged
+        if any(f.refuse for f in faults)
+    ]
+    if len(refused) == len(judged):
+        return Verdict(source, False, " ".join(refused), axis, simulated, tuple(remarks)), (), []
+    remarks += [f"One of {len(judged)} hits in {source.name} is refused: {t}" for t in refused]
+    good = [hit for hit, faults in judged if not any(f.refuse for f in faults)]
+    hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
+    remarks = tuple(remarks)
     return Verdict(source, True, "", axis, simulated, remarks), hits, []
 
 

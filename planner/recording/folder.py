@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from collections.abc import Collection
 from pathlib import Path
 
 from planner.errors import InputError
@@ -72,10 +73,17 @@ def read_poses(path: Path, joint_names: tuple[str, ...]) -> tuple[PoseRow, ...]:
     return tuple(rows)
 
 
-def files_in(folder: Path) -> list[Path]:
-    """Files of a folder without a table, by name. Raises InputError if there are none."""
-    found = sorted(p for p in folder.iterdir() if p.is_file() and p.name[0] != ".")
-    found = [path for path in found if path.name != TABLE]
+def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
+    """Files of a folder without a table, by name; of its subfolders those with known `suffixes`.
+
+    Raises InputError if there are none.
+    """
+    found = sorted(p for p in folder.rglob("*") if p.is_file())
+    found = [
+        path for path in found
+        if path.name != TABLE and not any(part[0] == "." for part in path.relative_to(folder).parts)
+        and (path.parent == folder or path.suffix.lower() in suffixes)
+    ]  # fmt: skip
     if not found:
         raise InputError(f"{folder} holds no recordings; name a folder that does.")
     return found

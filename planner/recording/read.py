@@ -1,6 +1,7 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from planner.recording import plausible
 from planner.recording.entries import check_size, columns_of
 from planner.recording.hdf5 import read_hdf5
 from planner.recording.named_columns import to_records
-from planner.recording.records import FrfRecord, Record
+from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
@@ -107,21 +108,25 @@ READERS: dict[str, Callable[[Path], tuple[Record, ...]]] = {
 
 def read(path: Path) -> tuple[Record, ...]:
     """All records of a file. Raises InputError with one sentence if it cannot be read right."""
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
+    if path.suffix.lower() not in READERS:
         raise InputError(
             f"{path} has no known format; recordings are {', '.join(READERS)}: export one of these."
         )
     try:
-        size = path.stat().st_size
+        stat = path.stat()
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path.") from None
-    if size == 0:
+    if stat.st_size == 0:
         raise InputError(f"{path} is empty; export it again.")
-    if size > MAX_BYTES:
+    if stat.st_size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
+    return _read(path, (stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns))
+
+
+@lru_cache(maxsize=1)  # a file of many hits is read once, not once a hit
+def _read(path: Path, version: tuple[int, ...]) -> tuple[Record, ...]:
     try:
-        records = reader(path)
+        records = READERS[path.suffix.lower()](path)
     except InputError:
         raise
     except (ValueError, TypeError, LookupError, ArithmeticError, MemoryError, OSError) as error:
@@ -130,3 +135,14 @@ def read(path: Path) -> tuple[Record, ...]:
         ) from error
     plausible.check(path, records)
     return records
+
+
+def hit_count(path: Path) -> int:
+    """How many hits a file holds; 1 where it cannot be read, or holds FRFs."""
+    if READERS.get(path.suffix.lower()) not in (read_uff, _read_txt):
+        return 1  # named columns: a hit a file
+    try:
+        records = read(path)
+    except InputError:
+        return 1
+    return max(1, sum(isinstance(record, TimeRecord) for record in records))

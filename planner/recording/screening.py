@@ -1,5 +1,6 @@
 """Screening of hits: what a careful engineer would refuse while standing at the robot."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +11,14 @@ from planner.recording.records import AXES, Fault, Hit
 # Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
 # the last they are the same. Chosen.
 UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
+# Overload: so improbable is it that equal samples at the top are chance, judged by samples that
+# lie below the top by a share of NEAR at most. A pulse of NARROW samples above its half is so sharp
+# that two are equal in one of 300 at a step of COARSE of its peak.
+BY_CHANCE, NEAR, NARROW, COARSE = 5e-4, 0.1, 6, 2e-3
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
+WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
 LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
+QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer to a hit
 NOTHING = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
 
 
@@ -20,10 +27,9 @@ class ScreeningLimits:
     """When a hit is refused. Ratios are of the pulse's peak unless stated."""
 
     band_hz: tuple[float, float] = (4.0, 60.0)
-    clipped_samples: int = 4  # equal to the last digit, at the very top
     second_peak: float = 0.12
     least_snr: float = 8.0  # peak force over noise
-    least_response_snr: float = 4.0
+    least_response_snr: float = 5.0  # of the strongest channel, soon after the pulse
     roll_off_db: float = 20.0  # force spectrum at the band's end, below its top in the band
     least_pretrigger: int = 2  # samples before the pulse
 
@@ -33,7 +39,7 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
     limits, pulse = limits or ScreeningLimits(), hit.pulse
     if pulse.peak_n < NOTHING or np.max(np.abs(hit.acceleration_m_s2)) < NOTHING:
         return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
-    faults = [*_short(hit, limits), *_weak(hit, limits), *_clipping(hit, limits)]
+    faults = [*_short(hit, limits), *_weak(hit, limits), *_clipping(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
     return (
@@ -74,30 +80,81 @@ def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
             faults.append(
                 Fault("dead", f"The acceleration along {AXES[i]} is constant; check its cable.")
             )
+    ratio = _response_snr(hit)
+    if ratio is not None and ratio < limits.least_response_snr:
+        faults.append(
+            Fault(
+                "too_weak",
+                f"The response is only {ratio:.1f} times the noise before the hit; hit harder.",
+            )
+        )
     return faults
 
 
-def _clipping(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
-    """Overload leaves the top flat: several neighbouring samples equal to the last digit."""
+def _response_snr(hit: Hit) -> float | None:
+    """Rms of the strongest response, soon after the pulse, over the noise before it.
+
+    None where the record holds no such time.
+    """
+    pulse, rate = hit.pulse, hit.sampling_rate_hz
+    after = slice(pulse.first, pulse.first + max(QUIET_SAMPLES, round(ANSWER_S * rate)))
+    if pulse.quiet < QUIET_SAMPLES:
+        return None
+    before = hit.acceleration_m_s2[:, : pulse.quiet]
+    mean = np.mean(before, axis=1, keepdims=True)
+    rounding = np.array([_step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
+    noise = np.hypot(np.std(before, axis=1), rounding)
+    answer = np.sqrt(np.mean((hit.acceleration_m_s2[:, after] - mean) ** 2, axis=1))
+    return float(np.max(answer / np.maximum(noise, NOTHING)))
+
+
+def _clipping(hit: Hit) -> list[Fault]:
+    """Overload leaves the top flat: several samples equal to the last digit."""
     faults = []
     channels = [("force", hit.force_n)]
     channels += [(f"acceleration {a}", s) for a, s in zip(AXES, hit.acceleration_m_s2, strict=True)]
     for name, samples in channels:
+        size = samples - np.median(samples)
         for sense in (1.0, -1.0):
-            top = float(np.max(sense * samples))
-            if top <= 0:
-                continue
-            flat = _longest_run(sense * samples >= top * (1 - 1e-6))
-            if flat >= limits.clipped_samples:
+            top = float(np.max(sense * size))
+            equal = sense * size >= top * (1 - 1e-6)
+            # A pulse has one top; a decaying response reaches the same top again and again.
+            flat = _longest_run(equal) if name == "force" else int(np.sum(equal))
+            if not _by_chance(np.maximum(sense * size, 0.0), flat, name == "force"):
+                level = float(samples[int(np.argmax(sense * size))])
                 faults.append(
                     Fault(
                         "clipped",
-                        f"The {name} is clipped at {sense * top:.4g} ({flat} samples); raise the "
+                        f"The {name} is clipped at {level:.4g} ({flat} samples); raise the "
                         f"channel's range or hit more softly.",
                     )
                 )
                 break
     return faults
+
+
+def _by_chance(size: np.ndarray, flat: int, pulse: bool) -> bool:
+    """Whether so many samples of |a channel| may be equal at its top without an overload.
+
+    Stored in steps, samples fall upon the top as upon any other step nearby: as often as by the
+    Poisson distribution. A pulse so narrow has a top so sharp that no two are equal.
+    """
+    top = float(np.max(size))
+    if top <= 0 or flat < 2:
+        return True
+    step = _step(size)
+    if pulse and int(np.sum(size > 0.5 * top)) <= NARROW and step < COARSE * top:
+        return False
+    near = np.sum((size > (1 - NEAR) * top) & (size < top * (1 - 1e-6)))
+    each = (float(near) + 1) * step / (NEAR * top)
+    return each ** (flat - 1) / math.factorial(min(flat - 1, 20)) > BY_CHANCE
+
+
+def _step(samples: np.ndarray) -> float:
+    """The step in which a converter stored samples (n,): least difference of any two."""
+    steps = np.diff(np.unique(samples))
+    steps = steps[steps > 1e-9 * np.max(np.abs(samples))]
+    return float(np.min(steps)) if steps.size else 0.0
 
 
 def _longest_run(mask: np.ndarray) -> int:
@@ -218,7 +275,8 @@ def screen_repeats(
         alike = np.array([own.of(frf) for frf in frfs[group]])
         typical = float(np.median(alike))
         for i, share in zip(group.tolist(), alike, strict=True):
-            if share > UNLIKE or share > typical - FAR_BELOW:
+            usual = share > UNLIKE or share > typical - FAR_BELOW
+            if usual and not _struck(frfs[i], centre, across):
                 continue
             same = [frfs[j] for j in group if j != i and level[j] == level[i]]
             told = _disagreement(frfs[i], own, across, same)
@@ -277,6 +335,16 @@ def _disagreement(
     if not agreed:
         return None
     return "incoherent", "does not agree with the others of its axis"
+
+
+def _struck(frf: np.ndarray, own: np.ndarray, across: dict[int, np.ndarray]) -> bool:
+    """Whether an FRF is that of another axis in size too: no tilt brings in so much of it."""
+    plain = _likeness(frf, own)
+    return any(
+        abs(_likeness(frf, other)) > max(LIKE, plain + FAR_BELOW)
+        and abs(np.vdot(other, frf)) > WHOLE * np.linalg.norm(other) ** 2
+        for other in across.values()
+    )
 
 
 def _levels(hits: tuple[Hit, ...]) -> np.ndarray:

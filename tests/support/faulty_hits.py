@@ -95,16 +95,23 @@ class Scene:
 
 
 def clipped_force(scene: Scene, good: Hit) -> Hit:
-    """The converter of the hammer saturates at 35 to 85 % of the peak."""
-    top = good.pulse.offset_n + scene.rng.uniform(0.35, 0.85) * good.pulse.peak_n
-    return replace(good, force_n=np.minimum(good.force_n, top))
+    """The converter of the hammer saturates at 35 to 85 % of the peak: two samples or more."""
+    second = np.sort(good.force_n)[-2] - good.pulse.offset_n
+    share = min(scene.rng.uniform(0.35, 0.85), second / good.pulse.peak_n)
+    return replace(
+        good, force_n=np.minimum(good.force_n, good.pulse.offset_n + share * good.pulse.peak_n)
+    )
 
 
 def clipped_acceleration(scene: Scene, good: Hit) -> Hit:
-    """The converter of the strongest channel saturates at 20 to 80 % of its largest sample."""
+    """The converter of the strongest channel saturates at 20 to 80 % of its largest sample.
+
+    Three samples or more of one sign are cut: of fewer nobody could know.
+    """
     samples = good.acceleration_m_s2.copy()
     channel = int(np.argmax(np.max(np.abs(samples), axis=1)))
-    top = scene.rng.uniform(0.2, 0.8) * np.max(np.abs(samples[channel]))
+    third = max(np.sort(samples[channel])[-3], -np.sort(samples[channel])[2])
+    top = min(scene.rng.uniform(0.2, 0.8) * np.max(np.abs(samples[channel])), third)
     samples[channel] = np.clip(samples[channel], -top, top)
     return replace(good, acceleration_m_s2=samples)
 
@@ -119,9 +126,9 @@ def double(scene: Scene, good: Hit) -> Hit:
 
 
 def weak(scene: Scene, good: Hit) -> Hit:
-    """So faint that the response is no larger than the chain's noise, which stays as it is."""
+    """So faint that the response is below the chain's noise, which stays as it is."""
     noise = scene.hammer.noise * float(np.max(np.sqrt(np.mean(good.acceleration_m_s2**2, axis=1))))
-    share = scene.hammer.noise * scene.rng.uniform(0.2, 1.0)
+    share = scene.hammer.noise * scene.rng.uniform(0.1, 0.6)
     made = scene.hit(good.axis, share * pulse(scene.hammer, scene.rng), noise_m_s2=noise)
     force = made.force_n - scene.offset * scene.hammer.peak_n
     extra = scene.hammer.force_noise * scene.hammer.peak_n * scene.rng.standard_normal(force.size)
