@@ -68,7 +68,7 @@ def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> Scr
     hits: list[tuple[Hit, ...]] = []
     records: list[FrfRecord] = []
     for source in sources:
-        verdict, found, frfs = _read_one(source, band_hz)
+        verdict, found, frfs = read_one(source, band_hz)
         verdicts.append(verdict)
         hits.append(found)
         records += frfs
@@ -98,9 +98,10 @@ def _refuse_others(
     records.clear()
 
 
-def _read_one(
+def read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[Verdict, tuple[Hit, ...], list[FrfRecord]]:
+    """One file, judged by itself: the verdict, its usable hits, its FRFs."""
     from planner.recording.hits import hits_from
     from planner.recording.read import read
     from planner.recording.screening import ScreeningLimits, screen

@@ -292,6 +292,21 @@ def screen_repeats(
     return tuple(faults)
 
 
+def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:
+    """How alike a hit's FRF and those of `others` along its axis are, in size too; 0: none such."""
+    same = [
+        other for other in others
+        if other.axis_index == hit.axis_index and other.sampling_rate_hz == hit.sampling_rate_hz
+    ]  # fmt: skip
+    if not same:
+        return 0.0
+    shortest = min(len(one.force_n) for one in (hit, *same))
+    frf = _frf(hit, shortest, band_hz)
+    centre = _centre(np.array([_frf(other, shortest, band_hz) for other in same]))
+    sizes = np.linalg.norm(frf), np.linalg.norm(centre)
+    return _likeness(frf, centre) * float(min(sizes) / max(*sizes, NOTHING))
+
+
 @dataclass(frozen=True, eq=False)
 class _Agreement:
     """How hits along an axis are answered, and in `across` those along the others."""
