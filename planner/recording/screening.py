@@ -29,7 +29,7 @@ class ScreeningLimits:
     band_hz: tuple[float, float] = (4.0, 60.0)
     second_peak: float = 0.12
     least_snr: float = 8.0  # peak force over noise
-    least_response_snr: float = 5.0  # of the strongest channel, soon after the pulse
+    least_response_snr: float = 6.0  # of the strongest channel, soon after the pulse
     roll_off_db: float = 20.0  # force spectrum at the band's end, below its top in the band
     least_pretrigger: int = 2  # samples before the pulse
 

@@ -78,7 +78,7 @@ class PosePage:
         parts += [_cut(f"not whole yet: {why}", "dim") for why in self.unfinished[-2:]]
         if self.progress:
             parts.append(_cut(self.progress))
-        parts.append(_cut(f"waiting for hits in {self.folder}", "dim"))
+        parts.append(_cut(f"waiting for hits in {_end(str(self.folder))}", "dim"))
         parts.append(Text(self.keys, style="reverse"))
         return Group(*parts)
 
@@ -118,6 +118,12 @@ def keys_that_do(pairs: Sequence[tuple[str, str, bool]]) -> str:
         elif now:
             lines[-1] += f"  {one}" if lines[-1] else one
     return "\n".join(lines)
+
+
+def _end(path: str) -> str:
+    """The end of a path that is too long for the line: folders differ there."""
+    most = WIDTH - 25
+    return path if len(path) <= most else f"…{path[1 - most :]}"
 
 
 def _cut(text: str, style: str = "") -> Text:

@@ -250,7 +250,7 @@ class _Session:
                 self.rung.add((verdict.path, number))
                 new.append(verdict.kind)
         page = replace(
-            self.page, hits=tuple(hits), unfinished=tuple(why for _, why in waiting),
+            self.page, hits=tuple(hits), unfinished=tuple(_named(*one) for one in waiting),
             progress=self.progress,
         )  # fmt: skip
         kinds = {hit.kind for hit in hits}
@@ -266,9 +266,8 @@ class _Session:
         self.page = replace(page, keys="" if self.auto else keys_that_do(keys))
         if new:
             self.screen.forget()
-        self.screen.show(self.page.page())
-        if new:
             self.screen.bell(3 if set(new) - {"good"} else 1)
+        self.screen.show(self.page.page())
 
     def _at_pose(self, proposal: Proposal) -> None:
         """Wait at one pose for hits and keys, until it is measured, skipped or superseded."""
@@ -431,3 +430,9 @@ class _Session:
             self.stop = "target reached" if self.auto else ""
         if len(state.used) >= stop.measurements_max:
             self.stop = "as many measurements as campaign.toml allows"
+
+
+def _named(path: Path, why: str) -> str:
+    """What is the matter with a file, by its name alone."""
+    text = why.replace(str(path), path.name)
+    return text if path.name in text else f"{path.name} {text}"
