@@ -15,6 +15,15 @@ def stability(
     ],
     cut: Annotated[Path, typer.Option("--cut", metavar="CUT_TOML", help="Cutter and cut.")],
     pose: Annotated[str | None, typer.Option(metavar="NAME", help="Of the source's poses.")] = None,
+    tool: Annotated[
+        Path | None, typer.Option(metavar="TOOL_TOML", help="Put this tool on, as couple does.")
+    ] = None,
+    reference: Annotated[
+        Path | None, typer.Option(metavar="TOOL_TOML", help="The tested tool, taken off before.")
+    ] = None,
+    robot: Annotated[
+        Path | None, typer.Option(metavar="ROBOT_TOML", help="Tells how the tip turns; see couple.")
+    ] = None,
     point: Annotated[
         str | None, typer.Option(metavar="RPM,DEPTH_M", help="How stable is this very point?")
     ] = None,
@@ -34,7 +43,7 @@ def stability(
     from planner.report.plot_files import Pictures
     from planner.report.stability_of import Asked, stability_of
 
-    asked = Asked(source, cut, pose, point, samples)
+    asked = Asked(source, cut, pose, point, samples, tool, reference, robot)
     pictures = Pictures(plot, format_, rrd)
     with counting(quiet=as_json) as tell:
         answer = stability_of(asked, pictures, tell)

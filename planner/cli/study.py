@@ -13,7 +13,7 @@ def study(
         str,
         typer.Argument(
             metavar="NAME|all",
-            help="busch2022, busch2020, seyedhosseini2025, lei2023, or all of them.",
+            help="busch2022, busch2020, seyedhosseini2025, lei2023, birk2025, or all.",
         ),
     ],
     out: Annotated[

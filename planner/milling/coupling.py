@@ -44,6 +44,7 @@ class TipReceptance:
     offset_sd: np.ndarray  # (F, k, k)
     frame: np.ndarray = field(default_factory=lambda: np.eye(3))
     remarks: tuple[str, ...] = ()
+    simulated: bool = False  # the source says that it holds simulated, not measured, data
 
     @property
     def receptance(self) -> np.ndarray:
@@ -81,6 +82,7 @@ class CoupledFrf:
     sd: np.ndarray
     amplification: np.ndarray
     remarks: tuple[str, ...] = ()
+    simulated: bool = False
 
     @property
     def accelerance(self) -> np.ndarray:
@@ -120,6 +122,7 @@ def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = Non
         np.sqrt(_whole(variance, tip.kept, tip.frame**2)),
         np.sqrt(grown / np.maximum(size, 1e-300)),
         tip.remarks,
+        tip.simulated,
     )
 
 

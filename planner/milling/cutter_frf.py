@@ -37,10 +37,8 @@ class CutterFrf:
         """In the plane of the cut; InputError where an axis that this needs is not known."""
         h = _turned(self.receptance, cut.plane)
         if not np.all(np.isfinite(h)):
-            missing = [
-                AXES[i] for i in range(3)
-                if not np.all(np.isfinite(self.receptance[i]) & np.isfinite(self.receptance[:, i]))
-            ]  # fmt: skip
+            missing = [AXES[i] for i in range(3) if not np.all(np.isfinite(self.receptance[i, i]))]
+            missing = missing or ["each axis, of hits along the other"]
             raise InputError(
                 f"{self.name} lacks FRFs along {', '.join(missing)}, which the cut's plane needs; "
                 f"measure them, or check feed and axis in the cut's file."

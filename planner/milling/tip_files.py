@@ -142,6 +142,7 @@ def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
     values = np.array([[found[(*a, *b)] for b in wanted] for a in wanted])
     seen = TwoPoints(frequency, directions, values, noise * np.abs(values))
     found = two_point_receptance(seen, tool, back)
+    found = replace(found, simulated=any(record.simulated for record in records))
     if noise > 0:
         return smoothed(found)
     text = "How noisy the FRFs are is not stated: no sd counts it; say so by --noise PERCENT."

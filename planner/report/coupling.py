@@ -16,7 +16,7 @@ from planner.milling.verification import Resonance, VerifyingHit, resonances, ve
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.coupling_plots import coupling_figures
 from planner.report.plot_files import Pictures
-from planner.report.text import drawn, remarks, table
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,7 @@ class CouplingReport(Answer):
     amplification: Amplification
     verify: VerifyingHit
     contact: "dict[str, object] | msgspec.UnsetType" = msgspec.UNSET
+    simulated: bool = False
     remarks: tuple[str, ...] = ()
     plots: tuple[str, ...] = ()
     before: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
@@ -94,14 +95,18 @@ class CouplingReport(Answer):
         ]
         if isinstance(self.contact, dict):
             lines.append(Text(_contact_sentence(self.contact)))
+        if self.simulated:
+            lines.append(SIMULATED)
         return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots))
 
     def with_pictures(self, pictures: Pictures) -> "CouplingReport":
         """The same, its pictures drawn."""
         if not pictures.wanted or self.coupled is None:
             return self
-        title = f"{self.tool} at {self.pose}"
-        figures = coupling_figures(self.before, self.coupled, title, self.reference or "holder")
+        mark = SIMULATED_TITLE if self.simulated else ""
+        title = f"{mark}{self.tool} at {self.pose}"
+        before = "as measured" if self.reference is None else f"measured: {self.reference}"
+        figures = coupling_figures(self.before, self.coupled, title, before)
         written = pictures.write(figures, self.tool)
         return replace(self, plots=tuple(written["plots"]))
 
@@ -140,7 +145,8 @@ def coupling_report(
         tool, reference, pose, str(npz.resolve()),
         (float(coupled.frequency_hz[0]), float(coupled.frequency_hz[-1])),
         len(coupled.frequency_hz), tuple(MOTIONS[k] for k in coupled.kept),
-        resonances(coupled), amplification, verifying_hit(coupled), remarks=tuple(said),
+        resonances(coupled), amplification, verifying_hit(coupled), simulated=coupled.simulated,
+        remarks=tuple(said),
         before=before, coupled=coupled,
     )  # fmt: skip
 

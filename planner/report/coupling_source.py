@@ -65,7 +65,8 @@ def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
     mean, sd = campaign.frf(q[None], lines)
     s2 = (2j * np.pi * lines) ** 2
     motion = TipMotion(pose, lines, mean[0] / s2, sd[0] / np.abs(s2), q)
-    return completed(motion, simulation, q), pose
+    simulated = any(m.simulated for m in state.recorded)
+    return replace(completed(motion, simulation, q), simulated=simulated), pose
 
 
 def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path) -> TipReceptance:

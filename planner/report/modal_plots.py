@@ -11,6 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
+from planner.modal.matrix_modes import MatrixModes
+from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.pole_identification import PoleIdentification
@@ -55,17 +57,23 @@ def modal_figures(
 
 
 def stabilisation_figure(
-    found: PoleIdentification, modal: ModalModel, title: str = "", scaled: bool = True
+    found: PoleIdentification | MatrixPoles,
+    modal: ModalModel | MatrixModes,
+    title: str = "",
+    scaled: bool = True,
+    singular: np.ndarray | None = None,
 ) -> Figure:
     """Poles of all model orders (right axis) over the singular values of the responses (left).
 
     The singular values of the FRF matrix over frequency are the complex mode indicator function
     (CMIF; Shih et al., Mech. Syst. Signal Process. 2, 1988). `scaled` is False where the
-    responses are spectra of free decays, whose size means nothing.
+    responses are spectra of free decays, whose size means nothing, or not in SI units. `singular`
+    (k, F), decreasing, where it is known already.
     """
     figure, grid = panels((12.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
     panel, data = grid[0, 0], found.data
-    singular = np.linalg.svd(np.moveaxis(data.response, -1, 0), compute_uv=False).T
+    if singular is None:
+        singular = np.linalg.svd(np.moveaxis(data.response, -1, 0), compute_uv=False).T
     for k, values in enumerate(singular):
         colour = SINGULAR[min(k, len(SINGULAR) - 1)]
         panel.semilogy(data.frequency_hz, values, color=colour, lw=1.1, label=f"CMIF {k + 1}")
@@ -112,7 +120,7 @@ def cmif_figure(
     return figure
 
 
-def _poles(found: PoleIdentification) -> tuple[np.ndarray, np.ndarray]:
+def _poles(found: PoleIdentification | MatrixPoles) -> tuple[np.ndarray, np.ndarray]:
     """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others."""
     lines = stable(found.diagram)
     kept = {(int(o), complex(p)) for x in lines for o, p in zip(x.orders, x.poles, strict=True)}
@@ -228,7 +236,7 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     return figure
 
 
-def mac_figure(modal: ModalModel, title: str = "") -> Figure:
+def mac_figure(modal: ModalModel | MatrixModes, title: str = "") -> Figure:
     """AutoMAC of the shapes, with its values in the cells."""
     count = len(modal.modes)
     side = float(np.clip(0.6 * count, 4.0, 14.0))

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import isotonic_regression
 
 from planner.frf.frf import Frf
+from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import ModalModel
 from planner.report.plot_text import plain_text
 
@@ -48,7 +49,7 @@ def with_sd(value: float, sd: float) -> str:
     return f"{value:.{decimals}f} ± {small}"
 
 
-def label_modes(panel: Axes, modal: ModalModel) -> None:
+def label_modes(panel: Axes, modal: ModalModel | MatrixModes) -> None:
     """Modes as vertical lines, with frequency, damping and probability above the panel."""
     upright = len(modal.modes) > COLUMNS
     low, high = panel.get_xlim()
@@ -77,7 +78,7 @@ def label_modes(panel: Axes, modal: ModalModel) -> None:
         )
 
 
-def number_modes(panel: Axes, modal: ModalModel) -> None:
+def number_modes(panel: Axes, modal: ModalModel | MatrixModes) -> None:
     """Modes as thin vertical lines, with their numbers inside at the top."""
     low, high = panel.get_xlim()
     frequency = np.array([mode.frequency_hz for mode in modal.modes])

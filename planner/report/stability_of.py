@@ -23,13 +23,20 @@ LOBES_SHARE = 0.2  # of the time, where samples follow
 
 @dataclass(frozen=True)
 class Asked:
-    """What `stability` is asked: a source, its pose, another tool, and one point of interest."""
+    """What `stability` is asked: a source, its pose, and one point of interest.
+
+    With `tool` the FRFs are coupled to it first, as `couple` does: `reference` is the tested one,
+    `robot` whose simulation tells how the tip turns.
+    """
 
     source: Path
     cut: Path
     pose: str | None = None
     point: str | None = None
     samples: int = SAMPLES
+    tool: Path | None = None
+    reference: Path | None = None
+    robot: Path | None = None
 
 
 def stability_of(
@@ -60,6 +67,10 @@ def stability_of(
 def structure_of(asked: Asked, cut: Cut) -> Structure:
     """From modes, FRFs, or a campaign at a pose."""
     source = asked.source
+    if asked.tool is not None:
+        return _coupled(asked, asked.tool, cut)
+    if asked.reference is not None or asked.robot is not None:
+        raise InputError("--reference and --robot go with --tool; name the tool that is put on.")
     if source.suffix.lower() == ".toml":
         if asked.pose is not None:
             raise InputError(f"{source} states modes of one pose; leave --pose out.")
@@ -67,6 +78,23 @@ def structure_of(asked: Asked, cut: Cut) -> Structure:
     if source.is_dir():
         return of_frf(_of_campaign(source, asked.pose), cut)
     return of_frf(read_frf(source, asked.pose), cut)
+
+
+def _coupled(asked: Asked, tool: Path, cut: Cut) -> Structure:
+    from planner.milling.coupling import couple
+    from planner.milling.tool import load_tool
+    from planner.report.coupling_source import tip_of
+
+    target = load_tool(tool)
+    tested = None if asked.reference is None else load_tool(asked.reference)
+    tip, pose = tip_of(asked.source, tested, asked.pose, asked.robot, 0.0)
+    coupled = couple(tip, target, tested)
+    h, sd = coupled.accelerance[:3, :3].copy(), coupled.accelerance_sd[:3, :3]
+    unknown = [k for k in range(3) if k not in coupled.kept]
+    h[unknown] = h[:, unknown] = np.nan
+    frf = of_accelerance(f"{asked.source}, {pose}, {target.name}", coupled.frequency_hz, h, sd)
+    structure = of_frf(frf, cut)
+    return replace(structure, remarks=(*coupled.remarks, *structure.remarks))
 
 
 def _of_campaign(directory: Path, pose: str | None) -> CutterFrf:

@@ -12,6 +12,7 @@ from planner.milling.uncertainty import SampledLimits
 
 STABLE, UNSURE, LIMIT, POINT = "#dcefd9", "#f6e3b4", "black", "tab:red"
 ROWS = 240  # of depths at which probabilities are drawn
+WIDE = 8.0  # ratio of chatter frequencies from which their axis is logarithmic
 ROOM = 1.25  # of the picture above the highest limit
 
 
@@ -73,6 +74,8 @@ def _frequencies(panel, rpm: np.ndarray, found: Sequence[Loss]) -> None:
                 1.01, 0.7 if kind == "hopf" else 0.4, f"● {kind}", color=colour, fontsize=9,
                 transform=panel.transAxes,
             )  # fmt: skip
+    if np.any(np.isfinite(hertz)) and np.nanmax(hertz) > WIDE * np.nanmin(hertz):
+        panel.set_yscale("log")
     panel.set_ylabel("chatter (Hz)")
     panel.set_xlabel("spindle speed (rpm)")
     panel.grid(True, alpha=0.3)
