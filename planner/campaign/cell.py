@@ -16,6 +16,7 @@ from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.identification.measurement_model import Tolerances
+from planner.milling.cut import Cut, load_cut
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
@@ -33,6 +34,8 @@ class Cell:
     workspace: Workspace
     # Whether the scatter of frequencies from visit to visit is learned.
     visit_scatter: bool = field(default=True, kw_only=True)
+    # The cut whose stability is to be decided, where campaign.toml names one.
+    cut: Cut | None = field(default=None, kw_only=True)
 
     @classmethod
     def load(
@@ -53,7 +56,9 @@ class Cell:
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
-        made = cls(config, robot, simulation, workspace, visit_scatter=visit_scatter)
+        table = config.cut
+        cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
+        made = cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
         made._check_angles()
         return made
 
@@ -63,6 +68,7 @@ class Cell:
         for where, poses in (
             ("[goal] joints_deg", self.config.goal.joints_deg),
             ("[acquisition] own_poses_deg", self.config.acquisition.own_poses_deg),
+            ("[cut] joints_deg", self.config.cut.joints_deg if self.config.cut else None),
         ):
             for number, pose in enumerate(poses or [], 1):
                 self.check_pose(tuple(pose), f"{where}, pose {number}")

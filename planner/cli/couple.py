@@ -46,7 +46,10 @@ def couple(
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
     as_json: AsJson = False,
 ) -> int:
-    """Predict the FRFs of another tool: the tested one is taken off, the other put on."""
+    """Predict the FRFs of another tool: the tested one is taken off, the other put on.
+
+    Example: planner couple predictions/poses.npz --tool long.toml --out long.npz
+    """
     from planner.milling.coupling import couple as coupling
     from planner.milling.tool import load_tool
     from planner.report.coupling import coupling_report
