@@ -21,7 +21,7 @@ SEED = 7  # of the noises: the same answer for the same FRFs
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
+class FrfEquations:
     """One FRF's real, weighted equations: residues' columns, out-of-band terms taken out, data.
 
     `free` (2F, 2m) are the residues' columns orthogonal to `rest` (2F, t); `data` (2F,).
@@ -94,13 +94,13 @@ def _alone(poles: np.ndarray, highest: float) -> np.ndarray:
 
 def _entry(
     lines: Lines, values: np.ndarray, weight: np.ndarray, found: Refined, inside: np.ndarray
-) -> Entry:
+) -> FrfEquations:
     columns = _real((basis(lines, found.poles) * weight).T)
     product = np.zeros(columns.shape[1], bool)
     product[: 2 * len(inside)] = np.tile(inside, 2)
     rest, free = columns[:, ~product], columns[:, product]
     q, _ = np.linalg.qr(rest / np.linalg.norm(rest, axis=0))
-    return Entry(q, free - q @ (q.T @ free), _real(values * weight))
+    return FrfEquations(q, free - q @ (q.T @ free), _real(values * weight))
 
 
 def _products(normal: np.ndarray, told: np.ndarray, residue: np.ndarray) -> np.ndarray:
@@ -143,7 +143,7 @@ def _times(values: np.ndarray) -> np.ndarray:
 
 
 def _by_poles(
-    lines: Lines, weight: np.ndarray, found: Refined, entries: list[list[Entry]]
+    lines: Lines, weight: np.ndarray, found: Refined, entries: list[list[FrfEquations]]
 ) -> np.ndarray:
     """Errors (2m, n, n, 2F), weighted, that the noise of the poles leaves; all entries share it."""
     m, n = len(found.poles), len(weight)
