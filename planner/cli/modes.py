@@ -46,6 +46,9 @@ def modes(
         Path | None,
         typer.Option(metavar="FOLDER", help="Of any points: write UFF and CSV files here."),
     ] = None,
+    operating: Annotated[
+        bool, typer.Option("--operating", help="Responses alone, no force: unscaled modes.")
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
     """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
@@ -64,6 +67,10 @@ def modes(
         with reporting("identifying", quiet=as_json) as progress:
             answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
+    if operating:
+        from planner.report.operating_analysis import operating_report
+
+        return respond(operating_report(paths, band_hz, pictures), as_json)
     matrix = None if force else matrix_report(paths, band_hz, quantity, pictures, real, export)
     answer = matrix or modal_report(
         paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s

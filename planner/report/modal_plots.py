@@ -15,6 +15,7 @@ from planner.modal.matrix_modes import MatrixModes
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
+from planner.modal.operating import OperatingModes
 from planner.modal.pole_identification import PoleIdentification
 from planner.modal.stabilisation import stable
 from planner.report.frf_plots import AXES, MEASURED, MODEL
@@ -236,7 +237,7 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     return figure
 
 
-def mac_figure(modal: ModalModel | MatrixModes, title: str = "") -> Figure:
+def mac_figure(modal: ModalModel | MatrixModes | OperatingModes, title: str = "") -> Figure:
     """AutoMAC of the shapes, with its values in the cells."""
     count = len(modal.modes)
     side = float(np.clip(0.6 * count, 4.0, 14.0))

@@ -11,6 +11,7 @@ from scipy.optimize import isotonic_regression
 from planner.frf.frf import Frf
 from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import ModalModel
+from planner.modal.operating import OperatingModes
 from planner.report.plot_text import plain_text
 
 MODE, USABLE = "tab:blue", "tab:green"
@@ -49,7 +50,7 @@ def with_sd(value: float, sd: float) -> str:
     return f"{value:.{decimals}f} ± {small}"
 
 
-def label_modes(panel: Axes, modal: ModalModel | MatrixModes) -> None:
+def label_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -> None:
     """Modes as vertical lines, with frequency, damping and probability above the panel."""
     upright = len(modal.modes) > COLUMNS
     low, high = panel.get_xlim()
@@ -78,7 +79,7 @@ def label_modes(panel: Axes, modal: ModalModel | MatrixModes) -> None:
         )
 
 
-def number_modes(panel: Axes, modal: ModalModel | MatrixModes) -> None:
+def number_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -> None:
     """Modes as thin vertical lines, with their numbers inside at the top."""
     low, high = panel.get_xlim()
     frequency = np.array([mode.frequency_hz for mode in modal.modes])
