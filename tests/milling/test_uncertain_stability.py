@@ -56,7 +56,7 @@ def test_rational_fit_of_noisy_frfs_is_as_good_as_their_noise():
     assert fit.error < 0.011
 
 
-@pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order"])
+@pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order", "semi_discretisation"])
 def test_frfs_give_the_limits_of_their_modes(method: str):
     given = cut(
         milling="down", radial_immersion=0.5, spindle_rpm=(5000.0, 15000.0, 5), method=method,
@@ -67,6 +67,19 @@ def test_frfs_give_the_limits_of_their_modes(method: str):
     np.testing.assert_allclose(
         [loss.depth_m for loss in found], [loss.depth_m for loss in wanted], rtol=2e-3
     )
+
+
+def test_methods_agree_on_cross_frfs_and_residual_compliance():
+    given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (12000.0, 15000.0, 2)}
+    soft = crossed()
+    soft = CutterModes(soft.poles, soft.shapes, soft.drives, 20 * soft.residual)
+    full = losses(machine(soft, cut(**given)))
+    semi = losses(machine(soft, cut(**given, method="semi_discretisation")))
+    without = losses(machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual),
+                             cut(**given)))  # fmt: skip
+    for a, b, c in zip(full, semi, without, strict=True):
+        assert a.depth_m == pytest.approx(b.depth_m, rel=2e-3)
+        assert abs(a.depth_m / c.depth_m - 1) > 0.01
 
 
 def test_frfs_that_end_before_the_chatter_are_refused():
