@@ -132,7 +132,7 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_campaign_config(path: Path) -> CampaignConfig:
     """Read and check campaign.toml; InputError with one sentence where it is wrong."""
     config = load_toml(path, CampaignConfig, "campaign.toml")
-    _check(config, path)
+    check_config(config, path)
     return config
 
 
@@ -141,7 +141,8 @@ def config_from_builtins(data: Any) -> CampaignConfig:
     return msgspec.convert(data, type=CampaignConfig)
 
 
-def _check(config: CampaignConfig, path: Path) -> None:
+def check_config(config: CampaignConfig, path: Path) -> None:
+    """InputError where entries make no sense by themselves; `path` is named there."""
     w, low_high = config.workspace, [config.modes.band_hz]
     if (w.joints_deg is None) == (w.position_m is None):
         raise InputError(

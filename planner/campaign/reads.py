@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -224,6 +224,19 @@ class CampaignReads:
             name = self._model_name(self._configured(), self.state)
             model_cache.keep_model(self._kept, name, model)
         return found
+
+    def records(self) -> list[dict[str, Any]]:
+        """All measured modes, one row each: what pandas.DataFrame takes."""
+        from planner.campaign.records import measured_records
+
+        return measured_records(self.cell.robot.joint_names, self.state.measurements.values())
+
+    def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
+        """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
+        from planner.campaign.records import predicted_records
+
+        q = np.atleast_2d(q_rad)
+        return predicted_records(self.cell.robot.joint_names, q, self.predict(q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

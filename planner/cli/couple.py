@@ -1,5 +1,6 @@
 """FRFs of another tool by receptance coupling (`planner couple`)."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,10 @@ def couple(
         float,
         typer.Option(metavar="PERCENT", min=0.0, help="Of FRFs whose file states no sd."),
     ] = 0.0,
+    contact_from: Annotated[
+        Path | None,
+        typer.Option(metavar="FRFS", help="Measured with TOOL there: its contact is identified."),
+    ] = None,
     band_hz: Annotated[
         tuple[float, float] | None,
         typer.Option("--band-hz", metavar="LOW HIGH", help="Band in Hz, which has to be covered."),
@@ -41,11 +46,14 @@ def couple(
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
     as_json: AsJson = False,
 ) -> int:
-    """Predict the FRFs of another tool: the tested one is taken off, the other put on."""
+    """Predict the FRFs of another tool: the tested one is taken off, the other put on.
+
+    Example: planner couple predictions/poses.npz --tool long.toml --out long.npz
+    """
     from planner.milling.coupling import couple as coupling
     from planner.milling.tool import load_tool
     from planner.report.coupling import coupling_report
-    from planner.report.coupling_source import tip_of, within
+    from planner.report.coupling_source import fitted_contact, tip_of, within
     from planner.report.plot_files import Pictures
 
     pictures = Pictures(plot, format_)
@@ -53,7 +61,13 @@ def couple(
     tested = None if reference is None else load_tool(reference)
     tip, name = tip_of(source, tested, pose, robot, noise / 100)
     tip = within(tip, band_hz, source)
+    contact = None
+    if contact_from is not None:
+        contact = fitted_contact(tip, target, tested, contact_from, pose)
+        target = contact.tool
     before, coupled = coupling(tip, None), coupling(tip, target, tested)
     tested_name = None if tested is None else tested.name
     answer = coupling_report(before, coupled, target.name, tested_name, name, out)
+    if contact is not None:
+        answer = replace(answer, contact=contact.to_json())
     return respond(answer.with_pictures(pictures), as_json)

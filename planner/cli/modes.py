@@ -39,9 +39,19 @@ def modes(
     ] = None,
     format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
+    real: Annotated[
+        bool, typer.Option("--real", help="Of any points: real normal modes as shapes.")
+    ] = False,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Of any points: write UFF and CSV files here."),
+    ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder."""
+    """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
+
+    Example: planner modes exports/P001/*.uff --plot pictures
+    """
     from planner.cli.progress import reporting
     from planner.report.matrix_analysis import matrix_report
     from planner.report.modal_analysis import modal_report
@@ -54,7 +64,7 @@ def modes(
         with reporting("identifying", quiet=as_json) as progress:
             answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
-    matrix = None if force else matrix_report(paths, band_hz, quantity, pictures)
+    matrix = None if force else matrix_report(paths, band_hz, quantity, pictures, real, export)
     answer = matrix or modal_report(
         paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s
     )

@@ -41,7 +41,10 @@ def stability(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """To which depth a cut is stable at each spindle speed, and how it chatters beyond."""
+    """To which depth a cut is stable at each spindle speed, and how it chatters beyond.
+
+    Example: planner stability cell7 --cut cut.toml --plot pictures
+    """
     from planner.cli.progress import counting
     from planner.report.plot_files import Pictures
     from planner.report.stability_of import Asked, stability_of

@@ -13,7 +13,7 @@ def study(
         str,
         typer.Argument(
             metavar="NAME|all",
-            help="busch2022, busch2020, seyedhosseini2025, lei2023, or all of them.",
+            help="busch2022, busch2020, seyedhosseini2025, lei2023, birk2025, or all.",
         ),
     ],
     out: Annotated[
@@ -29,6 +29,8 @@ def study(
     """Do a paper's study again on simulated recordings: tables, pictures, what holds.
 
     `all` keeps each finished study in FOLDER and does not run it again.
+
+    Example: planner study busch2022 --out figures
     """
     from planner.cli.progress import counting
     from planner.studies import registry

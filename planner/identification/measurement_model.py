@@ -10,6 +10,7 @@ FRFs are between points: r rows, three a sensor, and c columns, three a hit poin
 frame. Every sensor has a matrix and a place of its own; the hammer and the delay are common.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,17 +143,28 @@ def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.nda
 
     Those of the joints are there where the matrices behind `turned` have their slopes.
     """
+    return _basis(h, turned.moment, turned.turning, turned.by_angle, s, t)
+
+
+def _basis(
+    h: np.ndarray,
+    moment: np.ndarray,
+    turning: np.ndarray,
+    by_angle: np.ndarray | None,
+    s: np.ndarray,
+    t: Tolerances,
+) -> np.ndarray:
     n, rows, columns, lines = h.shape
     numbers = OpenNumbers.of(h)
-    joints = 0 if turned.by_angle is None else turned.by_angle.shape[1]
+    joints = 0 if by_angle is None else by_angle.shape[1]
     # All is written once, in place: such arrays are large.
     out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
     by_axis = out[:, : numbers.hits].reshape(n, columns, OF_HIT, rows, columns, lines)
     # A miss along an axis changes the column of that axis only: a view of these.
-    hit_basis(h, turned.moment, t, np.einsum("namiaf->namif", by_axis))
-    chain_basis(h, turned.turning, s, t, out[:, numbers.hits : numbers.known])
-    if turned.by_angle is not None:
-        np.multiply(turned.by_angle, t.joint_rad, out=out[:, numbers.known :])
+    hit_basis(h, moment, t, np.einsum("namiaf->namif", by_axis))
+    chain_basis(h, turning, s, t, out[:, numbers.hits : numbers.known])
+    if by_angle is not None:
+        np.multiply(by_angle, t.joint_rad, out=out[:, numbers.known :])
     return out
 
 
@@ -191,6 +203,42 @@ class ChainTransfer:
 
 
 @dataclass(frozen=True, eq=False)
+class Block:
+    """What the hits at one point open of what one sensor heard: `basis` (n, l, 3, 3, F).
+
+    `rows` and `columns` are theirs in the FRFs, `numbers` (l,) those that move them.
+    """
+
+    rows: slice
+    columns: slice
+    numbers: np.ndarray
+    basis: np.ndarray
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Of values (k, r, c, F) the block's, as real rows (k, 18F)."""
+        return real_rows(values[:, self.rows, self.columns])
+
+
+def blocks(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> tuple[Block, ...]:
+    """`basis` without all that is 0: of each sensor and hit point."""
+    numbers, found = OpenNumbers.of(h), []
+    moment, turning, angles = turned.moment, turned.turning, turned.by_angle
+    joints = 0 if angles is None else angles.shape[1]
+    of_all = np.arange(numbers.known - OF_HAMMER, numbers.known + joints)
+    for sensor in range(h.shape[1] // 3):
+        of_sensor = numbers.hits + OF_SENSOR * sensor + np.arange(OF_SENSOR)
+        for point in range(h.shape[2] // 3):
+            of_hits = HIT_NUMBERS * point + np.arange(HIT_NUMBERS)
+            rows, columns = (slice(3 * k, 3 * k + 3) for k in (sensor, point))
+            at = (slice(None), rows, columns)
+            by_angle = None if angles is None else angles[:, :, rows, columns]
+            own = _basis(h[at], moment[at], turning[at], by_angle, s, t)
+            every = np.concatenate([of_hits, of_sensor, of_all])
+            found.append(Block(rows, columns, every, own))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
 class Marginal:
     """A pose's misfit with η integrated out: χ², half gradient, normal, ln|I + BᵀB|, and E[η]."""
 
@@ -201,139 +249,46 @@ class Marginal:
     eta: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Some of a pose's residuals (m,), with unit noise, and derivatives (d, m).
+
+    `b` (l, m) is how the `numbers` (l,) move them, all others not doing so.
+    """
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    b: np.ndarray
+    numbers: np.ndarray
+
+
 def marginal(residual: np.ndarray, jacobian: np.ndarray, b: np.ndarray) -> Marginal:
     """Of residuals (m,) with unit noise, their derivatives (d, m) and B (l, m)."""
-    inner = np.eye(len(b)) + b @ b.T
+    return marginal_of([Part(residual, jacobian, b, np.arange(len(b)))], len(b), len(jacobian))
+
+
+def marginal_of(parts: Sequence[Part], size: int, count: int) -> Marginal:
+    """The same of parts of a pose that have `size` numbers, and `count` derivatives."""
+    inner, onto = np.eye(size), np.zeros((size, 1 + count))
+    chi2, gradient, normal = 0.0, np.zeros(count), np.zeros((count, count))
+    for p in parts:
+        inner[np.ix_(p.numbers, p.numbers)] += p.b @ p.b.T
+        onto[p.numbers] += p.b @ np.concatenate([p.residual[None], p.jacobian]).T
+        chi2 += float(p.residual @ p.residual)
+        gradient += p.jacobian @ p.residual
+        normal += p.jacobian @ p.jacobian.T
     factor = np.linalg.cholesky(inner)
-    onto = np.linalg.solve(factor, b @ np.concatenate([residual[None], jacobian]).T)
+    onto = np.linalg.solve(factor, onto)
     r, j = onto[:, 0], onto[:, 1:]
     return Marginal(
-        float(residual @ residual - r @ r),
-        jacobian @ residual - j.T @ r,
-        jacobian @ jacobian.T - j.T @ j,
+        chi2 - float(r @ r),
+        gradient - j.T @ r,
+        normal - j.T @ j,
         2 * float(np.sum(np.log(np.diagonal(factor)))),
         np.linalg.solve(factor.T, r),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Integrated:
-    """χ² with all η integrated out, in all and of each pose (n,); half gradient, and normal."""
-
-    chi2: float
-    gradient: np.ndarray
-    normal: np.ndarray
-    by_pose: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """Estimates, in sds: `own` (n, 4c + dof) of each pose's hits and joints, `chain` (k,)."""
-
-    own: np.ndarray
-    chain: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class LeftOpen:
-    """B of n poses, weighted, as it is somewhere and held there.
-
-    `own` (l, m) of each pose is whitened (by `factor`), so that integrating out subtracts the
-    square of what is projected on it; `common` (k, m) is of numbers that all poses share: the
-    chain of a campaign. `crossed` (n, r, c, F), weighted, is what goes beyond first order. Were B
-    to follow the parameters, larger FRFs would seem to fit better, having larger B.
-    """
-
-    own: tuple[np.ndarray, ...]
-    factor: tuple[np.ndarray, ...]
-    common: tuple[np.ndarray, ...]
-    crossed: np.ndarray
-
-    @classmethod
-    def at(
-        cls,
-        h: np.ndarray,
-        turned: Turned,
-        s: np.ndarray,
-        weight: np.ndarray,
-        tolerances: Tolerances,
-        told: Told | None = None,
-    ) -> "LeftOpen":
-        """Of accelerances h (n, r, c, F) and the weight of residuals.
-
-        With `told`, what the chain makes of hits that miss, of second order, is that of these
-        estimates. (B itself must not follow them: it would then be fitted to the same noise.)
-        """
-        made = basis(h, turned, s, tolerances)
-        crossed = np.zeros_like(h) if told is None else _crossed(made, turned, s, tolerances, told)
-        made *= weight[:, None]
-        numbers = OpenNumbers.of(h)
-        own, factors, common = [], [], []
-        for pose in made:
-            mine = _real(numbers.own(pose))
-            factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
-            own.append(np.linalg.solve(factor, mine))
-            factors.append(factor)
-            common.append(_real(numbers.shared(pose)))
-        return cls(tuple(own), tuple(factors), tuple(common), weight * crossed)
-
-    def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
-        """Of residuals (n, r, c, F) and their derivatives (n, d, r, c, F), both weighted."""
-        residual = residual + self.crossed
-        d, k = slope.shape[1], len(self.common[0])
-        chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
-        whole, shared = np.zeros((d + k, d + k)), np.empty((len(residual), k, k))
-        for i, (own, common) in enumerate(zip(self.own, self.common, strict=True)):
-            r, j = _real(residual[i, None])[0], np.concatenate([_real(slope[i]), common])
-            onto, moved = own @ r, own @ j.T
-            chi2[i] = r @ r - onto @ onto
-            gradients[i] = j @ r - moved.T @ onto
-            normal = j @ j.T - moved.T @ moved
-            shared[i] = normal[d:, d:]
-            whole += normal
-        pull = gradients.sum(axis=0)
-        # The common numbers at their best, and what that takes from all else.
-        right = np.column_stack([pull[d:], whole[d:, :d]])
-        solved = np.linalg.solve(whole[d:, d:] + np.eye(k), right)
-        eta, across = -solved[:, 0], solved[:, 1:]
-        by_pose = chi2 + 2 * gradients[:, d:] @ eta + np.einsum("nij,i,j->n", shared, eta, eta)
-        return Integrated(
-            float(chi2.sum() + pull[d:] @ eta),
-            pull[:d] + whole[:d, d:] @ eta,
-            whole[:d, :d] - whole[:d, d:] @ across,
-            by_pose,
-        )
-
-    def told(self, residual: np.ndarray) -> Told:
-        """What weighted residuals (n, r, c, F) tell of the numbers."""
-        flat, k = _real(residual + self.crossed), len(self.common[0])
-        whole, pull = np.eye(k), np.zeros(k)
-        for own, common, r in zip(self.own, self.common, flat, strict=True):
-            moved = own @ common.T
-            whole += common @ common.T - moved.T @ moved
-            pull += common @ r - moved.T @ (own @ r)
-        chain = -np.linalg.solve(whole, pull)
-        left = [
-            -np.linalg.solve(factor.T, own @ (r + chain @ common))
-            for own, factor, common, r in zip(self.own, self.factor, self.common, flat, strict=True)
-        ]
-        return Told(np.array(left), chain)
-
-
-def _crossed(
-    made: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances, told: Told
-) -> np.ndarray:
-    """Of second order (n, r, c, F): what the chain makes of the misses, both as they are told."""
-    count = OpenNumbers.of(made)
-    hits, joints = made[:, : count.hits], made[:, count.known :]
-    missed = np.einsum("nl,nlijf->nijf", told.own[:, : count.hits], hits)
-    missed += np.einsum("nl,nlijf->nijf", told.own[:, count.hits :], joints)
-    turns = hit_basis(turned.turning, turned.twisting, t)
-    numbers = told.own[:, : count.hits].reshape(len(made), -1, OF_HIT)
-    turning = np.einsum("nam,namif->niaf", numbers, turns)
-    return np.einsum("k,nkijf->nijf", told.chain, chain_basis(missed, turning, s, t))
-
-
-def _real(values: np.ndarray) -> np.ndarray:
+def real_rows(values: np.ndarray) -> np.ndarray:
     """Real and imaginary parts (l, 2rcF) of values (l, r, c, F)."""
     return np.ascontiguousarray(values).reshape(len(values), -1).view(float)

@@ -10,6 +10,7 @@ et al., Phys. Rep. 470, 2009) in the slices of a tapered one.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -135,12 +136,15 @@ def transfer(segments: Sequence[Segment], omega: np.ndarray) -> np.ndarray:
     omega (F,) in rad/s, > 0.
     """
     total = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
+    omega = np.ascontiguousarray(omega, float)
     for segment in segments[::-1]:
-        total = _segment(segment, omega) @ point_mass(segment.mass, omega) @ total
+        total = _segment(segment, omega.tobytes()) @ total
     return total
 
 
-def _segment(segment: Segment, omega: np.ndarray) -> np.ndarray:
+@lru_cache(maxsize=8)  # a contact is identified with the same segments again and again
+def _segment(segment: Segment, lines: bytes) -> np.ndarray:
+    omega = np.frombuffer(lines)
     out = np.zeros((len(omega), 12, 12), complex)
     bent = _along(segment, lambda section: section.bending(omega))
     out[np.ix_(range(len(omega)), FIRST_PLANE, FIRST_PLANE)] = bent
@@ -149,7 +153,7 @@ def _segment(segment: Segment, omega: np.ndarray) -> np.ndarray:
     for places, slope in rods:
         moved = _along(segment, lambda section, slope=slope: slope(section, omega))
         out[np.ix_(range(len(omega)), places, places)] = moved
-    return out
+    return out @ point_mass(segment.mass, omega)
 
 
 def _along(segment: Segment, slope: Callable[[Section], np.ndarray]) -> np.ndarray:

@@ -21,6 +21,7 @@ from planner.milling.tool import Tool
 MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
 # Above this a 1 % error of every measured FRF is more than a tenth of the coupled one.
 AMPLIFICATION_LIMIT = 10.0
+SHARE = 1e-9  # of an axis in another: rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,7 @@ class TipReceptance:
     offset_sd: np.ndarray  # (F, k, k)
     frame: np.ndarray = field(default_factory=lambda: np.eye(3))
     remarks: tuple[str, ...] = ()
+    simulated: bool = False  # the source says that it holds simulated, not measured, data
 
     @property
     def receptance(self) -> np.ndarray:
@@ -69,8 +71,8 @@ class TipReceptance:
 class CoupledFrf:
     """Receptances (6, 6, F) at the tip of the target tool, their sd, and how noise grew.
 
-    In the axes of the FRFs. The motions not `kept` were not measured: they are taken as held, so
-    that theirs are 0. `amplification` (F,) is the relative error of the 3 × 3 of motions per force,
+    In the axes of the FRFs. The motions not `kept` were not measured: they are taken as held, and
+    theirs are NaN. `amplification` (F,) is the relative error of the 3 × 3 of motions per force,
     in the Frobenius norm, for relative errors of one unit in every measured value, each by itself.
     """
 
@@ -80,6 +82,7 @@ class CoupledFrf:
     sd: np.ndarray
     amplification: np.ndarray
     remarks: tuple[str, ...] = ()
+    simulated: bool = False
 
     @property
     def accelerance(self) -> np.ndarray:
@@ -119,6 +122,7 @@ def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = Non
         np.sqrt(_whole(variance, tip.kept, tip.frame**2)),
         np.sqrt(grown / np.maximum(size, 1e-300)),
         tip.remarks,
+        tip.simulated,
     )
 
 
@@ -192,8 +196,14 @@ def _uncertain(
 
 
 def _whole(values: np.ndarray, kept: tuple[int, ...], frame: np.ndarray) -> np.ndarray:
-    """(F, k, k) as (6, 6, F) in the axes in which `frame` is given, 0 where nothing is known."""
+    """(F, k, k) as (6, 6, F) in the axes in which `frame` is given, NaN where nothing is known."""
     out = np.zeros((len(values), 6, 6), values.dtype)
     out[np.ix_(range(len(values)), kept, kept)] = values
     turn = np.kron(np.eye(2), frame)
-    return np.moveaxis(turn @ out @ turn.T, 0, -1)
+    whole = np.moveaxis(turn @ out @ turn.T, 0, -1)
+    # A direction is not known where motions that were not kept have a share in it.
+    lacking = [k for k in range(6) if k not in kept]
+    unknown = np.any(np.abs(turn[:, lacking]) > SHARE, axis=1)
+    whole[unknown] = np.nan
+    whole[:, unknown] = np.nan
+    return whole

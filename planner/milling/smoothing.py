@@ -14,11 +14,13 @@ from planner.modal.rational_fit import rational_fit
 from planner.modal.refine import Refined, refine
 from planner.modal.residues import basis, basis_slope, laplace
 
-PAIRS = (4, 6, 8, 10, 12, 15, 19, 24)  # of conjugate poles that are tried
-PATIENCE = 2  # numbers of pairs in turn that may gain nothing
+PAIRS = (5, 8, 12)  # of conjugate poles from which the search begins
+MOST = 24  # modes
+NEIGHBOURS = 9  # lines over which a misfit is summed
+TRIED_DAMPING = (0.01, 0.06)  # of a mode that is tried where the fit misses
 FIRST_DAMPING = 0.01
 # χ² per degree of freedom up to which a fit counts as one to the noise, and may be used.
-FITS = 1.3
+FITS = 1.2
 SWINGS = 0.3  # damping ratio from which a pole of the start stands for no mode
 ABOVE = 1.5  # of the last line's frequency: where a mode above the lines is first looked for
 NO_TRACE = 1e-8  # of scaled normal equations: eigenvalues below are rounding
@@ -56,52 +58,95 @@ def smoothed(tip: TipReceptance) -> TipReceptance:
 
 
 def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothed | None:
-    """The fit by the number of poles that the Bayesian information criterion likes best.
+    """The fit by the modes that the Bayesian information criterion likes best.
 
     values (F, n, n) at lines (F,) in Hz, sd of the same shape. None where there are too few lines.
     """
-    count, square = len(values), (2 * np.pi * frequency_hz) ** 2
-    receptance, entries = np.moveaxis(values, 0, -1), values[0].size
-    accelerance = -receptance * square
-    variance = (np.moveaxis(sd, 0, -1) * square) ** 2
-    best, least, worse = None, np.inf, 0
+    square = (2 * np.pi * frequency_hz) ** 2
+    receptance = np.moveaxis(values, 0, -1)
+    problem = _Problem(frequency_hz, -receptance * square, (np.moveaxis(sd, 0, -1) * square) ** 2)
+    best: Refined | None = None
     for pairs in PAIRS:
-        if 2 * count < LINES_PER_NUMBER * (2 * pairs + TERMS) or worse >= PATIENCE:
+        if 2 * len(values) < LINES_PER_NUMBER * (2 * pairs + TERMS):
             break
         even = 2 * np.pi * np.geomspace(frequency_hz[0], frequency_hz[-1], pairs + 2)[1:-1]
-        first = even * (-FIRST_DAMPING + 1j)
-        start = rational_fit(frequency_hz, receptance, first).poles
-        penalty = 2 * (entries + 1) * np.log(2 * values.size)
-        found = _refined(frequency_hz, accelerance, variance, start, penalty)
-        unknown = 2 * len(found.poles) + TERMS
-        criterion = found.chi2 + (unknown * entries + 2 * len(found.poles)) * np.log(
-            2 * values.size
-        )
-        worse = 0 if criterion < least else worse + 1
-        if criterion < least:
-            best, least = found, criterion
+        start = rational_fit(frequency_hz, receptance, even * (-FIRST_DAMPING + 1j)).poles
+        found = problem.pruned(problem.grown(problem.pruned(_swinging(start, frequency_hz[-1]))))
+        if best is None or problem.criterion(found) < problem.criterion(best):
+            best = found
     if best is None:
         return None
-    fitted, spread = _values(frequency_hz, best, variance)
-    shaped = (np.moveaxis(a, -1, 0) / square[:, None, None] for a in (-fitted, spread))
-    return Smoothed(best.poles, *shaped, best.chi2 / max(best.degrees, 1))
+    fitted, spread = _values(frequency_hz, best, problem.variance)
+    off = np.moveaxis(spread / square, -1, 0)
+    moved = np.moveaxis(-fitted / square, -1, 0)
+    return Smoothed(best.poles, moved, off, best.chi2 / max(best.degrees, 1))
 
 
-def _refined(
-    frequency_hz: np.ndarray, accelerance: np.ndarray, variance: np.ndarray, poles: np.ndarray,
-    penalty: float,
-) -> Refined:  # fmt: skip
-    """The likeliest poles from a start, those left out whose χ² is not worth the penalty."""
+def _swinging(poles: np.ndarray, highest_hz: float) -> np.ndarray:
+    """Poles of a start that stand for modes, and one above the lines.
+
+    That one stands for the nearest mode there: the few terms of the rest do not follow it.
+    """
     swing = poles[-poles.real < SWINGS * np.abs(poles)]
-    # One stands for the nearest mode above the lines: the rest's few terms do not follow it.
-    poles = np.append(swing, ABOVE * 2 * np.pi * frequency_hz[-1] * (-FIRST_DAMPING + 1j))
-    while True:
-        found = refine(laplace(frequency_hz), accelerance, variance, poles, _decaying)
-        needed = found.significance > penalty
-        if np.all(needed) or len(poles) == 1:
-            return found
-        # One after the other: of two that stand for the same mode neither seems needed.
-        poles = np.delete(found.poles, np.argmin(found.significance))
+    return np.append(swing, ABOVE * 2 * np.pi * highest_hz * (-FIRST_DAMPING + 1j))
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Accelerance and its variance (n, n, F) at lines (F,) in Hz."""
+
+    frequency_hz: np.ndarray
+    accelerance: np.ndarray
+    variance: np.ndarray
+
+    def refined(self, poles: np.ndarray) -> Refined:
+        lines = laplace(self.frequency_hz)
+        return refine(lines, self.accelerance, self.variance, poles, _decaying)
+
+    @property
+    def each(self) -> float:
+        """What a number costs in χ²."""
+        return float(np.log(2 * self.accelerance.size))
+
+    @property
+    def entries(self) -> int:
+        return self.accelerance[..., 0].size
+
+    def worth(self, found: Refined) -> float:
+        """χ² that a mode has to explain; more where the fit is off, for then anything explains."""
+        return 2 * (self.entries + 1) * self.each * max(found.chi2 / max(found.degrees, 1), 1.0)
+
+    def criterion(self, found: Refined) -> float:
+        """The Bayesian information criterion, least for the best."""
+        modes = len(found.poles)
+        return found.chi2 + ((2 * modes + TERMS) * self.entries + 2 * modes) * self.each
+
+    def pruned(self, start: np.ndarray | Refined) -> Refined:
+        """Without the poles whose χ² is not worth their numbers, one after the other.
+
+        Of two that stand for the same mode neither seems needed.
+        """
+        found = start if isinstance(start, Refined) else self.refined(start)
+        while len(found.poles) > 1:
+            if np.min(found.significance) > self.worth(found):
+                break
+            found = self.refined(np.delete(found.poles, np.argmin(found.significance)))
+        return found
+
+    def grown(self, found: Refined) -> Refined:
+        """With further poles where the fit misses most, as long as they are worth it."""
+        while len(found.poles) < MOST:
+            columns = basis(laplace(self.frequency_hz), found.poles)
+            fitted = np.reshape(found.point.coefficients @ columns, self.variance.shape)
+            off = np.sum(np.abs(self.accelerance - fitted) ** 2 / self.variance, axis=(0, 1))
+            off = np.convolve(off, np.ones(NEIGHBOURS), mode="same")
+            place = 2 * np.pi * self.frequency_hz[np.argmax(off)]
+            trials = [self.refined(np.append(found.poles, place * (1j - d))) for d in TRIED_DAMPING]
+            best = min(trials, key=self.criterion)
+            if found.chi2 - best.chi2 < self.worth(best):
+                break
+            found = best
+        return found
 
 
 def _decaying(poles: np.ndarray) -> bool:

@@ -77,14 +77,15 @@ def _npz(path: Path, pose: str | None) -> TipReceptance | TipMotion:
             )
     s2 = (2j * np.pi * frequency[keep]) ** 2
     h, spread = mean[row][..., keep] / s2, np.abs(sd[row][..., keep] / s2)
+    if full:
+        kept = tuple(int(k) for k in stored["motions"]) if "motions" in stored else tuple(range(6))
+        h, spread = h[np.ix_(kept, kept)], spread[np.ix_(kept, kept)]
+        if np.all(np.isfinite(h)) and np.all(np.isfinite(spread)):
+            return TipReceptance.known(frequency[keep], h, spread, kept)
     if not (np.all(np.isfinite(h)) and np.all(np.isfinite(spread))):
         raise InputError(f"{path}: FRFs of {names[row]} are not finite; measure what lacks.")
-    if not full:
-        angles = np.deg2rad(stored["joints_deg"][row]) if "joints_deg" in stored else None
-        return TipMotion(names[row], frequency[keep], h, spread, angles)
-    kept = tuple(int(k) for k in stored["motions"]) if "motions" in stored else tuple(range(6))
-    grid = np.ix_(kept, kept)
-    return TipReceptance.known(frequency[keep], h[grid], spread[grid], kept)
+    angles = np.deg2rad(stored["joints_deg"][row]) if "joints_deg" in stored else None
+    return TipMotion(names[row], frequency[keep], h, spread, angles)
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:
@@ -141,6 +142,7 @@ def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
     values = np.array([[found[(*a, *b)] for b in wanted] for a in wanted])
     seen = TwoPoints(frequency, directions, values, noise * np.abs(values))
     found = two_point_receptance(seen, tool, back)
+    found = replace(found, simulated=any(record.simulated for record in records))
     if noise > 0:
         return smoothed(found)
     text = "How noisy the FRFs are is not stated: no sd counts it; say so by --noise PERCENT."

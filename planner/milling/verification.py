@@ -51,7 +51,7 @@ class VerifyingHit:
 
 def resonances(coupled: CoupledFrf) -> tuple[Resonance, ...]:
     """Peaks of the direct FRFs, direction by direction, by frequency."""
-    size = np.abs(coupled.receptance[range(3), range(3)])
+    size = np.nan_to_num(np.abs(coupled.receptance[range(3), range(3)]))
     found = []
     for k in range(3):
         for line in find_peaks(size[k])[0]:
@@ -79,7 +79,7 @@ def verifying_hit(coupled: CoupledFrf) -> VerifyingHit:
         axis = AXES.index(best.direction)
         line = int(np.argmin(np.abs(coupled.frequency_hz - best.frequency_hz)))
     else:
-        direct = np.abs(coupled.receptance[range(3), range(3)])
+        direct = np.nan_to_num(np.abs(coupled.receptance[range(3), range(3)]))
         axis, line = (int(k) for k in np.unravel_index(np.argmax(direct), direct.shape))
     return VerifyingHit(
         f"+{AXES[axis]}",

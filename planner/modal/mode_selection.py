@@ -88,6 +88,13 @@ def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
     return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + FLOOR**2 * power
 
 
+def running_mean(values: np.ndarray, half: int) -> np.ndarray:
+    """Mean over a window of `half` values (F,) to either side, clipped at the ends."""
+    low, high = _windows(values.size, half)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return (total[high] - total[low]) / (high - low)
+
+
 def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:
     """First and one past the last line of a window around every line, clipped at the ends."""
     index = np.arange(lines)

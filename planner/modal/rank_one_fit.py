@@ -9,7 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDS, STILL = 60, 1e-10  # of alternating and of Gauss-Newton steps, relative to the shape
+ROUNDS, STILL = 60, 1e-8  # of alternating and of Gauss-Newton steps, relative to the shape
+# Relative to all entries, an error that each is given at first: none rules alone.
+START_SHARE = 0.03
+REWEIGHED = 3  # times that the weights follow what no shape explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +61,9 @@ class Entries:
 class FittedShape:
     """A shape over all points, with what is left of the residues.
 
-    `sd` (points,) is of real and imaginary part each; `misfit` is χ² per degree of freedom, by
-    which it is widened where above 1; NaN where no entry is left over to tell.
+    `sd` (points,) is of real and imaginary part each; `misfit` is χ² per degree of freedom of
+    the noise alone; NaN where no entry is left over to tell. Beyond it entries count as uncertain
+    in proportion to their size, as hits and sets make them.
     """
 
     shape: np.ndarray  # (points,) complex
@@ -78,8 +82,58 @@ def fit_shape(
     share the residue evenly.
     """
     values = residue * 2j * damped_1_s
-    weight = 1 / (2 * variance * (2 * damped_1_s) ** 2)
-    shape = _start(entries, values, weight)
+    noise = 2 * variance * (2 * damped_1_s) ** 2
+    even = noise + START_SHARE**2 * np.mean(np.abs(values) ** 2)
+    shape = _fitted(entries, values, 1 / even, _start(entries, values, 1 / even))
+    weight = 1 / noise
+    for _ in range(REWEIGHED):
+        shape = _fitted(entries, values, weight, shape)
+        left = values - shape[entries.rows] * shape[entries.columns]
+        jacobian = _jacobian(entries, shape)
+        normal = jacobian.conj().T @ (weight[:, None] * jacobian)
+        free = residue.size - int(np.linalg.matrix_rank(normal, tol=1e-12 * np.trace(normal).real))
+        if free <= 0:
+            break
+        # What no shape explains is taken for hits and sets that differ in proportion.
+        size = np.abs(shape[entries.rows] * shape[entries.columns]) ** 2
+        beyond = np.sum((np.abs(left) ** 2 - noise) / noise)
+        share = max(0.0, float(beyond / max(np.sum(size / noise), 1e-300)))
+        weight = 1 / (noise + share * size)
+    shape = _fitted(entries, values, weight, shape)
+    left = values - shape[entries.rows] * shape[entries.columns]
+    jacobian = _jacobian(entries, shape)
+    normal = jacobian.conj().T @ (weight[:, None] * jacobian)
+    covariance = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
+    free = residue.size - int(np.linalg.matrix_rank(normal, tol=1e-12 * np.trace(normal).real))
+    misfit = float(np.sum(np.abs(left) ** 2 / noise) / free) if free > 0 else float("nan")
+    wider = max(1.0, float(np.sum(weight * np.abs(left) ** 2) / free)) if free > 0 else 1.0
+    sd = np.sqrt(np.maximum(np.diag(covariance).real, 0.0) / 2 * wider)
+    return FittedShape(shape, sd, misfit, left / (2j * damped_1_s))
+
+
+def fit_halves(
+    entries: Entries, residue: np.ndarray, variance: np.ndarray, damped_1_s: float
+) -> FittedShape:
+    """As `fit_shape`, rows and columns each by themselves; points that are both give the scale."""
+    n = entries.points
+    apart = Entries(entries.rows, entries.columns + n, 2 * n)
+    found = fit_shape(apart, residue, variance, damped_1_s)
+    rows, columns = found.shape[:n], found.shape[n:]
+    felt, hit = np.isin(np.arange(n), entries.rows), np.isin(np.arange(n), entries.columns)
+    both = felt & hit
+    if not both.any():
+        return fit_shape(entries, residue, variance, damped_1_s)
+    ratio = np.vdot(rows[both], columns[both]) / max(np.linalg.norm(rows[both]) ** 2, 1e-300)
+    root = np.sqrt(complex(ratio)) or 1.0
+    shape = np.where(felt, rows * root, columns / root)
+    sd = np.where(felt, found.sd[:n] * abs(root), found.sd[n:] / abs(root))
+    return FittedShape(shape, sd, found.misfit, found.left)
+
+
+def _fitted(
+    entries: Entries, values: np.ndarray, weight: np.ndarray, shape: np.ndarray
+) -> np.ndarray:
+    """The shape that fits best, from a first one (Gauss-Newton)."""
     for _ in range(ROUNDS):
         jacobian = _jacobian(entries, shape)
         normal = jacobian.conj().T @ (weight[:, None] * jacobian)
@@ -90,15 +144,7 @@ def fit_shape(
         shape = _shortened(entries, values, weight, shape, step)
         if np.linalg.norm(step) < STILL * np.linalg.norm(shape):
             break
-    left = values - shape[entries.rows] * shape[entries.columns]
-    jacobian = _jacobian(entries, shape)
-    normal = jacobian.conj().T @ (weight[:, None] * jacobian)
-    covariance = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
-    free = residue.size - np.linalg.matrix_rank(normal, tol=1e-12 * np.trace(normal).real)
-    misfit = float(np.sum(weight * np.abs(left) ** 2) / free) if free > 0 else float("nan")
-    wider = max(1.0, misfit) if np.isfinite(misfit) else 1.0
-    sd = np.sqrt(np.maximum(np.diag(covariance).real, 0.0) / 2 * wider)
-    return FittedShape(shape, sd, misfit, left / (2j * damped_1_s))
+    return shape
 
 
 def _jacobian(entries: Entries, shape: np.ndarray) -> np.ndarray:

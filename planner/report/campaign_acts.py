@@ -63,7 +63,7 @@ class ExampleFolder(Answer):
         toml, folder = escape(self.robot), escape(self.example)
         return (
             f"An example of one's own to change is in {folder}: robot/robot.toml, "
-            f"robot/robot.urdf and campaign.toml, with comments.\n"
+            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script.\n"
             f"  planner check {toml}\n"
             f"  planner new {folder}/cell --robot {toml} --campaign {escape(self.campaign)}\n"
             f"  planner next {folder}/cell"

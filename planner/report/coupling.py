@@ -1,19 +1,22 @@
 """Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 from rich.console import Group
 from rich.text import Text
 
 from planner.errors import InputError
-from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
+from planner.milling.coupling import AMPLIFICATION_LIMIT, MOTIONS, CoupledFrf
+from planner.milling.interface import NUMBERS
 from planner.milling.verification import Resonance, VerifyingHit, resonances, verifying_hit
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.coupling_plots import coupling_figures
 from planner.report.plot_files import Pictures
-from planner.report.text import drawn, remarks, table
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ class CouplingReport(Answer):
     resonances: tuple[Resonance, ...]
     amplification: Amplification
     verify: VerifyingHit
+    contact: "dict[str, object] | msgspec.UnsetType" = msgspec.UNSET
+    simulated: bool = False
     remarks: tuple[str, ...] = ()
     plots: tuple[str, ...] = ()
     before: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
@@ -88,26 +93,44 @@ class CouplingReport(Answer):
             Text(self.verify.sentence),
             Text(f"FRFs (m/s²/N) with sd: {self.npz}"),
         ]
+        if isinstance(self.contact, dict):
+            lines.append(Text(_contact_sentence(self.contact)))
+        if self.simulated:
+            lines.append(SIMULATED)
         return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots))
 
     def with_pictures(self, pictures: Pictures) -> "CouplingReport":
         """The same, its pictures drawn."""
-        from dataclasses import replace
-
         if not pictures.wanted or self.coupled is None:
             return self
-        title = f"{self.tool} at {self.pose}"
-        figures = coupling_figures(self.before, self.coupled, title, self.reference or "holder")
+        mark = SIMULATED_TITLE if self.simulated else ""
+        title = f"{mark}{self.tool} at {self.pose}"
+        before = "as measured" if self.reference is None else f"measured: {self.reference}"
+        figures = coupling_figures(self.before, self.coupled, title, before)
         written = pictures.write(figures, self.tool)
         return replace(self, plots=tuple(written["plots"]))
+
+
+def _contact_sentence(contact: dict[str, Any]) -> str:
+    numbers = [
+        f"{name} = {contact[name]['value']:.4g} "
+        + (
+            "(not determined)"
+            if contact[name]["sd_percent"] is None
+            else f"± {contact[name]['sd_percent']:.2g} %"
+        )
+        for name in NUMBERS
+    ]
+    return (
+        f"Contact identified: {', '.join(numbers)}; misfit {contact['misfit_before_percent']:.3g} "
+        f"% as stated, {contact['misfit_percent']:.3g} % now."
+    )
 
 
 def coupling_report(
     before: CoupledFrf, coupled: CoupledFrf, tool: str, reference: str | None, pose: str, npz: Path
 ) -> CouplingReport:
     """Write the npz and say what it holds; `before` is the tested tool's tip."""
-    from planner.milling.coupling import MOTIONS
-
     save_coupled(npz, coupled, pose)
     amplification = Amplification.of(coupled.frequency_hz, coupled.amplification)
     said = [*coupled.remarks]
@@ -116,13 +139,14 @@ def coupling_report(
     held = [MOTIONS[k] for k in range(3) if k not in coupled.kept]
     if held:
         said.append(
-            f"Nothing was measured along the tool's own {', '.join(held)}: FRFs there are 0."
+            f"Nothing was measured along the tool's own {', '.join(held)}: FRFs there are NaN."
         )
     return CouplingReport(
         tool, reference, pose, str(npz.resolve()),
         (float(coupled.frequency_hz[0]), float(coupled.frequency_hz[-1])),
         len(coupled.frequency_hz), tuple(MOTIONS[k] for k in coupled.kept),
-        resonances(coupled), amplification, verifying_hit(coupled), tuple(said),
+        resonances(coupled), amplification, verifying_hit(coupled), simulated=coupled.simulated,
+        remarks=tuple(said),
         before=before, coupled=coupled,
     )  # fmt: skip
 

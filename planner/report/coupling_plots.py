@@ -7,6 +7,7 @@ from planner.milling.coupling import AMPLIFICATION_LIMIT, CoupledFrf
 from planner.report.frf_plots import AXES, MEASURED, MODEL
 from planner.report.plot_marks import panels
 
+FLOOR = 0.3  # of the least value: bands that reach below are cut off there
 MANY_DECADES = 20.0  # ratio of the band's ends from which the frequency axis is logarithmic
 
 
@@ -24,7 +25,7 @@ def coupling_figure(
 
     Below, line by line, how many times relative errors of the measured FRFs grew.
     """
-    moved = [k for k in range(3) if np.any(coupled.receptance[k, k])]
+    moved = [k for k in range(3) if np.all(np.isfinite(coupled.receptance[k, k]))]
     n = len(moved)
     layout = {"height_ratios": [1.0] * n + [0.7]}
     figure, grid = panels((4.6 * n + 2.0, 2.9 * n + 2.2), title, n + 1, n, gridspec_kw=layout)
@@ -38,8 +39,9 @@ def coupling_figure(
             panel.plot(f, 1e6 * mean, color=MODEL, lw=1.3, label="this tool, ± 2 sd")
             if before is not None:
                 size = 1e6 * np.abs(before.receptance[i, j])
-                panel.plot(f, size, color=MEASURED, lw=0.9, label=f"measured: {reference}")
+                panel.plot(f, size, color=MEASURED, lw=0.9, label=reference)
             panel.set_yscale("log")
+            panel.set_ylim(bottom=1e6 * FLOOR * mean.min())
             panel.set_title(f"response {AXES[i]}, hit {AXES[j]}", fontsize=9, loc="left", pad=3)
             panel.grid(True, which="both", alpha=0.2)
             if column == 0:

@@ -8,11 +8,15 @@ import numpy as np
 from planner.campaign.campaign import Campaign
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
+from planner.milling.contact_fit import ContactFit, fit_contact
 from planner.milling.coupling import TipReceptance
+from planner.milling.cutter_frf import read_frf
 from planner.milling.simulated_rotations import completed
 from planner.milling.tip_files import MEASURE, TipMotion, read_tip
 from planner.milling.tool import Tool
 from planner.robot.robot import Robot
+
+LINES = 1e-6  # Hz by which lines of two files may differ
 
 
 def tip_of(
@@ -61,7 +65,8 @@ def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
     mean, sd = campaign.frf(q[None], lines)
     s2 = (2j * np.pi * lines) ** 2
     motion = TipMotion(pose, lines, mean[0] / s2, sd[0] / np.abs(s2), q)
-    return completed(motion, simulation, q), pose
+    simulated = any(m.simulated for m in state.recorded)
+    return replace(completed(motion, simulation, q), simulated=simulated), pose
 
 
 def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path) -> TipReceptance:
@@ -81,3 +86,18 @@ def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path
         raise InputError(f"{source} has no two lines within {low:g} to {high:g} Hz; ask for more.")
     names = ("frequency_hz", "measured", "sd", "left", "right", "offset", "offset_sd")
     return replace(tip, **{name: getattr(tip, name)[chosen] for name in names})
+
+
+def fitted_contact(
+    tip: TipReceptance, target: Tool, tested: Tool | None, seen: Path, pose: str | None
+) -> ContactFit:
+    """The target's contact from its FRFs in a file, of the same pose and lines as the source."""
+    frf = read_frf(seen, pose if seen.suffix.lower() == ".npz" else None)
+    place = np.searchsorted(frf.frequency_hz, tip.frequency_hz - LINES)
+    place = np.minimum(place, len(frf.frequency_hz) - 1)
+    if np.any(np.abs(frf.frequency_hz[place] - tip.frequency_hz) > 2 * LINES):
+        raise InputError(
+            f"{seen} does not hold the lines of the source, {tip.frequency_hz[0]:.4g} to "
+            f"{tip.frequency_hz[-1]:.4g} Hz; export the same grid, or name a band by --band-hz."
+        )
+    return fit_contact(tip, target, tested, frf.receptance[..., place])

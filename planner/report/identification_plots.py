@@ -53,6 +53,7 @@ def identification_figures(
                 lines,
                 "pose, in recorded order",
                 f"{mark}Map of H {axis}{axis}, {when} identification",
+                names=[pose.name for pose in poses],
             )
     for pose in sorted(poses, key=lambda pose: not pose.held_out)[:most]:
         name = re.sub(r"[^\w.-]", "_", pose.name)

@@ -3,18 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group
+from rich.text import Text
 
 from planner.errors import PlannerError
 from planner.frf.matrix import FrfMatrix, matrix_of
-from planner.modal.matrix_modes import MatrixMode, MatrixModes, modes_of_matrix
+from planner.modal.matrix_modes import MatrixMode, MatrixModes, modes_of_matrix, with_normal_modes
 from planner.recording.dof import Dof
 from planner.recording.geometry import read_geometry
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Record
 from planner.report.answer import Answer, RefusedFile
-from planner.report.modal_analysis import check_options, sources_of
+from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN, check_options, sources_of
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
 
@@ -26,7 +28,8 @@ class MatrixShape:
     """A mode of a matrix of FRFs; `shape` is [re, im] per degree of freedom, in their order.
 
     In kg^-1/2 (unit modal mass) where `scaled`, else of unit length; `shape_sd` is of real and
-    imaginary part each. `modal_mass_kg` belongs to the shape with largest component 1.
+    imaginary part each. `modal_mass_kg` belongs to the shape with largest component 1,
+    `scatter_hz` is how the frequency differs from set to set (sd).
     """
 
     frequency_hz: float
@@ -40,6 +43,7 @@ class MatrixShape:
     mpc: float
     mpd_deg: float
     modal_mass_kg: float
+    scatter_hz: float
 
     @classmethod
     def of(cls, mode: MatrixMode) -> "MatrixShape":
@@ -49,7 +53,7 @@ class MatrixShape:
             tuple((float(s.real), float(s.imag)) for s in mode.shape),
             tuple(float(sd) for sd in mode.shape_sd),
             mode.scaled, mode.probability, mode.collinearity, mode.deviation_deg,
-            mode.modal_mass_kg,
+            mode.modal_mass_kg, mode.scatter_hz,
         )  # fmt: skip
 
 
@@ -71,6 +75,7 @@ class MatrixReport(Answer):
     accepted: tuple[str, ...]
     remarks: tuple[str, ...]
     simulated: bool
+    exports: tuple[str, ...] = ()
     plots: tuple[str, ...] = ()
     rrd: str | None = None
 
@@ -86,6 +91,7 @@ class MatrixReport(Answer):
         for k, mode in enumerate(self.modes):
             made.add_row(str(k + 1), *self._cells(mode))
         parts = [made, *remarks(self.remarks), *drawn(self.plots, self.rrd)]
+        parts += [Text("\n  ".join(["Files:", *self.exports]))] if self.exports else []
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
     def _cells(self, mode: MatrixShape) -> tuple[str, ...]:
@@ -107,10 +113,14 @@ def matrix_report(
     band_hz: tuple[float, float] | None,
     quantity: str | None,
     pictures: Pictures,
+    real: bool = False,
+    files_to: Path | None = None,
 ) -> MatrixReport | None:
     """Analyse files of FRFs between any points; None where they are no such matrix.
 
-    They are then hits of one pose, or all three responses of one point, and read elsewhere.
+    They are then hits of one pose, or all three responses of one point, and read elsewhere. With
+    `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder for
+    universal files and tables.
     """
     files = [source.path for source in sources_of(paths)]
     if not any(isinstance(record, FrfRecord) for record in _first(files)):
@@ -122,19 +132,22 @@ def matrix_report(
     check_options(band_hz, quantity=quantity)
     matrix = matrix_of(frfs, quantity)
     found = modes_of_matrix(matrix, band_hz)
+    if real:
+        found = with_normal_modes(found)
     return MatrixReport(
         modes=tuple(MatrixShape.of(mode) for mode in found.modes),
         dofs=tuple(named(dof) for dof in found.dofs),
         references=tuple(named(dof) for dof in matrix.references),
         frfs=matrix.count,
         band_hz=found.band_hz,
-        fit_error=found.fit_error,
-        order=found.order,
+        fit_error=found.found.fit_error,
+        order=found.found.order,
         refused=refused,
         accepted=tuple(str(path) for path in held),
         remarks=found.remarks,
         simulated=matrix.simulated,
-        **_draw(pictures, matrix, found),
+        exports=_export(matrix, found, files, real, files_to),
+        **_draw(pictures, matrix, found, files),
     )
 
 
@@ -143,8 +156,34 @@ def named(dof: Dof) -> tuple[int | str, str]:
     return (int(dof.node) if dof.node.lstrip("-").isdigit() else dof.node), dof.direction
 
 
-def _draw(pictures: Pictures, matrix: FrfMatrix, found: MatrixModes) -> dict:
-    return {"plots": (), "rrd": None}
+def _export(
+    matrix: FrfMatrix, found: MatrixModes, files: Sequence[Path], real: bool, folder: Path | None
+) -> tuple[str, ...]:
+    """Write files for other programs, where wanted; where they are."""
+    if folder is None:
+        return ()
+    from planner.report.matrix_files import Exported, export
+
+    what = Exported(matrix, found, read_geometry(tuple(files)), real)
+    return tuple(str(path) for path in export(what, folder.absolute()))
+
+
+def _draw(
+    pictures: Pictures, matrix: FrfMatrix, found: MatrixModes, files: Sequence[Path]
+) -> dict[str, Any]:
+    """Draw what is wanted; where it is."""
+    if not pictures.wanted:
+        return NOT_DRAWN
+    from planner.report.matrix_plots import matrix_figures
+    from planner.report.shape_motion import animate
+
+    name = files[0].name[-LONGEST_NAME:] + (f" and {len(files) - 1} more" if files[1:] else "")
+    geometry = read_geometry(tuple(files))
+    drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name)
+    if geometry is not None and pictures.folder is not None:
+        moving = animate(found, geometry, pictures.folder.absolute())
+        drawn["plots"] = [*drawn["plots"], *map(str, moving)]
+    return drawn
 
 
 def _first(files: Sequence[Path]) -> tuple[Record, ...]:

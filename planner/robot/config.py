@@ -171,10 +171,15 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
-    With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
-    own stiffness, of the size of weight times height, is added: so it is unless robot.toml says
-    false (None is what it says where it says nothing; `load_config` puts a bool there).
-    `stiffness_sd_percent` is how well each stated stiffness is known (None: as the caller thinks),
+    `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
+    `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
+    m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
+    `held` says where joints stay that do not move in the tests, as rails and turntables:
+    NAME_m = 1.2 for a sliding one, NAME_deg = 30 for a turning one.
+
+    Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
+    gravity's own stiffness, of the size of weight times height, is added.
+    `stiffness_sd_percent` is how well each stated stiffness is known,
     `stiffness_bias_sd_percent` by how much all of them may be off together, as gear makers' are.
     """
 
@@ -184,7 +189,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor_frame: str
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
-    geometric_stiffness: bool | None = None
+    held: dict[str, float] = {}
+    geometric_stiffness: bool | None = None  # a bool once `load_config` has read it
     stiffness_sd_percent: float | None = None
     stiffness_bias_sd_percent: float | None = None
     compliance: tuple[Compliance, ...] = ()

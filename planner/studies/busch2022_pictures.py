@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.studies import drawing
-from planner.studies.busch2022_data import FREQUENCY_MODELS, FUSIONS, KERNELS
+from planner.studies.busch2022_data import COMPARED, FREQUENCY_MODELS, KERNELS
 
 FLOOR = -0.2  # of R² in bars; less is drawn cut off
 
@@ -52,12 +52,12 @@ def _figure_8(eight: np.ndarray, shown: tuple[int, ...]) -> Figure:
     panels = figure.subplots(2, modes, sharex=True)
     for k in range(modes):
         upper, lower = panels[:, k]
-        drawing.curves(upper, counts, FUSIONS, np.maximum(eight[:, k, :, 0], FLOOR))
+        drawing.curves(upper, counts, COMPARED, np.maximum(eight[:, k, :, 0], FLOOR))
         upper.axhline(0.9, color="black", ls="--", lw=0.8)
         upper.set_ylim(FLOOR - 0.03, 1.05)
         upper.set_title(f"mode {k + 1}", fontsize=10)
-        drawing.curves(lower, counts, FUSIONS, eight[:, k, :, 1])
-        lower.set_ylim(bottom=0)
+        drawing.curves(lower, counts, COMPARED, eight[:, k, :, 1])
+        lower.set_ylim(0, 1.1 * float(np.quantile(eight[..., 1], 0.97)))
         lower.set_xlabel("poses N")
         lower.set_xticks(counts[::2] if len(counts) > 5 else counts)
     panels[0, 0].set_ylabel(f"R² (below {FLOOR:g}: drawn there)")

@@ -6,7 +6,7 @@ from planner.errors import InputError
 from planner.progress import Tell
 from planner.studies.report import Report
 
-NAMES = ("busch2022", "busch2020", "seyedhosseini2025", "lei2023")
+NAMES = ("busch2022", "busch2020", "seyedhosseini2025", "lei2023", "birk2025")
 ALL = "all"
 ALIASES = {f"seed-00{i}": name for i, name in enumerate(NAMES)}  # what they were called before
 Study = Callable[[Tell, bool], Report]  # progress, and whether the small version is wanted

@@ -109,10 +109,12 @@ def test_taper_converges_with_the_fourth_power_of_the_slices(monkeypatch):
     found = []
     for slices in (4, 8, 64):
         monkeypatch.setattr(beam, "SLICES", slices)
+        beam._segment.cache_clear()
         found.append(free_free([segment], omega)[0, 0, 0])
     rough, finer, fine = found
     assert abs(finer - fine) < abs(rough - fine) / 12
     monkeypatch.undo()
+    beam._segment.cache_clear()
     assert free_free([segment], omega)[0, 0, 0] == pytest.approx(fine, rel=1e-5)
 
 

@@ -134,7 +134,14 @@ def test_a_missing_point_is_named(few, tmp_path):
 def test_motions_alone_are_refused_with_what_to_measure(coupled, tmp_path):
     with np.load(coupled["npz"]) as stored:
         keys = ("frequency_hz", "frf_mean", "frf_sd", "pose")
-        np.savez(tmp_path / "alone.npz", **{name: stored[name] for name in keys})
+        alone = {name: stored[name] for name in keys}
+    np.savez(tmp_path / "lacking.npz", **alone)
+    code, said = answered(tmp_path / "lacking.npz", *PAIR, "--out", tmp_path / "a.npz")
+    assert code == 2
+    assert "measure what lacks" in said
+    for name in ("frf_mean", "frf_sd"):
+        alone[name] = np.nan_to_num(alone[name])
+    np.savez(tmp_path / "alone.npz", **alone)
     code, said = answered(tmp_path / "alone.npz", *PAIR, "--out", tmp_path / "a.npz")
     assert code == 2
     assert "two points" in said

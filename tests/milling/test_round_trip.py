@@ -62,16 +62,34 @@ def test_all_sixteen_within_five_percent():
     worst = at_peaks(found, truth)
     assert worst.max() < 0.05
     assert worst[:2, :2].max() < 0.01
-    assert scatter(found, truth) == pytest.approx(1.0, abs=0.35)
+    assert 0.5 < scatter(found, truth) < 1.6  # of few numbers: nine modes err, not 528 lines
     assert any("common modes" in remark for remark in found.remarks)
+
+
+@pytest.mark.slow
+def test_all_sixteen_of_twenty_noises():
+    """How often, and how sure: printed for the record."""
+    worst, sure = [], []
+    for seed in range(100, 120):
+        found, truth = changed(machine(seed=seed), seed=seed)
+        worst.append(at_peaks(found, truth))
+        sure.append(scatter(found, truth))
+    motions, whole = (np.max(np.array(worst)[:, :n, :n], axis=(1, 2)) for n in (2, 4))
+    print(
+        f"worst motions {np.sort(100 * motions).round(2)} %, all {np.sort(100 * whole).round(1)} %"
+    )
+    print(f"errors in sds {np.sort(sure).round(2)}")
+    assert np.max(motions) < 0.05
+    assert np.count_nonzero(whole < 0.05) >= 16
+    assert 0.6 < np.median(sure) < 1.4
 
 
 @pytest.mark.parametrize(
     ("base", "put", "held"),
     [
-        (machine(), TARGET, SOFT),
+        pytest.param(machine(), TARGET, SOFT, marks=pytest.mark.slow),
         (machine(split=1.01), TARGET, LOOSER),
-        (machine(cross=1.0, seed=2), TARGET, LOOSER),
+        pytest.param(machine(cross=1.0, seed=2), TARGET, LOOSER, marks=pytest.mark.slow),
     ],
     ids=["soft contact", "close modes", "strong cross coupling"],
 )
@@ -117,7 +135,7 @@ def test_as_many_modes_as_the_noise_shows():
     found = fit(FREQUENCY, seen, 0.01 * np.abs(exact))
     assert found is not None
     inside = np.abs(found.poles) < 2 * np.pi * FREQUENCY[-1]
-    assert np.count_nonzero(inside) == 8
+    assert 8 <= np.count_nonzero(inside) <= 9  # of two poles for one mode neither looks idle
     error = np.abs(found.receptance - exact)
     assert np.sqrt(np.mean((error / found.sd) ** 2)) == pytest.approx(1.0, abs=0.35)
     assert np.median(error / np.abs(exact)) < 0.002

@@ -10,7 +10,16 @@ from planner.campaign.events import Configured, Entry, Imported, Proposed, Undon
 from planner.campaign.state import Measurement
 from planner.check.remark import CheckRemark
 from planner.report.page.facts import Facts
-from planner.report.page.html import Markup, bullets, joined, paragraphs, section, table, tag
+from planner.report.page.html import (
+    Markup,
+    bullets,
+    joined,
+    paragraphs,
+    section,
+    table,
+    tag,
+    words_table,
+)
 from planner.report.text import number
 from planner.report.text import with_sd as pm
 from planner.version import __version__
@@ -92,16 +101,19 @@ def measured(facts: Facts) -> Markup:
     refused = [(r.pose, r.file, r.reason) for r in facts.status.refused]
     if refused:
         parts += [tag("h3", f"Refused, kept and not used: {len(refused)}"),
-                  _words(("pose", "file", "why"), refused)]  # fmt: skip
+                  words_table(("pose", "file", "why"), refused)]  # fmt: skip
     held = [(h.measured.pose, h.question.question.text) for h in facts.status.held]
     if held:
-        parts += [tag("h3", "Held until a question is answered"), _words(("pose", "asked"), held)]
+        parts += [
+            tag("h3", "Held until a question is answered"),
+            words_table(("pose", "asked"), held),
+        ]
     skipped = [(s.pose, s.reason or "–") for s in facts.status.skipped]
     if skipped:
-        parts += [tag("h3", "Not measured"), _words(("pose", "why"), skipped)]
+        parts += [tag("h3", "Not measured"), words_table(("pose", "why"), skipped)]
     said = [(m.pose, text) for m in state.recorded for text in m.remarks]
     if said:
-        parts += [tag("h3", "Remarks on recordings"), _words(("pose", "remark"), said)]
+        parts += [tag("h3", "Remarks on recordings"), words_table(("pose", "remark"), said)]
     return section("What was measured, and what was refused", *parts, id_="measured")
 
 
@@ -116,11 +128,6 @@ def _pose(m: Measurement, starred: bool) -> list[object]:
     ]  # fmt: skip
 
 
-def _words(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> Markup:
-    made = table(header, rows)
-    return Markup(made.replace("<table>", '<table class="words">', 1))
-
-
 def decisions(facts: Facts) -> Markup:
     """The log, entry by entry."""
     undone = {e.event.act for e in facts.campaign.entries if isinstance(e.event, Undone)}
@@ -128,7 +135,9 @@ def decisions(facts: Facts) -> Markup:
     for entry in facts.campaign.entries:
         mark = " (taken back)" if entry.seq in undone else ""
         rows.append((str(entry.seq), entry.time[:19].replace("T", " "), act(entry) + mark))
-    return section("Log of decisions", _words(("entry", "time (UTC)", "what"), rows), id_="log")
+    return section(
+        "Log of decisions", words_table(("entry", "time (UTC)", "what"), rows), id_="log"
+    )
 
 
 def act(entry: Entry) -> str:
@@ -169,7 +178,7 @@ def reproduce(facts: Facts) -> Markup:
     listing = tag(
         "details",
         tag("summary", f"SHA-256 of {len(rows)} files that these numbers come from"),
-        _words(("file", "SHA-256"), rows),
+        words_table(("file", "SHA-256"), rows),
     )
     config = tag("pre", (campaign.directory / "campaign.toml").read_text("utf-8", "replace"))
     text = (

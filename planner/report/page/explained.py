@@ -8,12 +8,6 @@ from planner.errors import InputError
 from planner.report.page.html import Markup, bullets, joined, picture, section, table, tag
 
 KEPT = "diagnosis.json"  # as `diagnose --out` writes it
-VERDICTS = {
-    "consistent": "The simulation, once its own parameters are fitted, explains the recordings to "
-    "within their noise.",
-    "explained": "The simulation lacks physics that was found; with that it explains them.",
-    "unexplained": "Simulation and recordings differ, and no effect known here explains all of it.",
-}
 LEAST_SHOWN = 5e-4  # of a probability in the table: 0.05 %
 MOST_PICTURES = 4
 
@@ -32,7 +26,7 @@ def diagnosis_of(directory: Path, given: Path | None) -> Path | None:
 def diagnosis(file: Path) -> Markup:
     """Verdict, findings, what else was considered, agreement."""
     found = _read(file)
-    parts: list[object] = [tag("p", tag("b", VERDICTS.get(found["verdict"], found["verdict"])))]
+    parts: list[object] = [tag("p", tag("b", found.get("verdict_text", found["verdict"])))]
     for finding in found["findings"]:
         parts.append(tag("p", finding["text"]))
         rows = [

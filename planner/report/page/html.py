@@ -47,6 +47,11 @@ def table(header: Sequence[object], rows: Iterable[Sequence[object]], caption: s
     return tag("div", tag("table", *said, head, body), class_="scroll")
 
 
+def words_table(header: Sequence[object], rows: Iterable[Sequence[object]]) -> Markup:
+    """A table of words, whose lines break."""
+    return Markup(table(header, rows).replace("<table>", '<table class="words">', 1))
+
+
 def _cell(cell: object) -> Markup:
     if not isinstance(cell, list):
         return tag("td", cell)
