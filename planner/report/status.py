@@ -129,9 +129,9 @@ class DecisionStatus:
         p = self.stable_probability
         least = int(np.argmin(np.abs(p - 0.5)))
         stable, not_stable = np.sum(p >= self.probability), np.sum(1 - p >= self.probability)
+        at = f"{self.speed_rpm:g} rpm and {1e3 * self.depth_m:g} mm"
         said = (
-            f"The cut at {self.speed_rpm:g} rpm and {1e3 * self.depth_m:g} mm is stable at {stable} "
-            f"of {len(p)} poses, not stable at {not_stable}, undecided at "
+            f"The cut at {at} is stable at {stable} of {len(p)} poses, not stable at {not_stable}, undecided at "
             f"{len(p) - stable - not_stable} (with {100 * self.probability:g} % probability each); "
             f"least sure is pose {least + 1}, stable with {100 * p[least]:.0f} %. "
         )
