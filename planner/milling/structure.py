@@ -112,6 +112,6 @@ def beyond(structure: Structure, chatter_hz: np.ndarray) -> str | None:
     if not count:
         return None
     return (
-        f"At {count} speeds the cut would chatter outside the FRFs' {lines[0]:g} to {lines[-1]:g} "
-        f"Hz, where the fitted modes only guess: measure there too."
+        f"At {count} of the speeds the cut would chatter outside the FRFs' {lines[0]:g} to "
+        f"{lines[-1]:g} Hz, where the fitted modes only guess: measure there too."
     )

@@ -131,9 +131,10 @@ class DecisionStatus:
         stable, not_stable = np.sum(p >= self.probability), np.sum(1 - p >= self.probability)
         at = f"{self.speed_rpm:g} rpm and {1e3 * self.depth_m:g} mm"
         said = (
-            f"The cut at {at} is stable at {stable} of {len(p)} poses, not stable at {not_stable}, undecided at "
-            f"{len(p) - stable - not_stable} (with {100 * self.probability:g} % probability each); "
-            f"least sure is pose {least + 1}, stable with {100 * p[least]:.0f} %. "
+            f"The cut at {at} is stable at {stable} of {len(p)} poses, not stable at "
+            f"{not_stable}, undecided at {len(p) - stable - not_stable} (with "
+            f"{100 * self.probability:g} % probability each); least sure is pose {least + 1}, "
+            f"stable with {100 * p[least]:.0f} %. "
         )
         if self.sure:
             return said + "The decision is sure."
