@@ -129,3 +129,17 @@ def test_robust_depth_is_that_of_the_coefficients_alone():
     assert np.all(both.robust() < depth)
     assert np.all(np.diag(both.probability(depth * 0.5)) > 0.98)
     assert np.all(np.diag(both.probability(depth * 2)) < 0.1)
+
+
+def test_samples_between_speeds_follow_what_is_expected(monkeypatch):
+    """Looked at at a few speeds only, robust depths keep the dips of the limit between them."""
+    from planner.milling import uncertainty
+
+    monkeypatch.setattr(uncertainty, "MOST_SPEEDS", 4)
+    given = cut(spindle_rpm=(9300.0, 10700.0, 10))
+    structure = Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, 0.0, 0.1])))
+    found = losses(structure.machine(given))
+    drawn = sampled_limits(structure.samples(given, 20), found)
+    depth = np.array([loss.depth_m for loss in found])
+    share = drawn.robust() / depth
+    np.testing.assert_allclose(share, share[0], rtol=0.01)
