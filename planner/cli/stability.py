@@ -43,7 +43,7 @@ def stability(
 ) -> int:
     """To which depth a cut is stable at each spindle speed, and how it chatters beyond.
 
-    Example: planner stability cell7 --cut cut.toml --plot pictures
+    Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.cli.progress import counting
     from planner.report.plot_files import Pictures
