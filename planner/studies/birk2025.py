@@ -16,7 +16,7 @@ from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.identification.identify import identify
+from planner.identification.identify import QUICK, THOROUGH, identify
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS, Priors
 from planner.identification.result import Identification
@@ -87,6 +87,7 @@ def _model(hits: PathHits, which: np.ndarray, name: str, small: bool) -> Model:
         CAD_INERTIAS if ours else Priors(),
         band_hz=BAND_HZ,
         starts=1 if small else STARTS,
+        effort=QUICK if small else THOROUGH,
         tolerances=Tolerances.of(nominal.robot.config) if ours else None,
     )
     agreed = [_agreement(hits, found.simulation, band) for band in (BAND_HZ, FULL_HZ)]
