@@ -65,6 +65,8 @@ class HitRecord(msgspec.Struct, frozen=True):
     accepted: bool = True
     reason: str = ""
     simulated: bool = False
+    hit_point: str = ""  # as the table of recordings named it, "" where it did not
+    response_points: tuple[str, ...] = ()
 
 
 class MeasuredMode(msgspec.Struct, frozen=True):

@@ -155,7 +155,7 @@ def measure_files(
 ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
     """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
     new = tuple(
-        Source(store.recording_path(directory, digest, suffix), s.name, s.hit, s.repeat)
+        Source(store.recording_path(directory, digest, suffix), s.name, s.hit, s.repeat, s.stated)
         for s, digest, suffix in fresh
     )
     measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
@@ -169,6 +169,8 @@ def measure_files(
             accepted=verdict.accepted,
             reason=verdict.reason,
             simulated=verdict.simulated,
+            hit_point=source.stated.hit_point,
+            response_points=source.stated.response_points,
         )
         for verdict, (source, digest, suffix) in zip(
             measured.verdicts[len(old) :], fresh, strict=True

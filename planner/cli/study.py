@@ -29,6 +29,8 @@ def study(
     """Do a paper's study again on simulated recordings: tables, pictures, what holds.
 
     `all` keeps each finished study in FOLDER and does not run it again.
+
+    Example: planner study busch2022 --out figures
     """
     from planner.cli.progress import counting
     from planner.studies import registry

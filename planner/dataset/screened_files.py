@@ -1,10 +1,11 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from planner.errors import PlannerError
-from planner.recording.records import FrfRecord, Hit, Record
+from planner.recording.points import StatedPoints
+from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 
 
 @dataclass(frozen=True)
@@ -15,6 +16,24 @@ class Source:
     name: str
     hit: str | None = None
     repeat: int | None = None
+    stated: StatedPoints = field(default_factory=StatedPoints)
+
+    @classmethod
+    def of(cls, row: PoseRow) -> "Source":
+        """The file that a row of the table names."""
+        assert row.file is not None
+        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated)
+
+    def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
+        """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
+        from planner.recording.hits import hits_from, located
+        from planner.recording.read import read
+
+        records: tuple[Record, ...] = read(self.path)
+        frfs = [record for record in records if isinstance(record, FrfRecord)]
+        if frfs:
+            return (), tuple(located(record, self.stated) for record in frfs)
+        return hits_from(records, self.hit, self.stated), ()
 
 
 @dataclass(frozen=True)
@@ -60,17 +79,13 @@ def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> Scr
 def _read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[Verdict, tuple[Hit, ...], list[FrfRecord]]:
-    from planner.recording.hits import hits_from
-    from planner.recording.read import read
     from planner.recording.screening import ScreeningLimits, screen
 
     try:
-        records: tuple[Record, ...] = read(source.path)
-        frfs = [record for record in records if isinstance(record, FrfRecord)]
+        found, frfs = source.read()
         if frfs:
             simulated = any(record.simulated for record in frfs)
-            return Verdict(source, True, "", source.hit, simulated), (), frfs
-        found = hits_from(records, axis=source.hit)
+            return Verdict(source, True, "", source.hit, simulated), (), list(frfs)
     except PlannerError as error:
         return Verdict(source, False, renamed(str(error), (source,))), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)

@@ -55,8 +55,9 @@ def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
         )
     for i, samples in enumerate(hit.acceleration_m_s2):
         if not np.any(samples - samples[0]):
+            name = hit.label(i)
             faults.append(
-                Fault("dead", f"The acceleration along {AXES[i]} is constant; check its cable.")
+                Fault("dead", f"The acceleration along {name} is constant; check its cable.")
             )
     return faults
 
@@ -65,7 +66,7 @@ def _clipping(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
     """Overload leaves the top flat: several neighbouring samples equal to the last digit."""
     faults = []
     channels = [("force", hit.force_n)]
-    channels += [(f"acceleration {a}", s) for a, s in zip(AXES, hit.acceleration_m_s2, strict=True)]
+    channels += [(f"acceleration {hit.label(i)}", s) for i, s in enumerate(hit.acceleration_m_s2)]
     for name, samples in channels:
         for sense in (1.0, -1.0):
             top = float(np.max(sense * samples))
@@ -181,10 +182,24 @@ def screen_repeats(
 ) -> tuple[tuple[Fault, ...], ...]:
     """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
 
-    Judged only where three hits or more were made along an axis; a robust vote needs a majority.
-    What a careful hand misses by is no disagreement, and what only sets one force level apart from
-    another may be the structure: that is for the diagnosis to say.
+    Only hits at one point that the same sensors heard are compared, and where three or more were
+    made along an axis; a robust vote needs a majority. What a careful hand misses by is no
+    disagreement, and what only sets one force level apart from another may be the structure: that
+    is for the diagnosis to say.
     """
+    faults: list[tuple[Fault, ...]] = [() for _ in hits]
+    for place in {(hit.hit_point, hit.responses) for hit in hits}:
+        own = [i for i, hit in enumerate(hits) if (hit.hit_point, hit.responses) == place]
+        found = _screen_alike(tuple(hits[i] for i in own), band_hz)
+        for i, one in zip(own, found, strict=True):
+            faults[i] = one
+    return tuple(faults)
+
+
+def _screen_alike(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[Fault, ...], ...]:
+    """The same of hits at one point that the same sensors heard."""
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
     if len({len(hit.force_n) for hit in hits}) > 1:
         return tuple(faults)

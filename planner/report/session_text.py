@@ -17,6 +17,7 @@ a, Enter  import the hits that wait          r  set the waiting hits aside, do n
 k         skip this pose, do not offer it    n  propose anew
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
+LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
 SIMULATED = "SIMULATED RECORDINGS: nothing here was measured on a real robot"
 
 
@@ -116,7 +117,7 @@ def uncertainty_line(model: Model) -> Text:
 def progress_line(
     history: list[float], target: float, seconds_per_pose: float | None, minimum: int
 ) -> Text:
-    """Time per pose, and about how long until the target, judging by the trend so far.
+    """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
     `history` is the overall sd (%) after each measurement; it falls about geometrically.
     """
@@ -124,21 +125,42 @@ def progress_line(
     if seconds_per_pose is not None:
         parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
     left = poses_to_go(history, target, minimum)
-    if left == 0:
-        parts.append("target reached")
+    if left == (0, 0):
+        parts.append("overall sd below the target")
     elif left is not None:
-        parts.append(f"about {left} more pose{'s' if left > 1 else ''}")
+        parts.append(f"{_span(left)} more pose{'s' if left != (1, 1) else ''} by the trend so far")
         if seconds_per_pose is not None:
-            parts.append(f"about {left * seconds_per_pose / 60:.0f} min to go")
+            minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
+            rounded = [None if m is None else max(1, round(m)) for m in minutes]
+            parts.append(f"{_span((rounded[0] or 1, rounded[1]))} min to go")
+    elif len(history) > 1:
+        parts.append("no trend yet that tells how many more it takes")
     return Text("; ".join(parts))
 
 
-def poses_to_go(history: list[float], target: float, minimum: int) -> int | None:
-    """Poses until `history` falls to `target`; None while there is no trend to judge by."""
+def _span(of: tuple[int, int | None]) -> str:
+    low, high = of
+    if high is None:
+        return f"{low} or more"
+    return f"{low}" if low == high else f"{low} to {high}"
+
+
+def poses_to_go(history: list[float], target: float, minimum: int) -> tuple[int, int | None] | None:
+    """From how many to how many poses until `history` falls to `target`.
+
+    By its mean fall and the standard error of that; None at the end where that is beyond
+    MOST_TOLD, None as a whole where there is no trend to judge by or all of it is beyond.
+    """
     missing = max(0, minimum - len(history))
     if history and history[-1] <= target:
-        return missing
-    if len(history) < 2 or history[-1] >= history[0]:
+        return missing, missing
+    if len(history) < LEAST_TREND:
         return None
-    rate = np.log(history[-1] / history[0]) / (len(history) - 1)
-    return max(missing, int(np.ceil(np.log(target / history[-1]) / rate)))
+    falls = -np.diff(np.log(history))
+    mean, error = float(np.mean(falls)), float(np.std(falls, ddof=1) / np.sqrt(len(falls)))
+    far = float(np.log(history[-1] / target))
+    if mean <= error or far / (mean + error) > MOST_TOLD:
+        return None
+    quick = max(missing, 1, int(np.ceil(far / (mean + error))))
+    slow = int(np.ceil(far / (mean - error)))
+    return quick, (None if slow > MOST_TOLD else max(quick, slow))
