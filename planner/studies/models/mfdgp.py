@@ -235,8 +235,8 @@ def bound(layers: tuple[Layer, Layer], data: TwoLevelData, seed: int, draws: int
 
 @jax_setup.compiled("quick", static_argnums=(6, 7))
 def _climbed(
-    layers: tuple[Layer, Layer], data: TwoLevelData, seed: int, rate: float, free: float, steps: int,
-    batch: int, draws: int,
+    layers: tuple[Layer, Layer], data: TwoLevelData, seed: int, rate: float, free: float,
+    steps: int, batch: int, draws: int,
 ) -> tuple[Layer, Layer]:  # fmt: skip
     """So many steps of Adam; with `free` 0 noises and the spread of q stay, with 1 all moves."""
     n_low, n_high, key = len(data.y_low), len(data.y_high), jax.random.key(seed)
