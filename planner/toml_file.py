@@ -39,12 +39,19 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
 
 
 def _not_finite(value: Any, where: str = "") -> str | None:
-    """Where the first nan or inf stands, as `stop.probability`; None: nowhere."""
+    """Where the first nan or inf stands, as `[stop] probability`; None: nowhere."""
+    if isinstance(value, float):
+        return None if math.isfinite(value) else where
+    parts: list[tuple[str, Any]] = []
     if isinstance(value, dict):
-        parts = [(f"{where}.{key}" if where else key, v) for key, v in value.items()]
+        for key, item in value.items():
+            if isinstance(item, dict):
+                parts.append((f"{where} [{key}]".strip(), item))
+            elif isinstance(item, list) and item and isinstance(item[0], dict):
+                numbered = enumerate(item, 1)
+                parts += [(f"{where} [[{key}]] number {i}".strip(), one) for i, one in numbered]
+            else:
+                parts.append((f"{where} {key}".strip(), item))
     elif isinstance(value, list):
-        parts = [(f"{where}[{number}]", v) for number, v in enumerate(value, 1)]
-    else:
-        finite = not isinstance(value, float) or math.isfinite(value)
-        return None if finite else where
+        parts = [(where, item) for item in value]
     return next((found for name, v in parts if (found := _not_finite(v, name))), None)
