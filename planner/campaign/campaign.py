@@ -24,6 +24,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged, frf_key
 from planner.campaign.state import last_act
 from planner.errors import InputError
@@ -165,6 +166,10 @@ class Campaign(CampaignReads):
             self._append(Undone(entry.seq))
             return entry
 
+    def holding(self):
+        """A context in which nobody else can act in this campaign; InputError names who does."""
+        return self._journal.holding(wait_s=1.0)
+
     # -- inside --------------------------------------------------------------------------------
 
     def _acting(self):
@@ -202,6 +207,7 @@ class Campaign(CampaignReads):
             ImportReport,
             displacement,
             keep_files,
+            lacking,
             measure_files,
             not_used,
             taken_after_all,
@@ -254,6 +260,7 @@ class Campaign(CampaignReads):
                 *measured.remarks,
                 *taken_after_all(state, kept.fresh),
                 *displacement(state, delivery, stood),
+                *lacking(state, measurement),
                 *model.remarks,
             ),
             left_out=kept.left_out,
@@ -270,6 +277,7 @@ class _Acting:
 
     def __enter__(self) -> None:
         self._lock.__enter__()
+        remove_parts(self._campaign.directory / store.RECORDINGS)
         try:
             self._campaign._log_configuration()
         except BaseException:

@@ -1,5 +1,6 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -56,28 +57,10 @@ class Cell:
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
+        _check_angles(robot, config)
         table = config.cut
         cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
-        made = cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
-        made._check_angles()
-        return made
-
-    def _check_angles(self) -> None:
-        """InputError where joint angles in campaign.toml do not suit the robot."""
-        joints = len(self.robot.joint_names)
-        for where, poses in (
-            ("[goal] joints_deg", self.config.goal.joints_deg),
-            ("[acquisition] own_poses_deg", self.config.acquisition.own_poses_deg),
-            ("[cut] joints_deg", self.config.cut.joints_deg if self.config.cut else None),
-        ):
-            for number, pose in enumerate(poses or [], 1):
-                self.check_pose(tuple(pose), f"{where}, pose {number}")
-        for zone in self.config.forbidden:
-            if zone.joints_deg is not None and len(zone.joints_deg) != joints:
-                raise InputError(
-                    f"[[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the robot "
-                    f"{joints} joints; give one range a joint."
-                )
+        return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -157,22 +140,44 @@ class Cell:
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad; InputError if the robot cannot stand there."""
-        if len(joints_deg) != len(self.robot.joint_names):
+        return _checked_pose(self.robot, joints_deg, where)
+
+
+def _checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
+    """The pose (dof,) in rad; InputError if the robot cannot stand there."""
+    if len(joints_deg) != len(robot.joint_names):
+        raise InputError(
+            f"{where}: {len(joints_deg)} joint angles are given, the robot has "
+            f"{len(robot.joint_names)} joints; correct the columns."
+        )
+    q = np.deg2rad(np.asarray(joints_deg, dtype=float))
+    tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
+    over = np.maximum(robot.lower_rad - q, q - robot.upper_rad)
+    worst = int(np.argmax(over))
+    if over[worst] > tolerance:
+        low, high = np.rad2deg([robot.lower_rad[worst], robot.upper_rad[worst]])
+        raise InputError(
+            f"{where}: {robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
+            f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
+        )
+    return q
+
+
+def _check_angles(robot: Robot, config: CampaignConfig) -> None:
+    """Hold the joint angles that campaign.toml names against the robot; InputError."""
+    for where, poses in (
+        ("[goal] joints_deg", config.goal.joints_deg),
+        ("[acquisition] own_poses_deg", config.acquisition.own_poses_deg),
+        ("[cut] joints_deg", config.cut.joints_deg if config.cut else None),
+    ):
+        for number, pose in enumerate(poses or (), 1):
+            _checked_pose(robot, pose, f"campaign.toml, {where}, pose {number}")
+    for zone in config.forbidden:
+        if zone.joints_deg is not None and len(zone.joints_deg) != len(robot.joint_names):
             raise InputError(
-                f"{where}: {len(joints_deg)} joint angles are given, the robot has "
-                f"{len(self.robot.joint_names)} joints; give one angle a joint."
+                f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the "
+                f"robot {len(robot.joint_names)} joints; give one range a joint."
             )
-        q = np.deg2rad(np.asarray(joints_deg, dtype=float))
-        tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
-        over = np.maximum(self.robot.lower_rad - q, q - self.robot.upper_rad)
-        worst = int(np.argmax(over))
-        if over[worst] > tolerance:
-            low, high = np.rad2deg([self.robot.lower_rad[worst], self.robot.upper_rad[worst]])
-            raise InputError(
-                f"{where}: {self.robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
-                f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
-            )
-        return q
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:

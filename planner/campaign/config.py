@@ -137,8 +137,14 @@ def load_campaign_config(path: Path) -> CampaignConfig:
 
 
 def config_from_builtins(data: Any) -> CampaignConfig:
-    """The configuration as it stands in the log."""
-    return msgspec.convert(data, type=CampaignConfig)
+    """The configuration as it stands in the log; InputError where it cannot be one."""
+    try:
+        return msgspec.convert(data, type=CampaignConfig)
+    except msgspec.ValidationError as error:
+        raise InputError(
+            f"The log holds a configuration that no campaign.toml can state ({error}); start the "
+            f"campaign again with planner new, and import its recordings."
+        ) from None
 
 
 def check_config(config: CampaignConfig, path: Path) -> None:
@@ -181,9 +187,9 @@ def check_config(config: CampaignConfig, path: Path) -> None:
         ("[modes] count", config.modes.count, 1, 20),
         ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
         ("[acquisition] candidates", config.acquisition.candidates, 10, 20_000),
-        ("[stop] measurements_max", config.stop.measurements_max, 1, 1000),
-        ("[stop] measurements_min", config.stop.measurements_min, 0, 1000),
         ("[stop] frequency_sd_percent", config.stop.frequency_sd_percent, 1e-6, 100.0),
+        ("[stop] measurements_min", config.stop.measurements_min, 0, 1000),
+        ("[stop] measurements_max", config.stop.measurements_max, 1, 1000),
         ("[acquisition] singularity_margin", config.acquisition.singularity_margin, 0.0, 1.0),
     ]
     for name, value, low, high in limits:
@@ -204,6 +210,10 @@ def _check_choices(config: CampaignConfig, path: Path) -> None:
     ):
         if poses is not None and (not poses or len({len(pose) for pose in poses}) != 1):
             raise InputError(f"{path}: {name} needs one list of joint angles a pose; correct it.")
+    height, band = config.acquisition.hammer_height_m, config.goal.band_hz
+    for name, range_ in (("[acquisition] hammer_height_m", height), ("[goal] band_hz", band)):
+        if range_ is not None and not range_[0] < range_[1]:
+            raise InputError(f"{path}: {name} {list(range_)} must rise; correct it.")
     if config.acquisition.own_only and not config.acquisition.own_poses_deg:
         raise InputError(f"{path}: [acquisition] own_only needs own_poses_deg; add them.")
     _check_cut(config, path)

@@ -46,6 +46,7 @@ class CampaignReads:
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
         self._frfs: dict[tuple, Frf] = {}
+        self._verified: set[Path] = set()  # kept recordings whose content was held against its hash
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -172,12 +173,16 @@ class CampaignReads:
         )
 
     def source_of(self, hit: HitRecord) -> Source:
-        """The kept copy of a recording."""
+        """The kept copy of a recording; InputError where it is not what was imported."""
         path = store.recording_path(self.directory, hit.sha256, hit.suffix)
+        if path not in self._verified:
+            store.read_kept(path, hit.sha256, hit.file)
+            self._verified.add(path)
         names = self.cell.robot.points
         said = hit.hit_point or hit.response_points or names != PointNames()
         stated = StatedPoints(hit.hit_point, hit.response_points, names=names)
-        return Source(path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints())
+        points = stated if said else StatedPoints()
+        return Source(path, hit.file, hit.hit, hit.repeat, points, hit.part)
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""

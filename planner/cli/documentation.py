@@ -18,9 +18,7 @@ class WrittenManual(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        from rich.markup import escape
-
-        return f"The manual: {escape(self.manual)}"
+        return f"The manual: {self.manual}"
 
 
 def schema(

@@ -14,7 +14,13 @@ def stability(
         typer.Argument(metavar="SOURCE", help="npz of predict, UFF FRFs, a campaign, modes TOML."),
     ],
     cut: Annotated[Path, typer.Option("--cut", metavar="CUT_TOML", help="Cutter and cut.")],
-    pose: Annotated[str | None, typer.Option(metavar="NAME", help="Of the source's poses.")] = None,
+    pose: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Of the source's poses; all: each.")
+    ] = None,
+    path: Annotated[
+        Path | None,
+        typer.Option(metavar="POSES_CSV", help="Of a campaign: all these poses, as in predict."),
+    ] = None,
     tool: Annotated[
         Path | None, typer.Option(metavar="TOOL_TOML", help="Put this tool on, as couple does.")
     ] = None,
@@ -37,12 +43,21 @@ def stability(
 ) -> int:
     """To which depth a cut is stable at each spindle speed, and how it chatters beyond.
 
-    Example: planner stability cell7 --cut cut.toml --plot pictures
+    Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.cli.progress import counting
     from planner.report.plot_files import Pictures
     from planner.report.stability_of import Asked, stability_of
 
+    if path is not None or pose == "all":
+        from planner.milling.cut import load_cut
+        from planner.report.stability_path import path_report
+
+        with counting(quiet=as_json) as tell:
+            found = path_report(
+                source, path, load_cut(cut), samples, Pictures(plot, format_, rrd), tell
+            )
+        return respond(found, as_json)
     asked = Asked(source, cut, pose, point, samples, tool, reference, robot)
     pictures = Pictures(plot, format_, rrd)
     with counting(quiet=as_json) as tell:

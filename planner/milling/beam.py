@@ -21,7 +21,7 @@ GAUSS = np.sqrt(3) / 6  # places of Gauss's two points on a slice, from its midd
 
 
 @dataclass(frozen=True)
-class Material:
+class ToolMaterial:
     """Young's modulus in Pa, density in kg/m³, Poisson's ratio, structural loss factor."""
 
     youngs_modulus: float
@@ -50,7 +50,7 @@ class Segment:
     length: float
     diameter: float
     end_diameter: float
-    material: Material
+    material: ToolMaterial
     bore: float = 0.0
     mass: float = 0.0
 
@@ -74,7 +74,7 @@ class Section:
 
     diameter: float
     bore: float
-    material: Material
+    material: ToolMaterial
 
     @property
     def area(self) -> float:

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from planner.errors import InputError
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.interface import NUMBERS, Contact
+from planner.milling.interface import NUMBERS, ToolContact
 from planner.milling.tool import Tool
 
 FARTHEST = np.log(1e3)  # from the numbers stated: the prior's bounds
@@ -32,7 +32,7 @@ class ContactFit:
     """
 
     tool: Tool
-    contact: Contact
+    contact: ToolContact
     log_sd: np.ndarray
     before: float
     after: float
@@ -73,7 +73,7 @@ def fit_contact(
 
     def held(z: np.ndarray) -> Tool:
         values = np.exp(begin + z)
-        return target.held(number, Contact(*(float(v) for v in values)))
+        return target.held(number, ToolContact(*(float(v) for v in values)))
 
     first = couple(tip, target, reference)
     size = np.abs(np.where(known, seen, 1.0))

@@ -31,7 +31,8 @@ class TipReceptance:
     C = left · measured · right + offset, in m/N, m/(N·m), rad/N and rad/(N·m), over the motions
     `kept` (numbers in MOTIONS, rotations about x, y, z) along the columns of `frame` (3, 3), which
     are given in the axes of the FRFs. `sd` is that of each measured value, and of C's own rest
-    `offset_sd`, each taken for itself.
+    `offset_sd`, each taken for itself; where values err together, `errors` (D, F, n, n) says how,
+    independent of each other and of one sd each, instead of `sd`.
     """
 
     frequency_hz: np.ndarray  # (F,) > 0
@@ -44,6 +45,7 @@ class TipReceptance:
     offset_sd: np.ndarray  # (F, k, k)
     frame: np.ndarray = field(default_factory=lambda: np.eye(3))
     remarks: tuple[str, ...] = ()
+    errors: np.ndarray | None = None
     simulated: bool = False  # the source says that it holds simulated, not measured, data
 
     @property
@@ -106,7 +108,7 @@ def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = Non
     blocks = _Blocks.between(tip, target, reference, omega)
     c = tip.receptance
     coupled, left, right = blocks.applied(c)
-    variance = _carried(left @ tip.left, tip.sd**2, tip.right @ right)
+    variance = _measured(left @ tip.left, tip, tip.right @ right)
     variance += _carried(left, tip.offset_sd**2, right)
     for other in _uncertain(target, reference):
         moved = _Blocks.between(tip, *other, omega).applied(c)[0]
@@ -176,6 +178,13 @@ def inverse(transfer: np.ndarray) -> np.ndarray:
 def _carried(left: np.ndarray, variance: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Variance of left · δ · right, of independent entries δ."""
     return np.abs(left) ** 2 @ variance @ np.abs(right) ** 2
+
+
+def _measured(left: np.ndarray, tip: TipReceptance, right: np.ndarray) -> np.ndarray:
+    """Variance of left · δ · right of the measured values' errors δ."""
+    if tip.errors is None:
+        return _carried(left, tip.sd**2, right)
+    return np.sum([np.abs(left @ error @ right) ** 2 for error in tip.errors], axis=0)
 
 
 def _uncertain(

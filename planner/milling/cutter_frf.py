@@ -126,7 +126,26 @@ def of_accelerance(
     return CutterFrf(name, hertz, h, spread)
 
 
+def read_all(path: Path) -> list[CutterFrf]:
+    """Every pose of an npz of `predict`, in its order."""
+    if path.suffix.lower() != ".npz":
+        return [read_frf(path, None)]
+    names = _held(path)[0]
+    return [read_frf(path, name) for name in names]
+
+
 def _npz(path: Path, pose: str | None) -> CutterFrf:
+    poses, hertz, mean, sd = _held(path)
+    if pose is None and len(poses) > 1:
+        raise InputError(f"{path} holds {len(poses)} poses; say which with --pose, as {poses[0]}.")
+    if pose is not None and pose not in poses:
+        raise InputError(f"{path} has no pose {pose}; choose one of {', '.join(poses[:10])}.")
+    i = 0 if pose is None else poses.index(pose)
+    return of_accelerance(f"{path}, pose {poses[i]}", hertz, mean[i], None if sd is None else sd[i])
+
+
+def _held(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray | None]:
+    """Poses, lines, mean and sd that an npz holds."""
     try:
         with np.load(path, allow_pickle=False) as file:
             held = {name: file[name] for name in file.files}
@@ -145,12 +164,7 @@ def _npz(path: Path, pose: str | None) -> CutterFrf:
             f"{path}: frf_mean must be of shape (poses, 3, 3, lines) = {shape}, and frf_sd too; "
             f"write it with planner predict."
         )
-    if pose is None and len(poses) > 1:
-        raise InputError(f"{path} holds {len(poses)} poses; say which with --pose, as {poses[0]}.")
-    if pose is not None and pose not in poses:
-        raise InputError(f"{path} has no pose {pose}; choose one of {', '.join(poses[:10])}.")
-    i = 0 if pose is None else poses.index(pose)
-    return of_accelerance(f"{path}, pose {poses[i]}", hertz, mean[i], None if sd is None else sd[i])
+    return poses, hertz, mean, sd
 
 
 def _exported(path: Path) -> CutterFrf:

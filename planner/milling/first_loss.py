@@ -13,10 +13,10 @@ import numpy as np
 
 from planner.milling.machine import Monodromies, multipliers
 
-STEPS_TO_FLOOR = 8  # of the scan, up to the zeroth-order floor; flips may come before it
+STEPS_TO_FLOOR = 6  # of the scan, up to the zeroth-order floor; flips may come before it
 LEAST_STEPS = 16  # of the scan in all
-EQUAL_STEPS = 32  # of the same length, before steps grow with the depth
-GROWTH = 1.03
+EQUAL_STEPS = 24  # of the same length, before steps grow with the depth
+GROWTH = 1.045
 CHUNK = 12  # depths that are scanned at once
 REFINED = 1e-6  # relative width up to which a loss is refined
 AT_ONE = 1e-9  # |log |µ|| that is zero

@@ -10,7 +10,7 @@ NUMBERS = ("stiffness_n_m", "stiffness_nm_rad", "damping_ns_m", "damping_nms_rad
 
 
 @dataclass(frozen=True)
-class Contact:
+class ToolContact:
     """Complex stiffness k + iωc across the axis and in bending; along and about it, it holds.
 
     Stiffness in N/m and N·m/rad, damping in N·s/m and N·m·s/rad; `sd_percent` says how well each
@@ -37,6 +37,6 @@ class Contact:
         out[:, range(6), range(6, 12)] = -self.flexibility(omega)
         return out
 
-    def scaled(self, name: str, factor: float) -> "Contact":
+    def scaled(self, name: str, factor: float) -> "ToolContact":
         """The same with one of its four numbers multiplied."""
         return replace(self, **{name: factor * getattr(self, name)})

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.inference.parallel import side_by_side
 from planner.milling.first_loss import first_unstable, near, refined, scanned_depths
 from planner.milling.machine import Machine, Monodromies, check_structure
 from planner.milling.period import Period
@@ -13,6 +14,7 @@ from planner.progress import Tell, quietly
 
 DEPTH_ERROR = 3e-4  # relative, up to which points per period are added
 FINER = 1.5  # factor on the points, for the check
+MANY, BLOCK = 60, 10  # speeds from which two processes share them, in blocks of so many
 ROUNDS = 5  # of adding points
 SEMI_FINER = 2.0  # factor on the steps of a semi-discretisation, whose error falls with the square
 
@@ -34,16 +36,21 @@ NO_LOSS = Loss(np.nan)
 def losses(machine: Machine, tell: Tell = quietly) -> tuple[Loss, ...]:
     """At each speed of the cut, up to its largest depth, by its method."""
     check_structure(machine.modes)
-    cut, found = machine.cut, []
-    floor = machine.floor()
+    cut = machine.cut
     if cut.method == "zeroth_order":
         return zeroth_losses(machine)
     one = full_loss if cut.method == "full_discretisation" else semi_loss
-    scan = scanned_depths(floor.floor_m, cut.depth_m[1])
-    for i, rpm in enumerate(cut.speeds_rpm):
-        found.append(one(machine, float(rpm), scan))
-        tell("lobes", (i + 1) / len(cut.speeds_rpm))
-    return tuple(found)
+    scan = scanned_depths(machine.floor().floor_m, cut.depth_m[1])
+    speeds = [float(rpm) for rpm in cut.speeds_rpm]
+    if len(speeds) < MANY:
+        return tuple(one(machine, rpm, scan) for rpm in speeds)
+    blocks = [speeds[i : i + BLOCK] for i in range(0, len(speeds), BLOCK)]
+    found = side_by_side(
+        lambda block: [one(machine, rpm, scan) for rpm in block],
+        blocks,
+        lambda number, count: tell("lobes", count / len(blocks)),
+    )
+    return tuple(loss for block in found for loss in block)
 
 
 def zeroth_losses(machine: Machine) -> tuple[Loss, ...]:

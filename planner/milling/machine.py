@@ -19,6 +19,7 @@ Monodromies = Callable[[np.ndarray], list[np.ndarray]]  # of depths (B,) in m
 # then within 1e-4.
 POINTS, PER_RADIAN = 8, 0.55
 MOST_DEGREE = 32
+MOST_POINTS = 400  # of a period: with more, each depth takes a second
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,12 @@ class Machine:
         start, end = self.cut.immersion_rad
         arc = min(end - start, 2 * np.pi / self.cut.teeth)
         points = factor * (POINTS + PER_RADIAN * self.fastest * arc / (rpm * 2 * np.pi / 60))
+        if points > factor * MOST_POINTS:
+            slowest = rpm * points / (factor * MOST_POINTS)
+            raise InputError(
+                f"At {rpm:g} rpm the fastest mode swings too often while a tooth cuts; ask for "
+                f'{slowest:.0f} rpm or more, or choose the method "zeroth_order".'
+            )
         elements = int(np.ceil(points / MOST_DEGREE))
         return Grid(int(np.ceil(points / elements)), arc / elements * (1 + 1e-9))
 

@@ -38,6 +38,9 @@ def semi_monodromy(machine: Machine, rpm: float, count: int, depth: float) -> np
     free, push, seen = first_order(machine.modes)
     tau = 60 / (rpm * machine.cut.teeth)
     force = depth * step_matrices(machine.cut, machine.coefficients, count, depth)
+    # A residual compliance gives way at once: F = bA(Cz + DF − u before) is solved for F.
+    rest = machine.modes.residual
+    force = np.linalg.solve(np.eye(2) - force @ rest, force)
     size, step = len(free), tau / count
     forced = push @ force  # (m, s, 2)
     # One exponential of [[A, B], [0, 0]] holds the transition and the integral of the force.
@@ -49,21 +52,16 @@ def semi_monodromy(machine: Machine, rpm: float, count: int, depth: float) -> np
     state = np.eye(size, total)
     past = [np.eye(2, total, size + 2 * i) for i in range(count)]  # latest first
     for i in range(count):
-        now = seen @ state
-        older = past[-1]
-        newer = past[-2] if count > 1 else now
-        state = both[i, :, :size][:size] @ state + both[i, :size, size:] @ (older + newer) / 2
+        before = (past[-1] + past[-2]) / 2
+        moved = seen @ state
+        now = moved + rest @ force[i] @ (moved - before)
+        state = both[i, :size, :size] @ state + both[i, :size, size:] @ before
         past = [now, *past[:-1]]
     return np.concatenate([state, *past])
 
 
 def first_order(modes: CutterModes) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Real matrices A (s, s), B (s, 2), C (2, s) of ż = Az + BF, u = Cz."""
-    if np.any(modes.residual):
-        raise InputError(
-            "The semi-discretisation takes no residual compliance; choose the method "
-            "full_discretisation."
-        )
     real, imag = np.diag(modes.poles.real), np.diag(modes.poles.imag)
     free = np.block([[real, -imag], [imag, real]])
     push = np.concatenate([modes.drives.real, modes.drives.imag])

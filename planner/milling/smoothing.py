@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.milling.coupling import TipReceptance
+from planner.milling.rank_one import rank_one
 from planner.modal.rational_fit import rational_fit
 from planner.modal.refine import Refined, refine
-from planner.modal.residues import basis, basis_slope, laplace
+from planner.modal.residues import basis, laplace
 
 PAIRS = (5, 8, 12)  # of conjugate poles from which the search begins
 MOST = 24  # modes
@@ -21,21 +22,30 @@ TRIED_DAMPING = (0.01, 0.06)  # of a mode that is tried where the fit misses
 FIRST_DAMPING = 0.01
 # χ² per degree of freedom up to which a fit counts as one to the noise, and may be used.
 FITS = 1.2
+# Of χ²: where modes of one shape and one drive fit worse than this, residues are any.
+PRODUCTS = 1.15
 SWINGS = 0.3  # damping ratio from which a pole of the start stands for no mode
 ABOVE = 1.5  # of the last line's frequency: where a mode above the lines is first looked for
-NO_TRACE = 1e-8  # of scaled normal equations: eigenvalues below are rounding
 LINES_PER_NUMBER = 3.0  # real values for each unknown number of an entry, at least
 TERMS = 6  # of modes outside the lines, for each entry
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Receptances (F, n, n) of common poles (p,) in rad/s, their sd, χ² per degree of freedom."""
+    """Receptances (F, n, n) of common poles (p,) in rad/s, and χ² per degree of freedom.
+
+    `errors` (D, F, n, n) are independent of each other, of one sd each.
+    """
 
     poles: np.ndarray
     receptance: np.ndarray
-    sd: np.ndarray
+    errors: np.ndarray
     chi2: float
+
+    @property
+    def sd(self) -> np.ndarray:
+        """(F, n, n): root of E|error|²."""
+        return np.sqrt(np.sum(np.abs(self.errors) ** 2, axis=0))
 
 
 def smoothed(tip: TipReceptance) -> TipReceptance:
@@ -54,7 +64,9 @@ def smoothed(tip: TipReceptance) -> TipReceptance:
         f"misfit {np.sqrt(found.chi2):.2f} of their noise."
     )
     remarks = (*tip.remarks, text)
-    return replace(tip, measured=found.receptance, sd=found.sd, remarks=remarks)
+    return replace(
+        tip, measured=found.receptance, sd=found.sd, errors=found.errors, remarks=remarks
+    )
 
 
 def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothed | None:
@@ -76,10 +88,15 @@ def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothe
             best = found
     if best is None:
         return None
-    fitted, spread = _values(frequency_hz, best, problem.variance)
-    off = np.moveaxis(spread / square, -1, 0)
+    fitted, errors = rank_one(frequency_hz, problem.accelerance, problem.variance, best)
+    chi2 = problem.chi2(fitted, best)
+    if chi2 > PRODUCTS * best.chi2 / max(best.degrees, 1):
+        fitted, errors = rank_one(
+            frequency_hz, problem.accelerance, problem.variance, best, products=False
+        )
+        chi2 = problem.chi2(fitted, best)
     moved = np.moveaxis(-fitted / square, -1, 0)
-    return Smoothed(best.poles, moved, off, best.chi2 / max(best.degrees, 1))
+    return Smoothed(best.poles, moved, np.moveaxis(-errors / square, -1, 1), chi2)
 
 
 def _swinging(poles: np.ndarray, highest_hz: float) -> np.ndarray:
@@ -102,6 +119,11 @@ class _Problem:
     def refined(self, poles: np.ndarray) -> Refined:
         lines = laplace(self.frequency_hz)
         return refine(lines, self.accelerance, self.variance, poles, _decaying)
+
+    def chi2(self, fitted: np.ndarray, found: Refined) -> float:
+        """Per degree of freedom of a fit."""
+        off = np.abs(self.accelerance - fitted) ** 2
+        return float(np.sum(2 * off / self.variance)) / max(found.degrees, 1)
 
     @property
     def each(self) -> float:
@@ -151,41 +173,3 @@ class _Problem:
 
 def _decaying(poles: np.ndarray) -> bool:
     return bool(np.all(poles.real < 0) and np.all(poles.imag > 0))
-
-
-def _values(
-    frequency_hz: np.ndarray, found: Refined, variance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Accelerance (n, n, F) of a fit, and the root of E|error|² that the noise leaves in it.
-
-    Residues are each entry's own; the poles, which all entries share, err as all of them let them.
-    """
-    lines, m = laplace(frequency_hz), len(found.poles)
-    columns, slope = basis(lines, found.poles).T, basis_slope(lines, found.poles).T
-    weight = np.sqrt(2 / variance.reshape(-1, variance.shape[-1]))
-    fitted, both, slopes = [], [], []
-    for heavy, c in zip(weight, found.point.coefficients, strict=True):
-        a = _real(heavy[:, None] * columns)
-        q, _ = np.linalg.qr(a / np.linalg.norm(a, axis=0))
-        real, imag = slope[:, :m], slope[:, m:]
-        # ∂H/∂Re p = Re R·first + Im R·second, ∂H/∂Im p = Re R·second − Im R·first
-        turned = [c[:m] * real + c[m : 2 * m] * imag, c[:m] * imag - c[m : 2 * m] * real]
-        moved = _real(heavy[:, None] * np.concatenate(turned, axis=1))
-        slopes.append(moved - q @ (q.T @ moved))
-        both.append(np.sum(q**2, axis=1))
-        fitted.append(columns @ c)
-    normal = np.sum([m.T @ m for m in slopes], axis=0)
-    size = np.sqrt(np.maximum(np.diagonal(normal), 1e-300))
-    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
-    # A direction in which poles move without a trace is one of poles that nothing needs.
-    root = vectors / np.sqrt(np.maximum(values, NO_TRACE)) / size[:, None]
-    whole = np.array(
-        [b + np.sum((d @ root) ** 2, axis=1) for b, d in zip(both, slopes, strict=True)]
-    )
-    count = len(frequency_hz)
-    spread = np.sqrt(whole[:, :count] + whole[:, count:]) / weight
-    return np.reshape(fitted, variance.shape), spread.reshape(variance.shape)
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    return np.concatenate([values.real, values.imag], axis=0)

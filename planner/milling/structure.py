@@ -100,3 +100,18 @@ def check_band(frf: PlaneFrf, cut: Cut) -> None:
         f"{frf.name}: the FRFs reach from {ends[0]:g} to {ends[1]:g} Hz and the cut would chatter "
         f"{where}; measure over the band of the modes that chatter."
     )
+
+
+def beyond(structure: Structure, chatter_hz: np.ndarray) -> str | None:
+    """A sentence where chatter (n,) lies outside the lines of the FRFs; None where none does."""
+    if structure.frf is None:
+        return None
+    lines = structure.frf.frequency_hz
+    with np.errstate(invalid="ignore"):
+        count = int(np.sum((chatter_hz < lines[0]) | (chatter_hz > lines[-1])))
+    if not count:
+        return None
+    return (
+        f"At {count} of the speeds the cut would chatter outside the FRFs' {lines[0]:g} to "
+        f"{lines[-1]:g} Hz, where the fitted modes only guess: measure there too."
+    )

@@ -38,8 +38,8 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.milling.beam import Material, Segment, transfer
-from planner.milling.interface import NUMBERS, Contact
+from planner.milling.beam import Segment, ToolMaterial, transfer
+from planner.milling.interface import NUMBERS, ToolContact
 from planner.toml_file import load_toml
 
 # Of the cutting diameter, as which flutes bend (Kops and Vo, CIRP Annals 39, 1990).
@@ -80,7 +80,7 @@ class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
     contact: ContactTable | None = None
 
 
-class PointTable(msgspec.Struct, forbid_unknown_fields=True):
+class ToolPointTable(msgspec.Struct, forbid_unknown_fields=True):
     """[[point]]: where a tested tool was hit and measured."""
 
     node: int | str
@@ -96,15 +96,15 @@ class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
     material: dict[str, MaterialTable]
     name: str = ""
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    point: tuple[PointTable, ...] = ()
+    point: tuple[ToolPointTable, ...] = ()
 
 
 @dataclass(frozen=True)
-class Part:
+class ToolPart:
     """A segment, and the contact that holds it at its holder's side; None: rigidly."""
 
     segment: Segment
-    contact: Contact | None = None
+    contact: ToolContact | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Tool:
 
     name: str
     axis: tuple[float, float, float]
-    parts: tuple[Part, ...]
+    parts: tuple[ToolPart, ...]
     points: tuple[Point, ...] = ()
 
     @property
@@ -166,18 +166,18 @@ class Tool:
             own[0] = replace(own[0], contact=None)
         return replace(self, parts=tuple(own))
 
-    def contacts(self) -> list[tuple[int, Contact]]:
+    def contacts(self) -> list[tuple[int, ToolContact]]:
         """Contacts, and the number of the part that each holds."""
         return [(k, p.contact) for k, p in enumerate(self.parts) if p.contact is not None]
 
-    def held(self, number: int, contact: Contact) -> "Tool":
+    def held(self, number: int, contact: ToolContact) -> "Tool":
         """The same with another contact below a part."""
         parts = list(self.parts)
         parts[number] = replace(parts[number], contact=contact)
         return replace(self, parts=tuple(parts))
 
 
-def _split(parts: tuple[Part, ...], from_tip: float) -> tuple[Part, ...]:
+def _split(parts: tuple[ToolPart, ...], from_tip: float) -> tuple[ToolPart, ...]:
     """Parts with an end so many m from the tip."""
     out, left = list(parts), from_tip
     for k in range(len(parts) - 1, -1, -1):
@@ -188,13 +188,13 @@ def _split(parts: tuple[Part, ...], from_tip: float) -> tuple[Part, ...]:
             width = s.end_diameter + left / s.length * (s.diameter - s.end_diameter)
             below = replace(s, length=s.length - left, end_diameter=width, mass=0.0)
             above = replace(s, length=left, diameter=width)
-            out[k : k + 1] = [replace(parts[k], segment=below), Part(above)]
+            out[k : k + 1] = [replace(parts[k], segment=below), ToolPart(above)]
             break
         left -= s.length
     return tuple(out)
 
 
-def _loaded(parts: tuple[Part, ...], from_tip: float, mass: float) -> tuple[Part, ...]:
+def _loaded(parts: tuple[ToolPart, ...], from_tip: float, mass: float) -> tuple[ToolPart, ...]:
     """Parts with a mass (kg) so many m from the tip."""
     parts, length = _split(parts, from_tip), 0.0
     for k in range(len(parts) - 1, -1, -1):
@@ -213,7 +213,7 @@ def load_tool(path: Path) -> Tool:
         raise InputError(_with_unit(path, str(error))) from None
     _check(path, table)
     materials = {
-        name: Material(m.youngs_modulus_pa, m.density_kg_m3, m.poisson_ratio, m.loss_factor)
+        name: ToolMaterial(m.youngs_modulus_pa, m.density_kg_m3, m.poisson_ratio, m.loss_factor)
         for name, m in table.material.items()
     }
     parts = tuple(_part(s, materials[s.material]) for s in table.segment)
@@ -234,7 +234,7 @@ def load_tool(path: Path) -> Tool:
     return tool
 
 
-def _part(s: SegmentTable, material: Material) -> Part:
+def _part(s: SegmentTable, material: ToolMaterial) -> ToolPart:
     end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
     start = s.diameter_m
     if s.flutes:
@@ -243,8 +243,10 @@ def _part(s: SegmentTable, material: Material) -> Part:
         start = end = s.equivalent_diameter_m
     contact = None
     if s.contact is not None:
-        contact = Contact(**{name: getattr(s.contact, name) for name in (*NUMBERS, "sd_percent")})
-    return Part(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), contact)
+        contact = ToolContact(
+            **{name: getattr(s.contact, name) for name in (*NUMBERS, "sd_percent")}
+        )
+    return ToolPart(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), contact)
 
 
 UNITS = {

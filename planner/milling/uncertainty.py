@@ -17,7 +17,7 @@ PROBABILITY = 0.95  # that the robust depth is stable
 REPLICATES = 4  # Latin hypercubes, whose difference shows how far quantiles have converged
 # Shares of the limit without uncertainty at which samples are looked at first.
 FIRST = np.array([0.4, 0.6, 0.75, 0.88, 1.0, 1.15, 1.4])
-MOST_SPEEDS = 150  # at which samples are looked at; between them their limits are interpolated
+MOST_SPEEDS = 100  # at which samples are looked at; between them their limits are interpolated
 QUICKLY = 1e-3  # relative width of a sample's limit
 
 
@@ -67,7 +67,7 @@ def sampled_limits(
             found = np.array([loss.depth_m for loss in losses(machine)])
             return np.where(np.isnan(found), np.inf, found)
         found = _limits(machine, machine.cut.speeds_rpm[chosen], around[chosen])
-        return _between(np.arange(len(around)), chosen, found)
+        return _between(around, chosen, found)
 
     def done(number: int, count: int) -> None:
         tell("samples", count / len(machines))
@@ -75,11 +75,17 @@ def sampled_limits(
     return SampledLimits(np.array(side_by_side(one, list(machines), done)))
 
 
-def _between(at: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Linear between values (m,), inf where either neighbour is."""
+def _between(around: np.ndarray, chosen: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """(n,) from limits (m,) of a sample at some speeds: as shares of those of what is expected.
+
+    Where either has no limit beside a speed depths are interpolated, inf beside inf.
+    """
+    at = np.arange(len(around))
     finite = np.where(np.isfinite(values), values, 0.0)
-    beyond = np.interp(at, known, np.isinf(values).astype(float)) > 0
-    return np.where(beyond, np.inf, np.interp(at, known, finite))
+    beyond = np.interp(at, chosen, np.isinf(values).astype(float)) > 0
+    depth = np.where(beyond, np.inf, np.interp(at, chosen, finite))
+    share = np.interp(at, chosen, finite / around[chosen])  # NaN beside what has no limit
+    return np.where(np.isfinite(share * around) & ~beyond, share * around, depth)
 
 
 def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray:

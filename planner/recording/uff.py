@@ -39,8 +39,7 @@ def read_uff(path: Path) -> tuple[Record, ...]:
         )
     _check_numbers(path, times + frfs)
     records: list[Record] = []
-    if times:
-        records.append(_time_record(path, times))
+    records += [_time_record(path, hit) for hit in _by_hit(times)]
     if frfs:
         coherences = [s for s in sets if s["func_type"] == 6]
         records.append(_frf_record(path, frfs, coherences))
@@ -107,6 +106,23 @@ def _unit(path: Path, s: dict[str, Any]) -> tuple[str, str, float]:
             f"{path} labels a record of {stated} with the unit {label}; correct the export."
         )
     return known
+
+
+def _by_hit(sets: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Time histories hit by hit, where a file holds a whole run of them.
+
+    The n-th force and the n-th history of each response are the n-th hit; where they are not
+    equally many, nothing says which belong together, and all stay one record.
+    """
+    each: dict[tuple, list[dict[str, Any]]] = {}
+    for s in sets:
+        force = _QUANTITY.get(int(s["ordinate_spec_data_type"])) == "force"
+        response = int(s["rsp_node"]), int(s["rsp_dir"])
+        each.setdefault(("force",) if force else response, []).append(s)
+    counts = {len(of_one) for of_one in each.values()}
+    if ("force",) not in each or len(counts) != 1:
+        return [sets] if sets else []
+    return [list(hit) for hit in zip(*each.values(), strict=True)]
 
 
 def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:

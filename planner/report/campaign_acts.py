@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from rich.markup import escape
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
@@ -41,11 +40,11 @@ class NewCampaign(Answer):
     def text(self) -> str:
         """What was started, and how it goes on."""
         warned = (f"Check: {finding.sentence}" for finding in self.findings)
-        remarks = "".join(f"{escape(remark)}\n" for remark in (*self.remarks, *warned))
+        remarks = "".join(f"{remark}\n" for remark in (*self.remarks, *warned))
         return (
-            f"Campaign in {escape(self.campaign)}: robot {escape(self.robot)}, "
+            f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"
-            f"{remarks}Next: planner next {escape(self.campaign)}"
+            f"{remarks}Next: planner next {self.campaign}"
         )
 
 
@@ -60,12 +59,12 @@ class ExampleFolder(Answer):
 
     def text(self) -> str:
         """What to do with it."""
-        toml, folder = escape(self.robot), escape(self.example)
+        toml, folder = self.robot, self.example
         return (
             f"An example of one's own to change is in {folder}: robot/robot.toml, "
             f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script.\n"
             f"  planner check {toml}\n"
-            f"  planner new {folder}/cell --robot {toml} --campaign {escape(self.campaign)}\n"
+            f"  planner new {folder}/cell --robot {toml} --campaign {self.campaign}\n"
             f"  planner next {folder}/cell"
         )
 
@@ -96,7 +95,7 @@ class WithdrawnPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {escape(self.withdrawn)} is set aside; its recordings are kept."
+        return f"Pose {self.withdrawn} is set aside; its recordings are kept."
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ class SkippedPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {escape(self.skipped)} will not be offered again."
+        return f"Pose {self.skipped} will not be offered again."
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,4 +120,4 @@ class ConfirmedPose(Answer):
     def text(self) -> str:
         """One sentence."""
         sd = ", ".join(f"{v:.1f} %" for v in self.frequency_sd_percent)
-        return f"The hits of pose {escape(self.confirmed)} are used; sd of frequencies: {sd}."
+        return f"The hits of pose {self.confirmed} are used; sd of frequencies: {sd}."

@@ -4,8 +4,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.markup import escape
-
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
 from planner.report.answer import Answer
@@ -25,7 +23,7 @@ class WrittenReport(Answer):
     def text(self) -> str:
         """One sentence."""
         size = self.bytes / 1e6
-        return f"Report of {self.measurements} poses ({size:.1f} MB): {escape(self.report)}"
+        return f"Report of {self.measurements} poses ({size:.1f} MB): {self.report}"
 
 
 def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> WrittenReport:

@@ -85,7 +85,8 @@ def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path
     if np.count_nonzero(chosen) < 2:
         raise InputError(f"{source} has no two lines within {low:g} to {high:g} Hz; ask for more.")
     names = ("frequency_hz", "measured", "sd", "left", "right", "offset", "offset_sd")
-    return replace(tip, **{name: getattr(tip, name)[chosen] for name in names})
+    errors = None if tip.errors is None else tip.errors[:, chosen]
+    return replace(tip, errors=errors, **{name: getattr(tip, name)[chosen] for name in names})
 
 
 def fitted_contact(

@@ -21,9 +21,11 @@ def frf_sheet(
 
     `modes_hz` (k,) are the predicted natural frequencies, drawn as dotted lines.
     """
-    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    # Placed by hand: a layout that places itself takes more time than all the drawing.
+    figure = Figure(figsize=(11.0, 4.8))
     FigureCanvasAgg(figure)
     panels = figure.subplots(3, 3, sharex=True, height_ratios=(3.2, 1.3, 0.8))
+    figure.subplots_adjust(0.065, 0.155, 0.99, 0.94, wspace=0.16, hspace=0.12)
     low, high = frequency_hz[[0, -1]]
     inside = (measured.frequency_hz >= low) & (measured.frequency_hz <= high)
     lines = measured.frequency_hz[inside]
@@ -43,7 +45,7 @@ def frf_sheet(
     for panel, name in zip(panels[:, 0], names, strict=True):
         panel.set_ylabel(name, fontsize=8)
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
+    figure.legend(handles, labels, loc="lower center", ncols=3, fontsize=8)
     return figure
 
 

@@ -11,7 +11,7 @@ from planner.milling.cutter_frf import CutterFrf, of_accelerance, read_frf
 from planner.milling.lobes import Loss, losses
 from planner.milling.mode_file import load_mode_file
 from planner.milling.point import multiplier
-from planner.milling.structure import SAMPLES, Structure, of_frf, of_modes
+from planner.milling.structure import SAMPLES, Structure, beyond, of_frf, of_modes
 from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limits
 from planner.progress import Tell, quietly, within
 from planner.report.plot_files import Pictures
@@ -120,6 +120,8 @@ def _answer(
 ) -> StabilityReport:
     depth = np.array([loss.depth_m for loss in found])
     robust, remarks = depth, list(structure.remarks)
+    outside = beyond(structure, np.array([loss.chatter_hz for loss in found]))
+    remarks += [outside] if outside else []
     if drawn is not None:
         robust = drawn.robust()
         robust = np.where(np.isfinite(robust), robust, np.nan)

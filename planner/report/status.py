@@ -106,6 +106,7 @@ class DecisionStatus:
     stable_probability: np.ndarray
     sure: bool
     measurements_left: int | None
+    probability: float
 
     @classmethod
     def of(cls, model: "Model") -> "DecisionStatus | None":
@@ -115,10 +116,11 @@ class DecisionStatus:
         decision, table = model.decision, model.cell.config.cut
         if decision is None or table is msgspec.UNSET or not model.labelled:
             return None
-        sure = decision.sure(model.cell.config.stop.probability)
+        probability = model.cell.config.stop.probability
+        sure = decision.sure(probability)
         return cls(
             table.speed_rpm, table.depth_m, np.rad2deg(decision.q), decision.probability, sure,
-            measurements_left(model),
+            measurements_left(model), probability,
         )  # fmt: skip
 
     @property
@@ -126,10 +128,13 @@ class DecisionStatus:
         """One or two sentences."""
         p = self.stable_probability
         least = int(np.argmin(np.abs(p - 0.5)))
+        stable, not_stable = np.sum(p >= self.probability), np.sum(1 - p >= self.probability)
         at = f"{self.speed_rpm:g} rpm and {1e3 * self.depth_m:g} mm"
         said = (
-            f"The cut at {at} is stable with {100 * p.min():.0f} % probability or more at all of "
-            f"{len(p)} poses; least sure is pose {least + 1} with {100 * p[least]:.0f} %. "
+            f"The cut at {at} is stable at {stable} of {len(p)} poses, not stable at "
+            f"{not_stable}, undecided at {len(p) - stable - not_stable} (with "
+            f"{100 * self.probability:g} % probability each); least sure is pose {least + 1}, "
+            f"stable with {100 * p[least]:.0f} %. "
         )
         if self.sure:
             return said + "The decision is sure."

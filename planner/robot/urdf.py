@@ -92,16 +92,32 @@ def find_mesh(urdf: Path, name: str) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def copy_meshes(urdf: Path, target: Path) -> None:
-    """Copy the meshes that a URDF names to where the same URDF, at `target`, looks for them."""
+def copy_meshes(urdf: Path, target: Path) -> tuple[str, ...]:
+    """Copy the meshes that a URDF names to beside the same URDF at `target`.
+
+    Nothing is read outside the folders in which meshes are looked for, nor written outside that of
+    `target`; returns the names of meshes that would be.
+    """
     names = re.findall(r"<mesh\b[^>]*\bfilename\s*=\s*[\"']([^\"']+)", urdf.read_text("utf-8"))
-    for name in names:
+    left = []
+    for name in dict.fromkeys(names):
         file = _mesh_file(name)
-        for folder, there in zip(mesh_folders(urdf), mesh_folders(target), strict=True):
-            found, copy = Path(folder) / file, Path(there) / file
-            if not Path(file).is_absolute() and found.is_file() and not copy.exists():
+        if Path(file).is_absolute():
+            continue  # found by the same name from everywhere
+        for folder in mesh_folders(urdf):
+            found, copy = Path(folder) / file, target.parent / file
+            if not found.is_file():
+                continue
+            if not (_inside(found, Path(folder)) and _inside(copy, target.parent)):
+                left.append(name)
+            elif not copy.exists():
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(found, copy)
+    return tuple(dict.fromkeys(left))
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())
 
 
 def _mesh_file(name: str) -> str:

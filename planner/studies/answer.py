@@ -6,7 +6,7 @@ from typing import Any
 
 import msgspec
 from rich.console import Group, RenderableType
-from rich.markup import escape
+from rich.text import Text
 
 from planner.report.answer import Answer
 from planner.report.text import table
@@ -54,10 +54,10 @@ class StudyAnswer(Answer):
 
     def text(self) -> Group:
         """All tables, then the claims."""
-        parts: list[RenderableType] = [f"[bold magenta]{escape(self.data)}[/]"]
+        parts: list[RenderableType] = [Text(self.data, style="bold magenta")]
         parts += [_shown(entry) for entry in (*self.tables, self.claims)]
         if self.files:
-            parts.append(f"{len(self.files)} files in {escape(str(Path(self.files[0]).parent))}")
+            parts.append(f"{len(self.files)} files in {Path(self.files[0]).parent}")
         return Group(*parts)
 
 
@@ -74,15 +74,15 @@ class StudiesAnswer(Answer):
         """The claims of all studies, and where the rest is."""
         parts: list[RenderableType] = [_shown(study.claims) for study in self.studies]
         if self.taken:
-            parts.append(f"finished before, and not run again: {escape(', '.join(self.taken))}")
-        parts.append(f"all pages: {escape(self.files[0])}")
+            parts.append(f"finished before, and not run again: {', '.join(self.taken)}")
+        parts.append(f"all pages: {self.files[0]}")
         return Group(*parts)
 
 
 def _shown(entry: Table) -> RenderableType:
-    made = table(escape(entry.title), *map(escape, entry.columns))
+    made = table(entry.title, *entry.columns)
     for row in entry.rows:
-        made.add_row(*(escape(_cell(value)) for value in row))
+        made.add_row(*(_cell(value) for value in row))
     return made
 
 

@@ -16,7 +16,7 @@ from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.identification.identify import identify
+from planner.identification.identify import QUICK, THOROUGH, identify
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS, Priors
 from planner.identification.result import Identification
@@ -37,7 +37,7 @@ FEW = 3  # points, of which it is asked how far they suffice
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class IdentifiedModel:
     """An identified simulation and its agreement with all poses, in each band."""
 
     simulation: Simulation
@@ -50,7 +50,7 @@ def study(progress: Tell, small: bool = False) -> Report:
     """FRAC and Frobenius similarity by path, direction and band, and which poses suffice."""
     hits = load(small, within(progress, 0.0, 0.25))
     nine = hits.ends_and_middles
-    models: dict[str, Model] = {}
+    models: dict[str, IdentifiedModel] = {}
     for i, name in enumerate(FILES):
         progress(f"{name}: identification from nine poses", 0.25 + 0.15 * i)
         models[name] = _model(hits, nine, name, small)
@@ -77,7 +77,7 @@ def _simulation(name: str) -> Simulation:
     return Simulation(Robot.load(shipped("kr10_birk2025") / "robot" / FILES[name]))
 
 
-def _model(hits: PathHits, which: np.ndarray, name: str, small: bool) -> Model:
+def _model(hits: PathHits, which: np.ndarray, name: str, small: bool) -> IdentifiedModel:
     nominal, ours = _simulation(name), name.endswith("ours")
     frfs = hits.struck.frfs
     found = identify(
@@ -87,10 +87,11 @@ def _model(hits: PathHits, which: np.ndarray, name: str, small: bool) -> Model:
         CAD_INERTIAS if ours else Priors(),
         band_hz=BAND_HZ,
         starts=1 if small else STARTS,
+        effort=QUICK if small else THOROUGH,
         tolerances=Tolerances.of(nominal.robot.config) if ours else None,
     )
     agreed = [_agreement(hits, found.simulation, band) for band in (BAND_HZ, FULL_HZ)]
-    return Model(found.simulation, found, *agreed)
+    return IdentifiedModel(found.simulation, found, *agreed)
 
 
 def _agreement(hits: PathHits, simulation: Simulation, band_hz: tuple[float, float]) -> Agreement:
@@ -111,7 +112,7 @@ def _percent(agreement: Agreement) -> tuple[float, float]:
     )
 
 
-def _whole(models: dict[str, Model]) -> Table:
+def _whole(models: dict[str, IdentifiedModel]) -> Table:
     rows = []
     for name, model in models.items():
         limited, full, nan = _percent(model.limited), _percent(model.full), float("nan")
@@ -124,7 +125,7 @@ def _whole(models: dict[str, Model]) -> Table:
     return Table("birk2025_table_4", "Table 4: all points", columns, tuple(rows))
 
 
-def _by_path(hits: PathHits, models: dict[str, Model]) -> Table:
+def _by_path(hits: PathHits, models: dict[str, IdentifiedModel]) -> Table:
     rows = []
     for name, model in models.items():
         for i, path in enumerate(PATHS):
@@ -135,7 +136,7 @@ def _by_path(hits: PathHits, models: dict[str, Model]) -> Table:
     return Table("birk2025_table_5", "Table 5: by path, ≤ 200 Hz", columns, tuple(rows))
 
 
-def _by_direction(models: dict[str, Model]) -> Table:
+def _by_direction(models: dict[str, IdentifiedModel]) -> Table:
     rows = []
     for name, model in models.items():
         for band, agreement in (("≤ 200 Hz", model.limited), ("≤ 800 Hz", model.full)):
@@ -146,7 +147,7 @@ def _by_direction(models: dict[str, Model]) -> Table:
     return Table("birk2025_directions", "By direction and band", columns, tuple(rows))
 
 
-def _designs(hits: PathHits, model: Model, small: bool, progress: Tell) -> list[Design]:
+def _designs(hits: PathHits, model: IdentifiedModel, small: bool, progress: Tell) -> list[Design]:
     """The paper's nine points, as many of the planner's, fewer of these, and one path's."""
     simulation, frfs, q = _simulation("24P"), hits.struck.frfs, hits.struck.q
     nine = hits.ends_and_middles
@@ -182,7 +183,7 @@ def _design_table(hits: PathHits, designs: list[Design]) -> Table:
 
 
 def _findings(
-    models: dict[str, Model], paths: Table, designs: list[Design]
+    models: dict[str, IdentifiedModel], paths: Table, designs: list[Design]
 ) -> tuple[PaperClaim, ...]:
     frac = {name: _percent(model.limited)[0] for name, model in models.items()}
     full = {name: _percent(model.full)[0] for name, model in models.items()}
@@ -253,7 +254,7 @@ def _ratios(found: Identification) -> np.ndarray:
     return stiffness[:, 1] / stiffness[:, 0]
 
 
-def _campbell(hits: PathHits, models: dict[str, Model]) -> Figure:
+def _campbell(hits: PathHits, models: dict[str, IdentifiedModel]) -> Figure:
     """Figures 8 and 9: S1, hit and response y, over frequency and place along the path."""
     rows = np.flatnonzero(hits.path == PATHS[0])
     lines = np.linspace(BAND_HZ[0], BAND_HZ[1], 240)

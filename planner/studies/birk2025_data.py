@@ -24,7 +24,7 @@ from planner.truth.nonlinear import Port
 from planner.truth.other_laws import HarmonicDrive
 
 PATHS = ("S1", "S2", "S3")
-POINTS, FEW_POINTS = 40, 5  # of a path; of the small version
+POINTS, FEW_POINTS = 40, 4  # of a path; of the small version
 ENDS_M = {  # chosen: within the reach of the R1100, tool downwards
     "S1": ((0.32, 0.15, 0.35), (0.92, 0.15, 0.35)),
     "S2": ((0.6, -0.3, 0.35), (0.6, 0.3, 0.35)),

@@ -13,7 +13,8 @@ COLOURS = {
     "averaged RBF": "lightskyblue", "averaged AR1": "limegreen", "AR1-NARGP": "gold",
     "MFDGP": "tab:brown", "simulation": "0.6", "fused modes": "tab:red", "diagnosed": "black",
     "x": "tab:blue", "y": "tab:orange", "z": "tab:green",
-    "scatter allows": "0.8", "one by one": "tab:blue", "together": "tab:red",
+    "scatter allows": "0.8", "one by one": "tab:blue", "by kind": "tab:red",
+    "all at once": "tab:orange",
 }  # fmt: skip
 
 

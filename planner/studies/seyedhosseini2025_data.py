@@ -26,7 +26,7 @@ from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
 
-POSTURES, FEW_POSTURES = 254, 45  # of the paper; of the small version
+POSTURES, FEW_POSTURES = 254, 32  # of the paper; of the small version
 MODES, TABLED = 6, 4  # modes 5 and 6 are there for the FRFs up to 40 Hz
 SEED = 11
 X_M, Y_M, Z_M = np.linspace(1.3, 1.9, 7), np.linspace(-0.6, 0.6, 8), np.linspace(0.7, 1.2, 5)

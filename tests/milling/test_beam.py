@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from planner.milling import beam
-from planner.milling.beam import Material, Section, Segment, exponential, transfer
+from planner.milling.beam import Section, Segment, ToolMaterial, exponential, transfer
 
-STEEL = Material(2.1e11, 7850.0, 0.3)
-LOSSY = Material(5.4e11, 14500.0, 0.25, 0.002)
+STEEL = ToolMaterial(2.1e11, 7850.0, 0.3)
+LOSSY = ToolMaterial(5.4e11, 14500.0, 0.25, 0.002)
 J = np.block([[np.zeros((6, 6)), np.eye(6)], [-np.eye(6), np.zeros((6, 6))]])
 
 

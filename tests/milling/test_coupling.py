@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from scipy.signal import find_peaks
 
-from planner.milling.beam import Material, Segment
+from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import TipReceptance, couple
-from planner.milling.interface import Contact
+from planner.milling.interface import ToolContact
 from planner.milling.rotations import TwoPoints, two_point_receptance
-from planner.milling.tool import Part, Point, Tool
+from planner.milling.tool import Point, Tool, ToolPart
 from tests.milling.assembled import LOSS, NU, RHO, E, frf, machine
 
 FREQUENCY = np.concatenate([np.arange(5.0, 60.0, 0.25), np.arange(60.0, 1600.0, 5.0)])
-CARBIDE = Material(E, RHO, NU, LOSS)
+CARBIDE = ToolMaterial(E, RHO, NU, LOSS)
 RIGID_ENOUGH = (6.25e7, 3.86e6, 175.0, 0.14)
 LOOSER = (4.5e7, 4.19e6, 210.0, 1.5)
 REFERENCE = [(0.030, 0.02, 12), (0.020, 0.02, 8)]
@@ -22,9 +22,9 @@ KEPT = np.ix_([0, 1, 3, 4], [0, 1, 3, 4])
 
 
 def tool(pieces, contact=None):
-    parts = [Part(Segment(length, d, d, CARBIDE)) for length, d, _ in pieces]
+    parts = [ToolPart(Segment(length, d, d, CARBIDE)) for length, d, _ in pieces]
     if contact is not None:
-        parts[0] = Part(parts[0].segment, Contact(*contact))
+        parts[0] = ToolPart(parts[0].segment, ToolContact(*contact))
     return Tool("a rod", (0.0, 0.0, 1.0), tuple(parts))
 
 
@@ -119,7 +119,7 @@ def test_an_uncertain_contact_widens_the_answer(assembled):
     reference, _ = assembled
     ref, put = tool(REFERENCE, RIGID_ENOUGH), tool(TARGET, LOOSER)
     tip = two_point_receptance(measured(reference), ref, Point("1a", 0.02))
-    contact = Contact(*LOOSER, sd_percent=20.0)
+    contact = ToolContact(*LOOSER, sd_percent=20.0)
     sd = couple(tip, put.held(0, contact), ref).sd[0, 0]
     moved = couple(tip, put.held(0, contact.scaled("stiffness_n_m", 1.2)), ref).receptance[0, 0]
     assert np.nanmax(couple(tip, put, ref).sd) == 0

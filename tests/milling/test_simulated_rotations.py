@@ -9,11 +9,11 @@ import pytest
 
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
-from planner.milling.beam import Material, Segment
+from planner.milling.beam import Segment, ToolMaterial
 from planner.milling.coupling import couple
 from planner.milling.simulated_rotations import completed
 from planner.milling.tip_files import TipMotion
-from planner.milling.tool import Part, Tool
+from planner.milling.tool import Tool, ToolPart
 from planner.report.coupling_source import tip_of
 from planner.robot.config import Payload
 from planner.robot.robot import Robot
@@ -21,8 +21,8 @@ from planner.robot.robot import Robot
 ROBOT = Path(__file__).parents[2] / "campaigns" / "kr240_plane" / "robot" / "robot.toml"
 FREQUENCY = np.arange(4.0, 60.0, 0.5)
 Q = np.deg2rad([14.0, -95.0, 100.0, 10.0, -40.0, 20.0])
-ROD = Segment(0.25, 0.06, 0.06, Material(2e16, 7850.0, 0.3))  # as good as rigid
-TOOL = Tool("a rod", (0.0, 0.0, 1.0), (Part(ROD),))
+ROD = Segment(0.25, 0.06, 0.06, ToolMaterial(2e16, 7850.0, 0.3))  # as good as rigid
+TOOL = Tool("a rod", (0.0, 0.0, 1.0), (ToolPart(ROD),))
 
 
 @pytest.fixture(scope="module")

@@ -56,7 +56,7 @@ def test_rational_fit_of_noisy_frfs_is_as_good_as_their_noise():
     assert fit.error < 0.011
 
 
-@pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order"])
+@pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order", "semi_discretisation"])
 def test_frfs_give_the_limits_of_their_modes(method: str):
     given = cut(
         milling="down", radial_immersion=0.5, spindle_rpm=(5000.0, 15000.0, 5), method=method,
@@ -67,6 +67,19 @@ def test_frfs_give_the_limits_of_their_modes(method: str):
     np.testing.assert_allclose(
         [loss.depth_m for loss in found], [loss.depth_m for loss in wanted], rtol=2e-3
     )
+
+
+def test_methods_agree_on_cross_frfs_and_residual_compliance():
+    given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (12000.0, 15000.0, 2)}
+    soft = crossed()
+    soft = CutterModes(soft.poles, soft.shapes, soft.drives, 20 * soft.residual)
+    full = losses(machine(soft, cut(**given)))
+    semi = losses(machine(soft, cut(**given, method="semi_discretisation")))
+    without = losses(machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual),
+                             cut(**given)))  # fmt: skip
+    for a, b, c in zip(full, semi, without, strict=True):
+        assert a.depth_m == pytest.approx(b.depth_m, rel=2e-3)
+        assert abs(a.depth_m / c.depth_m - 1) > 0.01
 
 
 def test_frfs_that_end_before_the_chatter_are_refused():
@@ -116,3 +129,17 @@ def test_robust_depth_is_that_of_the_coefficients_alone():
     assert np.all(both.robust() < depth)
     assert np.all(np.diag(both.probability(depth * 0.5)) > 0.98)
     assert np.all(np.diag(both.probability(depth * 2)) < 0.1)
+
+
+def test_samples_between_speeds_follow_what_is_expected(monkeypatch):
+    """Looked at at a few speeds only, robust depths keep the dips of the limit between them."""
+    from planner.milling import uncertainty
+
+    monkeypatch.setattr(uncertainty, "MOST_SPEEDS", 4)
+    given = cut(spindle_rpm=(9300.0, 10700.0, 10))
+    structure = Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, 0.0, 0.1])))
+    found = losses(structure.machine(given))
+    drawn = sampled_limits(structure.samples(given, 20), found)
+    depth = np.array([loss.depth_m for loss in found])
+    share = drawn.robust() / depth
+    np.testing.assert_allclose(share, share[0], rtol=0.01)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from planner.design.stopping import percent
 from planner.report.predictions import ExpectedMode
 from planner.report.session_text import MOST_TOLD, poses_to_go, progress_line
 
@@ -51,3 +52,12 @@ def test_below_the_target_nothing_is_left_but_what_was_asked_at_least():
 def test_a_damping_of_which_nothing_is_known_is_no_number():
     assert ExpectedMode(10.0, 0.1, 0.133, 2.91).cells[1] == "not known"
     assert ExpectedMode(10.0, 0.1, 0.03, 0.002).cells[1] == "3.00 ± 0.20"
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [(0.0321, "0.032 %"), (1.44, "1.4 %"), (46.3, "46 %"), (99.6, "100 %"), (113.0, "more than "
+     "100 %"), (1.7e6, "more than 100 %"), (0.0, "0 %")],
+)  # fmt: skip
+def test_percentages_are_read_without_powers_of_ten(value, said):
+    assert percent(value) == said

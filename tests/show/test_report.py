@@ -1,6 +1,8 @@
 """`planner report`: one file that works offline, says everything, and lets no name break it."""
 
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 
 import pytest
@@ -88,6 +90,28 @@ def test_it_says_what_was_asked_measured_refused_and_how_good_it_is(report):
     assert len(re.findall(r"imported \d+ of \d+ hits", text)) == 2
     # Held-out quality, two modes' maps, two poses' FRFs.
     assert sum(s.startswith("data:image/png") for s in reader.sources) == 5
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no browser on this machine")
+def test_a_browser_shows_it_and_prints_it(report, tmp_path):
+    file = tmp_path / "report.html"
+    file.write_text(report[2])
+    call = [
+        "chromium",
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        f"--user-data-dir={tmp_path}",
+    ]
+    shown = subprocess.run([*call, "--dump-dom", file.as_uri()], capture_output=True, text=True,
+                           check=True, timeout=120).stdout  # fmt: skip
+    assert shown.count("<section") == report[2].count("<section")
+    assert "Content Security Policy" not in shown
+    pdf = tmp_path / "report.pdf"
+    subprocess.run([*call, f"--print-to-pdf={pdf}", file.as_uri()], capture_output=True,
+                   check=True, timeout=120)  # fmt: skip
+    assert pdf.read_bytes().startswith(b"%PDF")
+    assert len(re.findall(rb"/Type\s*/Page\b", pdf.read_bytes())) > 2
 
 
 def test_a_campaign_without_measurements_has_a_report_too(tmp_path, report, capsys):

@@ -4,6 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from planner.campaign.campaign import Campaign
+from planner.design.stopping import percent
 from planner.report.page.chapters import asked, decisions, meaning, measured, reproduce
 from planner.report.page.explained import diagnosis
 from planner.report.page.facts import Facts
@@ -53,7 +54,7 @@ def _cards(facts: Facts) -> Markup:
         (str(len(used)), "poses measured and used"),
         (str(hits), "hits used"),
         (str(len(facts.status.refused)), "recordings refused"),
-        (f"{known.rmse_percent:.2g} %", "expected RMSE of frequencies over the workspace"),
+        (percent(known.rmse_percent), "expected RMSE of frequencies over the workspace"),
         (
             "reached" if facts.status.done else "not reached",
             f"target of {facts.status.target_frequency_sd_percent:g} %",

@@ -12,6 +12,7 @@ from planner.report.page.html import Markup, joined, paragraphs, picture, sectio
 from planner.report.workspace_map import workspace_map
 
 SHOWN_FRFS = 6  # poses whose FRFs are drawn: the ones furthest off, then the first
+SHOWN_MAPS = 8  # modes whose maps are drawn
 DPI = 100
 POSITIONS = ("x of the tcp (m)", "y of the tcp (m)", "z of the tcp (m)")
 
@@ -65,7 +66,8 @@ def maps(facts: Facts) -> Markup:
     found = model.workspace_prediction
     poses = tuple(m.pose for m in facts.used)
     drawn = []
-    for k in range(found.frequency_hz.shape[1]):
+    count = found.frequency_hz.shape[1]
+    for k in range(min(count, SHOWN_MAPS)):
         figure = workspace_map(
             x, names, found.frequency_hz[:, k], facts.sd_percent[:, k], measured, poses, k + 1, flat
         )
@@ -73,7 +75,8 @@ def maps(facts: Facts) -> Markup:
     way = "" if flat else (
         " Several poses lie at one place of the map: shown is their mean, cell by cell."
     )  # fmt: skip
-    text = f"{len(x)} reachable poses stand for the workspace.{way}"
+    left = f" Modes above {SHOWN_MAPS} are not drawn." if count > SHOWN_MAPS else ""
+    text = f"{len(x)} reachable poses stand for the workspace.{way}{left}"
     return section("Natural frequencies over the workspace", tag("p", text), *drawn, id_="maps")
 
 

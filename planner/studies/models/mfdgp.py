@@ -98,7 +98,7 @@ class Training:
     inducing: int = 100
 
 
-class Data(NamedTuple):
+class TwoLevelData(NamedTuple):
     """Both levels' points and values, normalised; inducing inputs of both layers."""
 
     x_low: Any
@@ -114,7 +114,7 @@ class MFDGP:
     """Trained layers; values are in units of the levels' own means and sds."""
 
     layers: tuple[Layer, Layer]
-    data: Data
+    data: TwoLevelData
     low_units: Normalisation
     high_units: Normalisation
     bound: float  # of the normalised data, with many samples
@@ -149,7 +149,7 @@ def fit_mfdgp(
     starts = one.prior(1.0, START_NOISE, LENGTH, 0.0, 0.0)[0], two.start()
     z_low = choose_inducing(one, starts[0], cheap.x, how.inducing)
     z_high = choose_inducing(two, starts[1], wide, how.inducing)
-    data = Data(cheap.x, y_low, measured.x, y_high, z_low, z_high)
+    data = TwoLevelData(cheap.x, y_low, measured.x, y_high, z_low, z_high)
     layers = (
         _at_the_data(one, starts[0], z_low, cheap.x, y_low),
         _at_the_data(two, starts[1], z_high, wide, y_high),
@@ -206,7 +206,9 @@ def _divergence(layer: Layer) -> Array:
     return 0.5 * (jnp.sum(root**2) + jnp.sum(layer.mean**2) - len(layer.mean)) - size
 
 
-def _bound(layers: tuple[Layer, Layer], data: Data, low: Array, high: Array, noise: Array) -> Array:
+def _bound(
+    layers: tuple[Layer, Layer], data: TwoLevelData, low: Array, high: Array, noise: Array
+) -> Array:
     """The bound from a batch `low` (b,) and `high` (b',) of points and ε (s, b')."""
     first, second = layers
     d = data.x_low.shape[1]
@@ -224,7 +226,7 @@ def _bound(layers: tuple[Layer, Layer], data: Data, low: Array, high: Array, noi
 
 
 @jax_setup.compiled(static_argnums=3)
-def bound(layers: tuple[Layer, Layer], data: Data, seed: int, draws: int) -> Array:
+def bound(layers: tuple[Layer, Layer], data: TwoLevelData, seed: int, draws: int) -> Array:
     """The bound with all points and so many draws of f_1 at each expensive one."""
     noise = jax.random.normal(jax.random.key(seed), (draws, len(data.y_high)))
     low, high = jnp.arange(len(data.y_low)), jnp.arange(len(data.y_high))
@@ -233,8 +235,8 @@ def bound(layers: tuple[Layer, Layer], data: Data, seed: int, draws: int) -> Arr
 
 @jax_setup.compiled("quick", static_argnums=(6, 7))
 def _climbed(
-    layers: tuple[Layer, Layer], data: Data, seed: int, rate: float, free: float, steps: int,
-    batch: int, draws: int,
+    layers: tuple[Layer, Layer], data: TwoLevelData, seed: int, rate: float, free: float,
+    steps: int, batch: int, draws: int,
 ) -> tuple[Layer, Layer]:  # fmt: skip
     """So many steps of Adam; with `free` 0 noises and the spread of q stay, with 1 all moves."""
     n_low, n_high, key = len(data.y_low), len(data.y_high), jax.random.key(seed)
@@ -276,7 +278,7 @@ def _predicted_low(layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
 
 
 @jax_setup.compiled()
-def _predicted(layers: tuple[Layer, Layer], data: Data, x: Array) -> tuple[Array, Array]:
+def _predicted(layers: tuple[Layer, Layer], data: TwoLevelData, x: Array) -> tuple[Array, Array]:
     """Mean and variance (q,) of f_2, integrated over f_1(x)."""
     d = data.x_low.shape[1]
     below, unsure = _marginal(parse("rbf", d), layers[0], data.z_low, x)

@@ -20,7 +20,7 @@ from planner.studies.models.likelihood_gp import Normalisation, fit_likelihood
 from planner.studies.models.mfdgp import Training, fit_mfdgp
 from planner.studies.models.nargp import NARGP, fit_nargp, perdikaris
 
-FIRST_POINTS = 500  # of those measured, from which NARGP's climb on all of them begins
+FIRST_POINTS = 250  # of those measured, from which NARGP's climb on all of them begins
 SURFACE_TRAINING = Training(6000, 6000, inducing=300)
 
 

@@ -1,0 +1,51 @@
+"""Recordings that crashed or misled readers once: each is refused in one sentence, soon."""
+
+import h5py
+import numpy as np
+import pytest
+
+from planner.errors import InputError
+from planner.recording.hits import hits_from
+from planner.recording.read import read
+from planner.recording.screening import screen
+from tests.support.bad_input import write_h5, write_mat
+from tests.support.odd_recordings import ODD
+from tests.support.simulated_hits import RATE_HZ, make_hit
+
+
+def columns() -> dict[str, np.ndarray]:
+    hit = make_hit(np.random.default_rng(0))
+    names = [f"acceleration_{a}_m_s2" for a in "xyz"]
+    time_s = np.arange(hit.force_n.size) / RATE_HZ
+    each = dict(zip(names, hit.acceleration_m_s2, strict=True))
+    return {"time_s": time_s, "force_n": hit.force_n, **each}
+
+
+@pytest.mark.timeout(10)  # some of them hung: all take well below 1 s
+@pytest.mark.parametrize("what", ODD)
+def test_odd_recordings_are_refused_in_words(tmp_path, what):
+    name, write = ODD[what]
+    write(tmp_path / name, columns())
+    with pytest.raises(InputError, match=name) as refused:
+        hits_from(read(tmp_path / name))
+    assert "Error)" not in str(refused.value), refused.value  # it says what, not how it crashed
+
+
+def test_text_of_another_code_page_in_an_attribute_is_no_fault(tmp_path):
+    path = tmp_path / "hit.h5"
+    write_h5(path, columns())
+    with h5py.File(path, "a") as file:
+        file.attrs["note"] = np.bytes_(b"gr\xf6\xdfe")
+        file["force_n"].attrs["unit"] = np.bytes_(b"N")
+    (hit,) = hits_from(read(path))
+    assert hit.axis == "+x"
+
+
+@pytest.mark.parametrize(
+    ("factor", "kind"), [({"time_s": 1e-6}, "too_short"), ({"force_n": 1e-200}, "dead")]
+)
+def test_units_that_cannot_be_are_refused(tmp_path, factor, kind):
+    path, table = tmp_path / "hit.mat", columns()
+    write_mat(path, {**table, **{name: table[name] * by for name, by in factor.items()}})
+    (hit,) = hits_from(read(path))
+    assert kind in {fault.kind for fault in screen(hit) if fault.refuse}
