@@ -73,15 +73,23 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
     frequency, remarks = _lines(records), [r for record in records for r in record.remarks]
     sums: dict[tuple[Dof, Dof], list[np.ndarray]] = {}
     coherences: dict[tuple[Dof, Dof], np.ndarray] = {}
-    scaled, keep = True, frequency > 0
+    scaled, keep, dead = True, frequency > 0, []
     for record in records:
         kind, known = _kind(record, quantity, remarks)
         scaled &= known
         values = convert(frequency[keep], record.values[:, keep], kind, "accelerance")
         for k, (felt, hit) in enumerate(_places(record)):
+            if not np.any(values[k]):
+                dead.append(f"{felt} hit at {hit}")
+                continue
             key = felt.positive, hit.positive
             sums.setdefault(key, []).append(felt.sign * hit.sign * values[k])
             coherences[key] = record.coherence[k][keep]
+    if not sums:
+        raise RefusedError(f"{records[0].source}: all FRFs are zero; export them again.")
+    if dead:
+        named = ", ".join(dead[:3]) + (" …" if len(dead) > 3 else "")
+        remarks.append(f"{len(dead)} FRFs are zero throughout and were left out: {named}.")
     twice = [key for key, values in sums.items() if len(values) > 1]
     if twice:
         remarks.append(

@@ -155,11 +155,11 @@ def _mode(found: MatrixPoles, k: int, entries: Entries, points: int, scaled: boo
 def _shrunk(shape: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A shape whose hardly determined points are drawn towards zero, and its sds.
 
-    Points move about as far as the well determined half of them does (normal prior): where poles
-    of a set nearly coincide, its residues alone would be anything.
+    No point moves much farther than the farthest of the well determined half (normal prior): where
+    poles of a set nearly coincide, its residues alone would be anything.
     """
     known = sd <= np.median(sd)
-    power = float(np.mean(np.abs(shape[known]) ** 2))
+    power = float(np.max(np.abs(shape[known]) ** 2))
     share = power / np.maximum(power + 2 * sd**2, 1e-300)
     return shape * share, sd * np.sqrt(share)
 

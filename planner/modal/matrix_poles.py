@@ -69,8 +69,10 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
         return None
     start = _with_one_above(start, f[chosen][-1])
     sets = _sets(matrix, rows, columns)
+    felt = len(matrix.responses) >= len(matrix.references)
+    places = (rows, columns) if felt else (columns, rows)
     variance, poles = common(data, start)
-    fit, variance = established(data, sets, variance, poles)
+    fit, variance = established(data, sets, variance, poles, places)
     if not fit.poles.size:
         return None
     scale, weak, presence = judged(data, fit, variance)

@@ -11,17 +11,22 @@ from planner.modal.refine import refine
 from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
 
+# Row and column of each entry, columns being those of the few references.
+Places = tuple[np.ndarray, np.ndarray]
 # Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
 # are fitted: one in so many is kept.
-NEAR, THINNED = 8.0, 4
+NEAR, THINNED = 10.0, 3
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
 PRESENT, PRESENT_ADDED = 0.03, 0.2
 MOST_ADDED = 6
+ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
 PASSES = 2  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
+# Poles of one mode take part at the references alike (MAC of the participation).
+ALIKE = 0.8
 MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
 # Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
 # it.
@@ -54,25 +59,27 @@ def _variance(data: Data, fitted: np.ndarray, modes: int) -> np.ndarray:
 
 
 def established(
-    data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray
-) -> tuple[SetPoles, np.ndarray]:
+    data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
+    places: Places,
+) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
     """Fit with every set's own poles, weak modes left out and missing ones added."""
-    fit = _fit(data, sets, variance, poles)
+    fit = _fit(data, sets, variance, poles, rounds=ROUGH_ROUNDS)
+    tested: set[tuple[int, int]] = set()
     for number in range(PASSES):
         variance = _variance(data, fit.fitted, fit.poles.size)
         poles = _pruned(data, fit, variance)
-        if not number and poles.size == fit.poles.size:
-            poles = _unsplit(data, sets, fit, variance)
-            if poles.size == fit.poles.size:
-                poles = fit.poles
-        poles = np.append(poles, _missing(data, sets, fit, variance))
+        if poles.size == fit.poles.size:
+            poles = _unsplit(data, sets, fit, variance, places, tested)
+        split = poles.size < fit.poles.size
+        if number == 0:
+            poles = np.append(poles, _missing(data, sets, fit, variance))
         if not poles.size:
             return replace(fit, poles=poles), variance
-        same = np.array_equal(poles, fit.poles)
+        same = not split and poles.size == fit.poles.size
         if same and number:
             break
         known = fit.own if same else None
-        fit = _fit(data, sets, variance, poles, known)
+        fit = _fit(data, sets, variance, fit.poles if same else poles, known)
         if same:
             break
     return fit, _variance(data, fit.fitted, fit.poles.size)
@@ -80,13 +87,13 @@ def established(
 
 def _fit(
     data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
-    known: np.ndarray | None = None,
+    known: np.ndarray | None = None, rounds: int = ROUNDS,
 ) -> SetPoles:  # fmt: skip
     """Fit on thinned lines; poles that stray are left out."""
     while True:
         try:
             lines = _thinned(data, poles)
-            return fit_sets(data, sets, variance, poles, ROUNDS, known, lines)
+            return fit_sets(data, sets, variance, poles, rounds, known, lines)
         except StrayedError as error:
             poles, known = poles[~error.astray], None
 
@@ -217,22 +224,44 @@ def _explains(local: Data, less: SetPoles, more: SetPoles, variance: np.ndarray)
 
 
 def _unsplit(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
-) -> np.ndarray:
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
+    places: Places, tested: set[tuple[int, int]],
+) -> np.ndarray:  # fmt: skip
     """Poles with those pairs made one that sets of slightly different poles explain as well.
 
-    What one pole for all sets cannot follow, two poles within a bandwidth imitate.
+    What one pole for all sets cannot follow, two poles within a bandwidth imitate; they excite and
+    are excited alike. `tested` are pairs (lines) that were found to be two.
     """
     poles = fit.poles[np.argsort(fit.poles.imag)]
     kept: list[complex] = list(poles[:1])
     for pole in poles[1:]:
         last = kept[-1]
         width = 2 * max(abs(last.real), abs(pole.real))
-        if abs(pole.imag - last.imag) < width and _is_one(data, sets, fit, variance, last, pole):
+        step = 2 * np.pi * (data.frequency_hz[1] - data.frequency_hz[0])
+        pair = round(last.imag / step), round(pole.imag / step)
+        near = abs(pole.imag - last.imag) < width and pair not in tested
+        if (
+            near
+            and _alike(fit, places, last, pole)
+            and _is_one(data, sets, fit, variance, last, pole)
+        ):
             kept[-1] = (last + pole) / 2
         else:
+            tested.add(pair)
             kept.append(pole)
     return np.array(kept)
+
+
+def _alike(fit: SetPoles, places: Places, first: complex, second: complex) -> bool:
+    """Whether two poles take part at the references alike; always so at a single one."""
+    rows, columns = places
+    vectors = []
+    for pole in (first, second):
+        near = int(np.argmin(np.abs(fit.poles - pole)))
+        table = np.zeros((rows.max() + 1, columns.max() + 1), complex)
+        table[rows, columns] = fit.residue[:, near]
+        vectors.append(np.linalg.svd(table, full_matrices=False)[2][0])
+    return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
 
 
 def _is_one(

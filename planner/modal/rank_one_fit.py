@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 ROUNDS, STILL = 60, 1e-8  # of alternating and of Gauss-Newton steps, relative to the shape
+RIDGE = 1e-11
 # Relative to all entries, an error that each is given at first: none rules alone.
 START_SHARE = 0.03
 REWEIGHED = 3  # times that the weights follow what no shape explains
@@ -138,9 +139,9 @@ def _fitted(
         jacobian = _jacobian(entries, shape)
         normal = jacobian.conj().T @ (weight[:, None] * jacobian)
         left = values - shape[entries.rows] * shape[entries.columns]
-        step = np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ (
-            jacobian.conj().T @ (weight * left)
-        )
+        # A ridge far below all that is determined: a scale that is free then stays where it is.
+        normal[np.diag_indices(entries.points)] += RIDGE * np.trace(normal).real / entries.points
+        step = np.linalg.solve(normal, jacobian.conj().T @ (weight * left))
         shape = _shortened(entries, values, weight, shape, step)
         if np.linalg.norm(step) < STILL * np.linalg.norm(shape):
             break

@@ -106,7 +106,8 @@ def _spread(points: list[ReducedFit], own: np.ndarray, common: np.ndarray) -> np
     alone = np.array([x - i @ p.gradient for x, i, p in zip(own, inverse, points, strict=True)])
     m = common.size // 2
     far = _farthest(common)
-    weight = 1 / np.maximum([np.diag(i) for i in inverse], 1e-300)
+    least = (1e-6 * np.tile(far, 2)) ** 2  # finer than that no set's pole is known
+    weight = 1 / np.maximum([np.diag(i) for i in inverse], least)
     # A set in which the mode can hardly be seen says nothing.
     weight = np.where(1 / weight < np.tile(far, 2) ** 2, weight, 0.0)
     total = np.sum(weight, axis=0)

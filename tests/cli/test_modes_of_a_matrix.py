@@ -163,3 +163,14 @@ def test_lines_that_differ_are_refused(matrix, tmp_path, capsys):
     assert code in (2, 3)
     assert "b.uff has other frequency lines" in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_dead_channels_are_left_out_and_named(structure, matrix, tmp_path, capsys):
+    values = matrix.accelerance.copy()
+    values[10], values[20, 1] = 0.0, 0.0
+    path = write_matrix(tmp_path / "set.uff", replace(matrix, accelerance=values))
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert (code, answer["frfs"]) == (0, 146)
+    assert "4 FRFs are zero throughout" in " ".join(answer["remarks"])
+    assert [11, "z"] not in answer["dofs"]
+    agree(answer, structure)
