@@ -192,7 +192,7 @@ def diagnose_material(
     `robot` is the one of `given`, where it was loaded already.
     """
     robot = robot or given.nominal
-    dataset = given.read(robot.joint_names, robot.config.band_hz, lambda text: progress(text, 0.0))
+    dataset = given.read(robot, robot.config.band_hz, lambda text: progress(text, 0.0))
     offered = dict(zip(given.names, given.offered, strict=True))
     return diagnose(dataset, robot, offered=offered, progress=progress)
 

@@ -154,7 +154,7 @@ def _measured_hz(
     for i, pose in enumerate(poses):
         progress(f"checking on unused pose {i + 1} of {len(poses)}")
         rows = pool.rows[pose]
-        sources = tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in rows if r.file)
+        sources = tuple(Source.of(r) for r in rows if r.file)
         table = cell.config.modes
         measured = measure(sources, table.band_hz, window_rate_1_s=table.window_rate_1_s)
         modes = from_modal(measured.modal)

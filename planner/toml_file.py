@@ -30,21 +30,33 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     """
     text = read_toml_text(path, name)
     try:
-        raw = msgspec.toml.decode(text)
-        if (where := _not_finite(raw)) is not None:
-            raise InputError(f"{path}: {where} is no finite number; give one.")
-        return msgspec.convert(raw, type=kind)
-    except (msgspec.DecodeError, RecursionError, ValueError) as error:
+        found = msgspec.toml.decode(text, type=kind)
+    except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(f"{path} is not a valid {name} ({error}); correct it.") from None
+    entry, value = _not_finite(msgspec.to_builtins(found), "")
+    if entry:
+        raise InputError(f"{path}: {entry} is {value}; it must be a finite number.")
+    return found
 
 
-def _not_finite(value: Any, where: str = "") -> str | None:
-    """Where the first nan or inf stands, as `stop.probability`; None: nowhere."""
+def _not_finite(value: Any, name: str) -> tuple[str, float]:
+    """The first nan or inf below an entry, which no entry of ours may be, and its name."""
+    if isinstance(value, float):
+        return ("", 0.0) if math.isfinite(value) else (name, value)
+    pairs: list[tuple[str, Any]] = []
     if isinstance(value, dict):
-        parts = [(f"{where}.{key}" if where else key, v) for key, v in value.items()]
-    elif isinstance(value, list):
-        parts = [(f"{where}[{number}]", v) for number, v in enumerate(value, 1)]
-    else:
-        finite = not isinstance(value, float) or math.isfinite(value)
-        return None if finite else where
-    return next((found for name, v in parts if (found := _not_finite(v, name))), None)
+        for key, item in value.items():
+            if isinstance(item, dict):
+                pairs.append((f"{name} [{key}]".strip(), item))
+            elif isinstance(item, list | tuple) and item and isinstance(item[0], dict):
+                numbered = enumerate(item, 1)
+                pairs += [(f"{name} [[{key}]] number {i}".strip(), one) for i, one in numbered]
+            else:
+                pairs.append((f"{name} {key}".strip(), item))
+    elif isinstance(value, list | tuple):
+        pairs = [(name, item) for item in value]
+    for inner, item in pairs:
+        entry, number = _not_finite(item, inner)
+        if entry:
+            return entry, number
+    return "", 0.0

@@ -82,7 +82,9 @@ class Campaign(CampaignReads):
         with self._acting():
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
-            deliveries = sort_paths(paths, self.cell.robot.joint_names, pose, default)
+            deliveries = sort_paths(
+                paths, self.cell.robot.joint_names, self.cell.robot.points, pose, default
+            )
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in paths if path.is_file())
             reports = []
@@ -178,10 +180,12 @@ class Campaign(CampaignReads):
 
     def _log_configuration(self) -> None:
         """Follow changes made by hand to campaign.toml or the robot folder."""
+        from planner.campaign.check import refuse_errors
+
         configured, logged = self._configured(), self.state.configured
         assert logged is not None
         if (configured.config, configured.robot) != (logged.config, logged.robot):
-            _ = self.cell  # must load before it is believed
+            refuse_errors(self.cell.examined)  # before it is believed
             store.keep_robot_files(self.directory, configured.robot)
             self._append(configured)
 
@@ -289,10 +293,11 @@ def _first_entry(directory: Path) -> bytes:
     from datetime import UTC, datetime
 
     from planner.campaign.cell import Cell
+    from planner.campaign.check import refuse_errors
     from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)
-    Cell.load(directory / config.robot, config)
+    refuse_errors(Cell.load(directory / config.robot, config).examined)
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -6,6 +6,7 @@ from pathlib import Path
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.folder import TABLE, files_in, read_recordings
+from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import READERS
 from planner.recording.records import PoseRow
 
@@ -23,6 +24,7 @@ class Delivery:
 def sort_paths(
     paths: tuple[Path, ...],
     joint_names: tuple[str, ...],
+    points: PointNames,
     pose: str | None,
     default_pose: str | None,
 ) -> tuple[Delivery, ...]:
@@ -37,9 +39,9 @@ def sort_paths(
     for path in paths:
         table = path if path.name == TABLE else path / TABLE
         if table.is_file():
-            deliveries += _from_table(table.parent, joint_names, pose)
+            deliveries += _from_table(table.parent, joint_names, points, pose)
         elif path.is_dir() and (tables := sorted(path.rglob(TABLE))):
-            deliveries += _from_tables(path, tables, joint_names, pose)
+            deliveries += _from_tables(path, tables, joint_names, points, pose)
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
@@ -52,18 +54,23 @@ def sort_paths(
             raise InputError(
                 f"{bare[0]}: it is not clear at which pose it was recorded; say --pose ID."
             )
-        sources = tuple(Source(path, str(path)) for path in bare)
+        stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
+        sources = tuple(Source(path, str(path), stated=stated) for path in bare)
         deliveries.append(Delivery(name, None, sources))
     return tuple(deliveries)
 
 
 def _from_tables(
-    folder: Path, tables: list[Path], joint_names: tuple[str, ...], pose: str | None
+    folder: Path,
+    tables: list[Path],
+    joint_names: tuple[str, ...],
+    points: PointNames,
+    pose: str | None,
 ) -> list[Delivery]:
     """Deliveries of a folder's subfolders, each with a table of its own; `pose` picks one."""
     if len(tables) == 1:
-        return _from_table(tables[0].parent, joint_names, pose)
-    every = [d for table in tables for d in _from_table(table.parent, joint_names, None)]
+        return _from_table(tables[0].parent, joint_names, points, pose)
+    every = [d for table in tables for d in _from_table(table.parent, joint_names, points, None)]
     found = [d for d in every if pose in (None, d.pose)]
     if not found:
         names = ", ".join(dict.fromkeys(d.pose for d in every))
@@ -71,8 +78,10 @@ def _from_tables(
     return found
 
 
-def _from_table(folder: Path, joint_names: tuple[str, ...], pose: str | None) -> list[Delivery]:
-    recordings = read_recordings(folder, joint_names)
+def _from_table(
+    folder: Path, joint_names: tuple[str, ...], points: PointNames, pose: str | None
+) -> list[Delivery]:
+    recordings = read_recordings(folder, joint_names, points)
     rows: dict[str, list[PoseRow]] = {}
     for row in recordings.rows:
         rows.setdefault(row.pose, []).append(row)
@@ -88,7 +97,7 @@ def _from_table(folder: Path, joint_names: tuple[str, ...], pose: str | None) ->
         Delivery(
             name,
             group[0].joints_deg,
-            tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in group if r.file),
+            tuple(Source.of(r) for r in group if r.file),
             f"{folder / TABLE}, row {group[0].row}",
         )
         for name, group in rows.items()

@@ -67,6 +67,8 @@ class HitRecord(msgspec.Struct, frozen=True):
     reason: str = ""
     simulated: bool = False
     part: int = 0
+    hit_point: str = ""  # as the table of recordings named it, "" where it did not
+    response_points: tuple[str, ...] = ()
 
 
 class MeasuredMode(msgspec.Struct, frozen=True):

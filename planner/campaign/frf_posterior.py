@@ -5,7 +5,7 @@ are integrated out pose by pose, and the chain is estimated together with the si
 poses have in common may be a gain or a mass, and FRFs elsewhere are as uncertain as that.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,6 @@ from planner.diagnosis.linear.fit import Grade, Problem, tolerances_of
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.predict import misfit_at
 from planner.dynamics.gradient import Turned
-from planner.identification.measured_frfs import Measured
 from planner.identification.measurement_model import (
     CHAIN_NUMBERS,
     HIT_NUMBERS,
@@ -127,7 +126,7 @@ class ChainMisfit:
         matrices = self.misfit.matrices
         some = replace(
             self.misfit,
-            measured=Measured(*(getattr(m, field.name)[poses] for field in fields(m))),
+            measured=m.at(poses),
             setting=replace(s, q=s.q[poses], s=s.s[poses], jacobians=s.jacobians[poses]),
             inertias=replace(inertias, jacobians=inertias.jacobians[poses]),
             matrices=matrices.at(poses),

@@ -184,6 +184,8 @@ def measure_files(
             reason=verdict.reason,
             simulated=verdict.simulated,
             part=source.part,
+            hit_point=source.stated.hit_point,
+            response_points=source.stated.response_points,
         )
         for verdict, (source, digest, suffix) in zip(
             measured.verdicts[len(old) :], fresh, strict=True

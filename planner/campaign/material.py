@@ -36,14 +36,17 @@ class Material:
         own = self.campaign is not None and self.robot == self.campaign.robot_toml
         return self.campaign.cell.robot if self.campaign and own else Robot.load(self.robot)
 
-    def read(
-        self, joint_names: tuple[str, ...], band_hz: tuple[float, float], progress: Progress
-    ) -> Dataset:
-        """The recordings; nothing is written. Raises as `Dataset.read` does."""
+    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Progress) -> Dataset:
+        """The recordings of the robot; nothing is written. Raises as `Dataset.read` does."""
         rate = self.window_rate_1_s
         if self.campaign is None:
             return Dataset.read(
-                self.recordings, joint_names, band_hz, window_rate_1_s=rate, progress=progress
+                self.recordings,
+                robot.joint_names,
+                band_hz,
+                window_rate_1_s=rate,
+                progress=progress,
+                points=robot.points,
             )
         return self.campaign.dataset(band_hz, window_rate_1_s=rate, progress=progress)
 

@@ -73,7 +73,8 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
         allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
     asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
     if acquisition in INFORMED:
-        asked, seen = informed_candidates(cell), model.informed
+        asked = informed_candidates(cell)
+        seen = model.deciding if acquisition == "stability" else model.informed
     elif acquisition not in DESIGNS:
         seen = model.outlook
     picks = choose(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -20,6 +20,7 @@ from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.errors import InputError
+from planner.recording.points import PointNames, StatedPoints
 from planner.version import __version__
 
 # Imported where they are needed: with what is kept of a model, `status` needs none of them.
@@ -177,7 +178,11 @@ class CampaignReads:
         if path not in self._verified:
             store.read_kept(path, hit.sha256, hit.file)
             self._verified.add(path)
-        return Source(path, hit.file, hit.hit, hit.repeat, hit.part)
+        names = self.cell.robot.points
+        said = hit.hit_point or hit.response_points or names != PointNames()
+        stated = StatedPoints(hit.hit_point, hit.response_points, names=names)
+        stated = stated if said else StatedPoints()
+        return Source(path, hit.file, hit.hit, hit.repeat, stated, hit.part)
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""
@@ -224,6 +229,19 @@ class CampaignReads:
             name = self._model_name(self._configured(), self.state)
             model_cache.keep_model(self._kept, name, model)
         return found
+
+    def records(self) -> list[dict[str, Any]]:
+        """All measured modes, one row each: what pandas.DataFrame takes."""
+        from planner.campaign.records import measured_records
+
+        return measured_records(self.cell.robot.joint_names, self.state.measurements.values())
+
+    def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
+        """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
+        from planner.campaign.records import predicted_records
+
+        q = np.atleast_2d(q_rad)
+        return predicted_records(self.cell.robot.joint_names, q, self.predict(q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

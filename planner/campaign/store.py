@@ -137,6 +137,12 @@ def create_folder(
             directory.rmdir()
         os.replace(partial, directory)
         sync_folder(directory.parent)
+    except InputError as error:  # in words that name the user's files, not the copies
+        text = str(error)
+        for copy in (partial, partial.resolve()):
+            text = text.replace(str(copy / ROBOT), str(robot_toml.parent))
+            text = text.replace(str(copy / CONFIG), str(campaign_toml or CONFIG))
+        raise InputError(text) from None
     except OSError as error:
         raise InputError(
             f"{directory} cannot be made ({error.strerror}); choose another folder."

@@ -44,7 +44,10 @@ def compare(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Compare sampling strategies: error by number of measurements, on poses not used."""
+    """Compare sampling strategies: error by number of measurements, on poses not used.
+
+    Example: planner compare exports --robot robot/robot.toml --strategies random,default
+    """
     from planner.cli.progress import bars
     from planner.compare.bench import assemble, decide
     from planner.compare.resume import conduct, recorded
@@ -57,11 +60,11 @@ def compare(
     if simulation not in (None, *SIMULATIONS):
         raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
     loaded = Robot.load(robot)
-    rows = read_recordings(recordings, loaded.joint_names).rows
+    rows = read_recordings(recordings, loaded.joint_names, loaded.points).rows
     config = decide(loaded, [row.joints_deg for row in rows], campaign, simulation)
     folder = out or _cache_folder()
     with bars(quiet=as_json) as progress:
-        poses = recorded(recordings, loaded.joint_names, config.modes, workers, progress)
+        poses = recorded(recordings, loaded, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)
         found = conduct(bench, study, folder, scheduler, workers, progress)

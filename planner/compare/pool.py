@@ -1,6 +1,5 @@
 """The pool: every recorded pose with its modes and FRFs, made from its hits once and kept."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from planner.dataset.store import Store, user_store
 from planner.frf.frf import Frf
 from planner.recording.folder import read_recordings
 from planner.recording.records import PoseRow
+from planner.robot.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -46,15 +46,15 @@ class PoseFiles:
 
     def measured(self, store: Store) -> MeasuredPose:
         """Its recordings, read when something is asked that `store` does not hold."""
-        files = tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in self.rows if r.file)
+        files = tuple(Source.of(r) for r in self.rows if r.file)
         rate = self.table.window_rate_1_s
         return MeasuredPose(files, self.table.band_hz, window_rate_1_s=rate, store=store)
 
 
-def poses_of(folder: Path, joint_names: Sequence[str], table: ModesTable) -> tuple[PoseFiles, ...]:
+def poses_of(folder: Path, robot: Robot, table: ModesTable) -> tuple[PoseFiles, ...]:
     """The poses of a recordings folder in recorded order; InputError where it is wrong."""
     groups: dict[str, list[PoseRow]] = {}
-    for row in read_recordings(folder, tuple(joint_names)).rows:
+    for row in read_recordings(folder, robot.joint_names, robot.points).rows:
         groups.setdefault(row.pose, []).append(row)
     return tuple(PoseFiles(tuple(rows), table) for rows in groups.values())
 

@@ -15,6 +15,7 @@ from planner.compare.processes import Failure
 from planner.compare.run import run
 from planner.compare.tasks import Run, Study, Task
 from planner.errors import InputError
+from planner.robot.robot import Robot
 
 RUNS = "runs"
 Progress = Callable[[str, int, int], None]  # what is counted, done, of how many
@@ -22,13 +23,13 @@ Progress = Callable[[str, int, int], None]  # what is counted, done, of how many
 
 def recorded(
     recordings: Path,
-    joint_names: tuple[str, ...],
+    robot: Robot,
     table: ModesTable,
     workers: int,
     progress: Progress,
 ) -> tuple[PoolPose, ...]:
     """All poses of a recordings folder; what was found of them before is taken up."""
-    files = pool.poses_of(recordings, joint_names, table)
+    files = pool.poses_of(recordings, robot, table)
     found = {i: pool.make(None, f) for i, f in enumerate(files) if pool.kept(f)}
     todo = [i for i in range(len(files)) if i not in found]
     progress("poses", len(found), len(files))

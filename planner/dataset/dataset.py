@@ -1,5 +1,6 @@
 """Recordings read, screened and in order: what every analysis of several poses is given."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,6 +19,7 @@ from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
 from planner.recording.folder import read_recordings
 from planner.recording.force_levels import levels, peak_n
+from planner.recording.points import SENSOR, TCP, PointNames, together
 from planner.recording.records import Hit
 
 # Rate (1/s) of an exponential window that is laid over all records: decays that they cut off are
@@ -55,6 +57,7 @@ class Dataset:
         window_rate_1_s: float = 0.0,
         progress: Progress = lambda text: None,
         store: Store | None = None,
+        points: PointNames | None = None,
     ) -> "Dataset":
         """Read and screen all hits of a folder with recordings.csv.
 
@@ -65,6 +68,7 @@ class Dataset:
             window_rate_1_s: Of an exponential window that the analyser laid over all channels.
             progress: Is told which pose is read.
             store: Where FRFs and modes are looked up and kept; by default the user's.
+            points: Where the robot may be hit and heard (`Robot.points`); none: at the tool alone.
 
         Raises:
             InputError: The table is wrong.
@@ -74,9 +78,9 @@ class Dataset:
             Recording(
                 row.pose,
                 np.deg2rad(row.joints_deg),
-                Source(row.file, str(row.file), row.hit, row.repeat),
+                Source.of(row),
             )
-            for row in read_recordings(folder, joint_names).rows
+            for row in read_recordings(folder, joint_names, points).rows
             if row.file
         ]
         return cls.of(
@@ -120,7 +124,7 @@ class Dataset:
         remarks = tuple(
             f"Pose {entry.pose} is left out: {entry.measured.averaged.remarks[0]}"
             for entry in entries
-            if entry.measured.frf is None
+            if entry.measured.whole is None
         )
         if len(remarks) == len(entries):
             reason = refused[0][1] if refused else "".join(remarks[:1])
@@ -167,7 +171,7 @@ class Dataset:
     @cached_property
     def measured(self) -> tuple[PoseEntry, ...]:
         """The n entries with an FRF."""
-        return tuple(entry for entry in self.entries if entry.measured.frf is not None)
+        return tuple(entry for entry in self.entries if entry.measured.whole is not None)
 
     @property
     def poses(self) -> tuple[str, ...]:
@@ -181,8 +185,8 @@ class Dataset:
 
     @property
     def frfs(self) -> tuple[Frf, ...]:
-        """Of each pose, all its visits and force levels together."""
-        return _known(entry.measured.frf for entry in self.measured)
+        """Of each pose, all its visits and force levels together, at all points."""
+        return _known(entry.measured.whole for entry in self.measured)
 
     @property
     def ended_frfs(self) -> tuple[Frf, ...]:
@@ -236,6 +240,42 @@ class Dataset:
         """FRF of some hits of a visit, with an exponential window of rate LAID over them."""
         return estimate(hits, self.band_hz, "h1", LAID, window_rate_1_s=self.window_rate_1_s)
 
+    # -- by point ------------------------------------------------------------------------------
+
+    @cached_property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of all points where a sensor was, in the order of recording."""
+        return together([frf.layout for frf in self.frfs]).sensors
+
+    def heard_by(self, sensor: str, hit_point: str | None = None) -> "Dataset":
+        """Hits as one triaxial sensor has them: those that it heard, of one hit point or of all."""
+        some = []
+        for visit in self.visits:
+            own = (h for h in visit.hits if hit_point is None or h.hit_point == hit_point)
+            hits = tuple(one for hit in own if (one := hit.heard_by(sensor)) is not None)
+            if hits:
+                some.append(replace(visit, hits=hits))
+        return self.corrected(some)
+
+    @cached_property
+    def most_heard(self) -> "Dataset":
+        """Hits at one point as one triaxial sensor has them, both those of most visits.
+
+        The tool's, where it is among these; all, where there is nothing else.
+        """
+        count: Counter[tuple[str, str]] = Counter()
+        for visit in self.visits:
+            count.update({(h.hit_point, s) for h in visit.hits for s in h.layout.sensors
+                          if h.heard_by(s) is not None})  # fmt: skip
+        if set(count) <= {(TCP, SENSOR)} and self.sensors in ((SENSOR,), ()):
+            return self
+        if not count:
+            return self.corrected(())
+        most = max(count.values())
+        ends = [pair for pair, visits in count.items() if visits == most]
+        hit_point, sensor = (TCP, SENSOR) if (TCP, SENSOR) in ends else ends[0]
+        return self.heard_by(sensor, hit_point)
+
     # -- by force level ------------------------------------------------------------------------
 
     @cached_property
@@ -245,7 +285,9 @@ class Dataset:
     @cached_property
     def level_n(self) -> np.ndarray:
         """Peak forces (levels,) in N, weakest first: the same for all visits."""
-        return np.array([float(np.exp(np.mean(np.log(group)))) for group in self._by_level])
+        return np.array(
+            [float(np.exp(np.mean(np.log(group)))) for group in self._by_level if len(group)]
+        )
 
     def level(self, hit: Hit) -> int:
         """Which of `level_n` a hit belongs to."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dataset.dataset import LAID
-from planner.dataset.measure import MeasuredPose
+from planner.dataset.measure import MeasuredPose, of_tool
 from planner.dataset.screened_files import Source
 from planner.dataset.store import user_store
 from planner.frf.spectra import Windows, transform
-from planner.recording.records import FrfRecord, Hit
+from planner.recording.records import Hit
 
 LINES = 48  # of each hit, at most: four numbers a hit are told from 144 complex values
 DROP = 0.1  # of a pulse's force spectrum, where it ceases to excite: 20 dB
@@ -19,6 +19,8 @@ CHANNELS = 3
 @dataclass(frozen=True, eq=False)
 class HitColumns:
     """The n hits of a pose at L lines, at s = iω + `rate_1_s`; n = 0 of exported FRFs.
+
+    Those at the tcp, as the sensor there has them.
 
     `file` (n,) counts the files they are from; `axis` (n,) is 0, 1 or 2 and `sign` (n,) their sense
     along it. `accelerance` (n, 3, L) in m/s²/N is that of a force along +axis, `variance` (n, 3, L)
@@ -89,16 +91,11 @@ def columns_of(
     pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
     def make() -> HitColumns:
-        from planner.recording.hits import hits_from
-        from planner.recording.read import read
-
         hits, file = [], []
         for number, source in enumerate(sources):
-            records = read(source.path)
-            if not any(isinstance(record, FrfRecord) for record in records):
-                found = hits_from(source.of(records), axis=source.hit)
-                hits += found
-                file += [number] * len(found)
+            found = of_tool(source.read()[0])
+            hits += found
+            file += [number] * len(found)
         if not hits:
             return _none()
         return hit_columns(tuple(hits), tuple(file), band_hz, window_rate_1_s)

@@ -12,9 +12,10 @@ from planner.recording.records import Hit
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Accelerance (3, F) in m/s²/N along hit `axis` at one force `level`, at s = iω + `rate_1_s`.
+    """Accelerance (r, F) in m/s²/N along hit `axis` at one force `level`, at s = iω + `rate_1_s`.
 
-    `variance` (3, F) is E|δH|², ∞ where the pulse does not excite. `peak_n` is the mean peak.
+    Rows are those of the hits' layout. `variance` (r, F) is E|δH|², ∞ where the pulse does not
+    excite. `peak_n` is the mean peak.
     """
 
     axis: int
@@ -69,7 +70,7 @@ def column(
 
 
 def _uncertain(spectra: Spectra) -> np.ndarray | float:
-    """E|δH|² (3, F) by what was taken out of the hits and may be wrong."""
+    """E|δH|² (r, F) by what was taken out of the hits and may be wrong."""
     power = sum(np.abs(hit.force) ** 2 for hit in spectra.hits)
     doubts = (
         np.abs(hit.force * hit.doubtful) ** 2 for hit in spectra.hits if hit.doubtful is not None

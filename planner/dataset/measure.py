@@ -14,10 +14,16 @@ from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.homogeneity import Homogeneity, homogeneity
 from planner.modal.modes import ModalModel
+from planner.recording.points import SENSOR, TCP, TOOL
 from planner.recording.records import FrfRecord, Hit
 
 OVER = 5.5  # e^−OVER of the slowest decay is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
+
+NOT_OF_TOOL = (
+    "No hit at the tcp was heard by all axes of the sensor there: modes of the tool are not told, "
+    "what was measured at other points serves identification and diagnosis."
+)
 
 T = TypeVar("T")
 
@@ -81,16 +87,21 @@ class MeasuredPose:
 
     @property
     def frf(self) -> Frf | None:
-        """See `averaged`."""
+        """The tool's part of `whole`: hits at the tcp, and the sensor there; None without."""
+        return None if self.whole is None else self.whole.of_tool
+
+    @property
+    def whole(self) -> Frf | None:
+        """Of all points, see `averaged`."""
         return self.averaged.frf
 
     @cached_property
     def ended_frf(self) -> Frf | None:
-        """The FRF under an exponential window by which decays are over; exported ones as they are.
+        """`whole` under an exponential window by which decays are over; exported ones as they are.
 
         What the window does is part of the model (`Frf.exponential_rate_1_s`).
         """
-        plain = self.frf
+        plain = self.whole
         if plain is None or not np.isfinite(plain.tail_s):
             return plain
         return self.kept("ended frf", Frf, lambda: self._ended(plain, "weighted"))
@@ -98,7 +109,7 @@ class MeasuredPose:
     @cached_property
     def one_hit_frf(self) -> Frf | None:
         """The FRF of one hit in the middle of all, for a model of how hits miss; as `ended_frf`."""
-        plain = self.frf
+        plain = self.whole
         if plain is None or not self.hits:
             return plain
         return self.kept("one hit frf", Frf, lambda: self._ended(plain, "one_hit"))
@@ -148,7 +159,7 @@ class MeasuredPose:
 
     def _key(self, what: str) -> str:
         """Hash of the files' content and of all else that a result depends on."""
-        told = [(s.name, s.path.suffix, s.hit, s.repeat, s.part) for s in self.sources]
+        told = [(s.name, s.path.suffix, s.hit, s.repeat, s.stated, s.part) for s in self.sources]
         how = self.band_hz, self.estimator, self.window_rate_1_s
         return content_hash.digest(
             what, program(), content_hash.of(told), content_hash.of(how), self._contents
@@ -177,16 +188,24 @@ class MeasuredPose:
     def _decompose(self) -> Decomposed:
         from planner.modal.estimate_modes import estimate_modes
 
-        if self.frf is None:
+        if self.whole is None:
             return Decomposed(None, None, ())
+        if self.frf is None:
+            return Decomposed(None, None, (NOT_OF_TOOL,))
         try:
             modal = estimate_modes(self.frf, self.band_hz)
         except RefusedError as error:
             return Decomposed(None, None, (str(error),))
-        hits = self.hits
+        hits = of_tool(self.hits)
         levels = homogeneity(hits, modal, self.band_hz, self.window_rate_1_s) if hits else None
         told = (levels.remark,) if levels is not None and levels.remark else ()
         return Decomposed(modal, levels, (*modal.remarks, *told))
+
+
+def of_tool(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
+    """Hits at the tcp as the sensor there has them."""
+    heard = (hit.heard_by(SENSOR) for hit in hits if hit.hit_point == TCP)
+    return tuple(hit for hit in heard if hit is not None)
 
 
 def program() -> str:
@@ -228,22 +247,26 @@ def measure(
 def frf_of(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
 ) -> Frf:
-    """The FRF of files that were accepted before: the one that `measure` gave then."""
+    """The tool's FRF of files that were accepted before: the one that `measure` gave then."""
     pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
     def make() -> Frf:
-        from planner.recording.hits import hits_from
-        from planner.recording.read import read
-
-        hits, frfs = [], []
-        for source in sources:
-            records = read(source.path)
-            found = [record for record in records if isinstance(record, FrfRecord)]
-            frfs += found
-            hits += () if found else hits_from(source.of(records), axis=source.hit)
-        return _frf(tuple(hits), tuple(frfs), band_hz, "h1", window_rate_1_s)
+        read = [source.read() for source in sources]
+        hits = tuple(hit for found, _ in read for hit in found)
+        frfs = tuple(record for _, found in read for record in found)
+        whole = _frf(hits, frfs, band_hz, "h1", window_rate_1_s)
+        return whole.of_tool or _nothing(whole)
 
     return pose.kept("accepted frf", Frf, make)
+
+
+def _nothing(frf: Frf) -> Frf:
+    """The tool's FRF of a pose where others were measured."""
+    empty = np.full((3, 3, len(frf.frequency_hz)), np.nan)
+    return replace(
+        frf, accelerance=empty + 0j, variance=empty, coherence=empty, hits=(0, 0, 0),
+        force_share=None, layout=TOOL,
+    )  # fmt: skip
 
 
 def _frf(

@@ -1,11 +1,12 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from planner.errors import PlannerError
-from planner.recording.records import FrfRecord, Hit, Record
+from planner.recording.points import StatedPoints
+from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 
 
 @dataclass(frozen=True)
@@ -19,14 +20,28 @@ class Source:
     name: str
     hit: str | None = None
     repeat: int | None = None
+    stated: StatedPoints = field(default_factory=StatedPoints)
     part: int = 0
 
-    def of(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
-        """Of a file's records those that are meant."""
-        if not self.part:
-            return records
-        times = [record for record in records if not isinstance(record, FrfRecord)]
-        return tuple(times[self.part - 1 : self.part])
+    @classmethod
+    def of(cls, row: PoseRow) -> "Source":
+        """The file that a row of the table names."""
+        assert row.file is not None
+        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated)
+
+    def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
+        """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
+        from planner.recording.hits import hits_from, located
+        from planner.recording.read import read
+
+        records: tuple[Record, ...] = read(self.path)
+        frfs = [record for record in records if isinstance(record, FrfRecord)]
+        if frfs and not self.part:
+            return (), tuple(located(record, self.stated) for record in frfs)
+        if self.part:
+            times = [record for record in records if not isinstance(record, FrfRecord)]
+            records = tuple(times[self.part - 1 : self.part])
+        return hits_from(records, self.hit, self.stated), ()
 
     def parts(self, count: int) -> "tuple[Source, ...]":
         """Each of the file's hits by itself, where there are several."""
@@ -102,17 +117,13 @@ def read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[Verdict, tuple[Hit, ...], list[FrfRecord]]:
     """One file, judged by itself: the verdict, its usable hits, its FRFs."""
-    from planner.recording.hits import hits_from
-    from planner.recording.read import read
     from planner.recording.screening import ScreeningLimits, screen
 
     try:
-        records: tuple[Record, ...] = read(source.path)
-        frfs = [record for record in records if isinstance(record, FrfRecord)]
+        found, frfs = source.read()
         if frfs:
             simulated = any(record.simulated for record in frfs)
-            return Verdict(source, True, "", source.hit, simulated), (), frfs
-        found = hits_from(source.of(records), axis=source.hit)
+            return Verdict(source, True, "", source.hit, simulated), (), list(frfs)
     except PlannerError as error:
         return Verdict(source, False, renamed(str(error), (source,))), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)

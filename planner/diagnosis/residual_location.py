@@ -53,7 +53,7 @@ def where(problem: Problem, found: Fit) -> Where:
     place = np.clip(np.searchsorted(edges, measured.frequency_hz, "right") - 1, 0, BANDS - 1)
     bands = [_mean(np.where((place == k)[:, None, None], square, np.nan)) for k in range(BANDS)]
     poses = [_mean(one) for one in square]
-    directions = [[_mean(square[:, i, j]) for j in range(3)] for i in range(3)]
+    directions = [[_mean(square[:, i::3, j::3]) for j in range(3)] for i in range(3)]
     return Where(edges, np.array(bands), np.array(poses), np.array(directions))
 
 

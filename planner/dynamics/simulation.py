@@ -102,9 +102,10 @@ class Simulation:
 
     def poles(self, q: np.ndarray) -> Poles:
         """All poles and residues at q (n, dof) in rad."""
-        return self._solve(self.elastic.matrices(q))
+        return self.solved(self.elastic.matrices(q))
 
-    def _solve(self, m: Matrices) -> Poles:
+    def solved(self, m: Matrices) -> Poles:
+        """The same between the points of the matrices."""
         return solve_poles(m.mass, self.damping, self.stiffness + m.geometric, m.hit, m.sensor)
 
     def modes(self, q: np.ndarray, count: int) -> SimulatedModes:
@@ -151,6 +152,6 @@ class Simulation:
         "accelerance" (m/s²/N) or "receptance" (m/N). Raises InputError for unknown frames.
         """
         synthesis = {"accelerance": accelerance, "receptance": receptance}[quantity]
-        values = synthesis(self._solve(self.elastic.matrices(q, hits, sensors)), frequency_hz)
+        values = synthesis(self.solved(self.elastic.matrices(q, hits, sensors)), frequency_hz)
         n, rows, columns, lines = values.shape
         return values.reshape(n, rows // 3, 3, columns // 3, 3, lines)

@@ -16,6 +16,7 @@ import numpy as np
 
 from planner.frf.frf import Frf
 from planner.frf.spectra import HitSpectra, Spectra, Windows, transform
+from planner.recording.points import Layout
 from planner.recording.records import Hit
 
 ESTIMATORS = "h1", "h2", "hv", "weighted", "one_hit"
@@ -24,7 +25,7 @@ SMOOTH = 11  # lines over which the variance, which varies slowly, is averaged
 LEVEL_LINES = 15  # over which scatter of weighted hits is compared with what their noise explains
 PRIOR = 12.0  # real values of scatter that the pooled level counts for, beside those near a line
 
-# FRF, variance, coherence (3, F) of one hit axis, and the share (F,) of the force's noise.
+# FRF, variance, coherence (r, F) of one hit axis, and the share (F,) of the force's noise.
 Estimated = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -70,48 +71,61 @@ def of_spectra(
     if estimator not in ESTIMATORS:
         raise ValueError(f"unknown estimator {estimator}")
     frequency = spectra.frequency_hz
-    shape = (3, 3, frequency.size)
+    places = list(dict.fromkeys((s.layout, s.rows) for s in spectra.hits))
+    layout = _joined([inner for inner, _ in places])
+    shape = (*layout.shape, frequency.size)
     h, variance = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
-    coherence, share = np.full(shape, np.nan), np.full((3, frequency.size), np.nan)
-    counts = [0, 0, 0]
+    coherence, share = np.full(shape, np.nan), np.full((shape[1], frequency.size), np.nan)
+    counts = [0] * shape[1]
     by_noise = estimator in ("weighted", "one_hit")
     if by_noise and not all(s.noise_known and s.noise.all() for s in spectra.hits):
         estimator = "h1"
-    for axis in range(3):
-        group = [s for s in spectra.hits if s.axis == axis]
-        counts[axis] = len(group)
+    for place, axis in ((place, axis) for place in range(len(places)) for axis in range(3)):
+        inner, own = places[place]
+        group = [s for s in spectra.hits if (s.layout, s.rows, s.axis) == (inner, own, axis)]
+        column = 3 * place + axis
+        counts[column] = len(group)
         if group:
             found = _column(group, estimator, by_scatter)
-            h[:, axis], variance[:, axis], coherence[:, axis], share[axis] = found
+            rows = np.array(layout.rows(inner))[list(own)]
+            h[rows, column], variance[rows, column], coherence[rows, column] = found[:3]
+            share[column] = found[3]
     return Frf(
         frequency,
         h,
         variance,
         coherence,
-        (counts[0], counts[1], counts[2]),
+        tuple(counts),
         _usable(spectra, band_hz),
         windows.laid_1_s + windows.carried_1_s,
         spectra.remarks,
         spectra.tail_s,
         share,
         float(np.mean([s.force_window_s for s in spectra.hits])),
+        layout,
     )
 
 
+def _joined(layouts: list[Layout]) -> Layout:
+    """One layout for hits that sensors heard together: each group of them has its own columns."""
+    sensors = dict.fromkeys(name for layout in layouts for name in layout.sensors)
+    return Layout(tuple(layout.hits[0] for layout in layouts), tuple(sensors))
+
+
 def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estimated:
-    """One hit axis from its n hits."""
+    """One hit axis from its n hits, which the same r channels heard."""
     force = np.array([s.force for s in group])  # (n, F)
-    response = np.array([s.response for s in group])  # (n, 3, F)
-    noise = np.array([s.noise for s in group])  # (n, 3)
+    response = np.array([s.response for s in group])  # (n, r, F)
+    noise = np.array([s.noise for s in group])  # (n, r)
     weight = 1 / noise if estimator == "weighted" else np.ones(noise.shape)
     square = np.abs(force) ** 2
-    sff = np.einsum("nr,nf->rf", weight, square)  # (3, F)
+    sff = np.einsum("nr,nf->rf", weight, square)  # (r, F)
     sxx = np.einsum("nr,nrf->rf", weight, np.abs(response) ** 2)
     sxf = np.einsum("nr,nrf,nf->rf", weight, response, force.conj())
     if estimator == "one_hit":
         return _one_hit(group)
     h = _frf(sff, sxx, sxf, estimator)
-    told = weight[:, :, None] * square[:, None] / sff  # (n, 3, F), sums to 1 over hits
+    told = weight[:, :, None] * square[:, None] / sff  # (n, r, F), sums to 1 over hits
     force_share = np.array([s.force_noise for s in group])[:, None] / square  # (n, F)
     share = np.mean(np.sum(told**2 * force_share[:, None], axis=0), axis=0)
     alone = np.einsum("nr,nr,nf->rf", weight**2, noise, square) / sff**2
@@ -138,7 +152,7 @@ def _column(group: list[HitSpectra], estimator: str, by_scatter: bool) -> Estima
 def _one_hit(group: list[HitSpectra]) -> Estimated:
     """Mean of the hits' own FRFs, each with one share."""
     force = np.array([s.force for s in group])  # (n, F)
-    response = np.array([s.response for s in group])  # (n, 3, F)
+    response = np.array([s.response for s in group])  # (n, r, F)
     square = np.abs(force) ** 2
     strength = np.array(
         [np.sum(power) * np.sum(1 / s.noise) for power, s in zip(square, group, strict=True)]
@@ -153,7 +167,7 @@ def _one_hit(group: list[HitSpectra]) -> Estimated:
 
 
 def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> np.ndarray:
-    """H (3, F) from sums over hits."""
+    """H (r, F) from sums over hits."""
     h1 = sxf / sff
     if estimator in ("h1", "weighted"):
         return h1
@@ -164,7 +178,7 @@ def _frf(sff: np.ndarray, sxx: np.ndarray, sxf: np.ndarray, estimator: str) -> n
 
 
 def _level(scatter: np.ndarray, degrees: int) -> np.ndarray:
-    """Noise (3, F) beside what the records say: near each line, drawn toward the channels' mean."""
+    """Noise (r, F) beside what the records say: near each line, drawn toward the channels' mean."""
     pooled = float(np.mean(scatter)) / degrees
     near = _smooth(scatter, LEVEL_LINES) / degrees
     ones = np.ones(scatter.shape[1])

@@ -111,8 +111,13 @@ def stack(parts: Sequence[Agreement]) -> Agreement:
 
 
 def direct_mean(values: np.ndarray) -> float:
-    """Mean of a figure (response, hit) over the direct FRFs xx, yy, zz, as in Birk et al. 2025."""
-    return float(mean_known(np.diagonal(values), axis=0))
+    """Mean of a figure (response, hit) over the direct FRFs xx, yy, zz, as in Birk et al. 2025.
+
+    Between several points, rows and columns going by threes, those of every sensor and hit point.
+    """
+    rows, columns = values.shape
+    points = np.moveaxis(values.reshape(rows // 3, 3, columns // 3, 3), 2, 1)
+    return float(mean_known(np.diagonal(points, axis1=2, axis2=3)))
 
 
 def mean_known(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> np.ndarray:

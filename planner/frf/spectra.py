@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import RefusedError
+from planner.recording.points import TOOL, Layout
 from planner.recording.records import Hit
 
 MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
@@ -35,11 +36,12 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class HitSpectra:
-    """Transforms of one hit: force (F,) in N and responses (3, F) in m/s², summed over samples.
+    """Transforms of one hit: force (F,) in N and responses (r, F) in m/s², summed over samples.
 
-    `force_noise` and `noise` (3,) are the powers of the noise in them; `noise_known` is False where
-    nothing was recorded before the pulse and `noise` is no more than a bound. `doubtful` (3, F) is
-    the uncertain share of what was taken out of the responses (see `Hit`), None where nothing was.
+    They are along the `rows` of `layout`. `force_noise` and `noise` (r,) are the powers of the
+    noise in them; `noise_known` is False where nothing was recorded before the pulse and `noise` is
+    no more than a bound. `doubtful` (r, F) is the uncertain share of what was taken out of the
+    responses (see `Hit`), None where nothing was.
     """
 
     axis: int
@@ -50,6 +52,8 @@ class HitSpectra:
     noise: np.ndarray
     noise_known: bool
     doubtful: np.ndarray | None = None
+    layout: Layout = TOOL
+    rows: tuple[int, ...] = (0, 1, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +143,8 @@ def _transform(
         noise * float(np.sum((laid * carried)[used] ** 2)),
         known,
         doubtful,
+        hit.layout,
+        tuple(hit.rows),
     )
 
 

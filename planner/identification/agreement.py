@@ -98,9 +98,9 @@ def _stacked(
 
 
 def _simulated(simulation: Simulation, measured: Measured, q: np.ndarray) -> np.ndarray:
-    """(n, 3, 3, F), cut off at the records' ends as the measured ones are."""
-    matrices = simulation.elastic.matrices(q)
+    """(n, r, c, F), cut off at the records' ends as the measured ones are."""
+    matrices = measured.loaded(simulation.elastic.matrices(q, layout=measured.layout), simulation)
     h = response(matrices, simulation.elasticity, measured.s)
     if np.isfinite(measured.tail_s).any():
-        h -= cut_off(simulation.poles(q), measured.s, measured.tail_s)
+        h -= cut_off(simulation.solved(matrices), measured.s, measured.tail_s)
     return h

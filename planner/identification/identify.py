@@ -12,12 +12,12 @@ from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.agreement import MOST_LINES, fit_similarity
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.measured_frfs import common_band
+from planner.identification.measured_frfs import common_band, matrices_at
 from planner.identification.measurement_model import Tolerances
 from planner.identification.objective import Objective
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
-from planner.identification.staged_problem import Progress, StagedProblem, matrices_for
+from planner.identification.staged_problem import Progress, StagedProblem
 from planner.inference.least_squares import Minimum, inverse
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
@@ -98,7 +98,7 @@ def identify(
     p, elastic = parametrise(simulation, priors or Priors()), simulation.elastic
     inertias = p.inertias(elastic.body_jacobians(q))
     barrier = Barrier.around(elastic.inertia, p)
-    matrices = matrices_for(elastic, q, tolerances)
+    matrices = matrices_at(elastic, q, frfs, tolerances is not None)
     problem = StagedProblem(
         tuple(frfs), q, elastic, band, matrices, inertias, p, progress, effort, barrier, tolerances
     )

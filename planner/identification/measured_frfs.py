@@ -1,13 +1,17 @@
 """Measured FRFs of several poses as arrays with one noise level per value."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.dynamics.gradient import laplace
+from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
+from planner.recording.points import TOOL, Layout, together
+from planner.robot.elastic_model import ElasticModel, Matrices
+from planner.robot.robot import Robot
 
 # Where nothing is known of the noise: a share of the FRF, and one of the column's rms.
 ASSUMED_RELATIVE, ASSUMED_FLOOR = 0.05, 0.01
@@ -17,9 +21,9 @@ ASSUMED_RELATIVE, ASSUMED_FLOOR = 0.05, 0.01
 class Measured:
     """FRFs of n poses at F lines each, lines being the pose's own.
 
-    `s` (n, F) is the Laplace variable at which they hold, `accelerance` (n, 3, 3, F) in m/s²/N,
-    `sd` (n, 3, 3, F) the root of E|δH|², ∞ where nothing was measured (accelerance is 1 there),
-    `tail_s` (n,) as in `Frf`.
+    `s` (n, F) is the Laplace variable at which they hold, `accelerance` (n, r, c, F) in m/s²/N
+    between the points of `layout`, `sd` (n, r, c, F) the root of E|δH|², ∞ where nothing was
+    measured (accelerance is 1 there), `tail_s` (n,) as in `Frf`.
     """
 
     frequency_hz: np.ndarray
@@ -27,11 +31,23 @@ class Measured:
     accelerance: np.ndarray
     sd: np.ndarray
     tail_s: np.ndarray
+    layout: Layout = TOOL
 
     @property
     def used(self) -> np.ndarray:
-        """(n, 3, 3, F) bool."""
+        """(n, r, c, F) bool."""
         return np.isfinite(self.sd)
+
+    def at(self, poses: np.ndarray) -> "Measured":
+        """Of some of the poses, by their numbers."""
+        parts = self.frequency_hz, self.s, self.accelerance, self.sd, self.tail_s
+        return Measured(*(part[poses] for part in parts), layout=self.layout)
+
+    def loaded(self, matrices: Matrices, simulation: Simulation) -> Matrices:
+        """Matrices between the points of `layout` with the mass of sensors that were there."""
+        count = np.count_nonzero(self.used, axis=(2, 3)).reshape(len(self.used), -1, 3)
+        there = np.sum(count, axis=2) > 0
+        return _loaded(matrices, simulation.robot, self.layout, there)
 
 
 def common_band(frfs: Sequence[Frf], band_hz: tuple[float, float]) -> tuple[float, float]:
@@ -58,6 +74,7 @@ def stack(
     follow: calibration, angles, friction.
     """
     chosen = [_lines(frf, band_hz, most_lines) for frf in frfs]
+    layout = layout_of(frfs)
     n, f = len(frfs), max(len(c) for c in chosen)
     if f == 0:
         raise InputError(
@@ -65,8 +82,8 @@ def stack(
             f"longer, or widen band_hz."
         )
     frequency = np.full((n, f), float(band_hz[1]))
-    h = np.ones((n, 3, 3, f), dtype=complex)
-    sd = np.full((n, 3, 3, f), np.inf)
+    h = np.ones((n, *layout.shape, f), dtype=complex)
+    sd = np.full((n, *layout.shape, f), np.inf)
     for i, (frf, lines) in enumerate(zip(frfs, chosen, strict=True)):
         count = len(lines)
         frequency[i, :count] = frf.frequency_hz[lines]
@@ -74,11 +91,42 @@ def stack(
         given = np.isfinite(values) & np.isfinite(noise)
         total = np.sqrt(noise**2 + (model_error * np.abs(values)) ** 2)
         given &= total > 0
-        h[i, ..., :count] = np.where(given, values, 1.0)
-        sd[i, ..., :count] = np.where(given, total, np.inf)
+        at = np.ix_([i], layout.rows(frf.layout), layout.columns(frf.layout), range(count))
+        h[at] = np.where(given, values, 1.0)
+        sd[at] = np.where(given, total, np.inf)
     rates = np.array([frf.exponential_rate_1_s for frf in frfs])
     tails = np.array([frf.tail_s for frf in frfs])
-    return Measured(frequency, laplace(frequency, rates), h, sd, tails)
+    return Measured(frequency, laplace(frequency, rates), h, sd, tails, layout)
+
+
+def layout_of(frfs: Sequence[Frf]) -> Layout:
+    """The points of all FRFs."""
+    return together([frf.layout for frf in frfs])
+
+
+def matrices_at(
+    elastic: ElasticModel, q: np.ndarray, frfs: Sequence[Frf], sloped: bool = False
+) -> Matrices:
+    """Matrices at q (n, dof) between the points of FRFs measured there, their sensors' mass on.
+
+    `sloped`: with slopes by the joint angles, for readbacks may err.
+    """
+    layout = layout_of(frfs)
+    found = elastic.with_slopes(q, layout) if sloped else elastic.matrices(q, layout=layout)
+    there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
+    return _loaded(found, elastic.robot, layout, there)
+
+
+def _loaded(found: Matrices, robot: Robot, layout: Layout, there: np.ndarray) -> Matrices:
+    """With the mass of sensors at the poses where they were, `there` (n, s)."""
+    mass = found.mass
+    for number, name in enumerate(layout.sensors):
+        kg = robot.sensor_mass_kg.get(name, 0.0)
+        if kg:
+            moved = found.sensor[:, 3 * number : 3 * number + 3]
+            own = np.swapaxes(moved, 1, 2) @ moved
+            mass = mass + kg * there[:, number, None, None] * own
+    return replace(found, mass=mass)
 
 
 def _lines(frf: Frf, band_hz: tuple[float, float], most: int) -> np.ndarray:
@@ -92,12 +140,20 @@ def _lines(frf: Frf, band_hz: tuple[float, float], most: int) -> np.ndarray:
 
 
 def noise_sd(frf: Frf) -> np.ndarray:
-    """Sd (3, 3, F) of an FRF: from the hits' scatter, else from the coherence, else assumed."""
+    """Sd (r, c, F) of an FRF: from the hits' scatter, else from the coherence, else assumed."""
     h, hits = np.abs(frf.accelerance), np.maximum(frf.hits, 1)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         # Bendat & Piersol 2010, eq. 9.90, for both parts of the complex value.
         share = np.sqrt((1 - frf.coherence) / (frf.coherence * hits))
-        rms = np.sqrt(np.mean(h**2, axis=(0, 2), keepdims=True))
-        assumed = np.hypot(ASSUMED_RELATIVE * h, ASSUMED_FLOOR * rms)
+        assumed = np.hypot(ASSUMED_RELATIVE * h, ASSUMED_FLOOR * _rms(h))
         from_coherence = np.where(np.isfinite(share), np.minimum(share, 10.0) * h, assumed)
     return np.where(np.isfinite(frf.variance), np.sqrt(frf.variance), from_coherence)
+
+
+def _rms(size: np.ndarray) -> np.ndarray:
+    """Of each sensor's axes and all lines, column by column, (r, c, 1) of (r, c, F)."""
+    by_sensor = size.reshape(-1, 3, *size.shape[1:])
+    count = np.isfinite(by_sensor).sum(axis=(1, 3), keepdims=True)
+    power = np.nansum(by_sensor**2, axis=(1, 3), keepdims=True)
+    rms = np.sqrt(power / np.maximum(count, 1))
+    return np.broadcast_to(rms, (*by_sensor.shape[:3], 1)).reshape(*size.shape[:2], 1)

@@ -5,11 +5,16 @@ H (e + δ) + M (o × e), M being the response to moments at the tcp. A chain wit
 shows (I + E) (H + turning × p) at iω, delayed. Joints stand beside their readback. All of these are
 a few numbers a pose with normal priors, in which the FRF is linear: B η, η ~ N(0, 1). Integrating
 over η turns the covariance of the residuals from I into I + B Bᵀ (Woodbury), pose by pose.
+
+FRFs are between points: r rows, three a sensor, and c columns, three a hit point, each in its own
+frame. Every sensor has a matrix and a place of its own; the hammer and the delay are common.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from planner.dynamics.gradient import Turned
 from planner.robot.config import RobotConfig
@@ -53,72 +58,121 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-HIT_NUMBERS = 12  # of a pose: 4 of each hit axis
-CHAIN_NUMBERS = 14
+OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
+
+
+@dataclass(frozen=True)
+class OpenNumbers:
+    """How many numbers FRFs (…, r, c, F) leave open: of hits, then of the chain, then of joints."""
+
+    hits: int
+    chain: int
+
+    @classmethod
+    def of(cls, h: np.ndarray) -> "OpenNumbers":
+        """Of FRFs between some points."""
+        rows, columns = h.shape[-3:-1]
+        return cls(OF_HIT * columns, OF_SENSOR * (rows // 3) + OF_HAMMER)
+
+    @property
+    def known(self) -> int:
+        """Of hits and chain: those of the joints follow."""
+        return self.hits + self.chain
+
+    def own(self, values: np.ndarray) -> np.ndarray:
+        """Of values (l, …) of all numbers those of the pose alone: hits and joints."""
+        return np.concatenate([values[: self.hits], values[self.known :]])
+
+    def shared(self, values: np.ndarray) -> np.ndarray:
+        """Of values (l, …) those of the chain."""
+        return values[self.hits : self.known]
+
+
+# Of one hit point and one sensor: what is predicted at the tool.
+HIT_NUMBERS, CHAIN_NUMBERS = 3 * OF_HIT, OF_SENSOR + OF_HAMMER
 OPEN = HIT_NUMBERS + CHAIN_NUMBERS  # and one more of each joint
 
 
 def hit_basis(
     h: np.ndarray, moment: np.ndarray, t: Tolerances, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """Changes (n, 3, 4, 3, F) of the column of each hit axis, per sd of δ (2) and of o (2).
+    """Changes (n, c, 4, r, F) of the column of each hit axis, per sd of δ (2) and of o (2).
 
-    h (n, 3, 3, F) are accelerances, `moment` (n, 3, 3, F) those of moments.
+    h (n, r, c, F) are accelerances, `moment` (n, r, c, F) those of moments.
     """
-    n, _, _, lines = h.shape
-    out = np.empty((n, 3, 4, 3, lines), dtype=complex) if out is None else out
-    for axis, (first, second) in enumerate(ACROSS):
-        np.multiply(h[:, :, first], t.angle_rad, out=out[:, axis, 0])
-        np.multiply(h[:, :, second], t.angle_rad, out=out[:, axis, 1])
+    n, rows, columns, lines = h.shape
+    out = np.empty((n, columns, OF_HIT, rows, lines), dtype=complex) if out is None else out
+    for column in range(columns):
+        at = column - column % 3
+        first, second = (at + axis for axis in ACROSS[column % 3])
+        np.multiply(h[:, :, first], t.angle_rad, out=out[:, column, 0])
+        np.multiply(h[:, :, second], t.angle_rad, out=out[:, column, 1])
         # e_first × e = −e_second and e_second × e = e_first.
-        np.multiply(moment[:, :, second], -t.offset_m, out=out[:, axis, 2])
-        np.multiply(moment[:, :, first], t.offset_m, out=out[:, axis, 3])
+        np.multiply(moment[:, :, second], -t.offset_m, out=out[:, column, 2])
+        np.multiply(moment[:, :, first], t.offset_m, out=out[:, column, 3])
     return out
 
 
 def chain_basis(
     h: np.ndarray, turning: np.ndarray, s: np.ndarray, t: Tolerances, out: np.ndarray | None = None
 ) -> np.ndarray:
-    """Changes (n, 14, 3, 3, F) of FRFs per sd: of E (9), the sensor's place (3), scale, delay.
+    """Changes (n, k, r, c, F) of FRFs per sd: of each sensor's E (9) and place (3); scale, delay.
 
     `out`, where it is given, holds zeros.
     """
-    out = np.zeros((h.shape[0], CHAIN_NUMBERS, *h.shape[1:]), dtype=complex) if out is None else out
-    for i in range(3):
-        for j in range(3):
-            np.multiply(h[:, j], t.gain if i == j else t.across, out=out[:, 3 * i + j, i])
-    for axis, (first, second) in enumerate(ACROSS):
-        # α × e_axis, α being the sensor's angular acceleration.
-        np.multiply(turning[:, second], t.position_m, out=out[:, 9 + axis, first])
-        np.multiply(turning[:, first], -t.position_m, out=out[:, 9 + axis, second])
-    np.multiply(h, t.force_gain, out=out[:, 12])
-    np.multiply(h, -t.delay_s * s[:, None, None], out=out[:, 13])
+    if out is None:
+        out = np.zeros((h.shape[0], OpenNumbers.of(h).chain, *h.shape[1:]), dtype=complex)
+    for sensor in range(h.shape[1] // 3):
+        place, row = OF_SENSOR * sensor, 3 * sensor
+        for i in range(3):
+            for j in range(3):
+                size, to = t.gain if i == j else t.across, out[:, place + 3 * i + j, row + i]
+                np.multiply(h[:, row + j], size, out=to)
+        for axis, (first, second) in enumerate(ACROSS):
+            # α × e_axis, α being the sensor's angular acceleration.
+            moved, a, b = out[:, place + 9 + axis], row + first, row + second
+            np.multiply(turning[:, b], t.position_m, out=moved[:, a])
+            np.multiply(turning[:, a], -t.position_m, out=moved[:, b])
+    np.multiply(h, t.force_gain, out=out[:, -2])
+    np.multiply(h, -t.delay_s * s[:, None, None], out=out[:, -1])
     return out
 
 
 def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.ndarray:
-    """All of them of the poses, (n, 26 + dof, 3, 3, F).
+    """All of them of the poses, (n, l, r, c, F): as `OpenNumbers` counts them.
 
     Those of the joints are there where the matrices behind `turned` have their slopes.
     """
-    n, _, _, lines = h.shape
-    joints = 0 if turned.by_angle is None else turned.by_angle.shape[1]
+    return _basis(h, turned.moment, turned.turning, turned.by_angle, s, t)
+
+
+def _basis(
+    h: np.ndarray,
+    moment: np.ndarray,
+    turning: np.ndarray,
+    by_angle: np.ndarray | None,
+    s: np.ndarray,
+    t: Tolerances,
+) -> np.ndarray:
+    n, rows, columns, lines = h.shape
+    numbers = OpenNumbers.of(h)
+    joints = 0 if by_angle is None else by_angle.shape[1]
     # All is written once, in place: such arrays are large.
-    out = np.zeros((n, OPEN + joints, 3, 3, lines), dtype=complex)
-    by_axis = out[:, :HIT_NUMBERS].reshape(n, 3, 4, 3, 3, lines)
+    out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
+    by_axis = out[:, : numbers.hits].reshape(n, columns, OF_HIT, rows, columns, lines)
     # A miss along an axis changes the column of that axis only: a view of these.
-    hit_basis(h, turned.moment, t, np.einsum("namiaf->namif", by_axis))
-    chain_basis(h, turned.turning, s, t, out[:, HIT_NUMBERS:OPEN])
-    if turned.by_angle is not None:
-        np.multiply(turned.by_angle, t.joint_rad, out=out[:, OPEN:])
+    hit_basis(h, moment, t, np.einsum("namiaf->namif", by_axis))
+    chain_basis(h, turning, s, t, out[:, numbers.hits : numbers.known])
+    if by_angle is not None:
+        np.multiply(by_angle, t.joint_rad, out=out[:, numbers.known :])
     return out
 
 
 @dataclass(frozen=True, eq=False)
 class ChainTransfer:
-    """What a chain shows whose numbers are known: `scale` (n, F) times `matrix` (3, 3).
+    """What a chain shows whose numbers are known: `scale` (n, F) times `matrix` (r, r).
 
-    `place` (3,) is where the sensor is, in m from where it is said to be.
+    `place` (s, 3) is where each sensor is, in m from where it is said to be.
     """
 
     matrix: np.ndarray
@@ -127,22 +181,61 @@ class ChainTransfer:
 
     @classmethod
     def of(cls, numbers: np.ndarray, s: np.ndarray, t: Tolerances) -> "ChainTransfer":
-        """Of 14 numbers in sds, in the order of `chain_basis`, at s (n, F) in rad/s."""
-        matrix = np.eye(3) + np.where(np.eye(3), t.gain, t.across) * numbers[:9].reshape(3, 3)
-        scale = (1 + t.force_gain * numbers[12]) * np.exp(-t.delay_s * numbers[13] * s)
-        return cls(matrix, scale, t.position_m * numbers[9:12])
+        """Of all its numbers in sds, in the order of `chain_basis`, at s (n, F) in rad/s."""
+        each = numbers[:-OF_HAMMER].reshape(-1, OF_SENSOR)
+        within = np.where(np.eye(3), t.gain, t.across) * each[:, :9].reshape(-1, 3, 3)
+        matrix = np.asarray(block_diag(*(np.eye(3) + within)))
+        scale = (1 + t.force_gain * numbers[-2]) * np.exp(-t.delay_s * numbers[-1] * s)
+        return cls(matrix, scale, t.position_m * each[:, 9:])
 
     def of_accelerations(self, values: np.ndarray) -> np.ndarray:
-        """What is shown of accelerations (n, …, 3, 3, F), those of the responses third to last."""
+        """What is shown of accelerations (n, …, r, c, F), those of the responses third to last."""
         lines = values.shape[-1]
-        flat = values.reshape(*values.shape[:-2], 3 * lines)
+        flat = values.reshape(*values.shape[:-2], -1)
         scale = self.scale.reshape(len(self.scale), *[1] * (values.ndim - 2), lines)
         return (self.matrix @ flat).reshape(values.shape) * scale
 
     def shown(self, h: np.ndarray, turned: Turned) -> np.ndarray:
-        """FRFs (n, 3, 3, F) as the chain shows them."""
-        beside = np.cross(np.moveaxis(turned.turning, 1, -1), self.place)
-        return self.of_accelerations(h + np.moveaxis(beside, -1, 1))
+        """FRFs (n, r, c, F) as the chain shows them."""
+        turning = turned.turning.reshape(len(h), len(self.place), 3, *h.shape[2:])
+        beside = np.cross(np.moveaxis(turning, 2, -1), self.place[:, None, None])
+        return self.of_accelerations(h + np.moveaxis(beside, -1, 2).reshape(h.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """What the hits at one point open of what one sensor heard: `basis` (n, l, 3, 3, F).
+
+    `rows` and `columns` are theirs in the FRFs, `numbers` (l,) those that move them.
+    """
+
+    rows: slice
+    columns: slice
+    numbers: np.ndarray
+    basis: np.ndarray
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Of values (k, r, c, F) the block's, as real rows (k, 18F)."""
+        return real_rows(values[:, self.rows, self.columns])
+
+
+def blocks(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> tuple[Block, ...]:
+    """`basis` without all that is 0: of each sensor and hit point."""
+    numbers, found = OpenNumbers.of(h), []
+    moment, turning, angles = turned.moment, turned.turning, turned.by_angle
+    joints = 0 if angles is None else angles.shape[1]
+    of_all = np.arange(numbers.known - OF_HAMMER, numbers.known + joints)
+    for sensor in range(h.shape[1] // 3):
+        of_sensor = numbers.hits + OF_SENSOR * sensor + np.arange(OF_SENSOR)
+        for point in range(h.shape[2] // 3):
+            of_hits = HIT_NUMBERS * point + np.arange(HIT_NUMBERS)
+            rows, columns = (slice(3 * k, 3 * k + 3) for k in (sensor, point))
+            at = (slice(None), rows, columns)
+            by_angle = None if angles is None else angles[:, :, rows, columns]
+            own = _basis(h[at], moment[at], turning[at], by_angle, s, t)
+            every = np.concatenate([of_hits, of_sensor, of_all])
+            found.append(Block(rows, columns, every, own))
+    return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,137 +249,46 @@ class Marginal:
     eta: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Some of a pose's residuals (m,), with unit noise, and derivatives (d, m).
+
+    `b` (l, m) is how the `numbers` (l,) move them, all others not doing so.
+    """
+
+    residual: np.ndarray
+    jacobian: np.ndarray
+    b: np.ndarray
+    numbers: np.ndarray
+
+
 def marginal(residual: np.ndarray, jacobian: np.ndarray, b: np.ndarray) -> Marginal:
     """Of residuals (m,) with unit noise, their derivatives (d, m) and B (l, m)."""
-    inner = np.eye(len(b)) + b @ b.T
+    return marginal_of([Part(residual, jacobian, b, np.arange(len(b)))], len(b), len(jacobian))
+
+
+def marginal_of(parts: Sequence[Part], size: int, count: int) -> Marginal:
+    """The same of parts of a pose that have `size` numbers, and `count` derivatives."""
+    inner, onto = np.eye(size), np.zeros((size, 1 + count))
+    chi2, gradient, normal = 0.0, np.zeros(count), np.zeros((count, count))
+    for p in parts:
+        inner[np.ix_(p.numbers, p.numbers)] += p.b @ p.b.T
+        onto[p.numbers] += p.b @ np.concatenate([p.residual[None], p.jacobian]).T
+        chi2 += float(p.residual @ p.residual)
+        gradient += p.jacobian @ p.residual
+        normal += p.jacobian @ p.jacobian.T
     factor = np.linalg.cholesky(inner)
-    onto = np.linalg.solve(factor, b @ np.concatenate([residual[None], jacobian]).T)
+    onto = np.linalg.solve(factor, onto)
     r, j = onto[:, 0], onto[:, 1:]
     return Marginal(
-        float(residual @ residual - r @ r),
-        jacobian @ residual - j.T @ r,
-        jacobian @ jacobian.T - j.T @ j,
+        chi2 - float(r @ r),
+        gradient - j.T @ r,
+        normal - j.T @ j,
         2 * float(np.sum(np.log(np.diagonal(factor)))),
         np.linalg.solve(factor.T, r),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class Integrated:
-    """χ² with all η integrated out, in all and of each pose (n,); half gradient, and normal."""
-
-    chi2: float
-    gradient: np.ndarray
-    normal: np.ndarray
-    by_pose: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """Estimates, in sds: `own` (n, 12 + dof) of each pose's hits and joints, `chain` (14,)."""
-
-    own: np.ndarray
-    chain: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class LeftOpen:
-    """B of n poses, weighted, as it is somewhere and held there.
-
-    `own` (l, m) of each pose is whitened (by `factor`), so that integrating out subtracts the
-    square of what is projected on it; `common` (14, m) is of numbers that all poses share: the
-    chain of a campaign. `crossed` (n, 3, 3, F), weighted, is what goes beyond first order. Were B
-    to follow the parameters, larger FRFs would seem to fit better, having larger B.
-    """
-
-    own: tuple[np.ndarray, ...]
-    factor: tuple[np.ndarray, ...]
-    common: tuple[np.ndarray, ...]
-    crossed: np.ndarray
-
-    @classmethod
-    def at(
-        cls,
-        h: np.ndarray,
-        turned: Turned,
-        s: np.ndarray,
-        weight: np.ndarray,
-        tolerances: Tolerances,
-        told: Told | None = None,
-    ) -> "LeftOpen":
-        """Of accelerances h (n, 3, 3, F) and the weight of residuals.
-
-        With `told`, what the chain makes of hits that miss, of second order, is that of these
-        estimates. (B itself must not follow them: it would then be fitted to the same noise.)
-        """
-        made = basis(h, turned, s, tolerances)
-        crossed = np.zeros_like(h) if told is None else _crossed(made, turned, s, tolerances, told)
-        made *= weight[:, None]
-        own, factors, common = [], [], []
-        for pose in made:
-            mine = _real(np.concatenate([pose[:HIT_NUMBERS], pose[OPEN:]]))
-            factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
-            own.append(np.linalg.solve(factor, mine))
-            factors.append(factor)
-            common.append(_real(pose[HIT_NUMBERS:OPEN]))
-        return cls(tuple(own), tuple(factors), tuple(common), weight * crossed)
-
-    def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
-        """Of residuals (n, 3, 3, F) and their derivatives (n, d, 3, 3, F), both weighted."""
-        residual = residual + self.crossed
-        d, k = slope.shape[1], CHAIN_NUMBERS
-        chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
-        whole, shared = np.zeros((d + k, d + k)), np.empty((len(residual), k, k))
-        for i, (own, common) in enumerate(zip(self.own, self.common, strict=True)):
-            r, j = _real(residual[i, None])[0], np.concatenate([_real(slope[i]), common])
-            onto, moved = own @ r, own @ j.T
-            chi2[i] = r @ r - onto @ onto
-            gradients[i] = j @ r - moved.T @ onto
-            normal = j @ j.T - moved.T @ moved
-            shared[i] = normal[d:, d:]
-            whole += normal
-        pull = gradients.sum(axis=0)
-        # The common numbers at their best, and what that takes from all else.
-        right = np.column_stack([pull[d:], whole[d:, :d]])
-        solved = np.linalg.solve(whole[d:, d:] + np.eye(k), right)
-        eta, across = -solved[:, 0], solved[:, 1:]
-        by_pose = chi2 + 2 * gradients[:, d:] @ eta + np.einsum("nij,i,j->n", shared, eta, eta)
-        return Integrated(
-            float(chi2.sum() + pull[d:] @ eta),
-            pull[:d] + whole[:d, d:] @ eta,
-            whole[:d, :d] - whole[:d, d:] @ across,
-            by_pose,
-        )
-
-    def told(self, residual: np.ndarray) -> Told:
-        """What weighted residuals (n, 3, 3, F) tell of the numbers."""
-        flat = _real(residual + self.crossed)
-        whole, pull = np.eye(CHAIN_NUMBERS), np.zeros(CHAIN_NUMBERS)
-        for own, common, r in zip(self.own, self.common, flat, strict=True):
-            moved = own @ common.T
-            whole += common @ common.T - moved.T @ moved
-            pull += common @ r - moved.T @ (own @ r)
-        chain = -np.linalg.solve(whole, pull)
-        left = [
-            -np.linalg.solve(factor.T, own @ (r + chain @ common))
-            for own, factor, common, r in zip(self.own, self.factor, self.common, flat, strict=True)
-        ]
-        return Told(np.array(left), chain)
-
-
-def _crossed(
-    made: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances, told: Told
-) -> np.ndarray:
-    """Of second order (n, 3, 3, F): what the chain makes of the misses, both as they are told."""
-    hits, joints = made[:, :HIT_NUMBERS], made[:, OPEN:]
-    missed = np.einsum("nl,nlijf->nijf", told.own[:, :HIT_NUMBERS], hits)
-    missed += np.einsum("nl,nlijf->nijf", told.own[:, HIT_NUMBERS:], joints)
-    turns = hit_basis(turned.turning, turned.twisting, t)
-    numbers = told.own[:, :HIT_NUMBERS].reshape(-1, 3, 4)
-    turning = np.einsum("nam,namif->niaf", numbers, turns)
-    return np.einsum("k,nkijf->nijf", told.chain, chain_basis(missed, turning, s, t))
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts (l, 2 · 9F) of values (l, 3, 3, F)."""
+def real_rows(values: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts (l, 2rcF) of values (l, r, c, F)."""
     return np.ascontiguousarray(values).reshape(len(values), -1).view(float)

@@ -13,8 +13,9 @@ from scipy.linalg import block_diag
 
 from planner.dynamics.gradient import Inertias, response_gradient, response_turned
 from planner.identification.feasible_inertias import Barrier
+from planner.identification.left_open import Integrated, LeftOpen
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Integrated, LeftOpen, Tolerances
+from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
 from planner.inference.least_squares import Quadratic

@@ -11,7 +11,7 @@ from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.agreement import MODEL_ERROR
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.measured_frfs import stack
+from planner.identification.measured_frfs import matrices_at, stack
 from planner.identification.measurement_model import Tolerances
 from planner.identification.objective import TOO_SOFT, Objective, stands
 from planner.identification.parameters import Parametrisation
@@ -67,9 +67,8 @@ class StagedProblem:
         count = len(p.parameters)
         elastic = self.elastic.carried_by(p.elasticity(x[:count]).stiffness)
         inertias = p.inertias(elastic.body_jacobians(self.q))
-        there = replace(
-            self, matrices=matrices_for(elastic, self.q, self.tolerances), inertias=inertias
-        )
+        matrices = matrices_at(elastic, self.q, self.frfs, self.tolerances is not None)
+        there = replace(self, matrices=matrices, inertias=inertias)
         return there, np.concatenate([there.standing(x[:count]), x[count:]])
 
     def standing(self, theta: np.ndarray) -> np.ndarray:
@@ -108,8 +107,3 @@ class StagedProblem:
 
         tolerance = LOG_TOLERANCE if objective.logarithmic else self.effort.tolerance
         return minimise(objective, x, tolerance, steps, told if tell else None)
-
-
-def matrices_for(elastic: ElasticModel, q: np.ndarray, tolerances: Tolerances | None) -> Matrices:
-    """Matrices at q (n, dof), with slopes by the joint angles where readbacks may err."""
-    return elastic.matrices(q) if tolerances is None else elastic.with_slopes(q)

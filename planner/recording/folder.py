@@ -4,10 +4,12 @@ import csv
 import io
 import math
 from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
 from planner.recording.named_columns import hit_direction
+from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
 
 TABLE = "recordings.csv"
@@ -22,8 +24,14 @@ def joint_columns(folder: Path) -> tuple[str, ...]:
     return tuple(name.removesuffix("_deg") for name in header if name.endswith("_deg"))
 
 
-def read_recordings(folder: Path, joint_names: tuple[str, ...]) -> RecordingsFolder:
-    """The table of a recordings folder. Raises InputError naming file, row and remedy."""
+def read_recordings(
+    folder: Path, joint_names: tuple[str, ...], points: PointNames | None = None
+) -> RecordingsFolder:
+    """The table of a recordings folder; `points` are the robot's.
+
+    Raises InputError naming file, row and remedy.
+    """
+    points = points or PointNames()
     path = folder / TABLE
     header, lines = _table(path)
     joints = _joint_columns(path, header, joint_names, {"pose", "hit", "repeat", "file"})
@@ -32,10 +40,13 @@ def read_recordings(folder: Path, joint_names: tuple[str, ...]) -> RecordingsFol
             raise InputError(f"{path} has no column {name}; add it (see its first row).")
     inside = folder.resolve()
     rows: list[PoseRow] = []
-    seen: dict[tuple[str, str, int], int] = {}
-    for number, cells in lines:
-        row = _recording_row(path, inside, number, dict(zip(header, cells, strict=True)), joints)
-        key = (row.pose, str(row.hit), row.repeat or 0)
+    seen: dict[tuple[object, ...], int] = {}
+    for number, values in lines:
+        cells = dict(zip(header, values, strict=True))
+        row = _recording_row(path, inside, number, cells, joints)
+        row = _with_points(path, row, cells, points)
+        stated = row.stated
+        key = row.pose, row.hit, stated.hit_point, stated.response_points, row.repeat or 0
         if row.repeat is not None and key in seen:
             raise InputError(
                 f"{path}, row {number}: pose {row.pose}, hit {row.hit}, repeat {row.repeat} is "
@@ -180,9 +191,10 @@ def _recording_row(
     angles = tuple(_number(path, number, name, cells[name]) for name in joints)
     hit = cells["hit"].strip().lower()
     if not hit_direction(hit):
+        frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
         raise InputError(
             f'{path}, row {number}: hit is "{cells["hit"].strip()}"; give a signed axis of the '
-            f"tcp frame such as +x."
+            f"{frame} frame such as +x."
         )
     hit = hit if hit[0] in "+-" else f"+{hit}"
     repeat = None
@@ -199,6 +211,26 @@ def _recording_row(
         repeat,
         _file(path, folder, number, cells["file"].strip()),
     )
+
+
+def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointNames) -> PoseRow:
+    """The row with the points that its cells name."""
+    hit_point = cells.get("hit_point", "").strip()
+    responses = tuple(cells.get("response_points", "").split())
+    for column, name in (("hit_point", hit_point), *(("response_points", n) for n in responses)):
+        if name and name not in points.known:
+            raise InputError(
+                f'{path}, row {row.row}: {column} names "{name}", which is none of robot.toml\'s '
+                f"points ({', '.join(points.known)}); correct it, or add a [[point]]."
+            )
+    twice = next((name for name in responses if responses.count(name) > 1), None)
+    if twice:
+        raise InputError(
+            f"{path}, row {row.row}: response_points names {twice} twice; name each point once."
+        )
+    if not hit_point and not responses and points == PointNames():
+        return row
+    return replace(row, stated=StatedPoints(hit_point, responses, row.row, points))
 
 
 def _file(path: Path, folder: Path, number: int, name: str) -> Path:

@@ -1,26 +1,56 @@
-"""Records to hits: force in N, three accelerations in m/s², one stated axis; nothing guessed."""
+"""Records to hits: force in N, accelerations in m/s², one stated axis; nothing guessed."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from planner.errors import InputError
+from planner.recording.dof import Dof
 from planner.recording.named_columns import hit_direction
-from planner.recording.records import AXES, Channel, Hit, Record, TimeRecord
+from planner.recording.points import SENSOR, StatedPoints
+from planner.recording.records import AXES, Channel, FrfRecord, Hit, Record, TimeRecord
 
 
-def hits_from(records: Sequence[Record], axis: str | None = None) -> tuple[Hit, ...]:
-    """The hits in a file's records; `axis` ("+x" … "-z") is what the table of recordings says.
+def hits_from(
+    records: Sequence[Record], axis: str | None = None, stated: StatedPoints | None = None
+) -> tuple[Hit, ...]:
+    """The hits in a file's records.
 
-    Raises InputError saying what the file holds instead of a hit.
+    `axis` ("+x" … "-z") and `stated` are what the table of recordings says. Raises InputError
+    saying what the file holds instead of a hit, or which point it names that is none.
     """
     times = [record for record in records if isinstance(record, TimeRecord)]
     if not times:
         raise InputError("The file holds no time histories; export force and accelerations.")
-    return tuple(_hit(record, axis) for record in times)
+    return tuple(_hit(record, axis, stated or StatedPoints()) for record in times)
 
 
-def _hit(record: TimeRecord, axis: str | None) -> Hit:
+def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
+    """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
+    count, source = len(record.values), record.source
+    response = [
+        _axis_there(source, stated, *at)
+        for at in zip(record.response_node or [""] * count, record.response_direction, strict=True)
+    ]
+    reference = [stated.hit_at(source, node) for node in record.reference_node or [""] * count]
+    return replace(record, response_node=tuple(response), reference_node=tuple(reference))
+
+
+def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:
+    """The point at a node, whose sensor has an axis along a direction (±1, ±2, ±3; 0 unknown)."""
+    point = stated.response_at(source, node)
+    axes = stated.names.axes_of(point)
+    along = AXES[abs(direction) - 1] if 1 <= abs(direction) <= 3 else ""
+    if along not in axes:
+        raise InputError(
+            f"{source}{stated.where} has a response along {along} at {point}, whose sensor has "
+            f"{', '.join(axes)} only; correct its direction, or the axes in robot.toml."
+        )
+    return point
+
+
+def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
     source = record.source
     forces = [c for c in record.channels if c.quantity == "force"]
     if len(forces) != 1:
@@ -29,21 +59,15 @@ def _hit(record: TimeRecord, axis: str | None) -> Hit:
             f"export force and accelerations together."
         )
     accelerations = [c for c in record.channels if c.quantity == "acceleration"]
-    directions = sorted(abs(c.direction) for c in accelerations)
-    if directions != [1, 2, 3]:
-        raise InputError(
-            f"{source} holds {describe(record)}: a hit needs one acceleration in each of x, y and "
-            f"z; export all three with their directions."
-        )
+    responses = _responses(record, accelerations, stated)
     force, remarks = forces[0], list(record.remarks)
     for channel in (force, *accelerations):
         if not channel.unit:
             raise InputError(
                 f"{source}: the unit of {channel.name} is not known; label it N or m/s^2."
             )
-    samples = np.zeros((3, len(force.samples)))
-    for channel in accelerations:
-        samples[abs(channel.direction) - 1] = np.sign(channel.direction) * channel.samples
+    order = sorted(responses, key=lambda dof: _rank(dof, responses))
+    samples = np.array([responses[d].samples * np.sign(responses[d].direction) for d in order])
     name = _axis(record, force, axis, remarks)
     return Hit(
         source,
@@ -53,7 +77,38 @@ def _hit(record: TimeRecord, axis: str | None) -> Hit:
         samples,
         remarks=tuple(remarks),
         simulated=record.simulated,
+        hit_point=stated.hit_at(source, force.node),
+        responses=tuple(order),
     )
+
+
+def _responses(
+    record: TimeRecord, accelerations: Sequence[Channel], stated: StatedPoints
+) -> dict[Dof, Channel]:
+    """Accelerations by point and axis; of the tool's sensor, where it stands alone, all three."""
+    found: dict[Dof, Channel] = {}
+    whole = bool(accelerations)
+    for channel in accelerations:
+        if not 1 <= abs(channel.direction) <= 3:
+            whole = False
+            break
+        point = _axis_there(record.source, stated, channel.node, channel.direction)
+        whole = whole and Dof(point, AXES[abs(channel.direction) - 1]) not in found
+        found[Dof(point, AXES[abs(channel.direction) - 1])] = channel
+    tool = stated.names.axes_of(SENSOR)
+    of_tool = [dof.direction for dof in found if dof.node == SENSOR]
+    if not whole or (of_tool and not set(of_tool) >= set(tool)):
+        raise InputError(
+            f"{record.source} holds {describe(record)}: a hit needs one acceleration in each of x, "
+            f"y and z; export all three with their directions."
+        )
+    return found
+
+
+def _rank(dof: Dof, responses: dict[Dof, Channel]) -> tuple[int, int]:
+    """Places in order of the file, x, y, z at each."""
+    places = list(dict.fromkeys(own.node for own in responses))
+    return places.index(dof.node), dof.number
 
 
 def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[str]) -> str:

@@ -1,8 +1,10 @@
 """Named columns, wherever they were stored, to records: the one convention for all such files.
 
 Time histories: `time_s` (or an attribute `sampling_rate_hz`), `force_n`,
-`acceleration_x_m_s2`, `acceleration_y_m_s2`, `acceleration_z_m_s2`, attribute `hit` ("+x").
-FRFs: `frequency_hz` and `accelerance_xx` … (response, hit), complex or as `…_re`, `…_im`.
+`acceleration_x_m_s2`, `acceleration_y_m_s2`, `acceleration_z_m_s2`, attribute `hit` ("+x"); of a
+sensor at a point of the robot `acceleration_NAME_x_m_s2`, attribute `hit_point` ("NAME").
+FRFs: `frequency_hz` and `accelerance_xx` … (response, hit), complex or as `…_re`, `…_im`; between
+points `accelerance_NAME_x_NAME_x`, response first.
 """
 
 import re
@@ -19,7 +21,9 @@ from planner.recording.units import lookup
 _SUFFIXES = {"n": "N", "m_s2": "m/s^2", "m_s": "m/s", "m": "m", "s": "s", "hz": "Hz", "v": "V",
              "pa": "Pa", "g": "g", "kn": "kN", "mm_s2": "mm/s^2", "cm_s2": "cm/s^2"}  # fmt: skip
 _DIRECTION = re.compile(r"(?:^|[_\s])([+-]?)([xyz])(?:$|[_\s(\[])", re.IGNORECASE)
+_AT = re.compile(r"acceleration_(.+)_[xyz]$")
 _FRF = re.compile(r"(accelerance|mobility|receptance)_([xyz])([xyz])(_re|_im|)$")
+_BETWEEN = re.compile(r"(accelerance|mobility|receptance)_(.+)_([xyz])_(.+)_([xyz])(_re|_im|)$")
 UNEVEN = 1e-3  # share of a step by which sampling times may scatter (rounding in text files)
 
 
@@ -43,7 +47,7 @@ def to_records(path: Path, named: Named) -> tuple[Record, ...]:
             raise InputError(
                 f"{path}: column {name}, sample {bad[0] + 1} is not a finite number; export again."
             )
-    if any(_FRF.match(name.lower()) for name in named.columns):
+    if any(_frf_name(name) for name in named.columns):
         return (_frf(path, named),)
     return (_time(path, named),)
 
@@ -124,14 +128,17 @@ def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
     unit = named.units.get(name) or _unit_of_name(name)
     known = lookup(unit) if unit else None
     quantity, si, factor = known or ("unknown", "", 1.0)
-    match = _DIRECTION.search(re.sub(r"(_m_s2|_n|_g)$", "", name.lower()) + " ")
-    direction = 0
+    plain = re.sub(r"(_m_s2|_n|_g)$", "", name)
+    at = _AT.match(plain)
+    match = _DIRECTION.search(plain[at.end(1) :] + " " if at else plain.lower() + " ")
+    direction, node = 0, at[1] if at else ""
     if match:
         direction = (AXES.index(match[2].lower()) + 1) * (-1 if match[1] == "-" else 1)
     if quantity == "force":
         hit = _attribute(named, "hit")
         direction = hit_direction(hit) if hit else 0
-    return Channel(name, quantity, si, direction, np.asarray(values, dtype=float) * factor)
+        node = (_attribute(named, "hit_point") or "").strip()
+    return Channel(name, quantity, si, direction, np.asarray(values, dtype=float) * factor, node)
 
 
 def _unit_of_name(name: str) -> str:
@@ -153,43 +160,61 @@ def hit_direction(text: str) -> int:
     return (AXES.index(match[2]) + 1) * (-1 if match[1] == "-" else 1)
 
 
+def _frf_name(name: str) -> tuple[str, tuple[str, str, str, str], str] | None:
+    """Quantity, (point, axis) of response and of hit, "_re", "_im" or "" of a column's name."""
+    match = _FRF.match(name.lower())
+    if match:
+        return match[1], ("", match[2], "", match[3]), match[4]
+    match = _BETWEEN.match(name)
+    if match:
+        return match[1], (match[2], match[3], match[4], match[5]), match[6]
+    return None
+
+
 def _frf(path: Path, named: Named) -> FrfRecord:
-    columns = {name.lower(): np.asarray(values) for name, values in named.columns.items()}
-    if "frequency_hz" not in columns:
+    columns = {name: np.asarray(values) for name, values in named.columns.items()}
+    lower = {name.lower(): values for name, values in columns.items()}
+    if "frequency_hz" not in lower:
         raise InputError(f"{path} holds FRFs but no column frequency_hz; export it too.")
     for name, column in columns.items():
-        known = _FRF.match(name) or name.startswith("coherence_")
-        if known and len(column) != len(columns["frequency_hz"]):
+        known = _frf_name(name) or name.lower().startswith("coherence_")
+        if known and len(column) != len(lower["frequency_hz"]):
             raise InputError(
                 f"{path}: column {name} has {len(column)} values for "
-                f"{len(columns['frequency_hz'])} frequencies; export them together."
+                f"{len(lower['frequency_hz'])} frequencies; export them together."
             )
-    values: dict[tuple[str, str, str], np.ndarray] = {}
+    values: dict[tuple[str, tuple[str, str, str, str]], np.ndarray] = {}
     for name, column in columns.items():
-        match = _FRF.match(name)
-        if match:
-            part = column * (1j if match[4] == "_im" else 1.0)
-            key = (match[1], match[2], match[3])
-            values[key] = values.get(key, 0.0) + part
+        found = _frf_name(name)
+        if found:
+            part = column * (1j if found[2] == "_im" else 1.0)
+            values[found[:2]] = values.get(found[:2], 0.0) + part
     quantities = {key[0] for key in values}
     if len(quantities) != 1:
         raise InputError(f"{path} mixes {' and '.join(sorted(quantities))}; export one kind.")
     quantity = quantities.pop()
-    frequency = np.real(columns["frequency_hz"])
-    coherence = [
-        np.real(columns.get(f"coherence_{r}{h}", np.full(len(frequency), np.nan)))
-        for _, r, h in values
-    ]
+    frequency = np.real(lower["frequency_hz"])
+    unknown = np.full(len(frequency), np.nan)
+    coherence = [np.real(lower.get(_coherence(*at), unknown)) for _, at in values]
     unit = {"accelerance": "m/s^2/N", "mobility": "m/s/N", "receptance": "m/N"}[quantity]
     return FrfRecord(
         path,
         frequency,
         np.array([v.astype(complex) for v in values.values()]),
-        tuple(AXES.index(key[1]) + 1 for key in values),
-        tuple(AXES.index(key[2]) + 1 for key in values),
+        tuple(AXES.index(at[1]) + 1 for _, at in values),
+        tuple(AXES.index(at[3]) + 1 for _, at in values),
         quantity,
         unit,
         np.array(coherence),
         named.remarks,
         _simulated(named),
+        tuple(at[0] for _, at in values),
+        tuple(at[2] for _, at in values),
     )
+
+
+def _coherence(point: str, response: str, hit_point: str, hit: str) -> str:
+    """The column of an FRF's coherence, in lower case."""
+    if not point:
+        return f"coherence_{response}{hit}"
+    return f"coherence_{point}_{response}_{hit_point}_{hit}".lower()

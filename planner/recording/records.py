@@ -1,14 +1,17 @@
 """What a recording holds, before anything is computed from it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
+from planner.recording.dof import Dof
+from planner.recording.points import SENSOR, TCP, Layout, StatedPoints
 from planner.recording.pulse import Pulse, find_pulse
 
 AXES = ("x", "y", "z")
+OF_TOOL = tuple(Dof(SENSOR, axis) for axis in AXES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +20,8 @@ class Channel:
 
     `quantity` is "force", "acceleration", "velocity", "displacement", "pressure", "voltage" or
     "unknown"; `unit` the SI unit of `samples` ("N", "m/s^2", …, "V", "" when the file states none).
-    `direction` is ±1, ±2, ±3 for ±x, ±y, ±z, 0 when the file states none.
+    `direction` is ±1, ±2, ±3 for ±x, ±y, ±z, 0 when the file states none; `node` the name of a
+    point or the digits of a node number, "" when it states none.
     """
 
     name: str
@@ -25,6 +29,7 @@ class Channel:
     unit: str
     direction: int
     samples: np.ndarray  # (n,)
+    node: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,8 @@ class FrfRecord:
     `values[k]` is the response `response_direction[k]` (±1, ±2, ±3; 0 unknown) per unit force in
     `reference_direction[k]`; `quantity` is "accelerance" (m/s²/N), "mobility", "receptance" or
     "unknown"; `unit` the unit of the values. `coherence` is NaN where the file has none.
+    `response_node` and `reference_node` (k,) name the points, "0" where the file states none;
+    they are empty where the format knows no points. Directions up to ±6 are rotations.
     """
 
     source: Path
@@ -57,6 +64,8 @@ class FrfRecord:
     coherence: np.ndarray  # (k, F)
     remarks: tuple[str, ...] = ()
     simulated: bool = False
+    response_node: tuple[str, ...] = ()
+    reference_node: tuple[str, ...] = ()
 
 
 Record = TimeRecord | FrfRecord
@@ -64,15 +73,15 @@ Record = TimeRecord | FrfRecord
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """One hammer hit: force and the three accelerations of the sensor, as recorded.
+    """One hammer hit: the force, and the accelerations of all sensors, as recorded.
 
-    `axis` is the hit direction as a signed axis of the tcp frame ("+x" … "-z"): the force acts on
-    the structure along that signed axis, so that H_xx of a "-x" hit is −a_x/F. `acceleration_m_s2`
-    is already turned into +x, +y, +z of the sensor frame (parallel to the tcp frame). `hit_point`
-    and `sensor` name the nodes where it was hit and where the sensor sits: files name none, and
-    all hits of a pose are then at the tcp. `direction_sd_rad` is how far the hand may have missed
+    `axis` is the hit direction as a signed axis of the hit point's frame ("+x" … "-z"): the force
+    acts on the structure along that signed axis, so that H_xx of a "-x" hit is −a_x/F. Rows of
+    `acceleration_m_s2` are `responses`, point and axis of its frame; of the tool's sensor alone
+    they are x, y and z (parallel to those of the tcp). `hit_point` and the responses' nodes are
+    names of points as in `points.Layout`. `direction_sd_rad` is how far the hand may have missed
     the axis (sd of the angle), `gain_sd` the relative sd of the force's calibration: 0 where
-    nothing is known of it. `taken_out_m_s2` (3, n) is what was taken out of the accelerations as
+    nothing is known of it. `taken_out_m_s2` (r, n) is what was taken out of the accelerations as
     the answer to the hit's own miss, and `taken_out_sd` which share of that is uncertain.
     """
 
@@ -80,12 +89,12 @@ class Hit:
     axis: str
     sampling_rate_hz: float
     force_n: np.ndarray  # (n,)
-    acceleration_m_s2: np.ndarray  # (3, n)
+    acceleration_m_s2: np.ndarray  # (r, n)
     repeat: int = 1
     remarks: tuple[str, ...] = ()
     simulated: bool = False
-    hit_point: str = "tcp"
-    sensor: str = "tcp"
+    hit_point: str = TCP
+    responses: tuple[Dof, ...] = OF_TOOL
     direction_sd_rad: float = 0.0
     gain_sd: float = 0.0
     taken_out_m_s2: np.ndarray | None = None
@@ -95,6 +104,37 @@ class Hit:
     def pulse(self) -> Pulse:
         """Where the force's pulse lies."""
         return find_pulse(self.force_n)
+
+    @property
+    def layout(self) -> Layout:
+        """Its point, and its sensors in the order of the responses."""
+        return Layout((self.hit_point,), tuple(dict.fromkeys(d.node for d in self.responses)))
+
+    @property
+    def rows(self) -> list[int]:
+        """Rows of its layout that were measured."""
+        sensors = self.layout.sensors
+        return [3 * sensors.index(d.node) + abs(d.number) - 1 for d in self.responses]
+
+    def heard_by(self, sensor: str) -> "Hit | None":
+        """The hit as one triaxial sensor has it, x, y, z; None where it has not all three."""
+        if self.responses == tuple(Dof(sensor, axis) for axis in AXES):
+            return self
+        found = [i for axis in AXES for i, d in enumerate(self.responses) if d == Dof(sensor, axis)]
+        if len(found) < len(AXES):
+            return None
+        out = self.taken_out_m_s2
+        return replace(
+            self,
+            acceleration_m_s2=self.acceleration_m_s2[found],
+            responses=tuple(self.responses[i] for i in found),
+            taken_out_m_s2=None if out is None else out[found],
+        )
+
+    def label(self, row: int) -> str:
+        """A response in words: "x", of another sensor than the tool's "elbow x"."""
+        dof = self.responses[row]
+        return dof.direction if dof.node == SENSOR else f"{dof.node} {dof.direction}"
 
     @property
     def axis_index(self) -> int:
@@ -127,6 +167,7 @@ class PoseRow:
     repeat: int | None = None
     file: Path | None = None
     peak_force_n: float | None = None
+    stated: StatedPoints = field(default_factory=StatedPoints)
 
 
 @dataclass(frozen=True)

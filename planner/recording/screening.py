@@ -77,8 +77,9 @@ def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
         )
     for i, samples in enumerate(hit.acceleration_m_s2):
         if not np.any(samples - samples[0]):
+            name = hit.label(i)
             faults.append(
-                Fault("dead", f"The acceleration along {AXES[i]} is constant; check its cable.")
+                Fault("dead", f"The acceleration along {name} is constant; check its cable.")
             )
     ratio = _response_snr(hit)
     if ratio is not None and ratio < limits.least_response_snr:
@@ -112,7 +113,7 @@ def _clipping(hit: Hit) -> list[Fault]:
     """Overload leaves the top flat: several samples equal to the last digit."""
     faults = []
     channels = [("force", hit.force_n)]
-    channels += [(f"acceleration {a}", s) for a, s in zip(AXES, hit.acceleration_m_s2, strict=True)]
+    channels += [(f"acceleration {hit.label(i)}", s) for i, s in enumerate(hit.acceleration_m_s2)]
     for name, samples in channels:
         size = samples - np.median(samples)
         for sense in (1.0, -1.0):
@@ -257,13 +258,25 @@ def screen_repeats(
 ) -> tuple[tuple[Fault, ...], ...]:
     """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
 
-    Judged only where three hits or more were made along an axis; a robust vote needs a majority.
-    What a careful hand misses by is no disagreement, and what only sets one force level apart from
-    another may be the structure: that is for the diagnosis to say.
+    Only hits at one point that the same sensors heard are compared, and where three or more were
+    made along an axis; a robust vote needs a majority. What a careful hand misses by is no
+    disagreement, and what only sets one force level apart from another may be the structure: that
+    is for the diagnosis to say.
     """
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    if not hits:
-        return ()
+    for place in {(hit.hit_point, hit.responses) for hit in hits}:
+        own = [i for i, hit in enumerate(hits) if (hit.hit_point, hit.responses) == place]
+        found = _screen_alike(tuple(hits[i] for i in own), band_hz)
+        for i, one in zip(own, found, strict=True):
+            faults[i] = one
+    return tuple(faults)
+
+
+def _screen_alike(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[Fault, ...], ...]:
+    """The same of hits at one point that the same sensors heard."""
+    faults: list[tuple[Fault, ...]] = [() for _ in hits]
     shortest = min(len(hit.force_n) for hit in hits)
     frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
     axes = np.array([hit.axis_index for hit in hits])
@@ -300,6 +313,7 @@ def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float])
     same = [
         other for other in others
         if other.axis_index == hit.axis_index and other.sampling_rate_hz == hit.sampling_rate_hz
+        and (other.hit_point, other.responses) == (hit.hit_point, hit.responses)
     ]  # fmt: skip
     if not same:
         return 0.0

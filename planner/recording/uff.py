@@ -133,19 +133,21 @@ def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
             f"{path} mixes records of different sampling or length; export one hit with one rate."
         )
     common = {int(s["ref_dir"]) for s in sets if int(s["ref_dir"])}
+    hit_nodes = {int(s["ref_node"]) for s in sets if int(s["ref_dir"]) and int(s["ref_node"])}
     channels, remarks = [], []
     for s in sets:
         quantity, unit, factor = _unit(path, s)
-        direction = int(s["rsp_dir"])
+        direction, node = int(s["rsp_dir"]), int(s["rsp_node"])
         if quantity == "force":
             direction = int(s["ref_dir"]) or (common.pop() if len(common) == 1 else direction)
+            node = int(s["ref_node"]) or (hit_nodes.pop() if len(hit_nodes) == 1 else node)
         if not unit:
             label = str(s["ordinate_axis_units_lab"]).strip()
             remarks.append(f"The unit {label or 'of a record'} is not known.")
         name = str(s["rsp_ent_name"]).strip()
         name = name if name.upper() != "NONE" else f"{quantity} {direction:+d}"
         samples = np.asarray(s["data"], dtype=float) * factor
-        channels.append(Channel(name, quantity, unit, direction, samples))
+        channels.append(Channel(name, quantity, unit, direction, samples, str(node)))
     rate = next(iter(grids))[1]
     return TimeRecord(path, rate, tuple(channels), tuple(remarks), _simulated(sets))
 
@@ -164,14 +166,14 @@ def _frf_record(
 ) -> FrfRecord:
     frequency = np.asarray(sets[0]["x"], dtype=float)
     values, coherence, kinds = [], [], set()
-    found = {(int(c["rsp_dir"]), int(c["ref_dir"])): c for c in coherences}
+    found = {_place(c): c for c in coherences}
     for s in sets:
         if len(s["x"]) != len(frequency) or not np.allclose(s["x"], frequency):
             raise InputError(f"{path} mixes FRFs over different frequency lines; export one grid.")
         quantity, unit, factor = _unit_of_ratio(s)
         kinds.add((quantity, unit))
         values.append(np.asarray(s["data"], dtype=complex) * factor)
-        match = found.get((int(s["rsp_dir"]), int(s["ref_dir"])))
+        match = found.get(_place(s))
         same = match is not None and len(match["data"]) == len(frequency)
         coherence.append(
             np.real(match["data"]) if match and same else np.full(len(frequency), np.nan)
@@ -191,7 +193,23 @@ def _frf_record(
         np.array(coherence),
         remarks,
         _simulated(sets),
+        _nodes(sets, "rsp"),
+        _nodes(sets, "ref"),
     )
+
+
+def _place(s: dict[str, Any]) -> tuple[int, ...]:
+    """Where it was felt and hit: nodes and directions."""
+    return tuple(int(s[f"{end}_{what}"]) for end in ("rsp", "ref") for what in ("node", "dir"))
+
+
+def _nodes(sets: list[dict[str, Any]], end: str) -> tuple[str, ...]:
+    """Names of the nodes at one end ("rsp", "ref"): numbers, else the entities' names."""
+    numbers = [str(int(s[f"{end}_node"])) for s in sets]
+    if any(number != "0" for number in numbers):
+        return tuple(numbers)
+    names = [str(s[f"{end}_ent_name"]).strip() for s in sets]
+    return tuple("0" if name.upper() in ("", "NONE", "NULL") else name for name in names)
 
 
 def _unit_of_ratio(s: dict[str, Any]) -> tuple[str, str, float]:

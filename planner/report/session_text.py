@@ -18,6 +18,7 @@ k         skip this pose, do not offer it    n  propose anew
 b, h      late hits: of the pose before, or of this one
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
+LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
 SIMULATED = "SIMULATED RECORDINGS: nothing here was measured on a real robot"
 
 
@@ -120,50 +121,50 @@ def result_line(report: ImportReport) -> str:
 def progress_line(
     history: list[float], target: float, seconds_per_pose: float | None, minimum: int
 ) -> Text:
-    """Time per pose, and about how long until the target, judging by the trend so far.
+    """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
     `history` is the overall sd (%) after each measurement; it falls about geometrically.
     """
     parts = []
-    minutes = None if seconds_per_pose is None else seconds_per_pose / 60
-    if minutes is not None:
-        parts.append(f"{minutes:.1f} min per pose")
+    if seconds_per_pose is not None:
+        parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
     left = poses_to_go(history, target, minimum)
     if left == (0, 0):
-        parts.append("target reached")
+        parts.append("overall sd below the target")
     elif left is not None:
-        low, high = left
-        span = f"{low}" if low == high else f"{low} to {high}"
-        parts.append(f"{span} more pose{'s' if high > 1 else ''}")
-        if minutes is not None:
-            parts.append(f"{_span(low * minutes, high * minutes)} min to go")
+        parts.append(f"{_span(left)} more pose{'s' if left != (1, 1) else ''} by the trend so far")
+        if seconds_per_pose is not None:
+            minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
+            rounded = [None if m is None else max(1, round(m)) for m in minutes]
+            parts.append(f"{_span((rounded[0] or 1, rounded[1]))} min to go")
     elif len(history) > 1:
-        parts.append("how many more is not to be foretold yet")
+        parts.append("no trend yet that tells how many more it takes")
     return Text("; ".join(parts))
 
 
-def _span(low: float, high: float) -> str:
-    first, last = (f"{max(1.0, value):.0f}" for value in (low, high))
-    return first if first == last else f"{first} to {last}"
+def _span(of: tuple[int, int | None]) -> str:
+    low, high = of
+    if high is None:
+        return f"{low} or more"
+    return f"{low}" if low == high else f"{low} to {high}"
 
 
-TREND = 6  # last measurements by which the trend is judged
-MOST_TO_GO = 100  # poses; more is no forecast
+def poses_to_go(history: list[float], target: float, minimum: int) -> tuple[int, int | None] | None:
+    """From how many to how many poses until `history` falls to `target`.
 
-
-def poses_to_go(history: list[float], target: float, minimum: int) -> tuple[int, int] | None:
-    """Poses until `history` falls to `target`: from, to (one sd of the trend); None: no trend."""
+    By its mean fall and the standard error of that; None at the end where that is beyond
+    MOST_TOLD, None as a whole where there is no trend to judge by or all of it is beyond.
+    """
     missing = max(0, minimum - len(history))
     if history and history[-1] <= target:
         return missing, missing
-    recent = np.log(history[-TREND:])
-    if len(recent) < 4 or not target > 0:
+    if len(history) < LEAST_TREND:
         return None
-    steps = np.diff(recent)
-    mean, sd = float(np.mean(steps)), float(np.std(steps, ddof=1) / np.sqrt(len(steps)))
-    if mean + sd >= 0:
+    falls = -np.diff(np.log(history))
+    mean, error = float(np.mean(falls)), float(np.std(falls, ddof=1) / np.sqrt(len(falls)))
+    far = float(np.log(history[-1] / target))
+    if mean <= error or far / (mean + error) > MOST_TOLD:
         return None
-    low, high = (
-        int(np.ceil(np.log(target / history[-1]) / rate)) for rate in (mean - sd, mean + sd)
-    )
-    return None if high > MOST_TO_GO else (max(missing, low), max(missing, high))
+    quick = max(missing, 1, int(np.ceil(far / (mean + error))))
+    slow = int(np.ceil(far / (mean - error)))
+    return quick, (None if slow > MOST_TOLD else max(quick, slow))

@@ -177,11 +177,12 @@ def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
         return read_recordings(folder, joint_columns(folder))
     from planner.robot.robot import Robot
 
-    return read_recordings(folder, Robot.load(robot_toml).joint_names)
+    robot = Robot.load(robot_toml)
+    return read_recordings(folder, robot.joint_names, robot.points)
 
 
 def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
-    return tuple(Source(r.file, str(r.file), r.hit, r.repeat) for r in rows if r.file)
+    return tuple(Source.of(r) for r in rows if r.file)
 
 
 def _visited(pose: str, rows: list[PoseRow], measured: MeasuredPose) -> Visited:

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.recording.points import TOOL, Layout
 from planner.robot.angle_slopes import AngleSlopes, mass_slopes, turned
 from planner.robot.robot import Robot
 from planner.robot.virtual_joints import inertia_basis, virtual_model
@@ -132,16 +133,22 @@ class ElasticModel:
         return other
 
     def matrices(
-        self, q: np.ndarray, hits: Sequence[str] = (), sensors: Sequence[str] = ()
+        self,
+        q: np.ndarray,
+        hits: Sequence[str] = (),
+        sensors: Sequence[str] = (),
+        layout: Layout = TOOL,
     ) -> Matrices:
         """Matrices of poses q (n, dof) in rad, between named frames of the URDF.
 
-        Raises InputError where a frame does not exist.
+        Where none are named, between the points of a layout. Raises InputError where a frame does
+        not exist.
         """
         q = np.atleast_2d(q)
         n, e, robot = len(q), self.size, self.robot
-        ids = [[robot.frame_id("hit frame", name) for name in hits] or [robot.tcp_id]]
-        ids += [[robot.frame_id("sensor frame", name) for name in sensors] or [robot.sensor_id]]
+        own = robot.layout_ids(layout)
+        ids = [[robot.frame_id("hit frame", name) for name in hits] or own[0]]
+        ids += [[robot.frame_id("sensor frame", name) for name in sensors] or own[1]]
         # One for each call, so that threads do not meet in it.
         data, weight = self._model.createData(), self._weighed.createData()
         mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
@@ -164,18 +171,19 @@ class ElasticModel:
         hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)
 
-    def with_slopes(self, q: np.ndarray) -> Matrices:
+    def with_slopes(self, q: np.ndarray, layout: Layout = TOOL) -> Matrices:
         """Matrices of poses q (n, dof) in rad, and how they change with the joint angles."""
         q = np.atleast_2d(q)
-        return replace(self.matrices(q), by_angle=self._slopes(q))
+        return replace(self.matrices(q, layout=layout), by_angle=self._slopes(q, layout))
 
-    def _slopes(self, q: np.ndarray) -> AngleSlopes:
+    def _slopes(self, q: np.ndarray, layout: Layout) -> AngleSlopes:
         data, weight = self._model.createData(), self._weighed.createData()
         joints, size = self._virtual.carriers, self._model.nv
         bodies = np.empty((len(q), len(joints), 6, size))
-        ends = np.empty((len(q), 2, 6, size))
+        hits, sensors = self.robot.layout_ids(layout)
+        ends = np.empty((len(q), len(hits) + len(sensors), 6, size))
         stiffness = np.empty((len(q), len(self.robot.joint_names), self.size))
-        frames = [self._virtual.frames[k] for k in (self.robot.tcp_id, self.robot.sensor_id)]
+        frames = [self._virtual.frames[k] for k in (*hits, *sensors)]
         for i, row in enumerate(q):
             pin.computeJointJacobians(self._model, data, self._standing(row, weight))
             for b, joint in enumerate(joints):
@@ -187,8 +195,11 @@ class ElasticModel:
         places = self._virtual.rigid, self._elastic
         inertia = np.einsum("bk,kij->bij", self.inertia, inertia_basis())
         moved = turned(ends, *places)[..., :3, :]
+        # (n, points, dof, 3, e), the points side by side with their axes.
+        moved = np.moveaxis(moved, 1, 2).reshape(len(q), len(stiffness[0]), -1, self.size)
         mass = mass_slopes(bodies, inertia, *places)
-        return AngleSlopes(mass, moved[:, 0], moved[:, 1], stiffness)
+        at_hits = 3 * len(hits)
+        return AngleSlopes(mass, moved[:, :, :at_hits], moved[:, :, at_hits:], stiffness)
 
     def body_jacobians(self, q: np.ndarray) -> np.ndarray:
         """(n, bodies, 6, e) at q (n, dof) in rad: how the elastic rotations move the bodies.
@@ -204,6 +215,20 @@ class ElasticModel:
             for b, joint in enumerate(self._virtual.carriers):
                 jacobian = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
                 out[i, b] = jacobian[:, self._elastic]
+        return out
+
+    def sag(self, q: np.ndarray) -> np.ndarray:
+        """By how much the springs give (n, e) under the weight at q (n, dof), in rad (slides: m).
+
+        To first order, and also where robot.toml leaves gravity's own stiffness out.
+        """
+        q, data = np.atleast_2d(q), self._weighed.createData()
+        out = np.empty((len(q), self.size))
+        for i, row in enumerate(q):
+            full = np.zeros(self._model.nq)
+            full[self._virtual.rigid] = row
+            weight = pin.computeGeneralizedGravity(self._weighed, data, full)
+            out[i] = -weight[self._elastic] / (self._carrying + self._with_angle(row))
         return out
 
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:

@@ -9,7 +9,9 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.config import RobotConfig, load_config, with_effects
+from planner.recording.points import SENSOR, TCP, Layout, PointNames
+from planner.robot.config import PointTable, RobotConfig, load_config, with_effects
+from planner.robot.points import PREFIX, check_points, names_of, with_points
 from planner.robot.urdf import build_model, joint_axes, parse_urdf, read_urdf
 
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
@@ -41,14 +43,14 @@ class Robot:
         """
         config = load_config(robot_toml, geometric_stiffness)
         urdf = (robot_toml.parent / config.urdf).resolve()
-        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml))
+        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
 
     def described(self, config: RobotConfig, urdf_text: str) -> "Robot":
         """The robot that its two files describe with this config and text in their stead.
 
         `config` is as the file has it: its lists are without what its effects add.
         """
-        root = parse_urdf(urdf_text, self.urdf_path)
+        root = parse_urdf(urdf_text, self.urdf_path, self.config.held)
         return self._built(with_effects(config, self.path), self.path, self.urdf_path, root)
 
     @classmethod
@@ -60,7 +62,17 @@ class Robot:
         axes = joint_axes(root, tuple(model.names)[1:])
         robot = cls(config, robot_toml, urdf, text, model, axes)
         robot._check()
+        check_points(config.point, robot_toml)
+        with_points(model, config.point, [robot._link_of_point(p) for p in config.point])
+        _ = robot.points
         return robot
+
+    def _link_of_point(self, point: PointTable) -> int:
+        """Number of the frame that a point lies in."""
+        own = {TCP: self.tcp_id, SENSOR: self.sensor_id}
+        if not point.link and point.name in own:
+            return own[point.name]
+        return self.frame_id(f"[[point]] {point.name}: link", point.link)
 
     def _check(self) -> None:
         for entry, name in (
@@ -148,6 +160,25 @@ class Robot:
     def sensor_id(self) -> int:
         """Pinocchio's frame number of the sensor."""
         return self.frame_id("sensor_frame", self.config.sensor_frame)
+
+    @cached_property
+    def points(self) -> PointNames:
+        """What recordings may call the points of robot.toml, and that they may say nothing."""
+        config = self.config
+        return names_of(self.model, config.point, self.tcp_id, self.sensor_id, self.path)
+
+    def layout_ids(self, layout: Layout) -> tuple[list[int], list[int]]:
+        """Pinocchio's frame numbers of a layout's hit points and of its sensors."""
+        own = {p.name: self.frame_id("[[point]]", PREFIX + p.name) for p in self.config.point}
+        hits, sensors = {**own, TCP: self.tcp_id}, {**own, SENSOR: self.sensor_id}
+        hits.setdefault(SENSOR, self.sensor_id)
+        sensors.setdefault(TCP, self.tcp_id)
+        return [hits[n] for n in layout.hits], [sensors[n] for n in layout.sensors]
+
+    @cached_property
+    def sensor_mass_kg(self) -> dict[str, float]:
+        """Masses of sensors that are not 0, by what layouts call their points."""
+        return {self.points.sensor(p.name): p.mass_kg for p in self.config.point if p.mass_kg > 0}
 
     def frame_id(self, entry: str, name: str) -> int:
         """Pinocchio's number of a frame that robot.toml names at `entry`; InputError if none."""

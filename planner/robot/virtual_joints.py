@@ -7,6 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.robot.points import PREFIX
 from planner.robot.robot import BASE, Robot
 
 SMALL = "resonator"  # and its number: a body of its own too
@@ -64,11 +65,18 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
         inertia = inertia + inertia_change
     for carrier, values in zip(carriers, inertia, strict=True):
         model.appendBodyToJoint(carrier, _body(values), pin.SE3.Identity())
-    frames = tuple(
-        model.addFrame(pin.Frame(f.name, last[f.parentJoint], 0, f.placement, f.type))
-        for f in source.frames
-    )
+    frames = tuple(model.addFrame(_carried(f, last, ends)) for f in source.frames)
     return VirtualModel(model, rigid, elastic, tuple(names), tuple(carriers), inertia, frames)
+
+
+def _carried(frame: pin.Frame, last: list[int], ends: list[tuple[int, pin.SE3]]) -> pin.Frame:
+    """A frame of the robot on what carries it: on a link that bends, points lie on either half."""
+    joint, place = last[frame.parentJoint], frame.placement
+    outer, back = ends[frame.parentJoint]
+    half = -back.translation
+    if frame.name.startswith(PREFIX) and outer != joint and place.translation @ half > half @ half:
+        joint, place = outer, back * place
+    return pin.Frame(frame.name, joint, 0, place, frame.type)
 
 
 def _resonators(robot: Robot, model: pin.Model, last: list[int]) -> list[int]:

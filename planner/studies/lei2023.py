@@ -51,7 +51,7 @@ class Scores:
     seconds: float
 
 
-def study(progress: Tell) -> Report:
+def study(progress: Tell, small: bool = False) -> Report:
     """R² by 5-fold cross-validation on three robots, and the time that training takes."""
     scores = _scores(progress)
     table, modes = _by_kind(scores), _by_mode(scores)

@@ -2,8 +2,8 @@
 
 import csv
 import warnings
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -61,11 +61,13 @@ class Hammer:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedHit:
-    """force_n (n,) ≥ 0 along `axis`, acceleration_m_s2 (3, n)."""
+    """force_n (n,) ≥ 0 along `axis` of the hit point, acceleration_m_s2 (3s, n) of the sensors."""
 
     axis: str
     force_n: np.ndarray
     acceleration_m_s2: np.ndarray
+    hit_point: str = "tcp"
+    sensors: tuple[str, ...] = ("sensor",)
 
 
 def simulate_hit(
@@ -110,7 +112,7 @@ def noisy(hit: SimulatedHit, hammer: Hammer, rng: np.random.Generator) -> Simula
     a = a + hammer.noise * largest_rms(hit) * rng.standard_normal(a.shape)
     if hammer.rumble_m_s2 > 0:
         a = a + _rumble(a.shape, hammer, rng)
-    return SimulatedHit(hit.axis, f, a)
+    return replace(hit, force_n=f, acceleration_m_s2=a)
 
 
 def noise_power(hit: SimulatedHit, hammer: Hammer) -> np.ndarray:
@@ -135,29 +137,40 @@ def _rumble(shape: tuple[int, ...], hammer: Hammer, rng: np.random.Generator) ->
     return np.fft.irfft(size * (phase[0] + 1j * phase[1]), n)
 
 
-def write_uff(path: Path, hit: SimulatedHit, hammer: Hammer, *text: str) -> None:
-    """One hit as UFF 58b, labelled as simulated; up to 4 lines of text go into the header."""
+def write_uff(
+    path: Path,
+    hit: SimulatedHit,
+    hammer: Hammer,
+    *text: str,
+    nodes: Mapping[str, int] | None = None,
+) -> None:
+    """One hit as UFF 58b, labelled as simulated; up to 4 lines of text go into the header.
+
+    `nodes` are those of the points by name, 1 where there is none.
+    """
     import pyuff
 
     path.unlink(missing_ok=True)  # and "add": pyuff's "overwrite" loses sets before the last
     file = pyuff.UFF(str(path))
     direction = (AXES.index(hit.axis[1]) + 1) * (-1 if hit.axis[0] == "-" else 1)
-    channels = [(hit.force_n, 13, "N", direction, "hammer")]
+    at = dict(nodes or {})
+    channels = [(hit.force_n, 13, "N", direction, "hammer", at.get(hit.hit_point, 1))]
     channels += [
-        (samples, 12, "m/s^2", i + 1, f"sensor {AXES[i]}")
+        (samples, 12, "m/s^2", i % 3 + 1, f"{hit.sensors[i // 3]} {AXES[i % 3]}",
+         at.get(hit.sensors[i // 3], 1))
         for i, samples in enumerate(hit.acceleration_m_s2)
-    ]
-    for samples, kind, unit, response, name in channels:
+    ]  # fmt: skip
+    for samples, kind, unit, response, name, node in channels:
         entry = {
             "type": 58,
             "binary": 1,
             "func_type": 1,
             "id1": "SIMULATED, not measured",
             **{f"id{k}": line[:80] for k, line in enumerate(text[:4], 2)},
-            "rsp_node": 1,
+            "rsp_node": node,
             "rsp_dir": response,
             "rsp_ent_name": name.replace(" ", "_"),
-            "ref_node": 1,
+            "ref_node": at.get(hit.hit_point, 1),
             "ref_dir": direction,
             "ord_data_type": 4,
             "num_pts": samples.size,
@@ -211,20 +224,28 @@ def write_recordings(
     hits: Sequence[tuple[str, np.ndarray, int, SimulatedHit]],
     hammer: Hammer,
     description: str,
+    nodes: Mapping[str, int] | None = None,
 ) -> Path:
-    """recordings.csv and one UFF file a hit: pose, readback (dof,) in °, repeat, hit."""
+    """recordings.csv and one UFF file a hit: pose, readback (dof,) in °, repeat, hit.
+
+    Where other points than the tool's are hit or heard, the table names them.
+    """
     (folder / "data").mkdir(parents=True, exist_ok=True)
+    elsewhere = any((h.hit_point, h.sensors) != ("tcp", ("sensor",)) for *_, h in hits)
     rows = []
     for pose, readback, repeat, hit in hits:
         sign = "m" if hit.axis[0] == "-" else "p"
-        name = f"data/{pose}_{sign}{hit.axis[1]}_{repeat}.uff"
+        at = f"_{hit.hit_point}_{'_'.join(hit.sensors)}" if elsewhere else ""
+        name = f"data/{pose}_{sign}{hit.axis[1]}_{repeat}{at}.uff"
         what = f"pose {pose}, hit {hit.axis}, repeat {repeat}"
-        write_uff(folder / name, hit, hammer, description, what)
-        rows.append([pose, *(f"{v:.4f}" for v in readback), hit.axis, repeat, name])
+        write_uff(folder / name, hit, hammer, description, what, nodes=nodes)
+        points = [hit.hit_point, " ".join(hit.sensors)] if elsewhere else []
+        rows.append([pose, *(f"{v:.4f}" for v in readback), hit.axis, repeat, name, *points])
     with open(folder / "recordings.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         joints = [f"{name}_deg" for name in joint_names]
-        writer.writerow(["pose", *joints, "hit", "repeat", "file"])
+        points = ["hit_point", "response_points"] if elsewhere else []
+        writer.writerow(["pose", *joints, "hit", "repeat", "file", *points])
         writer.writerows(rows)
     return folder
 

@@ -44,6 +44,7 @@ class Builder:
         world = ElementTree.SubElement(top, "worldbody")
         base = ElementTree.SubElement(world, "body", name=self._root)
         self._hinges(base, "base")
+        self._sites(base, self._root)
         self._lumps(base, self._root)
         self._inertial(base, self._root)
         self._grow(base, self._root)
@@ -82,6 +83,7 @@ class Builder:
             elif any(s.joint == child for s in self._springs):
                 self._split(body, child)
             else:
+                self._sites(body, child)
                 self._inertial(body, child)
                 self._grow(body, child)
 
@@ -97,8 +99,10 @@ class Builder:
         apart = np.sqrt(0.75 / (mass * (along @ np.linalg.solve(second, along))))
         half = (tensor - mass * apart**2 * (np.eye(3) - np.outer(along, along))) / 2
         _inertial(body, mass / 2, centre - apart * along, half)
+        self._sites(body, link, end, (-np.inf, 0.5))
         outer = ElementTree.SubElement(body, "body", name=f"{link} outer", pos=_text(end / 2))
         self._hinges(outer, link)
+        self._sites(outer, link, end, (0.5, np.inf), end / 2)
         _inertial(outer, mass / 2, centre + apart * along - end / 2, half)
         self._grow(outer, link, end / 2)
 
@@ -110,7 +114,8 @@ class Builder:
         mass, centre, tensor = self._scattered(beam.link)
         slender, rest = _slender(mass, centre, tensor, end, 0.5 / beam.elements)
         _inertial(body, *rest)
-        piece, step = body, end / beam.elements
+        piece, step, first = body, end / beam.elements, 0.5 / beam.elements
+        self._sites(body, beam.link, end, (-np.inf, first))
         for element in range(beam.elements):
             # Springs sit in the middle of elements; the last piece is half as long.
             size = (0.5 if element == beam.elements - 1 else 1.0) * step
@@ -119,8 +124,34 @@ class Builder:
             name = f"{beam.link} piece {element}"
             piece = ElementTree.SubElement(piece, "body", name=name, pos=_text(shift))
             self._hinges(piece, f"{beam.link} element {element}")
+            start = first + element / beam.elements
+            reach = (start, np.inf if element == beam.elements - 1 else start + 2 * first)
+            self._sites(piece, beam.link, end, reach, start * end)
             _inertial(piece, float(own), size / 2, _rod(float(own), size, end))
         self._grow(piece, beam.link, end - step / 2)
+
+    def _sites(
+        self,
+        body: ElementTree.Element,
+        link: str,
+        end: np.ndarray | None = None,
+        reach: tuple[float, float] = (-np.inf, np.inf),
+        shift: np.ndarray | None = None,
+    ) -> None:
+        """Points of a link on one of its bodies: those within a reach, in shares of its `end`.
+
+        `shift` (3,) is where the body sits in the link's frame.
+        """
+        for point in self._table.get("point", ()):
+            place = np.array(point.get("position_m", (0.0, 0.0, 0.0)), dtype=float)
+            share = 0.0 if end is None else float(place @ end / (end @ end))
+            if point.get("link") == link and reach[0] <= share < reach[1]:
+                turned = np.deg2rad(point.get("rpy_deg", (0.0, 0.0, 0.0)))
+                at = place if shift is None else place - shift
+                quat = _quaternion(*turned)
+                name = str(point["name"])
+                if name not in ("tcp", "sensor"):
+                    ElementTree.SubElement(body, "site", name=name, pos=_text(at), quat=quat)
 
     def _lumps(self, body: ElementTree.Element, link: str) -> None:
         for extra in (a for a in self._deviation.added if a.link == link):
@@ -213,16 +244,22 @@ def _placement(origin: ElementTree.Element | None) -> tuple[str, str]:
     """Position and quaternion (w x y z) of a URDF origin."""
     if origin is None:
         return "0 0 0", "1 0 0 0"
-    roll, pitch, yaw = (float(v) for v in origin.get("rpy", "0 0 0").split())
+    return origin.get("xyz", "0 0 0"), _quaternion(
+        *(float(v) for v in origin.get("rpy", "0 0 0").split())
+    )
+
+
+def _quaternion(roll: float, pitch: float, yaw: float) -> str:
+    """w x y z of roll, pitch and yaw in rad."""
     cr, sr, cp, sp = np.cos(roll / 2), np.sin(roll / 2), np.cos(pitch / 2), np.sin(pitch / 2)
     cy, sy = np.cos(yaw / 2), np.sin(yaw / 2)
-    quaternion = (
+    values = (
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
-    return origin.get("xyz", "0 0 0"), _text(quaternion)
+    return _text(values)
 
 
 def _matrix(quaternion: str) -> np.ndarray:

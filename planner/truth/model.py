@@ -7,7 +7,7 @@ robot.toml says geometric_stiffness = false.
 """
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -43,11 +43,18 @@ class Truth:
     _weighs: bool = field(repr=False)  # whether gravity is part of the model
     stated: int = 0  # how many of the springs robot.toml states; they are the first
     sensor_offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from where it is stated
+    hit_point: str = "tcp"  # or one of robot.toml's points, as all sensors are
+    sensors: tuple[str, ...] = ("sensor",)
+    offsets_m: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)  # of others
+    sensor_mass_kg: Mapping[str, float] = field(default_factory=dict)
 
     def matrices(
         self, q: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """M, C, K (e, e) and the Jacobians (3, e) of hit point and sensor, in their own frames."""
+        """M, C, K (e, e) and the Jacobians of hit point (3, e) and sensors (3s, e).
+
+        In their own frames.
+        """
         import mujoco
 
         stiffness = self._springs(q)
@@ -55,11 +62,15 @@ class Truth:
         gravity = self._gravity(q, bent)
         model, data = self._posed(q, bent)
         mujoco.mj_crb(model, data)
-        full = _full_mass(model, data)
-        grid = np.ix_(self._elastic, self._elastic)
-        hit, _ = self._site(model, data, "tcp")
-        sensor, sensor_turn = self._site(model, data, "sensor")
-        sensor = sensor - _cross(self.sensor_offset_m) @ sensor_turn
+        mass = _full_mass(model, data)[np.ix_(self._elastic, self._elastic)]
+        hit, _ = self._site(model, data, self.hit_point)
+        each = []
+        for name in self.sensors:
+            linear, turn = self._site(model, data, name)
+            own = self.sensor_offset_m if name == "sensor" else (0.0, 0.0, 0.0)
+            each.append(linear - _cross(self.offsets_m.get(name, own)) @ turn)
+            mass = mass + self.sensor_mass_kg.get(name, 0.0) * each[-1].T @ each[-1]
+        sensor = np.concatenate(each)
         damping = np.diag(self.factors(q) * [s.damping for s in self.springs])
         stiffness = stiffness + gravity
         for bridge in self.deviation.bridges:
@@ -72,7 +83,7 @@ class Truth:
         if self.deviation.spin:
             turning = self.turning(q)
             damping = damping - turning.T @ _cross((0.0, 0.0, self.deviation.spin)) @ turning
-        return full[grid], damping, stiffness, hit, sensor
+        return mass, damping, stiffness, hit, sensor
 
     def gravity_stiffness(self, q: np.ndarray) -> np.ndarray:
         """Gravity's part (e, e) of K: how the weight's torques change with the springs' angles."""
@@ -116,7 +127,7 @@ class Truth:
     def turning(self, q: np.ndarray) -> np.ndarray:
         """Angular Jacobian (3, e) of the hit point, in its frame: what a moment there acts on."""
         model, data = self._posed(q, self._sag(q, self._springs(q)))
-        return self._site(model, data, "tcp")[1]
+        return self._site(model, data, self.hit_point)[1]
 
     def _site(self, model: object, data: object, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Linear and angular Jacobian (3, e) of a site, in its own frame."""
@@ -264,7 +275,7 @@ class Truth:
         return found
 
     def poles(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Poles (2e,) in rad/s, receptance residues (2e, 3, 3), and Js M⁻¹ Jhᵀ (3, 3)."""
+        """Poles (2e,) in rad/s, receptance residues (2e, 3s, 3), and Js M⁻¹ Jhᵀ (3s, 3)."""
         poles, shapes, entry, hit, sensor = self.modal(q)
         residues = np.einsum("ik,kj->kij", sensor @ shapes, entry @ hit.T)
         return poles, residues, sensor @ np.linalg.solve(self.matrices(q)[0], hit.T)
@@ -277,13 +288,13 @@ class Truth:
         return size / (2 * np.pi), -poles[order].real / size, residues[order]
 
     def accelerance(self, q: np.ndarray, frequency_hz: np.ndarray) -> np.ndarray:
-        """Accelerance (3, 3, F) in m/s²/N."""
+        """Accelerance (3s, 3, F) in m/s²/N."""
         poles, residues, _ = self.poles(q)
         iw = 2j * np.pi * np.asarray(frequency_hz)
         return iw**2 * np.einsum("kij,kf->ijf", residues, 1 / (iw - poles[:, None]))
 
     def respond(self, q: np.ndarray, force_n: np.ndarray, axis: int, step_s: float) -> np.ndarray:
-        """Accelerations (3, n) in m/s² of the sensor to a force (n,) along tcp axis 0, 1 or 2.
+        """Accelerations (3s, n) in m/s² of the sensors to a force (n,) along tcp axis 0, 1 or 2.
 
         From rest, and exact for a force that is linear between samples: each pole obeys
         x' = λx + f and a = Σ λ²R x + D f with D = Js M⁻¹ Jhᵀ, because Σ R = 0 and Σ λR = D.

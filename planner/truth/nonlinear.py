@@ -74,7 +74,7 @@ class _Linear:
 
 
 def respond(poses: Sequence[StruckPose], ports: Sequence[Port], step_s: float) -> list[np.ndarray]:
-    """Accelerations (h, 3, n) in m/s² of the sensor at each pose, from rest.
+    """Accelerations (h, 3s, n) in m/s² of the sensors at each pose, from rest.
 
     The poses are integrated together, so all forces have the same length. Raises InputError if
     the step is too long for a law.
@@ -105,7 +105,7 @@ def _without_laws(pose: _Linear, step_s: float) -> np.ndarray:
     y = y * pose.driven[:, :, None]
     flat, (_, hits, n) = y.reshape(len(y), -1), y.shape
     heard = pose.sensed.real @ flat.real - pose.sensed.imag @ flat.imag
-    return np.moveaxis(heard.reshape(3, hits, n), 0, 1) + (
+    return np.moveaxis(heard.reshape(-1, hits, n), 0, 1) + (
         pose.struck.T[:, :, None] * pose.forces[:, None]
     )
 

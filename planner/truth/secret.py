@@ -1,12 +1,13 @@
 """A robot with something concealed, the sensor that listens to it, and the hits on it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import ndimage
 
 from planner.errors import InputError
+from planner.truth.brakes import DampingScatter
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, MeasuringChain
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
@@ -76,7 +77,7 @@ class Tone:
 class Artefact:
     """What the measuring chain does wrong, without anybody knowing.
 
-    `rotation` and `gain` make x' = gain · rotation · x of the sensor's channels; all of them come
+    `rotation` and `gain` make x' = gain · rotation · x of one sensor's channels; all of them come
     late by `delay_s`; all channels are multiplied by exp(-t / window_s) from the hit on.
     """
 
@@ -84,23 +85,26 @@ class Artefact:
     gain: tuple[float, float, float] = (1.0, 1.0, 1.0)
     delay_s: float = 0.0
     window_s: float = np.inf
+    sensor: str = "sensor"
 
 
 @dataclass(frozen=True)
 class Secret:
     """What is concealed: physics of the robot, disturbances, and artefacts of the measurement.
 
-    `chain` is what is no artefact: a measuring chain within its tolerances.
+    `chain` is what is no artefact: a measuring chain within its tolerances. That of sensors at
+    other points is in `chains`, by point, but for force and delay, which are common.
     """
 
     deviation: Deviation
     ports: tuple[Port, ...] = ()
     loss_factor: float | None = None
-    drift: StiffnessDrift | JointDrift | None = None
+    drift: StiffnessDrift | JointDrift | DampingScatter | None = None
     load: LoadChange | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)
     chain: MeasuringChain = field(default_factory=MeasuringChain)
+    chains: Mapping[str, MeasuringChain] = field(default_factory=dict)
 
     def at(self, truth: Truth, progress: float) -> Truth:
         """The robot at a time of the campaign."""
@@ -113,13 +117,16 @@ class Secret:
 class HitVisit:
     """Hits (axis "+x", peak in N) at a pose q (rad); progress 0 to 1 through the campaign.
 
-    `aims`, one a hit, say how each misses its axis and the tcp; none: all are exact.
+    `aims`, one a hit, say how each misses its axis and the point that is hit; none: all are exact.
+    `hit_point` and `sensors` are points of robot.toml, or the tool's own.
     """
 
     q: np.ndarray
     shots: Sequence[tuple[str, float]]
     progress: float = 0.0
     aims: Sequence[Aim] = ()
+    hit_point: str = "tcp"
+    sensors: tuple[str, ...] = ("sensor",)
 
 
 def hit_poses(
@@ -145,7 +152,8 @@ def quiet_hits(
     rng: np.random.Generator,
 ) -> list[list[SimulatedHit]]:
     """The same without noise and before any window; the pulses depend on `rng` alone."""
-    truth = replace(truth, sensor_offset_m=secret.chain.offset_m)
+    offsets = {name: chain.offset_m for name, chain in secret.chains.items()}
+    truth = replace(truth, sensor_offset_m=secret.chain.offset_m, offsets_m=offsets)
     pulses = [
         np.array([pulse(replace(hammer, peak_n=peak), rng) for _, peak in visit.shots])
         for visit in visits
@@ -154,7 +162,11 @@ def quiet_hits(
     gain, step_s = secret.chain.force_gain, hammer.step_s
     return [
         [
-            sampled(axis, gain * force, _heard(secret, a, step_s), hammer)
+            replace(
+                sampled(axis, gain * force, _heard(secret, a, step_s, visit.sensors), hammer),
+                hit_point=visit.hit_point,
+                sensors=visit.sensors,
+            )
             for (axis, _), force, a in zip(visit.shots, forces, response, strict=True)
         ]
         for visit, forces, response in zip(visits, pulses, responses, strict=True)
@@ -169,10 +181,11 @@ def _responses(
     step_s: float,
     rng: np.random.Generator,
 ) -> list[np.ndarray]:
-    """Accelerations (h, 3, n) of the sensor at each visit."""
+    """Accelerations (h, 3s, n) of the sensors at each visit."""
     poses = []
     for visit, forces in zip(visits, pulses, strict=True):
         now = secret.at(truth, visit.progress)
+        now = replace(now, hit_point=visit.hit_point, sensors=visit.sensors)
         senses = np.array([-1.0 if axis[0] == "-" else 1.0 for axis, _ in visit.shots])
         axes = [AXES.index(axis[1]) for axis, _ in visit.shots]
         aims = visit.aims or [Aim()] * len(axes)
@@ -202,9 +215,19 @@ def _hum(pose: StruckPose, tone: Tone, phases: np.ndarray, step_s: float) -> np.
     return np.real(steady[None, :, None] * turning[:, None, :])
 
 
-def _heard(secret: Secret, response: np.ndarray, step_s: float) -> np.ndarray:
+def _heard(
+    secret: Secret, response: np.ndarray, step_s: float, sensors: Sequence[str]
+) -> np.ndarray:
+    """What the sensors show (3s, n); the artefact is one of `artefact.sensor`'s channels."""
     artefact, chain = secret.artefact, secret.chain
-    mixed = np.array(artefact.gain)[:, None] * (artefact.rotation @ chain.matrix @ response)
+    each = []
+    for sensor, own in zip(sensors, np.split(response, len(sensors)), strict=True):
+        of_tool = chain if sensor == "sensor" else MeasuringChain()
+        matrix = secret.chains.get(sensor, of_tool).matrix
+        if sensor == artefact.sensor:
+            matrix = np.array(artefact.gain)[:, None] * (artefact.rotation @ matrix)
+        each.append(matrix @ own)
+    mixed = np.concatenate(each)
     late = (artefact.delay_s + chain.delay_s) / step_s
     return mixed if late == 0 else ndimage.shift(mixed, (0, late), order=3)
 
@@ -213,7 +236,9 @@ def windowed(artefact: Artefact, hit: SimulatedHit, hammer: Hammer) -> Simulated
     """The hit times the window that was left on it."""
     t = np.arange(hit.force_n.size) / hammer.sampling_rate_hz
     window = np.exp(-np.maximum(t - hammer.pretrigger_s, 0.0) / artefact.window_s)
-    return SimulatedHit(hit.axis, window * hit.force_n, window * hit.acceleration_m_s2)
+    return replace(
+        hit, force_n=window * hit.force_n, acceleration_m_s2=window * hit.acceleration_m_s2
+    )
 
 
 def frfs(

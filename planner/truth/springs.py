@@ -18,6 +18,8 @@ from planner.truth.loss_factors import mixed
 
 ANGLE_STEP = 1e-4  # rad, for the change of a gas spring's torque
 
+OF_TOOL = "tcp", "sensor"  # points that need no link: robot.toml names their frames
+
 
 def check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_toml: Path) -> None:
     """Raise InputError for places that do not exist, which would be left out in silence."""
@@ -34,6 +36,8 @@ def check(table: dict, root: ElementTree.Element, deviation: Deviation, robot_to
     named += [wave.by for wave in deviation.harmonics if wave.by]
     named += [name for loop in deviation.feedback for name in (loop.driven, loop.sensed)]
     wrong += [name for name in named if name not in stated]
+    points = [p for p in table.get("point", ()) if p.get("link") or p["name"] not in OF_TOOL]
+    wrong += [p.get("link") for p in points if p.get("link") not in links]
     wrong += [table.get(k) for k in ("tcp_frame", "sensor_frame") if table.get(k) not in links]
     if wrong or not stated:
         what = f"no joint or link {wrong[0]}" if wrong else "no [[compliance]]"

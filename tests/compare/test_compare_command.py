@@ -36,7 +36,7 @@ def bench(pool):
     recordings, robot_toml, campaign = pool
     robot = Robot.load(robot_toml)
     config = decide(robot, [], campaign, "frozen")
-    poses = recorded(recordings, robot.joint_names, config.modes, 1, lambda *_: None)
+    poses = recorded(recordings, robot, config.modes, 1, lambda *_: None)
     return assemble(robot, config, poses)[0]
 
 

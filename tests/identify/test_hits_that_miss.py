@@ -10,7 +10,8 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import of_spectra
 from planner.frf.spectra import HitSpectra, Spectra, Windows
 from planner.identification.identify import identify
-from planner.identification.measurement_model import CHAIN_NUMBERS, LeftOpen, Tolerances
+from planner.identification.left_open import LeftOpen
+from planner.identification.measurement_model import CHAIN_NUMBERS, Tolerances
 from planner.identification.parameters import CAD_INERTIAS
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation

@@ -13,6 +13,7 @@ from planner.diagnosis.effects.sensor_rotation import SensorRotation
 from planner.diagnosis.effects.structural_damping import StructuralDamping
 from planner.diagnosis.effects.transverse_compliance import TransverseCompliance
 from planner.dynamics.simulation import Simulation
+from planner.recording.points import SENSOR
 
 KINDS: dict[str, type[Effect]] = {
     "joint_stiffness": JointStiffness,
@@ -31,6 +32,15 @@ KINDS: dict[str, type[Effect]] = {
 }
 
 
-def library(simulation: Simulation) -> tuple[Effect, ...]:
-    """Every effect at every place where a simulation of this robot can have it."""
-    return tuple(effect for kind in KINDS.values() for effect in kind.everywhere(simulation))
+OF_SENSORS = SensorRotation, SensorGain, Polarity  # each sensor has its own
+
+
+def library(simulation: Simulation, sensors: tuple[str, ...] = (SENSOR,)) -> tuple[Effect, ...]:
+    """Every effect at every place where a simulation of this robot, or a sensor, can have it."""
+    found: list[Effect] = []
+    for kind in KINDS.values():
+        if issubclass(kind, OF_SENSORS):
+            found += kind.everywhere(simulation, sensors)
+        else:
+            found += kind.everywhere(simulation)
+    return tuple(found)

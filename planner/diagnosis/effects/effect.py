@@ -10,6 +10,7 @@ from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Priors
+from planner.recording.points import TOOL, Layout
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,15 @@ class Quantity:
 class Setting:
     """Where an effect acts: n poses q (n, dof) in rad, lines s (n, F) in rad/s.
 
-    `jacobians` (n, B, 6, e) are those of the bodies, in the order of `simulation.elastic.bodies`.
+    `jacobians` (n, B, 6, e) are those of the bodies, in the order of `simulation.elastic.bodies`;
+    FRFs are between the points of `layout`.
     """
 
     simulation: Simulation
     q: np.ndarray
     s: np.ndarray
     jacobians: np.ndarray
+    layout: Layout = TOOL
 
     def body(self, joint: str) -> np.ndarray:
         """Jacobian (n, 6, e) of the link that a joint moves, linear part first."""
@@ -50,10 +53,32 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """FRF as measured = `left` (n, 3, 3, F) times the true one; `slope` (n, p, 3, 3, F)."""
+    """FRF as measured = `left` (n, r, r, F) times the true one; `slope` (n, p, r, r, F)."""
 
     left: np.ndarray
     slope: np.ndarray
+
+    @classmethod
+    def of_sensor(
+        cls, setting: Setting, sensor: str, left: np.ndarray, slope: np.ndarray
+    ) -> "Transfer":
+        """Of one sensor's `left` (n, 3, 3, F), all others being as they should; `slope` likewise.
+
+        A sensor that is not there changes nothing.
+        """
+        layout = setting.layout
+        if layout.sensors == (sensor,):
+            return cls(left, slope)
+        n, lines = setting.s.shape
+        size = layout.shape[0]
+        whole = np.zeros((n, size, size, lines), dtype=complex)
+        whole[:, np.arange(size), np.arange(size)] = 1.0
+        moved = np.zeros((n, slope.shape[1], size, size, lines), dtype=complex)
+        if sensor in layout.sensors:
+            at = 3 * layout.sensors.index(sensor)
+            whole[:, at : at + 3, at : at + 3] = left
+            moved[:, :, at : at + 3, at : at + 3] = slope
+        return cls(whole, moved)
 
 
 @dataclass(frozen=True)
@@ -61,7 +86,8 @@ class Effect:
     """An effect at a place. Each kind overrides what it changes.
 
     `springs` names the parameters of `priors` that belong to the effect: they are reported with
-    `quantities`, the ones that it adds.
+    `quantities`, the ones that it adds. `absorbed`: springs and inertias that are refitted can take
+    its place, so that only its own size says how much it matters, not what FRFs lack without it.
     """
 
     at: str
@@ -69,6 +95,7 @@ class Effect:
 
     name = "none"
     artefact = False
+    absorbed = False
 
     @property
     def prior(self) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import DELAY_SD_S, SENSOR_MATRIX_SD
+from planner.recording.points import SENSOR
 
 RATE_1_S = 1.0, 2.0  # median and log sd of a window's rate
 
@@ -30,6 +31,7 @@ class SensorChain(Effect):
         starts: Sequence[np.ndarray],
         windowed: bool = False,
         late_s: Sequence[float] = (),
+        sensor: str = SENSOR,
     ) -> "SensorChain":
         """From several starts of A (3, 3), and of the delay where A changes nothing."""
         rate = [Quantity("rate", "1/s", float(np.log(RATE_1_S[0])), RATE_1_S[1], True)]
@@ -39,7 +41,7 @@ class SensorChain(Effect):
         first = [q.mean for q in quantities[:-9]]
         begin = [(*first, *(float(v) for v in (a - np.eye(3)).flat)) for a in starts]
         begin += [(*first[:-1], float(late), *np.zeros(9).tolist()) for late in late_s]
-        return cls("sensor", quantities, windowed, tuple(begin))
+        return cls(sensor, quantities, windowed, tuple(begin))
 
     def starts(self) -> np.ndarray:
         """See `Effect.starts`."""
@@ -63,4 +65,4 @@ class SensorChain(Effect):
         slope[:, 0] = -s[:, None, None] * left
         for k in range(9):
             slope[:, 1 + k, k // 3, k % 3] = late
-        return Transfer(left, slope)
+        return Transfer.of_sensor(setting, self.at, left, slope)

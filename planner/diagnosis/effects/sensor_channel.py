@@ -8,6 +8,7 @@ from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import USUAL
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
+from planner.recording.points import SENSOR
 
 AXES = "xyz"
 
@@ -20,10 +21,12 @@ class SensorGain(Effect):
     artefact = True
 
     @classmethod
-    def everywhere(cls, simulation: Simulation) -> tuple["SensorGain", ...]:
+    def everywhere(
+        cls, simulation: Simulation, sensors: tuple[str, ...] = (SENSOR,)
+    ) -> tuple["SensorGain", ...]:
         """One effect for each channel."""
         gain = Quantity("gain", "1", 0.0, 0.5, True)
-        return tuple(cls(f"sensor_{a}", (gain,)) for a in AXES)
+        return tuple(cls(at, (gain,)) for at in _channels(simulation, sensors))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
         """diag(1, …, g, …, 1)."""
@@ -31,7 +34,7 @@ class SensorGain(Effect):
         left, slope = _ones(setting.s), np.zeros((len(setting.s), 1, 3, 3, setting.s.shape[1]))
         left[:, axis, axis] = gain
         slope[:, 0, axis, axis] = gain
-        return Transfer(left, slope)
+        return Transfer.of_sensor(setting, self.at[:-2], left, slope)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
@@ -51,15 +54,18 @@ class Polarity(Effect):
     artefact = True
 
     @classmethod
-    def everywhere(cls, simulation: Simulation) -> tuple["Polarity", ...]:
+    def everywhere(
+        cls, simulation: Simulation, sensors: tuple[str, ...] = (SENSOR,)
+    ) -> tuple["Polarity", ...]:
         """One effect for each channel."""
-        return tuple(cls(f"sensor_{a}") for a in AXES)
+        return tuple(cls(at) for at in _channels(simulation, sensors))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
         """diag(1, …, −1, …, 1)."""
         axis, left = AXES.index(self.at[-1]), _ones(setting.s)
         left[:, axis, axis] = -1.0
-        return Transfer(left, np.zeros((len(left), 0, 3, 3, left.shape[-1])))
+        none = np.zeros((len(left), 0, 3, 3, left.shape[-1]))
+        return Transfer.of_sensor(setting, self.at[:-2], left, none)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
@@ -81,7 +87,7 @@ class ChannelDelay(Effect):
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
         """e^(−sτ) times the identity."""
         late = np.exp(-setting.s * psi[0])
-        left = _ones(setting.s) * late[:, None, None]
+        left = _ones(setting.s, setting.layout.shape[0]) * late[:, None, None]
         slope = -setting.s[:, None, None] * left
         return Transfer(left, slope[:, None])
 
@@ -98,5 +104,12 @@ class ChannelDelay(Effect):
         return abs(values["delay"][0]) < USUAL * t.delay_s
 
 
-def _ones(s: np.ndarray) -> np.ndarray:
-    return np.broadcast_to(np.eye(3)[None, :, :, None], (len(s), 3, 3, s.shape[1])).astype(complex)
+def _ones(s: np.ndarray, size: int = 3) -> np.ndarray:
+    shape = len(s), size, size, s.shape[1]
+    return np.broadcast_to(np.eye(size)[None, :, :, None], shape).astype(complex)
+
+
+def _channels(simulation: Simulation, sensors: tuple[str, ...]) -> list[str]:
+    """Places "sensor_x" and so on of all axes that the sensors have."""
+    axes = simulation.robot.points.axes_of
+    return [f"{sensor}_{axis}" for sensor in sensors for axis in axes(sensor)]

@@ -8,6 +8,7 @@ from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
 from planner.diagnosis.thresholds import SENSOR_ROTATION_SD_DEG, USUAL
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
+from planner.recording.points import SENSOR
 
 
 @dataclass(frozen=True)
@@ -18,10 +19,13 @@ class SensorRotation(Effect):
     artefact = True
 
     @classmethod
-    def everywhere(cls, simulation: Simulation) -> tuple["SensorRotation", ...]:
-        """The effect at the only sensor."""
+    def everywhere(
+        cls, simulation: Simulation, sensors: tuple[str, ...] = (SENSOR,)
+    ) -> tuple["SensorRotation", ...]:
+        """The effect at each sensor."""
         sd = float(np.deg2rad(SENSOR_ROTATION_SD_DEG))
-        return (cls("sensor", tuple(Quantity(f"angle_{a}", "rad", 0.0, sd) for a in "xyz")),)
+        angles = tuple(Quantity(f"angle_{a}", "rad", 0.0, sd) for a in "xyz")
+        return tuple(cls(sensor, angles) for sensor in sensors)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
         """Rz Ry Rx at every line."""
@@ -34,7 +38,9 @@ class SensorRotation(Effect):
             slopes[0] @ factors[1] @ factors[2],
         ]
         n, f = setting.s.shape
-        return Transfer(
+        return Transfer.of_sensor(
+            setting,
+            self.at,
             np.broadcast_to(left[None, :, :, None], (n, 3, 3, f)),
             np.broadcast_to(np.array(by_axis)[None, :, :, :, None], (n, 3, 3, 3, f)),
         )
@@ -42,7 +48,8 @@ class SensorRotation(Effect):
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
         told = ", ".join(f"{np.rad2deg(v):.1f}°" for v, _, _ in values.values())
-        return f"The sensor is turned by {told} about its x, y and z axes: check how it sits."
+        which = "The sensor" if self.at == SENSOR else f"The sensor at {self.at}"
+        return f"{which} is turned by {told} about its x, y and z axes: check how it sits."
 
     def usual(self, values: dict[str, tuple[float, float, str]], t: Tolerances) -> bool:
         """See `Effect.usual`."""

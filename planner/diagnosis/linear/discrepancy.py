@@ -23,13 +23,7 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_UNKNOWN,
     DISCREPANCY_USUAL,
 )
-from planner.identification.measurement_model import (
-    CHAIN_NUMBERS,
-    HIT_NUMBERS,
-    OPEN,
-    ChainTransfer,
-    basis,
-)
+from planner.identification.measurement_model import ChainTransfer, OpenNumbers, basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +48,8 @@ class InnerProducts:
         the chain that the fit itself tells.
         """
         tolerances = fit.misfit.tolerances
-        first = cls.around(fit, springs, np.zeros(0 if tolerances is None else CHAIN_NUMBERS))
+        none = OpenNumbers.of(fit.misfit.measured.accelerance).chain
+        first = cls.around(fit, springs, np.zeros(0 if tolerances is None else none))
         if tolerances is None:
             return first
         return cls.around(fit, springs, first.worth(1.0).chain)
@@ -75,12 +70,12 @@ class InnerProducts:
             open_, slope = seen.of_accelerations(open_), seen.of_accelerations(slope)
         residual = misfit.weight * (h - misfit.measured.accelerance)
         open_, sloped = misfit.weight[:, None] * open_, misfit.weight[:, None] * slope
-        made = []
+        made, numbers = [], OpenNumbers.of(h)
         for i in range(len(h)):
             r, b, j = _real(residual[i][None]), _real(open_[i]), _real(sloped[i])
             varies = b.copy()
-            varies[HIT_NUMBERS:OPEN] *= CHAIN_VARIES
-            rows = np.concatenate([r, varies, j[loose], b[HIT_NUMBERS:OPEN], j])
+            varies[numbers.hits : numbers.known] *= CHAIN_VARIES
+            rows = np.concatenate([r, varies, j[loose], numbers.shared(b), j])
             made.append(rows @ rows.T)
         own = np.concatenate([np.zeros(open_.shape[1]), own[loose]])
         return cls(fit, np.array(made), own, chain)
@@ -181,6 +176,6 @@ def log_sum(values: np.ndarray) -> float:
 
 
 def _real(values: np.ndarray) -> np.ndarray:
-    """Complex (k, 3, 3, F) as real rows (k, 18 F)."""
+    """Complex (k, r, c, F) as real rows (k, 2rcF)."""
     whole = np.ascontiguousarray(values, dtype=complex)
     return whole.reshape(len(values), -1).view(float)

@@ -19,12 +19,13 @@ from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.identify import QUICK, STAGES, Effort, identify
-from planner.identification.measured_frfs import Measured, stack
+from planner.identification.measured_frfs import Measured, layout_of, matrices_at, stack
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
+from planner.recording.points import Layout
 from planner.robot.elastic_model import Matrices
 
 PRIORS = Priors(
@@ -48,6 +49,9 @@ class Grade:
 
 GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
 CLOSE, FINE = Grade(40), Grade(72)
+# More sensors tell more at fewer lines: of these, a power of the number of 3 × 3 FRFs is looked at.
+# Chosen so that four sensors take about twice the time of one; resonances need the least number.
+SHARED_WORK, LEAST_LINES = -0.35, 28
 ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
@@ -75,10 +79,21 @@ class Problem:
     priors: Priors = PRIORS
     exact: bool = False
 
+    @property
+    def layout(self) -> Layout:
+        """The points between which FRFs were measured."""
+        return layout_of(self.frfs)
+
+    @property
+    def blocks(self) -> int:
+        """How many FRF matrices of 3 × 3 there are: from each hit point to each sensor."""
+        rows, columns = self.layout.shape
+        return rows * columns // 9
+
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
         body, measured = _prepared(self, effect), _measured(self, grade)
-        setting = Setting(body.simulation, self.q, measured.s, body.jacobians)
+        setting = Setting(body.simulation, self.q, measured.s, body.jacobians, self.layout)
         inertias, p = body.inertias, body.parametrisation
         tolerances = None if self.exact else tolerances_of(self.simulation)
         kind = grade.logarithmic, grade.inertial, tolerances
@@ -111,13 +126,14 @@ def _prepared(problem: Problem, effect: Effect) -> _Prepared:
     simulation = effect.structure(problem.simulation)
     p = parametrise(simulation, effect.priors(simulation, problem.priors))
     jacobians = simulation.elastic.body_jacobians(problem.q)
-    matrices = simulation.elastic.with_slopes(problem.q)
+    matrices = matrices_at(simulation.elastic, problem.q, problem.frfs, sloped=True)
     return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
 
 
 @lru_cache(maxsize=16)
 def _measured(problem: Problem, grade: Grade) -> Measured:
-    return stack(problem.frfs, problem.band_hz, grade.lines, grade.model_error)
+    lines = max(round(grade.lines * problem.blocks**SHARED_WORK), min(grade.lines, LEAST_LINES))
+    return stack(problem.frfs, problem.band_hz, lines, grade.model_error)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,13 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect, Setting
 from planner.dynamics.gradient import Impedance, Inertias, Turned, response_parts
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Tolerances, basis, marginal
+from planner.identification.measurement_model import (
+    Part,
+    Tolerances,
+    blocks,
+    marginal_of,
+    real_rows,
+)
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
@@ -173,18 +179,27 @@ class Misfit:
         """Misfit of each pose, what hits and chain leave open being integrated out."""
         assert self.tolerances is not None
         n, d = slope.shape[:2]
-        open_ = basis(h, turned, self.setting.s, self.tolerances)
-        open_ *= self.weight[:, None]
+        open_ = blocks(h, turned, self.setting.s, self.tolerances)
+        for one in open_:
+            one.basis[:] *= self.weight[:, None, one.rows, one.columns]
+        count = 1 + max(int(one.numbers.max()) for one in open_)
+        loose = np.zeros(0) if self.discrepancy is None else self.discrepancy
+        further = count + np.arange(len(loose))
         free, size = np.flatnonzero(self.free), len(x)
         chi2, gradient = np.empty(n), np.zeros((n, size))
         normal = np.zeros((n, size, size))
         for i in range(n):
-            j = np.ascontiguousarray(slope[i]).reshape(d, -1).view(float)
-            r = np.ascontiguousarray(residual[i]).reshape(-1).view(float)
-            b = np.ascontiguousarray(open_[i]).reshape(open_.shape[1], -1).view(float)
-            if self.discrepancy is not None:
-                b = np.concatenate([b, self.discrepancy[:, None] * j[: len(self.discrepancy)]])
-            found = marginal(r, j, b)
+            parts = []
+            for one in open_:
+                if len(open_) > 1 and not self.weight[i, one.rows, one.columns].any():
+                    continue
+                j, b = one.of(slope[i]), real_rows(one.basis[i])
+                r, numbers = one.of(residual[i][None])[0], one.numbers
+                if len(loose):
+                    b = np.concatenate([b, loose[:, None] * j[: len(loose)]])
+                    numbers = np.concatenate([numbers, further])
+                parts.append(Part(r, j, b, numbers))
+            found = marginal_of(parts, count + len(loose), d)
             chi2[i] = found.chi2
             gradient[i, free] = found.gradient
             normal[i][np.ix_(free, free)] = found.normal

@@ -6,7 +6,7 @@ springs and inertias (`chain.SensorChain`), and A is then read: a rotation, one 
 channel's sign, or two channels exchanged.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -35,6 +35,7 @@ from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band
 from planner.identification.measurement_model import Tolerances
 from planner.inference.evidence import laplace, savage_dickey, temper
+from planner.recording.points import SENSOR
 from planner.recording.records import AXES, Hit
 
 LATE_S = 1.5e-3, 3e-3, 4.5e-3, 6e-3  # delays to begin with: from none, a large one is not found
@@ -79,10 +80,12 @@ KINDS = _kinds()
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """What the chain was found to be: A (3, 3), its covariance (9, 9), delay and sd in s.
+    """What a sensor's chain was found to be: A (3, 3), its covariance (9, 9), delay and sd in s.
 
     `gain` is by how much log evidence the data prefer it to a perfect chain.
     """
+
+    sensor: str
 
     matrix: np.ndarray
     covariance: np.ndarray
@@ -98,28 +101,39 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     told = window is not None and window.log_evidence > CLEAR
     found = [window] if window is not None and told else []
     clean = correct(recorded, found)
-    chain, t = measure_chain(clean, nominal), tolerances_of(nominal)
-    return tuple(
-        f for f in (*found, _delay(chain, t), _matrix(chain, t)) if f and f.log_evidence > CLEAR
-    )
+    told = [*found]
+    for sensor in _triaxial(clean):
+        chain, t = measure_chain(clean, nominal, sensor), tolerances_of(nominal)
+        told += [f for f in (_delay(chain, t), _matrix(chain, t)) if f]
+    return tuple(f for f in told if f.log_evidence > CLEAR)
 
 
-def measure_chain(recorded: Dataset, nominal: Simulation) -> Chain:
-    """Fit A and delay together with springs and inertias."""
+def _triaxial(recorded: Dataset) -> list[str]:
+    """Sensors with all three axes, by which one alone tells a matrix."""
+    hits = [hit for visit in recorded.visits for hit in visit.hits]
+    return [
+        name for name in recorded.sensors if any(hit.heard_by(name) is not None for hit in hits)
+    ]
+
+
+def measure_chain(recorded: Dataset, nominal: Simulation, sensor: str = SENSOR) -> Chain:
+    """Fit A and delay of a sensor together with springs and inertias, to what it alone heard."""
+    recorded = recorded if recorded.sensors == (sensor,) else recorded.heard_by(sensor)
     band = common_band(recorded.visit_frfs, recorded.band_hz)
     # Tolerances of the chain would hide what is looked for: they count when it is told.
     problem = Problem(recorded.visit_frfs, recorded.visit_q, nominal, band, exact=True)
     plain = fit(problem, Effect(""))
     bases = [kind.base for kind in KINDS if kind.effect != "sensor_gain"]
-    effect = SensorChain.build(bases, late_s=LATE_S)
+    effect = SensorChain.build(bases, late_s=LATE_S, sensor=sensor)
     found = fit(problem, effect)
-    near = fit(problem, SensorChain.build([np.eye(3)]), [plain])
+    near = fit(problem, SensorChain.build([np.eye(3)], sensor=sensor), [plain])
     best = min(found, near, key=lambda f: f.per_value)
     t = temper(best.per_value, ALIKE)
     covariance = np.linalg.inv(best.precision(t))[-10:, -10:]
     psi = best.x[-10:]
     gain = float(plain.data.chi2.sum() - best.data.chi2.sum()) / (2 * t)
     return Chain(
+        sensor,
         effect.matrix(psi),
         covariance[1:, 1:],
         float(psi[0]),
@@ -138,11 +152,14 @@ def _delay(chain: Chain, t: Tolerances) -> Finding | None:
     sd = float(np.hypot(chain.delay_sd_s, _off(chain, DELAY_OFF_S)))
     usual = float(np.hypot(sd, t.delay_s))  # what every chain has is no artefact
     evidence = min(savage_dickey(chain.delay_s, usual, DELAY_SD_S), chain.gain)
+    which = "All responses" if chain.sensor == SENSOR else f"All responses at {chain.sensor}"
     text = (
-        f"All responses come {1e3 * chain.delay_s:.3g} ± {1e3 * sd:.1g} ms after the force: the "
+        f"{which} come {1e3 * chain.delay_s:.3g} ± {1e3 * sd:.1g} ms after the force: the "
         f"phase falls in proportion to frequency. Check filters and sampling of the channels."
     )
-    return Finding("channel_delay", "sensor", evidence, {"delay": (chain.delay_s, sd, "s")}, text)
+    return Finding(
+        "channel_delay", chain.sensor, evidence, {"delay": (chain.delay_s, sd, "s")}, text
+    )
 
 
 def _matrix(chain: Chain, t: Tolerances) -> Finding | None:
@@ -156,8 +173,11 @@ def _matrix(chain: Chain, t: Tolerances) -> Finding | None:
     if not kind.effect:
         return None
     parameters, text = _say(kind, p, sd)
+    if chain.sensor != SENSOR:
+        text = text.replace("he sensor", f"he sensor at {chain.sensor}", 1)
     odds = min(evidence - read[0][0], chain.gain)
-    return Finding(kind.effect, kind.at, odds, parameters, text)
+    at = kind.at.replace(SENSOR, chain.sensor, 1)
+    return Finding(kind.effect, at, odds, parameters, text)
 
 
 def _read(
@@ -208,10 +228,10 @@ def _say(
     return {}, f"Channels {channel[0]} and {channel[1]} of the sensor are exchanged."
 
 
-def matrix_of(finding: Finding) -> np.ndarray:
-    """A (3, 3) of a finding; the identity where it is no matter of channels."""
+def matrix_of(finding: Finding, sensor: str = SENSOR) -> np.ndarray:
+    """A (3, 3) of a finding; the identity where it is no matter of the sensor's channels."""
     for kind in KINDS:
-        if (kind.effect, kind.at) == (finding.effect, finding.at):
+        if (kind.effect, kind.at.replace(SENSOR, sensor, 1)) == (finding.effect, finding.at):
             if kind.effect == "sensor_rotation":
                 return kind.matrix(np.array([finding.parameters[f"rotation_{a}"][0] for a in AXES]))
             if kind.effect == "sensor_gain":
@@ -226,14 +246,18 @@ def correct(recorded: Dataset, findings: Sequence[Finding]) -> Dataset:
     Accelerations are turned and shifted back; a window's rate is told to all that is estimated
     from them (`window_rate_1_s`) and the samples keep it.
     """
-    inverse, delay, rate = np.eye(3), 0.0, recorded.window_rate_1_s
+    inverse: dict[str, np.ndarray] = {}
+    delay, rate = dict.fromkeys(recorded.sensors, 0.0), recorded.window_rate_1_s
     for finding in findings:
-        inverse = inverse @ np.linalg.inv(matrix_of(finding))
-        if finding.effect == "channel_delay":
-            delay += finding.parameters["delay"][0]
+        for sensor in recorded.sensors:
+            own = np.linalg.inv(matrix_of(finding, sensor))
+            if not np.array_equal(own, np.eye(3)):
+                inverse[sensor] = inverse.get(sensor, np.eye(3)) @ own
+            if (finding.effect, finding.at) == ("channel_delay", sensor):
+                delay[sensor] += finding.parameters["delay"][0]
         if finding.effect == "exponential_window":
             rate += finding.parameters["rate"][0]
-    if delay or not np.array_equal(inverse, np.eye(3)):
+    if inverse or any(delay.values()):
         visits = tuple(
             replace(v, hits=tuple(_corrected(hit, inverse, delay) for hit in v.hits))
             for v in recorded.visits
@@ -244,12 +268,24 @@ def correct(recorded: Dataset, findings: Sequence[Finding]) -> Dataset:
     )
 
 
-def _corrected(hit: Hit, inverse: np.ndarray, delay_s: float) -> Hit:
-    a = inverse @ hit.acceleration_m_s2
+def _corrected(hit: Hit, inverse: Mapping[str, np.ndarray], delay_s: Mapping[str, float]) -> Hit:
+    for sensor in hit.layout.sensors:
+        rows = [i for i, dof in enumerate(hit.responses) if dof.node == sensor]
+        if len(rows) == len(AXES) and (sensor in inverse or delay_s[sensor]):
+            own = _turned_back(hit, rows, inverse.get(sensor, np.eye(3)), delay_s[sensor])
+            a = hit.acceleration_m_s2.copy()
+            a[rows] = own
+            hit = replace(hit, acceleration_m_s2=a)
+    return hit
+
+
+def _turned_back(hit: Hit, rows: list[int], inverse: np.ndarray, delay_s: float) -> np.ndarray:
+    """Accelerations (3, n) of one sensor as they were, of its rows x, y, z."""
+    a = inverse @ hit.acceleration_m_s2[rows]
     if delay_s:
         n = a.shape[1]
         early = np.exp(2j * np.pi * np.fft.rfftfreq(2 * n, 1 / hit.sampling_rate_hz) * delay_s)
         # Mirrored at its end, so that no step is shifted.
         whole = np.concatenate([a, a[:, ::-1]], axis=1)
         a = np.fft.irfft(np.fft.rfft(whole, axis=1) * early, 2 * n, axis=1)[:, :n]
-    return replace(hit, acceleration_m_s2=a)
+    return a

@@ -55,6 +55,7 @@ def _since(free: Fit, problem: DriftProblem) -> float:
 
 def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     """`drift`, where the recordings change with time and not with the pose alone."""
+    recorded = recorded.most_heard
     if len(recorded.visits) < 4 or _unchanged(recorded, nominal):
         return ()
     plain, *found = fits(recorded, nominal)

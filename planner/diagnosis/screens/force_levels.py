@@ -98,8 +98,9 @@ def screen(
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it.
 
     Without repeats `unknown` says what it wants. `single`: a law of several joints is not looked
-    for.
+    for. Of several sensors and hit points, the ones most heard tell.
     """
+    recorded = recorded.most_heard
     if len(recorded.level_n) < 2:
         return ()
     tone = screen_tone(recorded)
@@ -160,6 +161,7 @@ def _named(
 
 def differ(recorded: Dataset, nominal: Simulation) -> bool:
     """Whether FRFs of different force levels differ by more than noise, hits being exact."""
+    recorded = recorded.most_heard
     if len(recorded.level_n) < 2:
         return False
     found = equivalent(recorded, system_of(base(recorded, nominal)))

@@ -78,22 +78,33 @@ def _of_visit(
     basis = _basis(plain, number, s, tolerances)
     scale = np.repeat([tolerances.angle_rad, tolerances.offset_m], 2)
     out: list[HitError] = [HitError(*np.zeros((4, 2)))] * len(columns)
-    for axis in range(3):
-        group = [i for i, c in enumerate(columns) if c.axis == axis]
+    # Hits at one point, along one axis, that the same channels heard.
+    places = [(c.axis, c.hits[0].hit_point, c.hits[0].responses) for c in columns]
+    for place in dict.fromkeys(places):
+        group = [i for i, own in enumerate(places) if own == place]
         if len(group) < 2:
             continue
-        h = np.array([columns[i].accelerance[:, lines] for i in group])
-        variance = np.array([columns[i].variance[:, lines] for i in group])
+        rows, column = _at(plain, columns[group[0]].hits[0])
+        own = columns[group[0]].hits[0].rows
+        h = np.array([columns[i].accelerance[own][:, lines] for i in group])
+        variance = np.array([columns[i].variance[own][:, lines] for i in group])
         variance = variance + (RELATIVE * np.abs(h)) ** 2
         weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
-        eta, sd = _solved(h, weight, basis[axis])
+        eta, sd = _solved(h, weight, basis[column][:, rows])
         for i, e, own in zip(group, eta * scale, sd * scale, strict=True):
             out[i] = HitError(e[:2], e[2:], own[:2], own[2:])
     return tuple(out)
 
 
+def _at(plain: Fit, hit: Hit) -> tuple[np.ndarray, int]:
+    """Rows and column of a hit's responses among the fit's."""
+    layout = plain.misfit.setting.layout
+    rows = np.array(layout.rows(hit.layout))[hit.rows]
+    return rows, layout.columns(hit.layout)[hit.axis_index]
+
+
 def _basis(plain: Fit, number: int, s: np.ndarray, tolerances: Tolerances) -> np.ndarray:
-    """(3, 4, 3, F) at s (F,) in rad/s of a visit, by the fitted simulation."""
+    """(c, 4, r, F) at s (F,) in rad/s of a visit, by the fitted simulation."""
     misfit, (a, b) = plain.misfit, plain.misfit.split
     one = slice(number, number + 1)
     mass = misfit.matrices.mass + misfit.inertias.mass_change(plain.x[a:b])
@@ -103,7 +114,7 @@ def _basis(plain: Fit, number: int, s: np.ndarray, tolerances: Tolerances) -> np
 
 
 def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """η and its sd (n, 4) of n columns h (n, 3, F), in sds, and Σ η = 0.
+    """η and its sd (n, 4) of n columns h (n, r, F), in sds, and Σ η = 0.
 
     Least squares with prior N(0, 1) of h = common + B η, `common` being free at every line.
     """
@@ -125,7 +136,7 @@ def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.nd
 
 
 def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Re B* v of basis (4, 3, F) and values (3, F) or (4, 3, F)."""
+    """Re B* v of basis (4, r, F) and values (r, F) or (4, r, F)."""
     return np.tensordot(basis.conj(), values, axes=([-2, -1], [-2, -1])).real
 
 
@@ -155,17 +166,17 @@ def _corrected(
     s = 2j * np.pi * np.fft.rfftfreq(length, 1 / rate)[1:]
     unit = Tolerances(angle_rad=1.0, offset_m=1.0)
     basis = _basis(plain, number, s, unit)
-    hits = tuple(
-        _one(hit, basis[hit.axis_index], error, length, off)
-        for hit, error in zip(visit.hits, errors, strict=True)
-    )
-    return replace(visit, hits=hits)
+    hits = []
+    for hit, error in zip(visit.hits, errors, strict=True):
+        rows, column = _at(plain, hit)
+        hits.append(_one(hit, basis[column][:, rows], error, length, off))
+    return replace(visit, hits=tuple(hits))
 
 
 def _one(hit: Hit, basis: np.ndarray, error: HitError, length: int, off: float) -> Hit:
     eta = np.concatenate([error.tilt_rad, error.offset_m])
     force = hit.sign * (hit.force_n - np.median(hit.force_n))
-    change = np.zeros((3, length // 2 + 1), dtype=complex)
+    change = np.zeros((basis.shape[1], length // 2 + 1), dtype=complex)
     change[:, 1:] = np.einsum("k,kif->if", eta, basis) * np.fft.rfft(force, length)[1:]
     extra = np.fft.irfft(change, length, axis=1)[:, : len(hit.force_n)]
     rest = hit.acceleration_m_s2 - extra

@@ -1,0 +1,171 @@
+"""Points of a robot where one hits and where sensors sit, as recordings name them.
+
+Two points need no name in any file: where the tool is hit ("tcp") and where its sensor sits
+("sensor"). A recording that names no point is of these.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from planner.errors import InputError
+
+TCP, SENSOR = "tcp", "sensor"
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What rows and columns of FRF matrices are, by threes: x, y, z of each point in its frame.
+
+    A hit point stands twice where it was hit while other sensors listened: those were other hits.
+    """
+
+    hits: tuple[str, ...] = (TCP,)
+    sensors: tuple[str, ...] = (SENSOR,)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of rows (responses) and columns (hits)."""
+        return 3 * len(self.sensors), 3 * len(self.hits)
+
+    def rows(self, inner: "Layout") -> list[int]:
+        """Rows of this layout that are those of an `inner` one."""
+        places = [self.sensors.index(name) for name in inner.sensors]
+        return [3 * place + axis for place in places for axis in range(3)]
+
+    def columns(self, inner: "Layout") -> list[int]:
+        """Columns of this layout that are those of an `inner` one."""
+        places = [_nth(self.hits, *_which(inner.hits, i)) for i in range(len(inner.hits))]
+        return [3 * place + axis for place in places for axis in range(3)]
+
+
+TOOL = Layout()
+
+
+def together(layouts: Sequence[Layout]) -> Layout:
+    """The smallest layout that holds all, points in the order in which they first occur."""
+    hits: list[str] = []
+    sensors: list[str] = []
+    for layout in layouts:
+        sensors += [name for name in layout.sensors if name not in sensors]
+        for i in range(len(layout.hits)):
+            name, number = _which(layout.hits, i)
+            if hits.count(name) <= number:
+                hits.append(name)
+    return Layout(tuple(hits), tuple(sensors))
+
+
+def _which(names: Sequence[str], place: int) -> tuple[str, int]:
+    """The name at a place, and how often it stood before."""
+    return names[place], names[:place].count(names[place])
+
+
+def _nth(names: Sequence[str], name: str, number: int) -> int:
+    return [i for i, own in enumerate(names) if own == name][number]
+
+
+@dataclass(frozen=True)
+class PointNames:
+    """What a robot calls its points.
+
+    `axes` are those that a point's sensor has ("xyz", "x"), by name; `nodes` names points by the
+    digits of node numbers. `hits` and `sensors` name points that are where the tool is hit and
+    where its sensor sits: they are these.
+    """
+
+    axes: dict[str, str] = field(default_factory=dict)
+    nodes: dict[str, str] = field(default_factory=dict)
+    hits: tuple[str, ...] = (TCP,)
+    sensors: tuple[str, ...] = (SENSOR,)
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """All names that a recording may say."""
+        return tuple(dict.fromkeys((*self.axes, TCP, SENSOR)))
+
+    def axes_of(self, name: str) -> str:
+        """Axes of the sensor at a point, by its own name or by that of the layout."""
+        same = (name, *self.sensors) if name == SENSOR else (name,)
+        return next((self.axes[one] for one in same if one in self.axes), AXES)
+
+    def hit(self, name: str) -> str:
+        """What layouts call a point that is hit."""
+        return TCP if name in self.hits else name
+
+    def sensor(self, name: str) -> str:
+        """What layouts call a point that has a sensor."""
+        return SENSOR if name in self.sensors else name
+
+    def named(self, node: str) -> str | None:
+        """The point that a file calls by its name or by its node; None where it says nothing.
+
+        Files of a robot without points, or whose points have no nodes, may state any name or node:
+        they say nothing. Raises KeyError where it is no point's.
+        """
+        if node in self.known:
+            return node
+        if node in ("", "0") or not (self.nodes if node.isdigit() else self.axes):
+            return None
+        return self.nodes[node]
+
+
+@dataclass(frozen=True)
+class StatedPoints:
+    """What the table of recordings says of a file's points (nothing where empty), and its row."""
+
+    hit_point: str = ""
+    response_points: tuple[str, ...] = ()
+    row: int | None = None
+    names: PointNames = field(default_factory=PointNames)
+
+    @property
+    def where(self) -> str:
+        """The row in words, for messages."""
+        return "" if self.row is None else f" (row {self.row} of recordings.csv)"
+
+    def hit_at(self, source: object, node: str) -> str:
+        """The layout's name of the point that was hit, in a file that calls it `node`.
+
+        Raises InputError where the file names no point of the robot, or another than the table.
+        """
+        own = self._named(source, node, "hit")
+        if own and self.hit_point and self.names.hit(own) != self.names.hit(self.hit_point):
+            raise InputError(
+                f"{source}{self.where} was hit at {_told(node, own)}, the table says "
+                f"{self.hit_point}; correct the one that is wrong."
+            )
+        return self.names.hit(own or self.hit_point or TCP)
+
+    def response_at(self, source: object, node: str) -> str:
+        """The same of the point where a response was measured."""
+        own, stated = self._named(source, node, "response"), self.response_points
+        if own is None and len(stated) > 1:
+            raise InputError(
+                f"{source}{self.where} does not say which of {', '.join(stated)} a response is "
+                f"of; name its node, or its column acceleration_{stated[0]}_x_m_s2."
+            )
+        same = [name for name in stated if own and self.names.sensor(name) == self._sensor(own)]
+        if own and stated and not same:
+            raise InputError(
+                f"{source}{self.where} has a response at {_told(node, own)}, the table says "
+                f"{', '.join(stated)}; correct the one that is wrong."
+            )
+        return self._sensor(own or (stated[0] if stated else SENSOR))
+
+    def _sensor(self, name: str) -> str:
+        return self.names.sensor(name)
+
+    def _named(self, source: object, node: str, what: str) -> str | None:
+        try:
+            return self.names.named(node)
+        except KeyError:
+            nodes = ", ".join(f"{n} ({name})" for n, name in self.names.nodes.items())
+            known = f"node {node}" if node.isdigit() else f'point "{node}"'
+            raise InputError(
+                f"{source}{self.where} has a {what} at {known}, which is none of robot.toml's "
+                f"points ({nodes or ', '.join(self.names.known)}); correct it, or add a [[point]]."
+            ) from None
+
+
+def _told(node: str, name: str) -> str:
+    return name if node == name else f"node {node}, which is {name}"

@@ -1,0 +1,32 @@
+"""Degrees of freedom: node and signed direction, as universal files number them."""
+
+import pytest
+
+from planner.errors import InputError
+from planner.recording.dof import Dof
+
+
+@pytest.mark.parametrize("number", range(-6, 7))
+def test_a_direction_number_comes_back(number: int) -> None:
+    dof = Dof.of_uff(12, number)
+    assert (dof.node, dof.number) == ("12", number)
+    assert dof.positive.number == abs(number)
+    assert dof.sign * dof.positive.number == number
+
+
+def test_signed_directions_are_spelled_by_axis() -> None:
+    assert Dof.of_uff(7, -3) == Dof("7", "-z")
+    assert str(Dof("P3", "y")) == "P3:y"
+    assert Dof.of_uff(1, 5).is_turn
+    assert not Dof.of_uff(1, 2).is_turn
+
+
+@pytest.mark.parametrize("direction", ["w", "+x", "-scalar", ""])
+def test_an_unknown_direction_is_refused(direction: str) -> None:
+    with pytest.raises(InputError, match="direction"):
+        Dof("3", direction)
+
+
+def test_an_unknown_number_is_refused() -> None:
+    with pytest.raises(InputError, match="direction 7"):
+        Dof.of_uff(3, 7)
