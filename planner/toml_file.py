@@ -30,28 +30,33 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     """
     text = read_toml_text(path, name)
     try:
-        raw = msgspec.toml.decode(text)
-        if (where := _not_finite(raw)) is not None:
-            raise InputError(f"{path}: {where} is no finite number; give one.")
-        return msgspec.convert(raw, type=kind)
-    except (msgspec.DecodeError, RecursionError, ValueError) as error:
+        found = msgspec.toml.decode(text, type=kind)
+    except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(f"{path} is not a valid {name} ({error}); correct it.") from None
+    entry, value = _not_finite(msgspec.to_builtins(found), "")
+    if entry:
+        raise InputError(f"{path}: {entry} is {value}; it must be a finite number.")
+    return found
 
 
-def _not_finite(value: Any, where: str = "") -> str | None:
-    """Where the first nan or inf stands, as `[stop] probability`; None: nowhere."""
+def _not_finite(value: Any, name: str) -> tuple[str, float]:
+    """The first nan or inf below an entry, which no entry of ours may be, and its name."""
     if isinstance(value, float):
-        return None if math.isfinite(value) else where
-    parts: list[tuple[str, Any]] = []
+        return ("", 0.0) if math.isfinite(value) else (name, value)
+    pairs: list[tuple[str, Any]] = []
     if isinstance(value, dict):
         for key, item in value.items():
             if isinstance(item, dict):
-                parts.append((f"{where} [{key}]".strip(), item))
-            elif isinstance(item, list) and item and isinstance(item[0], dict):
+                pairs.append((f"{name} [{key}]".strip(), item))
+            elif isinstance(item, list | tuple) and item and isinstance(item[0], dict):
                 numbered = enumerate(item, 1)
-                parts += [(f"{where} [[{key}]] number {i}".strip(), one) for i, one in numbered]
+                pairs += [(f"{name} [[{key}]] number {i}".strip(), one) for i, one in numbered]
             else:
-                parts.append((f"{where} {key}".strip(), item))
-    elif isinstance(value, list):
-        parts = [(where, item) for item in value]
-    return next((found for name, v in parts if (found := _not_finite(v, name))), None)
+                pairs.append((f"{name} {key}".strip(), item))
+    elif isinstance(value, list | tuple):
+        pairs = [(name, item) for item in value]
+    for inner, item in pairs:
+        entry, number = _not_finite(item, inner)
+        if entry:
+            return entry, number
+    return "", 0.0

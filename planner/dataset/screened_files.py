@@ -36,7 +36,7 @@ class Source:
 
         records: tuple[Record, ...] = read(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
-        if frfs:
+        if frfs and not self.part:
             return (), tuple(located(record, self.stated) for record in frfs)
         return hits_from(self._meant(records), self.hit, self.stated), ()
 

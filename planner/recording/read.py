@@ -10,6 +10,7 @@ from planner.errors import InputError
 from planner.recording import plausible
 from planner.recording.entries import check_size, columns_of
 from planner.recording.hdf5 import read_hdf5
+from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.named_columns import to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.tdms import read_tdms
@@ -17,32 +18,36 @@ from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
 
 MAX_BYTES = 512 * 1024 * 1024
-# Classes of a MAT file's variables that are read: numbers and text; cells and structs are not.
-MAT_CLASSES = ("double", "single", "int", "uint", "logical", "char")
 
 
 def read_mat(path: Path) -> tuple[Record, ...]:
     """MATLAB files up to v7; v7.3 is HDF5."""
+    entries = read_mat5(path) if is_version_5(path) else _older(path)
+    if entries is None:
+        return read_hdf5(path)
+    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
+    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
+        return (_logged_spectra(path, visible),)
+    return to_records(path, columns_of(path, visible))
+
+
+def _older(path: Path) -> dict[str, object] | None:
+    """Entries of a file of version 4; None where it is of version 7.3."""
     import scipy.io
 
     try:
-        listed = [v for v in scipy.io.whosmat(str(path)) if v[2].startswith(MAT_CLASSES)]
+        listed = scipy.io.whosmat(str(path))
         # Real or complex is not said before it is read.
-        check_size(path, sum(8 * int(np.prod(v[1], dtype=float)) for v in listed))
-        names = [name for name, _, _ in listed]
-        entries = scipy.io.loadmat(str(path), squeeze_me=True, variable_names=names)
+        check_size(path, sum(8 * int(np.prod(shape, dtype=float)) for _, shape, _ in listed))
+        return scipy.io.loadmat(str(path))
     except NotImplementedError:
-        return read_hdf5(path)
+        return None
     except InputError:
         raise
     except Exception as error:
         raise InputError(
             f"{path} is not a readable MAT file ({type(error).__name__}); export it again."
         ) from None
-    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
-    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
-        return (_logged_spectra(path, visible),)
-    return to_records(path, columns_of(path, visible))
 
 
 def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
@@ -52,7 +57,7 @@ def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
     that it is a transfer function. The format knows no units, directions or coherence.
     """
     single = [np.asarray(entries[name]) for name in ("npts", "freq")]
-    spectra = np.atleast_2d(np.asarray(entries["yspec"]).T)
+    spectra = np.atleast_2d(np.squeeze(np.asarray(entries["yspec"])).T)
     if any(v.size != 1 or v.dtype.kind not in "fiub" for v in single) or (
         spectra.ndim != 2 or spectra.dtype.kind not in "fiuc"
     ):

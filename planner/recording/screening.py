@@ -146,9 +146,12 @@ def _by_chance(size: np.ndarray, flat: int, pulse: bool) -> bool:
     step = _step(size)
     if pulse and int(np.sum(size > 0.5 * top)) <= NARROW and step < COARSE * top:
         return False
+    if step > NEAR * top:
+        return True  # of so few steps nobody could tell
     near = np.sum((size > (1 - NEAR) * top) & (size < top * (1 - 1e-6)))
     each = (float(near) + 1) * step / (NEAR * top)
-    return each ** (flat - 1) / math.factorial(min(flat - 1, 20)) > BY_CHANCE
+    # Of the Poisson distribution: each^(flat−1) / (flat−1)!
+    return (flat - 1) * math.log(each) - math.lgamma(flat) > math.log(BY_CHANCE)
 
 
 def _step(samples: np.ndarray) -> float:
@@ -310,6 +313,7 @@ def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float])
     same = [
         other for other in others
         if other.axis_index == hit.axis_index and other.sampling_rate_hz == hit.sampling_rate_hz
+        and (other.hit_point, other.responses) == (hit.hit_point, hit.responses)
     ]  # fmt: skip
     if not same:
         return 0.0

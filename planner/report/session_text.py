@@ -126,9 +126,8 @@ def progress_line(
     `history` is the overall sd (%) after each measurement; it falls about geometrically.
     """
     parts = []
-    minutes = None if seconds_per_pose is None else seconds_per_pose / 60
-    if minutes is not None:
-        parts.append(f"{minutes:.1f} min per pose")
+    if seconds_per_pose is not None:
+        parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
     left = poses_to_go(history, target, minimum)
     if left == (0, 0):
         parts.append("overall sd below the target")

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planner.dataset.screened_files import Source, read_one
+from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import hit_count
 from planner.recording.records import Hit
 from planner.recording.screening import likeness_to, screen_repeats
@@ -29,8 +30,9 @@ class HitVerdict:
 class Verdicts:
     """Judges files that wait at a pose: each hit by itself, and beside the others that wait."""
 
-    def __init__(self, band_hz: tuple[float, float]):
+    def __init__(self, band_hz: tuple[float, float], points: PointNames):
         self._band = band_hz
+        self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
         self._read: dict[tuple, list[tuple[str, str, tuple[Hit, ...]]]] = {}
         self._before: tuple[Hit, ...] = ()
         self._now: tuple[Hit, ...] = ()
@@ -66,8 +68,7 @@ class Verdicts:
         stat = path.stat()
         key = path, stat.st_size, stat.st_mtime_ns
         if key not in self._read:
-            judged = [
-                read_one(s, self._band) for s in Source(path, path.name).parts(hit_count(path))
-            ]
+            every = Source(path, path.name, stated=self._stated).parts(hit_count(path))
+            judged = [read_one(source, self._band) for source in every]
             self._read[key] = [(v.axis or "", v.reason, hits) for v, hits, _ in judged]
         return self._read[key]

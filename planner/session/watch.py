@@ -89,7 +89,9 @@ class _Session:
         auto: bool, hits_per_pose: int, limit_s: float | None, explaining: DiagnosisProcess | None,
     ):  # fmt: skip
         self.campaign, self.inbox, self.console, self.keys = campaign, inbox, console, keys
-        self.screen, self.verdicts = Screen(console), Verdicts(campaign.cell.config.modes.band_hz)
+        cell = campaign.cell
+        self.screen = Screen(console)
+        self.verdicts = Verdicts(cell.config.modes.band_hz, cell.robot.points)
         self.here: set[Path] = set()  # looked late, and were said to be of the open pose
         self.pressed = False  # accept was pressed though hits are missing
         self.before = ""  # the pose measured last in this session

@@ -131,8 +131,8 @@ def test_meshes_are_copied_into_the_new_folder_only(tmp_path):
 
 @pytest.mark.parametrize(
     ("what", "line"),
-    [("stop.frequency_sd_percent", "[stop]\nfrequency_sd_percent = nan"),
-     ("goal.joints_deg[1][2]", "[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"),
+    [("frequency_sd_percent", "[stop]\nfrequency_sd_percent = nan"),
+     ("joints_deg", "[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"),
      ("[goal] joints_deg", "[goal]\njoints_deg = [[1, 2, 3, 4, 5]]"),
      ("[[forbidden]]", "[[forbidden]]\njoints_deg = [[1, 2]]")],
 )  # fmt: skip

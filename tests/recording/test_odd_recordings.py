@@ -3,9 +3,11 @@
 import h5py
 import numpy as np
 import pytest
+import scipy.io
 
 from planner.errors import InputError
 from planner.recording.hits import hits_from
+from planner.recording.mat5 import read_mat5
 from planner.recording.read import read
 from planner.recording.screening import screen
 from tests.support.bad_input import write_h5, write_mat
@@ -49,3 +51,23 @@ def test_units_that_cannot_be_are_refused(tmp_path, factor, kind):
     write_mat(path, {**table, **{name: table[name] * by for name, by in factor.items()}})
     (hit,) = hits_from(read(path))
     assert kind in {fault.kind for fault in screen(hit) if fault.refuse}
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_mat_files_are_read_as_by_scipy(tmp_path, compressed):
+    path = tmp_path / "any.mat"
+    made = {
+        "a": np.arange(12.0).reshape(3, 4), "complex": np.arange(3) + 1j, "hit": "+x",
+        "single": np.float32(2), "small": np.array([1, 2], dtype=np.int16), "cells": {"x": 1},
+    }  # fmt: skip
+    scipy.io.savemat(path, made, do_compression=compressed)
+    ours, theirs = read_mat5(path), scipy.io.loadmat(path)
+    assert set(ours) == set(made) - {"cells"}
+    for name, value in ours.items():
+        np.testing.assert_array_equal(np.squeeze(value), np.squeeze(theirs[name]))
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    for cut in rng.integers(128, len(whole) - 1, size=50):
+        path.write_bytes(whole[:cut])
+        with pytest.raises(InputError, match=r"any\.mat"):
+            read(path)
