@@ -114,7 +114,8 @@ def _points(
     A point that was only hit is among them where a driving point ties its size to the rest.
     """
     tied = [d for d in matrix.references if d not in checks.untied] if checks.driving else []
-    dofs = tuple(sorted({*matrix.responses, *tied}, key=by_number))
+    seen = {matrix.responses[o] for o in found.rows}
+    dofs = tuple(sorted({*seen, *tied}, key=by_number))
     apart = [d for d in matrix.references if d not in tied]
     place = {dof: k for k, dof in enumerate(dofs)}
     hit_at = place | {dof: len(dofs) + k for k, dof in enumerate(apart)}
