@@ -9,14 +9,16 @@ from planner.errors import InputError
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
-from planner.modal.rational_fit import RationalFit, rational_fit
+from planner.modal.rational_fit import CLOSE, RationalFit, rational_fit
 from planner.recording.read import read
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
-SECOND = 1e-3  # share of the FRF at a mode below which a residue's second part does not count
+SECOND = 1e-3  # share of the FRF, anywhere, below which a residue's second part does not count
 LEAST_LINES = 16
 FAR = 3.0  # times the highest line
+WORSE = 2.0  # times a fit's error that modes may be off by which leave far poles out; chosen
+BESIDE_SD = 0.1  # of the FRFs' sd: a fit as close as this adds nothing to it; chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +73,23 @@ class PlaneFrf:
 
     def fitted(self) -> CutterModes:
         """As modes."""
-        fit = rational_fit(self.frequency_hz, self.receptance)
-        return as_modes(fit, float(self.frequency_hz[-1]))
+        fit = rational_fit(self.frequency_hz, self.receptance, close=self._close)
+        modes = as_modes(fit, self.frequency_hz)
+        if self.error(modes) > max(WORSE * fit.error, CLOSE):
+            # Poles far above the lines are then no modes' compliance but a part of the curve.
+            modes = as_modes(fit, self.frequency_hz, far=np.inf)
+        return modes
+
+    @property
+    def _close(self) -> float:
+        """Relative error of a fit that is close enough, beside the sd that the FRFs have.
+
+        The mean of uncertain FRFs is that of no modes: more poles would follow that, and no more.
+        """
+        if self.sd is None:
+            return CLOSE
+        size = np.linalg.norm(self.receptance, axis=(0, 1))
+        return max(CLOSE, BESIDE_SD * float(np.median(np.linalg.norm(self.sd, axis=(0, 1)) / size)))
 
     def error(self, modes: CutterModes) -> float:
         """Root mean square over lines of ‖H − modes‖/‖H‖."""
@@ -81,18 +98,21 @@ class PlaneFrf:
         return float(np.sqrt(np.mean(share**2)))
 
 
-def as_modes(fit: RationalFit, highest_hz: float) -> CutterModes:
+def as_modes(fit: RationalFit, frequency_hz: np.ndarray, far: float = FAR) -> CutterModes:
     """Poles with a shape and a drive each; a residue of rank two takes its pole twice.
 
-    Poles far above the highest line are what is left of the modes there: their compliance.
+    Poles beyond `far` times the highest of the lines (F,) are what is left of the modes there:
+    their compliance.
     """
     poles, shapes, drives = [], [], []
-    far = np.abs(fit.poles) > FAR * 2 * np.pi * highest_hz
-    rest = fit.rest - 2 * np.real(fit.residues[far] / fit.poles[far, None, None]).sum(axis=0)
-    for pole, residue in zip(fit.poles[~far], fit.residues[~far], strict=True):
+    size = np.linalg.norm(fit.response(frequency_hz), axis=(0, 1))
+    s = 2j * np.pi * np.asarray(frequency_hz)
+    away = np.abs(fit.poles) > far * float(np.abs(s[-1]))
+    rest = fit.rest - 2 * np.real(fit.residues[away] / fit.poles[away, None, None]).sum(axis=0)
+    for pole, residue in zip(fit.poles[~away], fit.residues[~away], strict=True):
         left, sizes, right = np.linalg.svd(residue)
-        there = np.linalg.norm(fit.response(np.array([pole.imag / (2 * np.pi)])))
-        for k in range(1 + int(sizes[1] > SECOND * there * -pole.real)):
+        second = np.max(sizes[1] * (1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)
+        for k in range(1 + int(second > SECOND)):
             poles.append(pole)
             shapes.append(left[:, k] * sizes[k])
             drives.append(right[k])

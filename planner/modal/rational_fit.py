@@ -44,11 +44,15 @@ class RationalFit:
 
 
 def rational_fit(
-    frequency_hz: np.ndarray, response: np.ndarray, start: np.ndarray | None = None
+    frequency_hz: np.ndarray,
+    response: np.ndarray,
+    start: np.ndarray | None = None,
+    close: float = CLOSE,
 ) -> RationalFit:
     """Of a receptance (o, i, F) at lines (F,) above 0 Hz, with as many poles as it needs.
 
-    With poles `start` (k,) in rad/s, as many as these, from there on.
+    With poles `start` (k,) in rad/s, as many as these, from there on. An error of `close` needs no
+    more poles.
     """
     if start is not None:
         return _settled(frequency_hz, response, start)
@@ -62,7 +66,7 @@ def rational_fit(
             best, idle = found, 0
         else:
             idle += 1
-        if best.error < CLOSE or idle == PATIENCE:
+        if best.error < close or idle == PATIENCE:
             break
     assert best is not None
     return best
@@ -129,4 +133,4 @@ def _relocated(s: np.ndarray, h: np.ndarray, weight: np.ndarray, poles: np.ndarr
     real = np.sort(zeros[np.abs(zeros.imag) <= 1e-9 * np.abs(zeros)].real)
     # Two real poles are put together as an oscillation just under critical damping.
     joined = -np.sqrt(np.abs(real[0 : 2 * (len(real) // 2) : 2] * real[1::2])) * (1 - 0.05j)
-    return np.concatenate([upper, joined.conj() if len(joined) else upper[:0]])
+    return np.concatenate([upper, joined])

@@ -1,12 +1,14 @@
 """FRFs instead of modes, and what is not known: fits, samples, robust depths."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from planner.errors import InputError
 from planner.frf.quantities import convert
-from planner.milling.cutter_frf import CutterFrf, of_accelerance
-from planner.milling.cutter_modes import CutterModes
+from planner.milling.cutter_frf import CutterFrf, PlaneFrf, of_accelerance
+from planner.milling.cutter_modes import CutterModes, real_modes
 from planner.milling.lobes import losses
 from planner.milling.spread import ModeSpread, explaining, sampled
 from planner.milling.structure import Structure, of_frf
@@ -143,3 +145,21 @@ def test_samples_between_speeds_follow_what_is_expected(monkeypatch):
     depth = np.array([loss.depth_m for loss in found])
     share = drawn.robust() / depth
     np.testing.assert_allclose(share, share[0], rtol=0.01)
+
+
+def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():
+    """The mean of many FRFs is that of no modes: many poles would follow it, and mean nothing."""
+    random, lines = np.random.default_rng(3), np.arange(4.0, 80.0, 0.25)
+    hertz, damping = np.array([11.7, 13.7, 35.0, 48.8, 63.2]), np.array([1, 1, 3, 5, 6.5]) / 100
+    direction = random.standard_normal((5, 2))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    drawn = [
+        real_modes(hertz * factor, damping, np.full(5, 40.0), direction).receptance(lines)
+        for factor in 1 + 0.02 * random.standard_normal((100, 5))
+    ]
+    mean, sd = np.mean(drawn, axis=0), np.std(drawn, axis=0)
+    frf = PlaneFrf("uncertain", lines, mean.transpose(1, 2, 0), sd.transpose(1, 2, 0))
+    fit = rational_fit(lines, frf.receptance)
+    assert np.all(fit.poles.imag > 0)
+    assert frf.error(frf.fitted()) < 0.03
+    assert frf.error(replace(frf, sd=None).fitted()) < 0.03
