@@ -6,16 +6,19 @@ from planner.version import __version__
 
 if TYPE_CHECKING:
     from planner.api import analyse, diagnose, identify
+    from planner.ask_tell import AskTell
     from planner.campaign.campaign import Campaign
     from planner.dataset.dataset import Dataset
     from planner.dynamics.simulation import Simulation
     from planner.robot.robot import Robot
 
 __all__ = [
-    "Campaign", "Dataset", "Robot", "Simulation", "__version__", "analyse", "diagnose", "identify",
+    "AskTell", "Campaign", "Dataset", "Robot", "Simulation", "__version__", "analyse", "diagnose",
+    "identify",
 ]  # fmt: skip
 
 _MODULES = {
+    "AskTell": "planner.ask_tell",
     "Campaign": "planner.campaign.campaign",
     "Dataset": "planner.dataset.dataset",
     "Robot": "planner.robot.robot",

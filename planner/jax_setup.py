@@ -91,6 +91,8 @@ def _signature(argument: Any) -> Any:
     shape = getattr(argument, "shape", None)
     if shape is not None:
         return shape, argument.dtype
+    if isinstance(argument, tuple):
+        return tuple(_signature(one) for one in argument)
     return type(argument) if isinstance(argument, int | float | complex) else argument
 
 

@@ -84,15 +84,23 @@ def _goal(
     poses, hertz = workspace.poses, simulated.frequency_hz[: len(workspace.poses)]
     if table.joints_deg is not None:
         q = np.deg2rad(np.array(table.joints_deg, dtype=float))
-        said, x = low.simulate(q), cell.features(q)
-        inputs, hertz = surrogate.frequency_inputs(said), said.frequency_hz
-        poses = open_.poses(x, inputs, q, False) if open_ else Poses.plain(x, inputs)
+        poses, hertz = poses_at(cell, low, surrogate, open_, q)
     importance = np.tile(workspace.importance.sum(axis=0), (len(poses), 1))
     if table.band_hz is not None:
         with np.errstate(invalid="ignore"):
             inside = (hertz >= table.band_hz[0]) & (hertz <= table.band_hz[1])
         importance = importance * (inside if inside.any() else 1.0)
     return Target(poses, importance / importance.sum())
+
+
+def poses_at(
+    cell: Cell, low: LowFidelity, surrogate: Surrogate, open_: OpenParameters | None, q: np.ndarray
+) -> tuple[Poses, np.ndarray]:
+    """Poses q (n, dof) in rad as targets, and their simulated frequencies (n, k) in Hz."""
+    said, x = low.simulate(q), cell.features(q)
+    inputs = surrogate.frequency_inputs(said)
+    poses = open_.poses(x, inputs, q, False) if open_ else Poses.plain(x, inputs)
+    return poses, said.frequency_hz
 
 
 def cost_of(cell: Cell) -> Cost:

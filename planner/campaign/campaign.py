@@ -24,6 +24,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
+from planner.campaign.journal import remove_parts
 from planner.campaign.reads import CampaignReads, as_logged, frf_key
 from planner.campaign.state import last_act
 from planner.errors import InputError
@@ -165,6 +166,10 @@ class Campaign(CampaignReads):
             self._append(Undone(entry.seq))
             return entry
 
+    def holding(self):
+        """A context in which nobody else can act in this campaign; InputError names who does."""
+        return self._journal.holding(wait_s=1.0)
+
     # -- inside --------------------------------------------------------------------------------
 
     def _acting(self):
@@ -175,10 +180,12 @@ class Campaign(CampaignReads):
 
     def _log_configuration(self) -> None:
         """Follow changes made by hand to campaign.toml or the robot folder."""
+        from planner.campaign.check import refuse_errors
+
         configured, logged = self._configured(), self.state.configured
         assert logged is not None
         if (configured.config, configured.robot) != (logged.config, logged.robot):
-            _ = self.cell  # must load before it is believed
+            refuse_errors(self.cell.examined)  # before it is believed
             store.keep_robot_files(self.directory, configured.robot)
             self._append(configured)
 
@@ -200,6 +207,7 @@ class Campaign(CampaignReads):
             ImportReport,
             displacement,
             keep_files,
+            lacking,
             measure_files,
             not_used,
             taken_after_all,
@@ -252,6 +260,7 @@ class Campaign(CampaignReads):
                 *measured.remarks,
                 *taken_after_all(state, kept.fresh),
                 *displacement(state, delivery, stood),
+                *lacking(state, measurement),
                 *model.remarks,
             ),
             left_out=kept.left_out,
@@ -268,6 +277,7 @@ class _Acting:
 
     def __enter__(self) -> None:
         self._lock.__enter__()
+        remove_parts(self._campaign.directory / store.RECORDINGS)
         try:
             self._campaign._log_configuration()
         except BaseException:
@@ -283,10 +293,11 @@ def _first_entry(directory: Path) -> bytes:
     from datetime import UTC, datetime
 
     from planner.campaign.cell import Cell
+    from planner.campaign.check import refuse_errors
     from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)
-    Cell.load(directory / config.robot, config)
+    refuse_errors(Cell.load(directory / config.robot, config).examined)
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")

@@ -1,5 +1,6 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -7,13 +8,16 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
+from planner.campaign.check import plan_of
 from planner.campaign.config import CampaignConfig
 from planner.campaign.low_fidelity import LowFidelity
+from planner.check.examine import Examination, examine
 from planner.design.propose import check_name
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.identification.measurement_model import Tolerances
+from planner.milling.cut import Cut, load_cut
 from planner.robot.collision import Collisions
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
@@ -31,6 +35,8 @@ class Cell:
     workspace: Workspace
     # Whether the scatter of frequencies from visit to visit is learned.
     visit_scatter: bool = field(default=True, kw_only=True)
+    # The cut whose stability is to be decided, where campaign.toml names one.
+    cut: Cut | None = field(default=None, kw_only=True)
 
     @classmethod
     def load(
@@ -51,13 +57,21 @@ class Cell:
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
-        return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter)
+        _check_angles(robot, config)
+        table = config.cut
+        cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
+        return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
         """What the engineer has to know of every pose that is proposed, in sentences."""
         unchecked = Collisions(self.robot).unchecked
         return () if unchecked is None else (unchecked,)
+
+    @cached_property
+    def examined(self) -> Examination:
+        """What looks wrong in the robot, for what campaign.toml asks of it."""
+        return examine(self.robot, plan_of(self.config, "campaign.toml"))
 
     @property
     def tolerances(self) -> Tolerances:
@@ -108,11 +122,6 @@ class Cell:
         for zone in self.config.forbidden:
             at = found.position_m if zone.position_m else np.rad2deg(found.q)
             box = np.array(zone.position_m or zone.joints_deg, dtype=float)
-            if len(box) != at.shape[1]:
-                raise InputError(
-                    f"[[forbidden]] joints_deg has {len(box)} ranges, the robot {at.shape[1]} "
-                    f"joints; give one range a joint."
-                )
             allowed &= ~np.all((at >= box[:, 0]) & (at <= box[:, 1]), axis=1)
         return allowed
 
@@ -131,22 +140,44 @@ class Cell:
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad; InputError if the robot cannot stand there."""
-        if len(joints_deg) != len(self.robot.joint_names):
+        return _checked_pose(self.robot, joints_deg, where)
+
+
+def _checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
+    """The pose (dof,) in rad; InputError if the robot cannot stand there."""
+    if len(joints_deg) != len(robot.joint_names):
+        raise InputError(
+            f"{where}: {len(joints_deg)} joint angles are given, the robot has "
+            f"{len(robot.joint_names)} joints; correct the columns."
+        )
+    q = np.deg2rad(np.asarray(joints_deg, dtype=float))
+    tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
+    over = np.maximum(robot.lower_rad - q, q - robot.upper_rad)
+    worst = int(np.argmax(over))
+    if over[worst] > tolerance:
+        low, high = np.rad2deg([robot.lower_rad[worst], robot.upper_rad[worst]])
+        raise InputError(
+            f"{where}: {robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
+            f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
+        )
+    return q
+
+
+def _check_angles(robot: Robot, config: CampaignConfig) -> None:
+    """Hold the joint angles that campaign.toml names against the robot; InputError."""
+    for where, poses in (
+        ("[goal] joints_deg", config.goal.joints_deg),
+        ("[acquisition] own_poses_deg", config.acquisition.own_poses_deg),
+        ("[cut] joints_deg", config.cut.joints_deg if config.cut else None),
+    ):
+        for number, pose in enumerate(poses or (), 1):
+            _checked_pose(robot, pose, f"campaign.toml, {where}, pose {number}")
+    for zone in config.forbidden:
+        if zone.joints_deg is not None and len(zone.joints_deg) != len(robot.joint_names):
             raise InputError(
-                f"{where}: {len(joints_deg)} joint angles are given, the robot has "
-                f"{len(self.robot.joint_names)} joints; correct the columns."
+                f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the "
+                f"robot {len(robot.joint_names)} joints; give one range a joint."
             )
-        q = np.deg2rad(np.asarray(joints_deg, dtype=float))
-        tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
-        over = np.maximum(self.robot.lower_rad - q, q - self.robot.upper_rad)
-        worst = int(np.argmax(over))
-        if over[worst] > tolerance:
-            low, high = np.rad2deg([self.robot.lower_rad[worst], self.robot.upper_rad[worst]])
-            raise InputError(
-                f"{where}: {self.robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
-                f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
-            )
-        return q
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:

@@ -92,6 +92,19 @@ class StopTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     measurements_max: int = 30
 
 
+class CutTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What acquisition "stability" decides: whether a cut is stable at a speed and a depth.
+
+    `file` is a cut.toml beside robot.toml, `joints_deg` the poses of the milling path (none: the
+    workspace).
+    """
+
+    speed_rpm: float
+    depth_m: float
+    file: str = "cut.toml"
+    joints_deg: list[list[float]] | None = None
+
+
 class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of campaign.toml; tables that robot.toml has too go before its own."""
 
@@ -108,6 +121,7 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor: SensorTable | msgspec.UnsetType = msgspec.UNSET
     readback: ReadbackTable | msgspec.UnsetType = msgspec.UNSET
     diagnose: DiagnoseTable | msgspec.UnsetType = msgspec.UNSET
+    cut: CutTable | msgspec.UnsetType = msgspec.UNSET
 
     def of_the_cell(self) -> dict[str, HitsTable | SensorTable | ReadbackTable | DiagnoseTable]:
         """Tables that are given here and go before those of robot.toml, by name."""
@@ -118,16 +132,23 @@ class CampaignConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_campaign_config(path: Path) -> CampaignConfig:
     """Read and check campaign.toml; InputError with one sentence where it is wrong."""
     config = load_toml(path, CampaignConfig, "campaign.toml")
-    _check(config, path)
+    check_config(config, path)
     return config
 
 
 def config_from_builtins(data: Any) -> CampaignConfig:
-    """The configuration as it stands in the log."""
-    return msgspec.convert(data, type=CampaignConfig)
+    """The configuration as it stands in the log; InputError where it cannot be one."""
+    try:
+        return msgspec.convert(data, type=CampaignConfig)
+    except msgspec.ValidationError as error:
+        raise InputError(
+            f"The log holds a configuration that no campaign.toml can state ({error}); start the "
+            f"campaign again with planner new, and import its recordings."
+        ) from None
 
 
-def _check(config: CampaignConfig, path: Path) -> None:
+def check_config(config: CampaignConfig, path: Path) -> None:
+    """InputError where entries make no sense by themselves; `path` is named there."""
     w, low_high = config.workspace, [config.modes.band_hz]
     if (w.joints_deg is None) == (w.position_m is None):
         raise InputError(
@@ -143,6 +164,11 @@ def _check(config: CampaignConfig, path: Path) -> None:
         )
     low_high += w.joints_deg or w.position_m or []
     low_high += [w.rotation_deg] if w.rotation_deg else []
+    heights = config.acquisition.hammer_height_m
+    low_high += [heights] if heights else []
+    for zone in config.forbidden:
+        low_high += zone.position_m or zone.joints_deg or []
+    low_high += [config.goal.band_hz] if config.goal.band_hz else []
     for low, high in low_high:
         if not (abs(low) < 1e6 and abs(high) < 1e6 and low <= high):
             raise InputError(f"{path}: range [{low}, {high}] must be finite, lower bound first.")
@@ -161,7 +187,10 @@ def _check(config: CampaignConfig, path: Path) -> None:
         ("[modes] count", config.modes.count, 1, 20),
         ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),
         ("[acquisition] candidates", config.acquisition.candidates, 10, 20_000),
+        ("[stop] frequency_sd_percent", config.stop.frequency_sd_percent, 1e-6, 100.0),
+        ("[stop] measurements_min", config.stop.measurements_min, 0, 1000),
         ("[stop] measurements_max", config.stop.measurements_max, 1, 1000),
+        ("[acquisition] singularity_margin", config.acquisition.singularity_margin, 0.0, 1.0),
     ]
     for name, value, low, high in limits:
         if not low <= value <= high:
@@ -181,8 +210,13 @@ def _check_choices(config: CampaignConfig, path: Path) -> None:
     ):
         if poses is not None and (not poses or len({len(pose) for pose in poses}) != 1):
             raise InputError(f"{path}: {name} needs one list of joint angles a pose; correct it.")
+    height, band = config.acquisition.hammer_height_m, config.goal.band_hz
+    for name, range_ in (("[acquisition] hammer_height_m", height), ("[goal] band_hz", band)):
+        if range_ is not None and not range_[0] < range_[1]:
+            raise InputError(f"{path}: {name} {list(range_)} must rise; correct it.")
     if config.acquisition.own_only and not config.acquisition.own_poses_deg:
         raise InputError(f"{path}: [acquisition] own_only needs own_poses_deg; add them.")
+    _check_cut(config, path)
     for zone in config.forbidden:
         if (zone.position_m is None) == (zone.joints_deg is None):
             raise InputError(
@@ -190,3 +224,21 @@ def _check_choices(config: CampaignConfig, path: Path) -> None:
             )
         if zone.position_m is not None and len(zone.position_m) != 3:
             raise InputError(f"{path}: [[forbidden]] position_m needs ranges of x, y, z.")
+
+
+def _check_cut(config: CampaignConfig, path: Path) -> None:
+    cut = config.cut
+    if cut is msgspec.UNSET:
+        if config.acquisition.name == "stability":
+            raise InputError(
+                f'{path}: acquisition "stability" needs [cut] with speed_rpm and depth_m; add it.'
+            )
+        return
+    for name, value, low, high in (
+        ("speed_rpm", cut.speed_rpm, 1.0, 1e6),
+        ("depth_m", cut.depth_m, 1e-9, 1.0),
+    ):
+        if not low <= value <= high:
+            raise InputError(f"{path}: [cut] {name} is {value}; give {low:g} to {high:g}.")
+    if cut.joints_deg is not None and not cut.joints_deg:
+        raise InputError(f"{path}: [cut] joints_deg names no pose; add some, or leave it out.")

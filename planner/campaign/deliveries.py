@@ -7,6 +7,7 @@ from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.folder import TABLE, files_in, read_recordings
 from planner.recording.points import PointNames, StatedPoints
+from planner.recording.read import READERS
 from planner.recording.records import PoseRow
 
 
@@ -30,7 +31,8 @@ def sort_paths(
     """Deliveries by pose, in recording order.
 
     A folder with recordings.csv says itself which pose a file belongs to (`pose` then picks one,
-    or renames the only one); bare files belong to `pose` or, without it, to `default_pose`.
+    or renames the only one), and so do its subfolders; bare files belong to `pose` or, without it,
+    to `default_pose`.
     """
     deliveries: list[Delivery] = []
     bare: list[Path] = []
@@ -38,8 +40,10 @@ def sort_paths(
         table = path if path.name == TABLE else path / TABLE
         if table.is_file():
             deliveries += _from_table(table.parent, joint_names, points, pose)
+        elif path.is_dir() and (tables := sorted(path.rglob(TABLE))):
+            deliveries += _from_tables(path, tables, joint_names, points, pose)
         elif path.is_dir():
-            bare += files_in(path)
+            bare += files_in(path, READERS)
         elif path.is_file():
             bare.append(path)
         else:
@@ -54,6 +58,24 @@ def sort_paths(
         sources = tuple(Source(path, str(path), stated=stated) for path in bare)
         deliveries.append(Delivery(name, None, sources))
     return tuple(deliveries)
+
+
+def _from_tables(
+    folder: Path,
+    tables: list[Path],
+    joint_names: tuple[str, ...],
+    points: PointNames,
+    pose: str | None,
+) -> list[Delivery]:
+    """Deliveries of a folder's subfolders, each with a table of its own; `pose` picks one."""
+    if len(tables) == 1:
+        return _from_table(tables[0].parent, joint_names, points, pose)
+    every = [d for table in tables for d in _from_table(table.parent, joint_names, points, None)]
+    found = [d for d in every if pose in (None, d.pose)]
+    if not found:
+        names = ", ".join(dict.fromkeys(d.pose for d in every))
+        raise InputError(f"No table in {folder} has pose {pose}; their poses are {names}.")
+    return found
 
 
 def _from_table(

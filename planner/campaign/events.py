@@ -54,7 +54,8 @@ class Proposed(Event, frozen=True, tag="proposed"):
 class HitRecord(msgspec.Struct, frozen=True):
     """One file as it was imported; the file itself is kept under its sha256.
 
-    `reason` says why it was refused; empty for an accepted hit.
+    `reason` says why it was refused; empty for an accepted hit. `part` is which of the hits in the
+    file it is, from 1; 0: the file holds no other.
     """
 
     file: str
@@ -67,6 +68,7 @@ class HitRecord(msgspec.Struct, frozen=True):
     simulated: bool = False
     hit_point: str = ""  # as the table of recordings named it, "" where it did not
     response_points: tuple[str, ...] = ()
+    part: int = 0
 
 
 class MeasuredMode(msgspec.Struct, frozen=True):

@@ -1,6 +1,8 @@
 """Importing the hits of one pose: where they belong, which are new, what they give."""
 
+from collections import Counter
 from dataclasses import dataclass
+from dataclasses import replace as replaced
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
+from planner.recording.read import hit_count
 
 SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
 
@@ -88,27 +91,38 @@ def keep_files(
 ) -> KeptFiles:
     """Keep the raw files; those imported before at this pose are only named.
 
-    A file that the engineer refused is new only where it is itself among the `named` paths.
+    A file that the engineer refused is new only where it is itself among the `named` paths; one
+    that cannot be read is left out.
     Raises InputError for a recording that belongs to another pose already.
     """
     owner = {h.sha256: m.pose for m in state.recorded for h in m.hits}
-    fresh: dict[str, Kept] = {}
+    fresh: list[Kept] = []
     already, left_out = [], []
+    seen: set[str] = set()
     for source in delivery.sources:
-        digest = store.sha256(store.read_bytes(source.path))
+        try:
+            digest = store.sha256(store.read_bytes(source.path))
+        except InputError as error:  # one bad file does not keep the others out
+            left_out.append(_left(source, "", str(error)))
+            continue
         if owner.get(digest, delivery.pose) != delivery.pose:
             raise InputError(
                 f"{source.path} was imported before as a recording of pose {owner[digest]}; "
                 f"it cannot belong to {delivery.pose} too."
             )
-        if digest in owner or digest in fresh:
+        if digest in owner or digest in seen:
             already.append(source.name)
         elif reason := _reason_against(delivery.pose, digest, source.path in named, state):
-            hit = HitRecord(source.name, digest, "", source.hit, source.repeat, False, reason)
-            left_out.append(hit)
+            left_out.append(_left(source, digest, reason))
         else:
-            fresh[digest] = (source, *store.store_recording(directory, source.path))
-    return KeptFiles(tuple(fresh.values()), tuple(already), tuple(left_out))
+            seen.add(digest)
+            digest, suffix = store.store_recording(directory, source.path)
+            fresh += [(part, digest, suffix) for part in source.parts(hit_count(source.path))]
+    return KeptFiles(tuple(fresh), tuple(already), tuple(left_out))
+
+
+def _left(source: Source, digest: str, reason: str) -> HitRecord:
+    return HitRecord(source.name, digest, "", source.hit, source.repeat, False, reason)
 
 
 def _reason_against(pose: str, digest: str, named: bool, state: CampaignState) -> str:
@@ -155,7 +169,7 @@ def measure_files(
 ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
     """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
     new = tuple(
-        Source(store.recording_path(directory, digest, suffix), s.name, s.hit, s.repeat, s.stated)
+        replaced(s, path=store.recording_path(directory, digest, suffix))
         for s, digest, suffix in fresh
     )
     measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
@@ -171,6 +185,7 @@ def measure_files(
             simulated=verdict.simulated,
             hit_point=source.stated.hit_point,
             response_points=source.stated.response_points,
+            part=source.part,
         )
         for verdict, (source, digest, suffix) in zip(
             measured.verdicts[len(old) :], fresh, strict=True
@@ -193,3 +208,27 @@ def displacement(
         f"The readback of {delivery.pose} is up to {off:.2f}° from its setpoint; the readback "
         f"is used.",
     )
+
+
+def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
+    """Remarks on axes that were not hit, or once only, of those that the pose is to be hit along.
+
+    Files of FRFs say nothing of single hits and are not remarked upon.
+    """
+    counts = Counter(hit.hit[-1] for hit in measurement.accepted if hit.hit)
+    if not counts:
+        return ()
+    proposal = state.proposals.get(measurement.pose)
+    wanted = proposal.hits if proposal else ("x", "y", "z")
+    said = []
+    if missing := [axis for axis in wanted if not counts[axis]]:
+        said.append(
+            f"{measurement.pose} was not hit along {' and '.join(missing)}: what moves that way "
+            f"only is missing; hit along it too, at the same pose."
+        )
+    if once := [axis for axis in wanted if counts[axis] == 1]:
+        said.append(
+            f"{measurement.pose} has one hit only along {' and '.join(once)}: nothing tells "
+            f"whether it was good; hit again."
+        )
+    return tuple(said)

@@ -5,9 +5,12 @@ that a change anywhere is found. Only the last line can have been torn by a cras
 and set aside, before anything is appended.
 """
 
+import getpass
 import hashlib
 import os
-from contextlib import contextmanager
+import socket
+import sys
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,6 +20,7 @@ from filelock import FileLock, Timeout
 
 from planner.campaign.events import AnyEvent, Entry
 from planner.errors import InputError, JournalError
+from planner.version import __version__
 
 _ENTRY = msgspec.json.Decoder(Entry)
 _ENCODER = msgspec.json.Encoder()
@@ -52,6 +56,7 @@ def encode_line(previous_check: str, entry: Entry) -> tuple[bytes, str]:
     return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
 
 
+PART = ".part"  # ends the name of a file in the making
 START = b'{"check":"'  # of a line; within one, quotes are escaped
 
 
@@ -62,13 +67,15 @@ def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
     while position < len(data):
         end = data.find(b"\n", position)
         stop = len(data) if end < 0 else end + 1
-        entry, new_check = _read_line(data[position:stop], check, len(entries) + 1)
+        entry, new_check = _read_line(data[position:stop], check, len(entries) + 1, name)
         if entry is None:
-            # A write that was cut short leaves the beginning of one line, never two.
-            if stop < len(data) or START in data[position + 1 :]:
+            # A write that was cut short leaves the beginning of one line: no newline, no other.
+            seq = len(entries) + 1
+            whole, _ = _read_line(data[position : stop - 1], check, seq, name)
+            if end >= 0 or START in data[position + 1 :] or whole is not None:
                 raise JournalError(
-                    f"{name}, line {len(entries) + 1}, is damaged and whole lines follow it; "
-                    f"restore the file from a copy (the lines before it are intact)."
+                    f"{name}, line {seq}, is damaged; restore the file from a copy "
+                    f"(the lines before it are intact)."
                 )
             return LogContent(tuple(entries), check, position, data[position:])
         entries.append(entry)
@@ -77,17 +84,27 @@ def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
     return LogContent(tuple(entries), check, position, b"", missing)
 
 
-def _read_line(line: bytes, check: str, seq: int) -> tuple[Entry | None, str]:
+def _read_line(line: bytes, check: str, seq: int, name: str) -> tuple[Entry | None, str]:
+    """Entry and check of a line; None where it is damaged.
+
+    Raises JournalError where the line is whole, as its check says, and this program cannot read it.
+    """
     try:
         parsed = _LINE.decode(line)
-        body = bytes(parsed.entry)
-        entry = _ENTRY.decode(body)
     except (msgspec.DecodeError, UnicodeDecodeError):
         return None, check
+    body = bytes(parsed.entry)
     new_check = _chain(check, body)
-    if parsed.check != new_check or entry.seq != seq:
+    if parsed.check != new_check:
         return None, check
-    return entry, new_check
+    try:
+        entry = _ENTRY.decode(body)
+    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+        raise JournalError(
+            f"{name}, line {seq}, is whole, but planner {__version__} does not know what it says "
+            f"({error}); a newer planner wrote it: update planner."
+        ) from None
+    return (entry, new_check) if entry.seq == seq else (None, check)
 
 
 class Journal:
@@ -95,6 +112,7 @@ class Journal:
 
     def __init__(self, path: Path):
         self.path = path
+        self._lock = FileLock(str(path.with_suffix(".lock")))
         self._content = self._load()
 
     @property
@@ -123,22 +141,38 @@ class Journal:
 
         The lock is the operating system's: it ends with the process, however that ends.
         """
-        lock = FileLock(str(self.path.with_suffix(".lock")))
-        try:
-            lock.acquire(timeout=wait_s)
-        except Timeout:
-            raise InputError(
-                f"{self.path.parent} is in use by another planner; close that one first."
-            ) from None
-        try:
+        with self.holding(wait_s):
             self._content = self._load()
             self._repair_tail()
             yield self
+
+    @contextmanager
+    def holding(self, wait_s: float = 10.0):
+        """Hold the campaign's lock: nobody else writes meanwhile. Acts within need not wait.
+
+        Raises InputError that names who holds it.
+        """
+        holder = self.path.with_suffix(".holder")
+        try:
+            self._lock.acquire(timeout=wait_s)
+        except Timeout:
+            raise InputError(
+                f"{self.path.parent} is in use by {_text_of(holder)}; close that one first."
+            ) from None
+        try:
+            if self._lock.lock_counter == 1:
+                with suppress(OSError):  # only for the eyes of others
+                    holder.write_text(_who(), encoding="utf-8")
+            yield self
         finally:
-            lock.release()
+            if self._lock.lock_counter == 1:
+                with suppress(OSError):
+                    holder.unlink(missing_ok=True)
+            self._lock.release()
 
     def _repair_tail(self) -> None:
         content = self._content
+        remove_parts(self.path.parent)
         if content.torn:
             aside = self.path.with_name(f"{self.path.name}.torn-{content.whole_bytes}")
             write_synced(aside, content.torn)
@@ -158,28 +192,65 @@ class Journal:
         _append_synced(self.path, line)
         whole = content.whole_bytes + len(line)
         # Decoded again, so that what is used now is what a later reading will give.
-        decoded, _ = _read_line(line, content.check, entry.seq)
+        decoded, _ = _read_line(line, content.check, entry.seq, str(self.path))
         assert decoded is not None
         self._content = LogContent((*content.entries, decoded), check, whole, b"")
         return decoded
 
 
+def _who() -> str:
+    """This process, for the sentence that another one says."""
+    command = " ".join(Path(word).name for word in sys.argv[:2]) or "planner"
+    return (
+        f"{command} (process {os.getpid()} of {getpass.getuser()} on {socket.gethostname()}, since "
+        f"{datetime.now().astimezone():%H:%M})"
+    )
+
+
+def _text_of(holder: Path) -> str:
+    try:
+        return holder.read_text(encoding="utf-8").strip() or "another planner"
+    except (OSError, UnicodeDecodeError):
+        return "another planner"
+
+
 def _append_synced(path: Path, data: bytes) -> None:
-    with open(path, "ab") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
+    """Append to a file; where that fails (a full disk) the file is as it was before."""
+    before = path.stat().st_size
+    try:
+        with open(path, "ab") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+    except OSError:
+        with suppress(OSError), open(path, "r+b") as file:
+            file.truncate(before)
+        raise
 
 
 def write_synced(path: Path, data: bytes) -> None:
     """Write a file so that it is either whole under its name, or absent."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with open(partial, "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(partial, path)
+    partial = path.with_name(f".{path.name}.{os.getpid()}{PART}")
+    try:
+        with open(partial, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(partial, path)
+    except BaseException:  # a full disk would stay full of halves
+        partial.unlink(missing_ok=True)
+        raise
     sync_folder(path.parent)
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove what writers of this folder left half-written when they were killed.
+
+    Only for the one writer of a folder: another's parts may be in the making.
+    """
+    for part in folder.glob(f".*{PART}"):
+        if part.is_file():
+            part.unlink(missing_ok=True)
 
 
 def sync_folder(path: Path) -> None:

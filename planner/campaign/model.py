@@ -33,6 +33,7 @@ from planner.surrogate.modal_surrogate import (
 )
 
 if TYPE_CHECKING:
+    from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
@@ -106,6 +107,21 @@ class Model:
         return outlook(self.cell, self.low, self.surrogate, said, self.frf_noise, informed)
 
     @cached_property
+    def decision(self) -> "Decision | None":
+        """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
+        from planner.campaign.decision import decided
+
+        return decided(self)
+
+    @cached_property
+    def deciding(self) -> tuple[FrequencyOutputs, Poses]:
+        """As `informed`, the goal being the poses and modes on which the decision hangs."""
+        from planner.campaign.decision import decision_target
+
+        outputs, poses = self.informed
+        return replace(outputs, goal=decision_target(self)), poses
+
+    @cached_property
     def forecast(self) -> Forecast:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
         outputs, poses = self.outlook
@@ -115,9 +131,14 @@ class Model:
 
     @property
     def done(self) -> bool:
-        """Whether the target is reached with the probability that campaign.toml asks for."""
+        """Whether the target is reached with the probability that campaign.toml asks for.
+
+        That is the decision about the cut where acquisition "stability" asks for it.
+        """
         stop = self.cell.config.stop
         enough = len(self.labelled) >= stop.measurements_min
+        if self.cell.config.acquisition.name == "stability":
+            return enough and self.decision is not None and self.decision.sure(stop.probability)
         return enough and self.forecast.reached >= stop.probability
 
     def repeat(self) -> tuple[str, float, float] | None:

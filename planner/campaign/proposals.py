@@ -1,6 +1,7 @@
 """Where to measure next, as the campaign's log records it."""
 
 from dataclasses import replace
+from itertools import count as counted
 
 import numpy as np
 
@@ -30,18 +31,29 @@ def propose(
             f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
             f"widen [workspace] or raise candidates in campaign.toml."
         )
+    angles = [
+        tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])) for pick in picks
+    ]
     return tuple(
         Proposal(
-            pose=f"P{state.proposals_made + i + 1:03d}",
-            joints_deg=tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])),
+            pose=name,
+            joints_deg=joints_deg,
             position_m=_xyz(candidates.position_m[pick.index]),
             score=float(pick.score) if np.isfinite(pick.score) else None,
             reason=_reason(model, pick.index, acquisition),
             hits=tuple("xyz"[axis] for axis in pick.axes),
             minutes=round(pick.minutes, 2) if np.isfinite(pick.minutes) else None,
         )
-        for i, pick in enumerate(picks)
+        for pick, joints_deg, name in zip(picks, angles, _names(state, angles), strict=True)
     )
+
+
+def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
+    """Names of proposed poses: the one that a pose was proposed under before, else a new one."""
+    taken = {*state.measurements, *state.held}
+    known = {p.joints_deg: name for name, p in state.proposals.items() if name not in taken}
+    new = counted(state.proposals_made + 1)
+    return [known.get(joints_deg) or f"P{next(new):03d}" for joints_deg in angles]
 
 
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
@@ -61,7 +73,8 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
         allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
     asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
     if acquisition in INFORMED:
-        asked, seen = informed_candidates(cell), model.informed
+        asked = informed_candidates(cell)
+        seen = model.deciding if acquisition == "stability" else model.informed
     elif acquisition not in DESIGNS:
         seen = model.outlook
     picks = choose(

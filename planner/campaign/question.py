@@ -17,7 +17,7 @@ from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.inference.assignment import least_cost
 
-LEAST = 4  # measured poses before which the model's sd is not to be relied on
+LEAST = 3  # measured poses before which the model's sd is not to be relied on
 # Off is what lies further than both. Right poses are within 2.2 sd where the simulation fits
 # (without it up to 23 in one mode, 7 in two); what changes from day to day stays below 2 %.
 FAR_SD, FAR = 10.0, 0.02

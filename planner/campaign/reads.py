@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -46,6 +46,7 @@ class CampaignReads:
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
         self._frfs: dict[tuple, Frf] = {}
+        self._verified: set[Path] = set()  # kept recordings whose content was held against its hash
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -172,12 +173,16 @@ class CampaignReads:
         )
 
     def source_of(self, hit: HitRecord) -> Source:
-        """The kept copy of a recording."""
+        """The kept copy of a recording; InputError where it is not what was imported."""
         path = store.recording_path(self.directory, hit.sha256, hit.suffix)
+        if path not in self._verified:
+            store.read_kept(path, hit.sha256, hit.file)
+            self._verified.add(path)
         names = self.cell.robot.points
         said = hit.hit_point or hit.response_points or names != PointNames()
         stated = StatedPoints(hit.hit_point, hit.response_points, names=names)
-        return Source(path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints())
+        points = stated if said else StatedPoints()
+        return Source(path, hit.file, hit.hit, hit.repeat, points, hit.part)
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""
@@ -224,6 +229,19 @@ class CampaignReads:
             name = self._model_name(self._configured(), self.state)
             model_cache.keep_model(self._kept, name, model)
         return found
+
+    def records(self) -> list[dict[str, Any]]:
+        """All measured modes, one row each: what pandas.DataFrame takes."""
+        from planner.campaign.records import measured_records
+
+        return measured_records(self.cell.robot.joint_names, self.state.measurements.values())
+
+    def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
+        """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
+        from planner.campaign.records import predicted_records
+
+        q = np.atleast_2d(q_rad)
+        return predicted_records(self.cell.robot.joint_names, q, self.predict(q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

@@ -65,7 +65,7 @@ class CampaignState:
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
-    proposals_made: int = 0  # counts undone ones too: a name is never given twice
+    proposals_made: int = 0  # names given, undone ones too: none is given to another pose
     events: int = 0
     model_version: int = 0  # sequence number of the last event that changed the model
 
@@ -87,8 +87,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     state = CampaignState()
     for entry in entries:
         if isinstance(entry.event, Proposed):
-            made = state.proposals_made + len(entry.event.proposals)
-            state = replace(state, proposals_made=made)
+            state = replace(state, proposals_made=_made(state, entry.event))
         if isinstance(entry.event, Undone):
             if _counts(entries[entry.event.act - 1].event):
                 state = replace(state, stale=True, model_version=entry.seq)
@@ -96,6 +95,12 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
             state = _apply(state, entry.event, entry)
         state = replace(state, events=entry.seq)
     return state
+
+
+def _made(state: CampaignState, event: Proposed) -> int:
+    """How many names were given; a pose that is proposed again keeps its own."""
+    numbers = [p.pose[1:] for p in event.proposals if p.pose[1:].isdecimal()]
+    return max([state.proposals_made, *map(int, numbers)])
 
 
 def last_act(entries: Iterable[Entry], decisions_only: bool = False) -> Entry | None:

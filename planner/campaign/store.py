@@ -1,5 +1,6 @@
 """What a campaign folder holds besides its log: the robot folder and the raw recordings."""
 
+import glob
 import hashlib
 import os
 import shutil
@@ -13,6 +14,7 @@ from tomlkit.exceptions import TOMLKitError
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import sync_folder, write_synced
 from planner.errors import InputError
+from planner.toml_file import read_toml_text
 
 LOG = "log.jsonl"
 CONFIG = "campaign.toml"
@@ -39,7 +41,9 @@ def store_recording(folder: Path, path: Path) -> tuple[str, str]:
 
 
 def recording_path(folder: Path, digest: str, suffix: str) -> Path:
-    """Where the recording with this content hash is kept."""
+    """Where the recording with this content hash is kept; InputError where that is no hash."""
+    if not _is_hash(digest) or "/" in suffix or "\\" in suffix:
+        raise InputError(f"{folder / LOG} names a recording {digest + suffix!r}, which is no hash.")
     return folder / RECORDINGS / f"{digest}{suffix}"
 
 
@@ -74,12 +78,33 @@ def keep_robot_files(folder: Path, hashes: dict[str, str]) -> None:
 
 
 def restore_robot(folder: Path, hashes: dict[str, str], target: Path) -> None:
-    """Lay out in `target` the robot folder as it was when `hashes` were logged."""
+    """Lay out in `target` the robot folder as it was when `hashes` were logged.
+
+    Raises InputError where a file would lie outside it, is missing or has changed.
+    """
     for name, digest in hashes.items():
-        kept = folder / RECORDINGS / f"{digest}.robot"
         path = target / name
+        inside = path.resolve().is_relative_to(target.resolve())
+        if not inside or Path(name).is_absolute() or not _is_hash(digest):
+            raise InputError(
+                f"{folder / LOG} names {name!r} as a file of the robot folder, which it cannot "
+                f"be; nothing is written there. The log is not one that planner wrote."
+            )
+        data = read_kept(folder / RECORDINGS / f"{digest}.robot", digest, f"the robot's {name}")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(read_bytes(kept))
+        path.write_bytes(data)
+
+
+def read_kept(kept: Path, digest: str, what: str) -> bytes:
+    """A kept file's bytes, as they were when it was kept; InputError where they are not."""
+    data = read_bytes(kept)
+    if sha256(data) != digest:
+        raise InputError(f"{kept} is not what was kept as {what}; restore it from a copy.")
+    return data
+
+
+def _is_hash(text: str) -> bool:
+    return len(text) == 64 and set(text) <= set("0123456789abcdef")
 
 
 def create_folder(
@@ -100,7 +125,7 @@ def create_folder(
     partial = directory.with_name(f".{directory.name}.{os.getpid()}.part")
     try:
         directory.parent.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(partial, ignore_errors=True)
+        _remove_left(directory)
         partial.mkdir()
         _copy_robot(robot_toml, partial / ROBOT)
         robot = f"{ROBOT}/{robot_toml.name}"
@@ -112,12 +137,36 @@ def create_folder(
             directory.rmdir()
         os.replace(partial, directory)
         sync_folder(directory.parent)
+    except InputError as error:  # in words that name the user's files, not the copies
+        text = str(error)
+        for copy in (partial, partial.resolve()):
+            text = text.replace(str(copy / ROBOT), str(robot_toml.parent))
+            text = text.replace(str(copy / CONFIG), str(campaign_toml or CONFIG))
+        raise InputError(text) from None
     except OSError as error:
         raise InputError(
             f"{directory} cannot be made ({error.strerror}); choose another folder."
         ) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def _remove_left(directory: Path) -> None:
+    """Remove the halves of this campaign that were left by a `new` that was killed."""
+    for left in directory.parent.glob(f".{glob.escape(directory.name)}.*.part"):
+        process = left.name.split(".")[-2]
+        if not (process.isdecimal() and _alive(int(process))) or int(process) == os.getpid():
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _copy_robot(robot_toml: Path, target: Path) -> None:
@@ -136,10 +185,8 @@ def _copy_robot(robot_toml: Path, target: Path) -> None:
 def _taken_over(campaign_toml: Path, robot: str) -> str:
     """The user's campaign.toml, comments and all, with the robot's new place."""
     try:
-        document = tomlkit.parse(campaign_toml.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{campaign_toml} does not exist; name a campaign.toml.") from None
-    except (OSError, UnicodeDecodeError, TOMLKitError) as error:
+        document = tomlkit.parse(read_toml_text(campaign_toml, "campaign.toml"))
+    except TOMLKitError as error:
         raise InputError(
             f"{campaign_toml} is not a valid campaign.toml ({error}); correct it."
         ) from None

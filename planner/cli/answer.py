@@ -24,7 +24,8 @@ def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:
 
         text = answer.text()
         if text is not None:
-            Console().print(text)
+            # Names of poses and files are no markup.
+            Console(markup=False, emoji=False).print(text)
     return code
 
 

@@ -6,18 +6,24 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, refusals, respond, warn
+from planner.cli.checking import check
 from planner.cli.comparison import compare
+from planner.cli.couple import couple
 from planner.cli.diagnosis import diagnose
+from planner.cli.documentation import manual, schema
+from planner.cli.handing_on import export, report
 from planner.cli.identification import identify
 from planner.cli.modes import modes
 from planner.cli.proving import prove
+from planner.cli.stability import stability
 from planner.cli.study import study
+from planner.errors import InputError
 
 app = typer.Typer(
     name="planner",
     help="Plans hammer tests of a milling robot, fuses them with its simulation, explains both.",
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -41,16 +47,32 @@ def _root(
 @app.command()
 def new(
     directory: Directory,
-    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    robot: Annotated[
+        Path | None, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")
+    ] = None,
     campaign: Annotated[
         Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
     ] = None,
+    example: Annotated[
+        bool,
+        typer.Option("--example", help="Write robot.toml, campaign.toml and a URDF to change."),
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Start a campaign."""
-    from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import NewCampaign
+    """Start a campaign, or write files to begin one with.
 
+    The robot is checked: what looks wrong is said, what cannot work is refused.
+
+    Example: planner new cell7 --robot robot/robot.toml --campaign campaign.toml
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.campaign.example import write_example
+    from planner.report.campaign_acts import ExampleFolder, NewCampaign
+
+    if example == (robot is not None):
+        raise InputError("planner new needs either --robot ROBOT_TOML or --example; give one.")
+    if robot is None:
+        return respond(ExampleFolder(*write_example(directory)), as_json)
     return respond(NewCampaign.of(Campaign.new(directory, robot, campaign)), as_json)
 
 
@@ -63,7 +85,10 @@ def next_(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Propose the next pose or poses to measure."""
+    """Propose the next pose or poses to measure.
+
+    Example: planner next cell7 --count 3
+    """
     from planner.campaign.campaign import Campaign
     from planner.report.proposals import proposals
 
@@ -78,7 +103,10 @@ def import_(
     pose: Annotated[str | None, typer.Option(metavar="ID", help="Pose of these hits.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Import hits, refit, and say what changed."""
+    """Import hits, refit, and say what changed.
+
+    Example: planner import cell7 exports/P001
+    """
     from planner.campaign.campaign import Campaign
     from planner.cli.progress import reporting
     from planner.report.imports import ImportedPoses
@@ -98,7 +126,10 @@ def confirm(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Use the held hits of a pose: they are from there indeed, or from another pose."""
+    """Use the held hits of a pose: they are from there indeed, or from another pose.
+
+    Example: planner confirm cell7 P014 --at P009
+    """
     from planner.campaign.campaign import Campaign
     from planner.report.campaign_acts import ConfirmedPose
     from planner.report.imports import ImportedPoses
@@ -123,7 +154,10 @@ def status_(
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
     as_json: AsJson = False,
 ) -> int:
-    """What has been measured, what is open, how sure the model is and whether it may be."""
+    """What has been measured, what is open, how sure the model is and whether it may be.
+
+    Example: planner status cell7 --plot pictures
+    """
     from planner.campaign.campaign import Campaign
     from planner.report.plot_files import Pictures
     from planner.report.status import status
@@ -135,7 +169,10 @@ def status_(
 
 @app.command()
 def undo(directory: Directory, as_json: AsJson = False) -> int:
-    """Take back the last act."""
+    """Take back the last act.
+
+    Example: planner undo cell7
+    """
     from planner.campaign.campaign import Campaign
     from planner.report.campaign_acts import UndoneAct
 
@@ -149,7 +186,10 @@ def withdraw(
     reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
     as_json: AsJson = False,
 ) -> int:
-    """Set a measured pose aside; its recordings stay."""
+    """Set a measured pose aside; its recordings stay.
+
+    Example: planner withdraw cell7 P003 --reason "loose sensor"
+    """
     from planner.campaign.campaign import Campaign
     from planner.report.campaign_acts import WithdrawnPose
 
@@ -168,6 +208,8 @@ def skip(
 
     With a reason its neighbours are not offered either: what stands in the way there does so
     around it too.
+
+    Example: planner skip cell7 P007 --reason "hose in the way"
     """
     from planner.campaign.campaign import Campaign
     from planner.report.campaign_acts import SkippedPose
@@ -189,7 +231,10 @@ def watch(
     viewer: Viewer = False,
     as_json: AsJson = False,
 ) -> int:
-    """Interactive session: propose, wait for the analyser's export, import, refit."""
+    """Interactive session: propose, wait for the analyser's export, import, refit.
+
+    Example: planner watch cell7 exports/ --diagnose
+    """
     from planner.campaign.campaign import Campaign
     from planner.cli.progress import console
     from planner.report.imports import how_to_answer
@@ -216,7 +261,10 @@ def predict(
     out: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="Where FRFs go.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Modes and FRFs, with uncertainty, at given poses."""
+    """Modes and FRFs, with uncertainty, at given poses.
+
+    Example: planner predict cell7 poses.csv --out frfs.npz
+    """
     from planner.campaign.campaign import Campaign
     from planner.recording.folder import read_poses
     from planner.report.predictions import predictions
@@ -239,7 +287,10 @@ def replay(
     viewer: Viewer = False,
     as_json: AsJson = False,
 ) -> int:
-    """Rebuild the campaign from its log, step by step, and check each step."""
+    """Rebuild the campaign from its log, step by step, and check each step.
+
+    Example: planner replay cell7 --rrd cell7.rrd
+    """
     from planner.campaign.campaign import Campaign
     from planner.cli.progress import reporting
     from planner.report.replayed import replayed
@@ -251,12 +302,19 @@ def replay(
     return respond(answer, as_json, 0 if answer.reproduced else 1)
 
 
+app.command()(check)
+app.command()(report)
+app.command()(export)
 app.command()(modes)
 app.command()(identify)
 app.command()(diagnose)
 app.command()(prove)
 app.command()(compare)
 app.command()(study)
+app.command()(schema)
+app.command()(manual)
+app.command()(couple)
+app.command()(stability)
 
 
 @app.command()
@@ -268,7 +326,10 @@ def demo(
     viewer: Viewer = False,
     as_json: AsJson = False,
 ) -> int:
-    """Play a whole campaign on recordings shipped with the project (simulated)."""
+    """Play a whole campaign on recordings shipped with the project (simulated).
+
+    Example: planner demo --measurements 6
+    """
     from planner.cli.progress import reporting
     from planner.demo import play
 

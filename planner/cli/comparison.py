@@ -44,7 +44,10 @@ def compare(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Compare sampling strategies: error by number of measurements, on poses not used."""
+    """Compare sampling strategies: error by number of measurements, on poses not used.
+
+    Example: planner compare exports --robot robot/robot.toml --strategies random,default
+    """
     from planner.cli.progress import bars
     from planner.compare.bench import assemble, decide
     from planner.compare.resume import conduct, recorded

@@ -31,7 +31,10 @@ def diagnose(
     ] = 0.0,
     as_json: AsJson = False,
 ) -> int:
-    """Locate where simulation and recordings differ, name the missing physics, show the fit."""
+    """Locate where simulation and recordings differ, name the missing physics, show the fit.
+
+    Example: planner diagnose cell7 --out found
+    """
     import numpy as np
 
     from planner.api import diagnose_material

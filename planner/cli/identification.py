@@ -45,7 +45,10 @@ def identify(
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Fit stiffness and damping of a robot's simulation to recorded hits."""
+    """Fit stiffness and damping of a robot's simulation to recorded hits.
+
+    Example: planner identify exports --robot robot/robot.toml --out found/robot.toml
+    """
     from planner.api import identify as fit
     from planner.cli.progress import reporting
     from planner.dataset.dataset import Dataset

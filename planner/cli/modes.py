@@ -9,7 +9,10 @@ from planner.cli.answer import AsJson, refusals, respond
 
 
 def modes(
-    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Hits of one pose.")],
+    paths: Annotated[
+        list[Path],
+        typer.Argument(metavar="PATH...", help="Hits of a pose, or FRFs of any points."),
+    ],
     band_hz: Annotated[
         tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Band in Hz.")
     ] = None,
@@ -36,10 +39,24 @@ def modes(
     ] = None,
     format_: Annotated[str, typer.Option("--format", help="Of the pictures: png or svg.")] = "png",
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
+    real: Annotated[
+        bool, typer.Option("--real", help="Of any points: real normal modes as shapes.")
+    ] = False,
+    export: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Of any points: write UFF and CSV files here."),
+    ] = None,
+    operating: Annotated[
+        bool, typer.Option("--operating", help="Responses alone, no force: unscaled modes.")
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Experimental modal analysis of one pose's hits, or of a folder with recordings.csv."""
+    """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
+
+    Example: planner modes exports/P001/*.uff --plot pictures
+    """
     from planner.cli.progress import reporting
+    from planner.report.matrix_analysis import matrix_report
     from planner.report.modal_analysis import modal_report
     from planner.report.plot_files import Pictures
     from planner.report.survey import several_poses, survey
@@ -49,6 +66,13 @@ def modes(
         given = paths[0], band_hz, robot, estimator, quantity, window_rate_1_s
         with reporting("identifying", quiet=as_json) as progress:
             answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
-    else:
-        answer = modal_report(paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s)
+        return respond(answer, as_json, refusals(answer.refused))
+    if operating:
+        from planner.report.operating_analysis import operating_report
+
+        return respond(operating_report(paths, band_hz, pictures), as_json)
+    matrix = None if force else matrix_report(paths, band_hz, quantity, pictures, real, export)
+    answer = matrix or modal_report(
+        paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s
+    )
     return respond(answer, as_json, refusals(answer.refused))

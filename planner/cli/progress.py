@@ -9,7 +9,8 @@ def console(quiet: bool, stderr: bool = True):
     """A rich console on stderr (or stdout), silent if `quiet`."""
     from rich.console import Console
 
-    return Console(stderr=stderr, quiet=quiet)
+    # Names of poses and files are no markup.
+    return Console(stderr=stderr, quiet=quiet, markup=False, emoji=False)
 
 
 @contextmanager
@@ -17,7 +18,7 @@ def reporting(verb: str, quiet: bool) -> Iterator[Callable[[str], None]]:
     """A function that shows what is being done, with the time it has taken so far."""
     from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn())
     screen = console(quiet)
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task(verb, total=None)
@@ -36,7 +37,7 @@ def bars(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
         TimeRemainingColumn,
     )
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     times = (TimeElapsedColumn(), TimeRemainingColumn())
     screen = console(quiet)
     shown: dict[str, Any] = {}
@@ -58,7 +59,7 @@ def counting(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 
     columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(),
-               TextColumn("{task.description}"))  # fmt: skip
+               TextColumn("{task.description}", markup=False))  # fmt: skip
     screen = console(quiet)
     with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bar:
         task = bar.add_task("starting", total=1.0)

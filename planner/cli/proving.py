@@ -21,7 +21,10 @@ def prove(
     ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Make concealed cases with another engine, seal, diagnose, unseal and score them."""
+    """Make concealed cases with another engine, seal, diagnose, unseal and score them.
+
+    Example: planner prove --cases 20 --out proof
+    """
     from planner.cli.progress import counting
     from planner.prove.report import prove_report
     from planner.prove.run import diagnose_all, make

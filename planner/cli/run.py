@@ -33,6 +33,8 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        return _no_access(error)
     except MemoryError:
         return _say("The input needs more memory than this machine has; give a smaller one.", 2)
     except Exception as error:
@@ -50,6 +52,19 @@ def _usage(error: TyperException) -> int:
     if not text:  # no command was given: the help has been printed
         return 2
     return _say(f"{text.rstrip('.')}; see planner --help.", 2)
+
+
+def _no_access(error: OSError) -> int:
+    """A full disk, a folder that may not be written, a share that is gone."""
+    if os.environ.get("PLANNER_DEBUG"):
+        traceback.print_exc()
+    what = f"{error.filename} cannot be read or written" if error.filename else "A file failed"
+    why = error.strerror or type(error).__name__
+    return _say(
+        f"{what} ({why}); free the disk or allow it, and repeat: everything imported so far is "
+        f"kept.",
+        2,
+    )
 
 
 def _internal(error: Exception) -> int:

@@ -1,6 +1,5 @@
 """The papers' studies again (`planner study`)."""
 
-import time
 from pathlib import Path
 from typing import Annotated
 
@@ -12,23 +11,34 @@ from planner.cli.answer import AsJson, respond
 def study(
     name: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="busch2022, busch2020, seyedhosseini2025 or lei2023."),
+        typer.Argument(
+            metavar="NAME|all",
+            help="busch2022, busch2020, seyedhosseini2025, lei2023, birk2025, or all.",
+        ),
     ],
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Write tables (CSV) and pictures here.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Write tables (CSV), pictures and pages (HTML) here."),
     ] = None,
+    small: Annotated[
+        bool,
+        typer.Option("--small", help="A version of seconds, to see that it works: says little."),
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
-    """Do a paper's study again on simulated recordings: tables, pictures, what holds."""
+    """Do a paper's study again on simulated recordings: tables, pictures, what holds.
+
+    `all` keeps each finished study in FOLDER and does not run it again.
+
+    Example: planner study busch2022 --out figures
+    """
     from planner.cli.progress import counting
     from planner.studies import registry
-    from planner.studies.answer import StudyAnswer
-    from planner.studies.report import check_folder, write
+    from planner.studies.conduct import conduct, conduct_all
 
-    made = registry.find(name)
-    check_folder(out)
-    start = time.perf_counter()
     with counting(quiet=as_json) as progress:
-        report = made(progress)
-    files = write(report, out)
-    return respond(StudyAnswer.of(report, files, time.perf_counter() - start), as_json)
+        if name == registry.ALL:
+            answer = conduct_all(out, small, progress)
+        else:
+            answer = conduct(name, out, small, progress)
+    return respond(answer, as_json)

@@ -71,7 +71,11 @@ def _spread(bench: Bench, tasks: list[Task], scheduler: str | None, workers: int
 
 
 def _read(path: Path) -> Run | None:
-    return msgspec.json.decode(path.read_bytes(), type=Run) if path.exists() else None
+    """A run that was kept; None where there is none, or none that can be read: it is run again."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Run)
+    except (OSError, UnicodeDecodeError, msgspec.DecodeError):
+        return None
 
 
 def _folder(path: Path) -> Path:

@@ -71,7 +71,7 @@ class Dataset:
             points: Where the robot may be hit and heard (`Robot.points`); none: at the tool alone.
 
         Raises:
-            InputError: The table is wrong, or a pose mixes time histories and exported FRFs.
+            InputError: The table is wrong.
             RefusedError: No pose has a hit that can be used.
         """
         found = [

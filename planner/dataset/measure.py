@@ -10,7 +10,7 @@ import numpy as np
 from planner import content_hash
 from planner.dataset.screened_files import ScreenedFiles, Source, Verdict, read_files, renamed
 from planner.dataset.store import Store, user_store
-from planner.errors import InputError, RefusedError
+from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.homogeneity import Homogeneity, homogeneity
 from planner.modal.modes import ModalModel
@@ -75,10 +75,7 @@ class MeasuredPose:
 
     @cached_property
     def averaged(self) -> Averaged:
-        """FRF of all good hits, or of exported FRFs, and a verdict on each file.
-
-        Raises InputError where time histories and exported FRFs are mixed.
-        """
+        """FRF of all good hits, or of exported FRFs where there are no hits; a verdict a file."""
         return self.kept("frf", Averaged, self._average)
 
     @cached_property
@@ -162,7 +159,7 @@ class MeasuredPose:
 
     def _key(self, what: str) -> str:
         """Hash of the files' content and of all else that a result depends on."""
-        told = [(s.name, s.path.suffix, s.hit, s.repeat, s.stated) for s in self.sources]
+        told = [(s.name, s.path.suffix, s.hit, s.repeat, s.stated, s.part) for s in self.sources]
         how = self.band_hz, self.estimator, self.window_rate_1_s
         return content_hash.digest(
             what, program(), content_hash.of(told), content_hash.of(how), self._contents
@@ -173,10 +170,6 @@ class MeasuredPose:
         said = files.verdicts
         if not files.agreeing and not files.records:
             return Averaged(said, None, ("No usable hit: nothing was estimated.",))
-        if files.agreeing and files.records:
-            raise InputError(
-                "The files of this pose mix time histories and exported FRFs; import one kind only."
-            )
         try:
             frf = _frf(
                 files.agreeing, files.records, self.band_hz, self.estimator, self.window_rate_1_s

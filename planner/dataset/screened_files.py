@@ -1,5 +1,6 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,13 +11,17 @@ from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 
 @dataclass(frozen=True)
 class Source:
-    """One file and what the table of recordings says about it (None: nothing)."""
+    """One file and what the table of recordings says about it (None: nothing).
+
+    `part` is which of the file's hits it is, from 1; 0: all that the file holds.
+    """
 
     path: Path
     name: str
     hit: str | None = None
     repeat: int | None = None
     stated: StatedPoints = field(default_factory=StatedPoints)
+    part: int = 0
 
     @classmethod
     def of(cls, row: PoseRow) -> "Source":
@@ -31,9 +36,23 @@ class Source:
 
         records: tuple[Record, ...] = read(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
-        if frfs:
+        if frfs and not self.part:
             return (), tuple(located(record, self.stated) for record in frfs)
-        return hits_from(records, self.hit, self.stated), ()
+        return hits_from(self._meant(records), self.hit, self.stated), ()
+
+    def _meant(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
+        """Of a file's records those that are meant."""
+        if not self.part:
+            return records
+        times = [record for record in records if not isinstance(record, FrfRecord)]
+        return tuple(times[self.part - 1 : self.part])
+
+    def parts(self, count: int) -> "tuple[Source, ...]":
+        """Each of the file's hits by itself, where there are several."""
+        if count < 2:
+            return (self,)
+        named = [(k, f"{self.name} (hit {k})") for k in range(1, count + 1)]
+        return tuple(replace(self, name=name, part=k) for k, name in named)
 
 
 @dataclass(frozen=True)
@@ -68,17 +87,40 @@ def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> Scr
     hits: list[tuple[Hit, ...]] = []
     records: list[FrfRecord] = []
     for source in sources:
-        verdict, found, frfs = _read_one(source, band_hz)
+        verdict, found, frfs = read_one(source, band_hz)
         verdicts.append(verdict)
         hits.append(found)
         records += frfs
+    if any(hits):
+        _refuse_others(verdicts, hits, records)
     agreeing = _agreeing(hits, verdicts, band_hz)
     return ScreenedFiles(tuple(verdicts), tuple(hits), agreeing, tuple(records))
 
 
-def _read_one(
+def _refuse_others(
+    verdicts: list[Verdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
+) -> None:
+    """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
+    rates = Counter(round(hit.sampling_rate_hz, 6) for found in hits for hit in found)
+    usual = rates.most_common(1)[0][0]
+    for number, (verdict, found) in enumerate(zip(verdicts, hits, strict=True)):
+        other = next((h for h in found if round(h.sampling_rate_hz, 6) != usual), None)
+        text = ""
+        if other is not None:
+            text = f"sampled at {other.sampling_rate_hz:g} Hz, the others at {usual:g} Hz"
+        elif verdict.accepted and not found:
+            text = "it holds FRFs, the pose's other files time histories"
+        if text:
+            reason = f"{verdict.source.name} cannot be averaged: {text}; export all alike."
+            verdicts[number] = replace(verdict, accepted=False, reason=reason)
+            hits[number] = ()
+    records.clear()
+
+
+def read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[Verdict, tuple[Hit, ...], list[FrfRecord]]:
+    """One file, judged by itself: the verdict, its usable hits, its FRFs."""
     from planner.recording.screening import ScreeningLimits, screen
 
     try:
@@ -89,14 +131,20 @@ def _read_one(
     except PlannerError as error:
         return Verdict(source, False, renamed(str(error), (source,))), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)
-    faults = [fault for hit in found for fault in screen(hit, limits)]
-    remarks = tuple(f.text for f in faults if not f.refuse)
+    judged = [(hit, screen(hit, limits)) for hit in found]
+    remarks = [f.text for _, faults in judged for f in faults if not f.refuse]
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
-    refusing = [fault for fault in faults if fault.refuse]
-    if refusing:
-        text = " ".join(fault.text for fault in refusing)
-        return Verdict(source, False, text, axis, simulated, remarks), (), []
-    hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in found)
+    refused = [
+        " ".join(f.text for f in faults if f.refuse)
+        for _, faults in judged
+        if any(f.refuse for f in faults)
+    ]
+    if len(refused) == len(judged):
+        return Verdict(source, False, " ".join(refused), axis, simulated, tuple(remarks)), (), []
+    remarks += [f"One of {len(judged)} hits in {source.name} is refused: {t}" for t in refused]
+    good = [hit for hit, faults in judged if not any(f.refuse for f in faults)]
+    hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
+    remarks = tuple(remarks)
     return Verdict(source, True, "", axis, simulated, remarks), hits, []
 
 

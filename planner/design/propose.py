@@ -14,6 +14,7 @@ from planner.design.mixed import mixed
 from planner.design.mutual_information import mutual_information
 from planner.design.parameter_information import d_information, parameter_information
 from planner.design.space_filling import DESIGNS
+from planner.design.stability import stability
 from planner.design.variance import variance
 from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
@@ -29,10 +30,11 @@ ACQUISITIONS: dict[str, Score] = {
     "d_information": d_information,
     "mixed": mixed,
     "goal": goal,
+    "stability": stability,
 }
 # What these look at is nothing where no parameter of the simulation is open.
 OF_PARAMETERS = ("parameter_information", "d_information")
-INFORMED = (*OF_PARAMETERS, "mixed", "goal")  # those that look at parameters at all
+INFORMED = (*OF_PARAMETERS, "mixed", "goal", "stability")  # those that look at parameters at all
 WORKSPACE_POSES = 200  # candidates (a Sobol prefix: evenly spread) that stand for the workspace
 LEAST_DISTANCE = 1e-3  # in model coordinates, to poses measured or proposed before
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:  # a forecast that was kept is read without JAX
 FIELD_SAMPLES = 400  # samples of the error field, at least
 # Errors are as large as the model says, to within a factor of two, before any is seen.
 PRIOR_COUNT = 4.0
+MOST_PERCENT = 100.0  # what is larger is said to be larger
 WORKSPACE_POINTS = 64  # of the workspace, the first ones, over which the mean is taken
 
 
@@ -38,11 +39,22 @@ class Forecast:
     @property
     def text(self) -> str:
         """One or two sentences for the engineer."""
-        known = (
-            f"The frequencies' RMSE over the workspace is about {self.rmse_percent:.2g} %, below "
-            f"{self.bound_percent:.2g} % with {100 * self.probability:.0f} % probability."
-        )
-        return f"{known} One more measurement would gain about {self.gain_percent:.1g} %."
+        known = f"The frequencies' RMSE over the workspace is about {percent(self.rmse_percent)}"
+        share = f"{100 * self.probability:.0f} % probability"
+        if self.bound_percent > MOST_PERCENT:
+            known += f"; too little is known for a bound with {share}."
+        else:
+            known += f", below {percent(self.bound_percent)} with {share}."
+        return f"{known} One more measurement would gain about {percent(self.gain_percent, 1)}."
+
+
+def percent(value: float, digits: int = 2) -> str:
+    """A percentage with so many digits, in no power of ten; what is over 100 is no forecast."""
+    if value > MOST_PERCENT:
+        return f"more than {MOST_PERCENT:.0f} %"
+    rounded = float(f"{value:.{digits}g}")
+    decimals = max(0, digits - 1 - int(np.floor(np.log10(rounded)))) if rounded > 0 else 0
+    return f"{rounded:.{decimals}f} %"
 
 
 def forecast(

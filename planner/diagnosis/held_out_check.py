@@ -6,6 +6,8 @@ from planner.diagnosis.linear.predict import ThreefoldSimilarity, agreement, hel
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.diagnosis.thresholds import HELD_OUT_DOUBTED, HELD_OUT_WORSE
 
+LESSER = 3  # parts of an explanation that are tried where the whole fails at poses set aside
+
 
 @dataclass(frozen=True, eq=False)
 class JudgedDiagnosis:
@@ -20,15 +22,44 @@ class JudgedDiagnosis:
 def judge(found: Diagnosis) -> JudgedDiagnosis:
     """Judge the best explanation at poses set aside; if it fails there it is given up.
 
-    "unknown" then takes its probability, and the refitted simulation its place.
+    The likeliest part of it that does not fail takes its probability. If none is left "unknown"
+    does, and the refitted simulation takes its place.
     """
     aside, judged = held_out(found.problem, found.refitted, found.best)
-    if judged is not None and judged.explained.frac < judged.refitted.frac - HELD_OUT_WORSE:
-        found = _given_up(found)
-        judged = replace(judged, explained=judged.refitted)
+    if judged is not None and _fails(judged):
+        for lesser in _lesser(found)[:LESSER]:
+            _, other = held_out(found.problem, found.refitted, lesser.best)
+            if other is not None and not _fails(other):
+                found, judged = lesser, other
+                break
+        else:
+            found = _given_up(found)
+            judged = replace(judged, explained=judged.refitted)
     return JudgedDiagnosis(
         found, agreement(found.problem, found.refitted, found.best), aside, judged
     )
+
+
+def _fails(judged: ThreefoldSimilarity) -> bool:
+    return judged.explained.frac < judged.refitted.frac - HELD_OUT_WORSE
+
+
+def _lesser(found: Diagnosis) -> list[Diagnosis]:
+    """The diagnosis with a part of its best explanation in that one's stead, likeliest first."""
+    whole = next((c for c in found.candidates if c.fit is found.best), None)
+    if whole is None:
+        return []
+    out = []
+    for part in found.candidates:
+        if part.fit is None or not part.effects[0].at or not set(part.places) < set(whole.places):
+            continue
+        taken = replace(part, probability=part.probability + whole.probability)
+        emptied = replace(whole, probability=0.0)
+        rest = [c for c in found.candidates if c is not part and c is not whole]
+        ranked = tuple(sorted((taken, emptied, *rest), key=lambda c: -c.probability))
+        if ranked[0] is taken and taken.fit is not None:
+            out.append(replace(found, candidates=ranked, best=taken.fit))
+    return out
 
 
 def _given_up(found: Diagnosis) -> Diagnosis:

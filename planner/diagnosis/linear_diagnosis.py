@@ -12,6 +12,7 @@ from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle, tolerances_of
 from planner.diagnosis.linear.search import Found, search
+from planner.diagnosis.linear.slightness import thinned, without_slight
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -100,7 +101,7 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
 
 
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
-    weights = weigh(found.finalists, _priors([f.effect for f in found.finalists], all_))
+    found, weights = _weighed(problem, found, all_)
     candidates = tuple(
         _with_discrepancy(c, found, weights) for c in _candidates(found, weights, all_)
     )
@@ -110,6 +111,21 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
     return Diagnosis(
         _verdict(candidates), candidates, found.finalists[0], best, weights.temper, seconds, problem
     )
+
+
+def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Found, Weights]:
+    """Weights of all finalists, and of the likeliest with one effect fewer after the other."""
+
+    def weights(fits: Sequence[Fit]) -> Weights:
+        return weigh(fits, _priors([f.effect for f in fits], all_))
+
+    first = weights(found.finalists)
+    likeliest = found.finalists[int(np.argmax(first.probabilities[:-1]))]
+    more = thinned(problem, likeliest, found.finalists)
+    if not more:
+        return found, first
+    found = replace(found, finalists=(*found.finalists, *more))
+    return found, weights(found.finalists)
 
 
 def _with_discrepancy(candidate: Candidate, found: Found, weights: Weights) -> Candidate:
@@ -159,7 +175,9 @@ def _told_of(found: Fit, temper: float) -> tuple[Effect, ...]:
 
 def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
-    shares = list(weights.probabilities[:-1])
+    matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters_percent
+    named = [_told_of(f, weights.temper) for f in fits]
+    shares = list(without_slight(fits, named, weights.probabilities[:-1], matters / 100))
     unknown = float(weights.probabilities[-1])
     leader = int(np.argmax(shares))
     own = _priors([fits[leader].effect], all_)[0]

@@ -102,7 +102,7 @@ def _entry(diagnosis: Diagnosis, accepted: Candidate, found: Fit, effect: Effect
 
 
 def _toml(robot: Robot, changes: _Changes, urdf: str) -> str:
-    document = tomlkit.parse(robot.path.read_text(encoding="utf-8"))
+    document = tomlkit.parse(robot.path.read_text(encoding="utf-8-sig"))
     document["urdf"] = urdf
     listed: Any = document["compliance"]
     for block, values in zip(listed, changes.springs, strict=True):

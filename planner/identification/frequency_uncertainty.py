@@ -11,11 +11,12 @@ from planner.identification.result import Identification
 def frequency_sensitivity(
     identified: Identification, nominal: Simulation, priors: Priors, q: np.ndarray, count: int
 ) -> np.ndarray:
-    """∂ ln f of the `count` lowest undamped modes (n, count, P + R) at q (n, dof) in rad.
+    """∂ ln f of the `count` lowest oscillatory modes (n, count, P + R) at q (n, dof) in rad.
 
-    By the parameters in the order of `identified.mean`: with mass-normalised shapes φ,
-    ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968). The sag under gravity is held where the
-    identified springs carry the weight, as it is while they are identified.
+    As if they were undamped, by the parameters in the order of `identified.mean`: with
+    mass-normalised shapes φ, ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968). The sag under
+    gravity is held where the identified springs carry the weight, as it is while they are
+    identified.
     """
     p = parametrise(nominal, priors if identified.nuisances else Priors())
     return log_frequency_slope(identified.simulation, p, q, count)
@@ -28,8 +29,9 @@ def log_frequency_slope(
     m = simulation.elastic.matrices(q)
     stiffness = simulation.stiffness.real
     hertz, shapes, _ = undamped_modes(m.mass, stiffness + m.geometric)
-    square = (2 * np.pi * hertz[:, :count]) ** 2
-    phi = shapes[:, :, :count]
+    chosen = _oscillatory(simulation, hertz, shapes, count)
+    square = (2 * np.pi * np.take_along_axis(hertz, chosen, axis=1)) ** 2
+    phi = np.take_along_axis(shapes, chosen[:, None, :], axis=2)
     springs = np.diagonal(stiffness)[None, :, None] * phi**2 / (2 * square[:, None, :])
     own = len(parametrisation.parameters)
     out = np.zeros((len(q), count, own + len(parametrisation.nuisances)))
@@ -45,6 +47,19 @@ def log_frequency_slope(
         inertial = -0.5 * np.einsum("nbik,nbpik->nkbp", moved, half, optimize=True)
         out[:, :, own:] = inertial.reshape(len(q), count, -1)
     return out
+
+
+def _oscillatory(
+    simulation: Simulation, hertz: np.ndarray, shapes: np.ndarray, count: int
+) -> np.ndarray:
+    """Columns (n, count) of the lowest undamped modes that their damping lets swing.
+
+    Overdamped ones come last: `Simulation.modes` does not count them, and what they leave open is
+    no frequency's.
+    """
+    damping, omega = np.diagonal(simulation.damping), np.maximum(2 * np.pi * hertz, 1e-9)
+    ratio = np.einsum("e,nek->nk", damping, shapes**2) / (2 * omega)
+    return np.argsort(ratio >= 1, axis=1, kind="stable")[:, :count]
 
 
 def frequency_sd(

@@ -72,7 +72,7 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
     out, bodies = out.absolute(), result.simulation.elastic.bodies
     change = result.simulation.elastic.inertia - ElasticModel(robot).inertia
     elsewhere = out.parent.resolve() != robot.path.parent.resolve()
-    urdf, name, shares = robot.urdf_path, None, {}
+    urdf, name, shares, left = robot.urdf_path, None, {}, ()
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         if elsewhere or np.any(change):
@@ -81,8 +81,8 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
             text, shares = urdf_with_inertias(robot, bodies, change)
             _write_new(urdf, text)
             if elsewhere:
-                copy_meshes(robot.urdf_path, urdf)
-        stated = robot.path.read_text(encoding="utf-8")
+                left = copy_meshes(robot.urdf_path, urdf)
+        stated = robot.path.read_text(encoding="utf-8-sig")
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
         _write_new(out, updated_toml(stated, result, name, added))
@@ -90,7 +90,9 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."
         ) from None
-    return Written(out, urdf, tuple(_impossible(body, share) for body, share in shares.items()))
+    said = [_impossible(body, share) for body, share in shares.items()]
+    said += [f"Mesh {mesh} lies outside the robot's folder and is not copied." for mesh in left]
+    return Written(out, urdf, tuple(said))
 
 
 def _impossible(body: str, share: float) -> str:

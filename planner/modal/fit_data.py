@@ -20,7 +20,8 @@ class Data:
     (the end of the record only scales the residues). `rate_1_s` is that of the exponential
     window which the records carry; poles are those of the structure, without it. `tail_s` is the
     time from the pulse to the end of the record (see `residues`). `force_share` and
-    `force_window_s` say how the noise of the force spoils whole columns (see `Frf`).
+    `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `pooled`: an
+    unknown variance is taken as a level for each entry times one profile of lines.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -31,6 +32,7 @@ class Data:
     tail_s: float = np.inf
     force_share: np.ndarray | None = None  # (inputs, F)
     force_window_s: float = 0.0
+    pooled: bool = False
 
     @cached_property
     def lines(self) -> Lines:

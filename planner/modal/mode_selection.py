@@ -31,12 +31,15 @@ class PoleFit:
         return float(np.interp(frequency_hz, lines_hz, self.excess))
 
 
-def fit(data: Data, start: np.ndarray) -> PoleFit:
-    """Fit from starting poles (m,), leaving out and adding modes until neither helps."""
+def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
+    """Fit from starting poles (m,), leaving out and adding modes until neither helps.
+
+    `rounds` is how many modes may be tried beside those of the start.
+    """
     current = _refine(data, start, None)
     current = _prune(data, current)
     tried: list[complex] = []
-    for _ in range(MAX_ROUNDS):
+    for _ in range(rounds):
         candidate = _missing(data, current, tried)
         if candidate is None:
             break
@@ -79,8 +82,17 @@ def _scatter(data: Data, refined: Refined, power: np.ndarray) -> np.ndarray:
     total = np.concatenate([np.zeros((*square.shape[:2], 1)), np.cumsum(square, axis=-1)], axis=-1)
     local = (total[..., high] - total[..., low]) / (high - low)
     flat = np.mean(square, axis=-1, keepdims=True)
+    if data.pooled:
+        local = flat * np.mean(local / flat, axis=(0, 1))
     # A little of the overall level keeps quiet stretches from being trusted without limit.
     return (0.9 * local + 0.1 * flat) / max(lost, 0.1) + FLOOR**2 * power
+
+
+def running_mean(values: np.ndarray, half: int) -> np.ndarray:
+    """Mean over a window of `half` values (F,) to either side, clipped at the ends."""
+    low, high = _windows(values.size, half)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    return (total[high] - total[low]) / (high - low)
 
 
 def _windows(lines: int, half: int) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cholesky, solve, solve_triangular
 
+from planner.modal.refine import proportional
+
 # Relative ridge on the normal matrices: a band that leaves part of the circle empty makes them
 # singular to rounding, and only to rounding.
 RIDGE = 1e-12
@@ -61,6 +63,33 @@ def plscf(
     return tuple(_solve(order, normal, coupling, scale, circle) for order in orders)
 
 
+def row_errors(
+    frequency_hz: np.ndarray, frf: np.ndarray, order: int, weight: np.ndarray | None = None
+) -> np.ndarray:
+    """(outputs,) how badly each row fits the denominator of all, relative to the row: 0 is well.
+
+    One weight per row, the same for all lines. A row with a turned sign or with exchanged columns
+    has other poles than the rest and stands out.
+    """
+    omega = 2 * np.pi * np.asarray(frequency_hz)
+    circle = _circle(omega)
+    z = np.exp(1j * (omega - circle.base) * circle.step)
+    scale = np.sqrt(np.mean(np.abs(frf) ** 2, axis=(0, 2)))
+    scaled = frf / np.where(scale > 0, scale, 1.0)[:, None]
+    normal, coupling = _normal(z, scaled, weight, order)
+    inputs = frf.shape[1]
+    coefficients = _denominator(order, normal, coupling)
+    powers = z ** np.arange(order + 1)[:, None]
+    denominator = np.einsum("rij,rf->ijf", coefficients, powers)
+    seen = np.einsum("oif,ijf->ojf", scaled, denominator)
+    basis = np.concatenate([powers.real, powers.imag], axis=1)
+    values = np.concatenate([seen.real, seen.imag], axis=-1).reshape(-1, 2 * z.size)
+    orthonormal = np.linalg.qr(basis.T)[0]
+    left = np.sum(values**2, axis=1) - np.sum((values @ orthonormal) ** 2, axis=1)
+    power = np.sum(values**2, axis=1).reshape(-1, inputs).sum(axis=1)
+    return left.reshape(-1, inputs).sum(axis=1) / np.maximum(power, 1e-300)
+
+
 def _circle(omega: np.ndarray) -> _Circle:
     low, high = omega[0], omega[-1]
     # A band far above zero is moved down, or most of the circle would hold no data.
@@ -79,6 +108,8 @@ def _normal(
     """
     outputs, inputs, lines = frf.shape
     w = np.ones((outputs, lines)) if weight is None else weight / np.mean(weight)
+    if proportional(w):
+        return _normal_of_one_profile(z, frf * np.sqrt(w[:, :1, None] / w[0, 0]), w[0], order)
     lags = z[None, :] ** np.arange(order + 1)[:, None]
     index = np.arange(order + 1)
     lag = index[None, :] - index[:, None]  # column power minus row power
@@ -101,6 +132,28 @@ def _normal(
     return total, reduced
 
 
+def _normal_of_one_profile(
+    z: np.ndarray, frf: np.ndarray, weight: np.ndarray, order: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same where one weight (F,) holds for all outputs: they share one numerator's matrix."""
+    outputs, inputs, lines = frf.shape
+    lags = z[None, :] ** np.arange(order + 1)[:, None]
+    index = np.arange(order + 1)
+    lag = index[None, :] - index[:, None]
+    r = (lags @ weight).real
+    gram = r[np.abs(lag)]
+    gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
+    factor = cholesky(gram + RIDGE * r[0] * np.eye(order + 1), lower=True)
+    weighted = (weight * frf).reshape(-1, lines)
+    s = _two_sided(lags, weighted.T).real.reshape(-1, outputs, inputs)
+    coupled = -s[lag + order].reshape(order + 1, -1)  # rows, then columns × outputs × inputs
+    reduced = solve_triangular(factor, coupled, lower=True)
+    reduced = reduced.reshape(order + 1, order + 1, outputs, inputs).transpose(2, 0, 1, 3)
+    products = np.einsum("oif,ojf->ijf", frf.conj(), weight * frf).reshape(-1, lines)
+    t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
+    return t[lag + order].transpose(0, 2, 1, 3), np.ascontiguousarray(reduced)
+
+
 def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
     """Σ_f z^l data_f for l = −n…n."""
     return np.concatenate([(lags[:0:-1].conj()) @ data, lags @ data])
@@ -109,6 +162,18 @@ def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:
 def _solve(
     order: int, normal: np.ndarray, coupling: np.ndarray, scale: np.ndarray, circle: _Circle
 ) -> PoleSet:
+    coefficients = _denominator(order, normal, coupling)
+    z = 1 / _reciprocal_roots(coefficients)
+    z = z[(np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)].astype(complex)
+    poles = circle.to_poles(z)
+    participation = _participation(coefficients, z) * scale
+    participation /= np.linalg.norm(participation, axis=1, keepdims=True)
+    by_frequency = np.argsort(poles.imag)
+    return PoleSet(order, poles[by_frequency], participation[by_frequency])
+
+
+def _denominator(order: int, normal: np.ndarray, coupling: np.ndarray) -> np.ndarray:
+    """(order + 1, inputs, inputs) coefficients A_r, A₀ = I."""
     inputs = normal.shape[1]
     size = (order + 1) * inputs
     block = normal[: order + 1, :, : order + 1].reshape(size, size)
@@ -117,14 +182,7 @@ def _solve(
     ridge = RIDGE * np.trace(block) / size
     inner = block[inputs:, inputs:] + ridge * np.eye(size - inputs)
     a = -solve(inner, block[inputs:, :inputs], assume_a="sym", check_finite=False)
-    coefficients = np.concatenate([np.eye(inputs)[None], a.reshape(order, inputs, inputs)])
-    z = 1 / _reciprocal_roots(coefficients)
-    z = z[(np.abs(z) < 1) & (np.abs(z) > 1e-6) & (z.imag > 0)].astype(complex)
-    poles = circle.to_poles(z)
-    participation = _participation(coefficients, z) * scale
-    participation /= np.linalg.norm(participation, axis=1, keepdims=True)
-    by_frequency = np.argsort(poles.imag)
-    return PoleSet(order, poles[by_frequency], participation[by_frequency])
+    return np.concatenate([np.eye(inputs)[None], a.reshape(order, inputs, inputs)])
 
 
 def _reciprocal_roots(coefficients: np.ndarray) -> np.ndarray:

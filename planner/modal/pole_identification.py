@@ -58,7 +58,7 @@ def identify(data: Data, max_order: int = MAX_ORDER) -> PoleIdentification | Non
     if start.size == 0:
         return None
     fitted = fit(data, start)
-    modes = _modes(data, fitted, sets)
+    modes = modes_of_fit(data, fitted, sets)
     error = np.linalg.norm(data.response - model(data, fitted.refined))
     relative = float(error / np.linalg.norm(data.response))
     return PoleIdentification(modes, data, found, fitted, relative, top) if modes else None
@@ -74,7 +74,8 @@ def ladder(top: int) -> tuple[int, ...]:
     return tuple(sorted(orders | {top}))
 
 
-def _modes(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Identified, ...]:
+    """The poles of a fit that are established, with standard deviations and probabilities."""
     refined = fitted.refined
     m = refined.poles.size
     scale = scales(data, fitted)
@@ -96,7 +97,7 @@ def _modes(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Iden
         variance = scale[k] * np.mean(refined.residue_variance[..., k], axis=-1)
         variance = variance + np.mean(shared_residue[..., k], axis=-1)
         presence = _presence(data, refined, k)
-        support = _support(pole - data.rate_1_s, sets)
+        supported = support(pole - data.rate_1_s, sets)
         modes.append(
             Identified(
                 pole,
@@ -107,8 +108,8 @@ def _modes(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tuple[Iden
                 residue,
                 np.sqrt(variance),
                 presence,
-                support,
-                _probability(presence, support, float(weak[k])),
+                supported,
+                probability(presence, supported, float(weak[k])),
             )
         )
     return tuple(sorted(modes, key=lambda mode: mode.frequency_hz))
@@ -128,7 +129,7 @@ def natural_slope(pole: complex) -> np.ndarray:
     return np.array([by_frequency, [-(pole.imag**2) / size**3, pole.real * pole.imag / size**3]])
 
 
-def _support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
+def support(pole: complex, sets: tuple[PoleSet, ...]) -> float:
     """Share of the upper half of the orders with a pole within half a bandwidth or 0.5 %."""
     upper = sets[len(sets) // 2 :]
     reach = max(abs(pole.real), 0.005 * abs(pole))
@@ -146,7 +147,7 @@ def _presence(data: Data, refined: Refined, k: int) -> float:
     return float(np.linalg.norm(refined.residues.residue[..., k] * one) / max(whole, 1e-300))
 
 
-def _probability(presence: float, support: float, weak: float) -> float:
+def probability(presence: float, support: float, weak: float) -> float:
     """Logistic in what separates modes from artefacts.
 
     That is: the share of the response that is the mode's, its support in the diagram, and how

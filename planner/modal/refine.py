@@ -73,16 +73,16 @@ def refine(
     weight = 2 / variance.reshape(-1, count)
     poles = np.asarray(poles, complex)
 
-    def evaluate(parts: np.ndarray) -> ReducedFit:
-        return _evaluate(lines, data, weight, _complex(parts), residual_terms)
+    def at(parts: np.ndarray) -> ReducedFit:
+        return evaluate(lines, data, weight, _complex(parts), residual_terms)
 
     def objective(parts: np.ndarray) -> ReducedFit | None:
-        return evaluate(parts) if allowed(_complex(parts)) else None
+        return at(parts) if allowed(_complex(parts)) else None
 
     start = np.concatenate([poles.real, poles.imag])
     found = minimise(
         objective, start, 0.0, max_iterations,
-        longest=np.inf, at=evaluate(start), rule=DAMPING, settled=_settled,
+        longest=np.inf, at=at(start), rule=DAMPING, settled=_settled,
     )  # fmt: skip
     shape = outputs, inputs
     return _finish(lines, _complex(found.x), found.at, shape, count, found.converged)
@@ -133,9 +133,13 @@ def _complex(parts: np.ndarray) -> np.ndarray:
     return real + 1j * imag
 
 
-def _evaluate(
-    lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool
+def evaluate(
+    lines: Lines, data: np.ndarray, weight: np.ndarray, poles: np.ndarray, rest: bool = True
 ) -> ReducedFit:
+    """Residues at their best for poles (m,) of responses (entries, F), and how χ² goes on.
+
+    weight like data: 2/variance; `rest`: with out-of-band terms.
+    """
     m = poles.size
     linear, slope = basis(lines, poles, rest), basis_slope(lines, poles)
     p = linear.shape[0]
@@ -145,7 +149,11 @@ def _evaluate(
     gram, cross, square = products(columns, data, weight)
     size = np.sqrt(np.einsum("ekk->ek", gram))[:, :p]
     scaled = gram[:, :p, :p] / size[:, :, None] / size[:, None, :]
-    inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
+    if proportional(weight):  # entries share one matrix
+        inverse = np.linalg.pinv(scaled[:1], rcond=1e-13, hermitian=True)
+        inverse = np.repeat(inverse, len(scaled), axis=0)
+    else:
+        inverse = np.linalg.pinv(scaled, rcond=1e-13, hermitian=True)
     inverse /= size[:, :, None] * size[:, None, :]
     coefficients = np.einsum("ekl,el->ek", inverse, cross[:, :p])
     chi2 = float(np.sum(square) - np.einsum("ek,ek->", coefficients, cross[:, :p]))
@@ -176,12 +184,18 @@ def products(
     wide = np.concatenate([weight, weight], axis=1)
     values = np.concatenate([data.real, data.imag], axis=1)
     cross = (wide * values) @ both.T
-    common = np.all(weight == weight[:, :1])
-    if common:
-        gram = weight[:, 0, None, None] * (both @ both.T)
+    if proportional(weight):
+        profile = wide[0] / wide[0, 0]
+        gram = weight[:, 0, None, None] * ((both * profile) @ both.T)
     else:
         gram = np.stack([(both * row) @ both.T for row in wide])
     return gram, cross, square
+
+
+def proportional(weight: np.ndarray) -> bool:
+    """Whether the weights (entries, F) are a level for each entry times one profile of lines."""
+    product = weight[:, :1] * (weight[:1] / weight[0, 0])
+    return bool(np.all(np.abs(weight - product) <= 1e-12 * product))
 
 
 def slope_turn(coefficients: np.ndarray, m: int) -> np.ndarray:
@@ -217,13 +231,13 @@ def _finish(
         2 * count * entries - entries * p - 2 * m,
         covariance,
         variance[:, : 2 * m].reshape(*shape, 2, m),
-        _significance(point, m),
+        significance(point, m),
         converged,
         point,
     )
 
 
-def _significance(point: ReducedFit, m: int) -> np.ndarray:
+def significance(point: ReducedFit, m: int) -> np.ndarray:
     """Wald statistic of each mode's residues: 2 · entries degrees of freedom without a mode."""
     index = np.stack([np.arange(m), m + np.arange(m)], axis=1)
     value = point.coefficients[:, index]

@@ -47,7 +47,7 @@ class Lines:
     rest: np.ndarray  # (terms, F) complex
     tail_s: float = np.inf
 
-    def part(self, chosen: slice) -> "Lines":
+    def part(self, chosen: slice | np.ndarray) -> "Lines":
         """Some of the lines."""
         return Lines(self.x[chosen], self.factor[chosen], self.rest[:, chosen], self.tail_s)
 

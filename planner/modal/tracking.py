@@ -228,8 +228,12 @@ class _Belief:
         zeta = np.log([max(mode.damping_ratio, 1e-6) for mode in modes])
         cost += np.nan_to_num((zeta - self.log_damping[:, None]) / DAMPING_SD) ** 2
         shape = np.array([mode.shape for mode in modes])
+        known = np.isfinite(shape).all(axis=1)
+        shape[~known] = 1.0
         shape = shape / np.linalg.norm(shape, axis=1, keepdims=True)
         alike = np.einsum("mi,kij,mj->km", shape.conj(), self.shape[i], shape).real
+        # Of a mode whose shape was not said: as directions without preference are on average.
+        alike = np.where(known, alike, 1 / 3)
         cost += SHAPE_WEIGHT * (1 - alike)
         spurious = np.array([unexpected_cost(mode) for mode in modes])
         return np.where(np.isfinite(cost), MISSING_COST + spurious - cost, -np.inf)

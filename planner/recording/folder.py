@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
@@ -83,10 +84,17 @@ def read_poses(path: Path, joint_names: tuple[str, ...]) -> tuple[PoseRow, ...]:
     return tuple(rows)
 
 
-def files_in(folder: Path) -> list[Path]:
-    """Files of a folder without a table, by name. Raises InputError if there are none."""
-    found = sorted(p for p in folder.iterdir() if p.is_file() and p.name[0] != ".")
-    found = [path for path in found if path.name != TABLE]
+def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
+    """Files of a folder without a table, by name; of its subfolders those with known `suffixes`.
+
+    Raises InputError if there are none.
+    """
+    found = sorted(p for p in folder.rglob("*") if p.is_file())
+    found = [
+        path for path in found
+        if path.name != TABLE and not any(part[0] == "." for part in path.relative_to(folder).parts)
+        and (path.parent == folder or path.suffix.lower() in suffixes)
+    ]  # fmt: skip
     if not found:
         raise InputError(f"{folder} holds no recordings; name a folder that does.")
     return found
@@ -232,7 +240,7 @@ def _file(path: Path, folder: Path, number: int, name: str) -> Path:
         file = (folder / name).resolve()
         inside = file.is_relative_to(folder)
         found = inside and file.is_file()
-    except (OSError, ValueError):
+    except (OSError, ValueError, RuntimeError):  # RuntimeError: links that lead to themselves
         raise InputError(f"{path}, row {number}: {name!r} is no file name; correct it.") from None
     if not inside:
         raise InputError(

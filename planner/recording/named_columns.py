@@ -71,6 +71,11 @@ def _time(path: Path, named: Named) -> TimeRecord:
     if time_name is not None:
         factor = (lookup(named.units.get(time_name, "s")) or ("", "s", 1.0))[2]
         rate_hz = sampling_rate(path, named.columns[time_name] * factor)
+        if rate is not None and not abs(_positive(path, rate) / rate_hz - 1) < UNEVEN:
+            raise InputError(
+                f"{path} states a sampling rate of {rate} Hz, its time column one of "
+                f"{rate_hz:.6g} Hz; correct the one that is wrong."
+            )
     elif rate is not None:
         rate_hz = _positive(path, rate)
     else:
@@ -137,9 +142,10 @@ def _channel(name: str, values: np.ndarray, named: Named) -> Channel:
 
 
 def _unit_of_name(name: str) -> str:
-    bracket = re.search(r"[(\[]([^)\]]+)[)\]]\s*$", name)
-    if bracket:
-        return bracket[1]
+    plain = name.rstrip()
+    opened = max(plain.rfind("("), plain.rfind("["))
+    if opened >= 0 and plain.endswith((")", "]")):
+        return plain[opened + 1 : -1]
     for suffix in sorted(_SUFFIXES, key=len, reverse=True):
         if name.lower().endswith(f"_{suffix}"):
             return _SUFFIXES[suffix]
@@ -170,6 +176,14 @@ def _frf(path: Path, named: Named) -> FrfRecord:
     lower = {name.lower(): values for name, values in columns.items()}
     if "frequency_hz" not in lower:
         raise InputError(f"{path} holds FRFs but no column frequency_hz; export it too.")
+    lines = len(lower["frequency_hz"])
+    for name, column in columns.items():
+        known = _frf_name(name) or name.lower().startswith("coherence_")
+        if known and len(column) != lines:
+            raise InputError(
+                f"{path}: column {name} has {len(column)} values for {lines} frequencies; "
+                f"export them together."
+            )
     values: dict[tuple[str, tuple[str, str, str, str]], np.ndarray] = {}
     for name, column in columns.items():
         found = _frf_name(name)

@@ -1,56 +1,53 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
-import logging
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.named_columns import Named, to_records
-from planner.recording.records import FrfRecord, Record
+from planner.recording import plausible
+from planner.recording.entries import check_size, columns_of
+from planner.recording.hdf5 import read_hdf5
+from planner.recording.mat5 import is_version_5, read_mat5
+from planner.recording.named_columns import to_records
+from planner.recording.records import FrfRecord, Record, TimeRecord
+from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
 
 MAX_BYTES = 512 * 1024 * 1024
 
 
-def _columns(path: Path, entries: dict[str, object]) -> Named:
-    """Vectors among the entries are columns; single values are attributes."""
-    columns: dict[str, np.ndarray] = {}
-    attributes: dict[str, str] = {}
-    for name, entry in entries.items():
-        value = np.squeeze(np.asarray(entry))
-        if value.ndim == 1 and value.dtype.kind in "fiuc" and value.size > 1:
-            columns[name] = value if value.dtype.kind == "c" else value.astype(float)
-        elif value.ndim == 0:
-            item = value.item()
-            attributes[name] = item.decode() if isinstance(item, bytes) else str(item)
-    if not columns:
-        shapes = ", ".join(f"{n} {np.asarray(e).shape}" for n, e in list(entries.items())[:5])
-        raise InputError(
-            f"{path} holds no named vectors ({shapes or 'nothing'}); name them time_s, force_n, "
-            f"acceleration_x_m_s2 and so on."
-        )
-    return Named(columns, {}, attributes)
-
-
 def read_mat(path: Path) -> tuple[Record, ...]:
     """MATLAB files up to v7; v7.3 is HDF5."""
+    entries = read_mat5(path) if is_version_5(path) else _older(path)
+    if entries is None:
+        return read_hdf5(path)
+    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
+    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
+        return (_logged_spectra(path, visible),)
+    return to_records(path, columns_of(path, visible))
+
+
+def _older(path: Path) -> dict[str, object] | None:
+    """Entries of a file of version 4; None where it is of version 7.3."""
     import scipy.io
 
     try:
-        entries = scipy.io.loadmat(str(path), squeeze_me=True)
+        listed = scipy.io.whosmat(str(path))
+        # Real or complex is not said before it is read.
+        check_size(path, sum(8 * int(np.prod(shape, dtype=float)) for _, shape, _ in listed))
+        return scipy.io.loadmat(str(path))
     except NotImplementedError:
-        return read_hdf5(path)
+        return None
+    except InputError:
+        raise
     except Exception as error:
         raise InputError(
             f"{path} is not a readable MAT file ({type(error).__name__}); export it again."
         ) from None
-    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
-    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
-        return (_logged_spectra(path, visible),)
-    return to_records(path, _columns(path, visible))
 
 
 def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
@@ -59,9 +56,18 @@ def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
     `yspec` (lines, channels) is the half spectrum of `npts` samples at `freq` Hz; `tfun` tells
     that it is a transfer function. The format knows no units, directions or coherence.
     """
-    values = np.atleast_2d(np.asarray(entries["yspec"]).T).astype(complex)
-    samples, rate_hz = (float(np.asarray(entries[name])) for name in ("npts", "freq"))
-    whole = values.shape[1] == int(samples) // 2 + 1 and rate_hz > 0 and np.isfinite(values).all()
+    single = [np.asarray(entries[name]) for name in ("npts", "freq")]
+    spectra = np.atleast_2d(np.squeeze(np.asarray(entries["yspec"])).T)
+    if any(v.size != 1 or v.dtype.kind not in "fiub" for v in single) or (
+        spectra.ndim != 2 or spectra.dtype.kind not in "fiuc"
+    ):
+        raise InputError(
+            f"{path} holds yspec of shape {spectra.shape}, or npts or freq that is not one "
+            f"number; export transfer functions."
+        )
+    values = spectra.astype(complex)
+    samples, rate_hz = (float(v.item()) for v in single)
+    whole = values.shape[1] == samples // 2 + 1 and rate_hz > 0 and np.isfinite(values).all()
     if not (np.all(np.asarray(entries["tfun"]) == 1) and whole):
         raise InputError(
             f"{path} holds spectra of {values.shape[1]} lines that are not the transfer functions "
@@ -79,79 +85,6 @@ def _logged_spectra(path: Path, entries: dict[str, object]) -> FrfRecord:
         np.full(values.shape, np.nan),
         ("The file states no units, directions or coherence.",),
     )
-
-
-def read_hdf5(path: Path) -> tuple[Record, ...]:
-    """HDF5 files with one dataset per channel; attributes of the file and its root count too."""
-    import h5py
-
-    entries: dict[str, object] = {}
-    units: dict[str, str] = {}
-    try:
-        with h5py.File(path, "r") as file:
-            entries.update(file.attrs.items())
-
-            def visit(name: str, item: object) -> None:
-                if isinstance(item, h5py.Dataset):
-                    entries[name.rsplit("/", maxsplit=1)[-1]] = item[()]
-                    if "unit" in item.attrs:
-                        units[name.rsplit("/", maxsplit=1)[-1]] = str(item.attrs["unit"])
-
-            file.visititems(visit)
-    except Exception as error:
-        raise InputError(
-            f"{path} is not a readable HDF5 file ({type(error).__name__}); export it again."
-        ) from None
-    named = _columns(path, entries)
-    return to_records(path, Named(named.columns, units, named.attributes))
-
-
-def read_tdms(path: Path) -> tuple[Record, ...]:
-    """TDMS files; unit and increment as LabVIEW writes them (unit_string, wf_increment)."""
-    from nptdms import TdmsFile
-
-    # The library only warns of a file that is cut off, and then gives what there is.
-    warnings = _Warnings()
-    logger = logging.getLogger("nptdms")
-    logger.addHandler(warnings)
-    for name in list(logging.root.manager.loggerDict):
-        if name.startswith("nptdms"):
-            for handler in logging.getLogger(name).handlers:
-                handler.setLevel(logging.CRITICAL if handler is not warnings else logging.WARNING)
-    columns: dict[str, np.ndarray] = {}
-    units: dict[str, str] = {}
-    try:
-        file = TdmsFile.read(path)
-        attributes = {str(k): str(v) for k, v in file.properties.items()}
-        for group in file.groups():
-            attributes |= {str(k): str(v) for k, v in group.properties.items()}
-            for channel in group.channels():
-                columns[channel.name] = np.asarray(channel[:], dtype=float)
-                if channel.properties.get("unit_string"):
-                    units[channel.name] = str(channel.properties["unit_string"])
-                if channel.properties.get("wf_increment"):
-                    rate = 1 / float(channel.properties["wf_increment"])
-                    attributes.setdefault("sampling_rate_hz", repr(rate))
-    except Exception as error:
-        raise InputError(
-            f"{path} is not a readable TDMS file ({type(error).__name__}); export it again."
-        ) from None
-    finally:
-        logger.removeHandler(warnings)
-    if warnings.texts:
-        raise InputError(f"{path} is cut off ({warnings.texts[0]}); export it again.")
-    return to_records(path, Named(columns, units, attributes))
-
-
-class _Warnings(logging.Handler):
-    """Keeps what a library warns of."""
-
-    def __init__(self) -> None:
-        super().__init__(logging.WARNING)
-        self.texts: list[str] = []
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self.texts.append(record.getMessage())
 
 
 def _read_txt(path: Path) -> tuple[Record, ...]:
@@ -180,17 +113,41 @@ READERS: dict[str, Callable[[Path], tuple[Record, ...]]] = {
 
 def read(path: Path) -> tuple[Record, ...]:
     """All records of a file. Raises InputError with one sentence if it cannot be read right."""
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
+    if path.suffix.lower() not in READERS:
         raise InputError(
             f"{path} has no known format; recordings are {', '.join(READERS)}: export one of these."
         )
     try:
-        size = path.stat().st_size
+        stat = path.stat()
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path.") from None
-    if size == 0:
+    if stat.st_size == 0:
         raise InputError(f"{path} is empty; export it again.")
-    if size > MAX_BYTES:
+    if stat.st_size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-    return reader(path)
+    return _read(path, (stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns))
+
+
+@lru_cache(maxsize=1)  # a file of many hits is read once, not once a hit
+def _read(path: Path, version: tuple[int, ...]) -> tuple[Record, ...]:
+    try:
+        records = READERS[path.suffix.lower()](path)
+    except InputError:
+        raise
+    except (ValueError, TypeError, LookupError, ArithmeticError, MemoryError, OSError) as error:
+        raise InputError(
+            f"{path} cannot be read as {path.suffix} ({type(error).__name__}); export it again."
+        ) from error
+    plausible.check(path, records)
+    return records
+
+
+def hit_count(path: Path) -> int:
+    """How many hits a file holds; 1 where it cannot be read, or holds FRFs."""
+    if READERS.get(path.suffix.lower()) not in (read_uff, _read_txt):
+        return 1  # named columns: a hit a file
+    try:
+        records = read(path)
+    except InputError:
+        return 1
+    return max(1, sum(isinstance(record, TimeRecord) for record in records))

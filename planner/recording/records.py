@@ -50,7 +50,8 @@ class FrfRecord:
     `values[k]` is the response `response_direction[k]` (±1, ±2, ±3; 0 unknown) per unit force in
     `reference_direction[k]`; `quantity` is "accelerance" (m/s²/N), "mobility", "receptance" or
     "unknown"; `unit` the unit of the values. `coherence` is NaN where the file has none.
-    `response_node` and `reference_node` are as in `Channel`; () where the file states none.
+    `response_node` and `reference_node` (k,) name the points, "0" where the file states none;
+    they are empty where the format knows no points. Directions up to ±6 are rotations.
     """
 
     source: Path

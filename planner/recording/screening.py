@@ -1,5 +1,6 @@
 """Screening of hits: what a careful engineer would refuse while standing at the robot."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,15 @@ from planner.recording.records import AXES, Fault, Hit
 # Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
 # the last they are the same. Chosen.
 UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
+# Overload: so improbable is it that equal samples at the top are chance, judged by samples that
+# lie below the top by a share of NEAR at most. A pulse of NARROW samples above its half is so sharp
+# that two are equal in one of 300 at a step of COARSE of its peak.
+BY_CHANCE, NEAR, NARROW, COARSE = 5e-4, 0.1, 6, 2e-3
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
+WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
+LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
+QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer to a hit
+NOTHING = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
 
 
 @dataclass(frozen=True)
@@ -18,10 +27,9 @@ class ScreeningLimits:
     """When a hit is refused. Ratios are of the pulse's peak unless stated."""
 
     band_hz: tuple[float, float] = (4.0, 60.0)
-    clipped_samples: int = 4  # equal to the last digit, at the very top
     second_peak: float = 0.12
     least_snr: float = 8.0  # peak force over noise
-    least_response_snr: float = 4.0
+    least_response_snr: float = 6.0  # of the strongest channel, soon after the pulse
     roll_off_db: float = 20.0  # force spectrum at the band's end, below its top in the band
     least_pretrigger: int = 2  # samples before the pulse
 
@@ -29,9 +37,9 @@ class ScreeningLimits:
 def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]:
     """Faults of one hit by itself; those with `refuse` make it unusable."""
     limits, pulse = limits or ScreeningLimits(), hit.pulse
-    if pulse.peak_n == 0 or not np.any(hit.acceleration_m_s2):
+    if pulse.peak_n < NOTHING or np.max(np.abs(hit.acceleration_m_s2)) < NOTHING:
         return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
-    faults = [*_weak(hit, limits), *_clipping(hit, limits)]
+    faults = [*_short(hit, limits), *_weak(hit, limits), *_clipping(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
     return (
@@ -41,6 +49,20 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
         *_double(hit, limits),
         *_soft(hit, limits),
     )
+
+
+def _short(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
+    low, high = limits.band_hz
+    record_s = len(hit.force_n) / hit.sampling_rate_hz
+    if (high - low) * record_s >= LEAST_LINES:
+        return []
+    return [
+        Fault(
+            "too_short",
+            f"The record of {record_s:.3g} s resolves nothing between {low:g} and {high:g} Hz; "
+            f"record for longer, or correct the unit of the time.",
+        )
+    ]
 
 
 def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
@@ -59,30 +81,84 @@ def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
             faults.append(
                 Fault("dead", f"The acceleration along {name} is constant; check its cable.")
             )
+    ratio = _response_snr(hit)
+    if ratio is not None and ratio < limits.least_response_snr:
+        faults.append(
+            Fault(
+                "too_weak",
+                f"The response is only {ratio:.1f} times the noise before the hit; hit harder.",
+            )
+        )
     return faults
 
 
-def _clipping(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
-    """Overload leaves the top flat: several neighbouring samples equal to the last digit."""
+def _response_snr(hit: Hit) -> float | None:
+    """Rms of the strongest response, soon after the pulse, over the noise before it.
+
+    None where the record holds no such time.
+    """
+    pulse, rate = hit.pulse, hit.sampling_rate_hz
+    after = slice(pulse.first, pulse.first + max(QUIET_SAMPLES, round(ANSWER_S * rate)))
+    if pulse.quiet < QUIET_SAMPLES:
+        return None
+    before = hit.acceleration_m_s2[:, : pulse.quiet]
+    mean = np.mean(before, axis=1, keepdims=True)
+    rounding = np.array([_step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
+    noise = np.hypot(np.std(before, axis=1), rounding)
+    answer = np.sqrt(np.mean((hit.acceleration_m_s2[:, after] - mean) ** 2, axis=1))
+    return float(np.max(answer / np.maximum(noise, NOTHING)))
+
+
+def _clipping(hit: Hit) -> list[Fault]:
+    """Overload leaves the top flat: several samples equal to the last digit."""
     faults = []
     channels = [("force", hit.force_n)]
     channels += [(f"acceleration {hit.label(i)}", s) for i, s in enumerate(hit.acceleration_m_s2)]
     for name, samples in channels:
+        size = samples - np.median(samples)
         for sense in (1.0, -1.0):
-            top = float(np.max(sense * samples))
-            if top <= 0:
-                continue
-            flat = _longest_run(sense * samples >= top * (1 - 1e-6))
-            if flat >= limits.clipped_samples:
+            top = float(np.max(sense * size))
+            equal = sense * size >= top * (1 - 1e-6)
+            # A pulse has one top; a decaying response reaches the same top again and again.
+            flat = _longest_run(equal) if name == "force" else int(np.sum(equal))
+            if not _by_chance(np.maximum(sense * size, 0.0), flat, name == "force"):
+                level = float(samples[int(np.argmax(sense * size))])
                 faults.append(
                     Fault(
                         "clipped",
-                        f"The {name} is clipped at {sense * top:.4g} ({flat} samples); raise the "
+                        f"The {name} is clipped at {level:.4g} ({flat} samples); raise the "
                         f"channel's range or hit more softly.",
                     )
                 )
                 break
     return faults
+
+
+def _by_chance(size: np.ndarray, flat: int, pulse: bool) -> bool:
+    """Whether so many samples of |a channel| may be equal at its top without an overload.
+
+    Stored in steps, samples fall upon the top as upon any other step nearby: as often as by the
+    Poisson distribution. A pulse so narrow has a top so sharp that no two are equal.
+    """
+    top = float(np.max(size))
+    if top <= 0 or flat < 2:
+        return True
+    step = _step(size)
+    if pulse and int(np.sum(size > 0.5 * top)) <= NARROW and step < COARSE * top:
+        return False
+    if step > NEAR * top:
+        return True  # of so few steps nobody could tell
+    near = np.sum((size > (1 - NEAR) * top) & (size < top * (1 - 1e-6)))
+    each = (float(near) + 1) * step / (NEAR * top)
+    # Of the Poisson distribution: each^(flat−1) / (flat−1)!
+    return (flat - 1) * math.log(each) - math.lgamma(flat) > math.log(BY_CHANCE)
+
+
+def _step(samples: np.ndarray) -> float:
+    """The step in which a converter stored samples (n,): least difference of any two."""
+    steps = np.diff(np.unique(samples))
+    steps = steps[steps > 1e-9 * np.max(np.abs(samples))]
+    return float(np.min(steps)) if steps.size else 0.0
 
 
 def _longest_run(mask: np.ndarray) -> int:
@@ -201,9 +277,8 @@ def _screen_alike(
 ) -> tuple[tuple[Fault, ...], ...]:
     """The same of hits at one point that the same sensors heard."""
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    if len({len(hit.force_n) for hit in hits}) > 1:
-        return tuple(faults)
-    frfs = np.array([_frf(hit, band_hz) for hit in hits])
+    shortest = min(len(hit.force_n) for hit in hits)
+    frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
     axes = np.array([hit.axis_index for hit in hits])
     level = _levels(hits)
     centres = {axis: _centre(frfs[axes == axis]) for axis in set(axes.tolist())}
@@ -216,7 +291,8 @@ def _screen_alike(
         alike = np.array([own.of(frf) for frf in frfs[group]])
         typical = float(np.median(alike))
         for i, share in zip(group.tolist(), alike, strict=True):
-            if share > UNLIKE or share > typical - FAR_BELOW:
+            usual = share > UNLIKE or share > typical - FAR_BELOW
+            if usual and not _struck(frfs[i], centre, across):
                 continue
             same = [frfs[j] for j in group if j != i and level[j] == level[i]]
             told = _disagreement(frfs[i], own, across, same)
@@ -230,6 +306,22 @@ def _screen_alike(
                     ),
                 )
     return tuple(faults)
+
+
+def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:
+    """How alike a hit's FRF and those of `others` along its axis are, in size too; 0: none such."""
+    same = [
+        other for other in others
+        if other.axis_index == hit.axis_index and other.sampling_rate_hz == hit.sampling_rate_hz
+        and (other.hit_point, other.responses) == (hit.hit_point, hit.responses)
+    ]  # fmt: skip
+    if not same:
+        return 0.0
+    shortest = min(len(one.force_n) for one in (hit, *same))
+    frf = _frf(hit, shortest, band_hz)
+    centre = _centre(np.array([_frf(other, shortest, band_hz) for other in same]))
+    sizes = np.linalg.norm(frf), np.linalg.norm(centre)
+    return _likeness(frf, centre) * float(min(sizes) / max(*sizes, NOTHING))
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,6 +369,16 @@ def _disagreement(
     return "incoherent", "does not agree with the others of its axis"
 
 
+def _struck(frf: np.ndarray, own: np.ndarray, across: dict[int, np.ndarray]) -> bool:
+    """Whether an FRF is that of another axis in size too: no tilt brings in so much of it."""
+    plain = _likeness(frf, own)
+    return any(
+        abs(_likeness(frf, other)) > max(LIKE, plain + FAR_BELOW)
+        and abs(np.vdot(other, frf)) > WHOLE * np.linalg.norm(other) ** 2
+        for other in across.values()
+    )
+
+
 def _levels(hits: tuple[Hit, ...]) -> np.ndarray:
     """Which force level each hit belongs to."""
     groups = levels(np.sort([peak_n(hit) for hit in hits]))
@@ -288,12 +390,14 @@ def _centre(frfs: np.ndarray) -> np.ndarray:
     return np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
 
 
-def _frf(hit: Hit, band_hz: tuple[float, float]) -> np.ndarray:
-    frequency = np.fft.rfftfreq(len(hit.force_n), 1 / hit.sampling_rate_hz)
+def _frf(hit: Hit, samples: int, band_hz: tuple[float, float]) -> np.ndarray:
+    """FRF (3·F,) of a hit's first samples over the band's lines."""
+    frequency = np.fft.rfftfreq(samples, 1 / hit.sampling_rate_hz)
     inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    force = np.fft.rfft(hit.sign * (hit.force_n - np.median(hit.force_n)))[inside]
+    force = hit.sign * (hit.force_n - np.median(hit.force_n))
+    force = np.fft.rfft(force[:samples])[inside]
     mean = np.median(hit.acceleration_m_s2, axis=1, keepdims=True)
-    response = np.fft.rfft(hit.acceleration_m_s2 - mean, axis=1)[:, inside]
+    response = np.fft.rfft((hit.acceleration_m_s2 - mean)[:, :samples], axis=1)[:, inside]
     floor = 1e-3 * np.max(np.abs(force))
     return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
 

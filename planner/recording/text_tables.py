@@ -2,6 +2,7 @@
 
 import gzip
 import re
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,11 @@ from planner.recording.records import Record
 MAX_BYTES = 256 * 1024 * 1024
 LABELS = ("ch no.", "ch no", "channel", "name")  # head a row of names
 LEAST_ROWS = 8
+MOST_HEADER_LINES, MOST_HEADER_TEXT = (
+    10_000,
+    2000,
+)  # lines, and characters of one that are looked at
+SEPARATORS = re.compile(r"[=:,;\t]")  # between a key and its value
 
 
 def read_text(path: Path) -> tuple[Record, ...]:
@@ -28,7 +34,7 @@ def _decode(path: Path) -> str:
         else:
             with open(path, "rb") as file:
                 data = file.read(MAX_BYTES + 1)
-    except (OSError, EOFError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"{path} cannot be read ({error}); export it again.") from None
     if len(data) > MAX_BYTES:
         raise InputError(f"{path} holds more than {MAX_BYTES >> 20} MiB of text; split it.")
@@ -87,7 +93,7 @@ def _delimiter(path: Path, lines: list[str]) -> str:
 
 def _block_start(path: Path, lines: list[str], delimiter: str) -> int:
     run = 0
-    for i, line in enumerate(lines):
+    for i, line in enumerate(lines[:MOST_HEADER_LINES]):
         cells = _split(line, delimiter)
         if cells and _is_number(cells[0]) and (len(cells) < 2 or _is_number(cells[1])):
             run += 1
@@ -136,14 +142,26 @@ def _header(
             names = row
         elif full and names and len(set(row)) <= len(set(names)) and not any(units):
             units = row
-        pair = re.match(r"\s*#?\s*\"?([\w .()/-]+?)\"?\s*[=:,;\t]\s*\"?([^,;\t\"]+)", line)
+        pair = _pair(line[:MOST_HEADER_TEXT])
         if pair:
-            attributes.setdefault(_key(pair[1]), pair[2].strip())
+            attributes.setdefault(_key(pair[0]), pair[1])
     if not names:
         names = [f"column_{i + 1}" for i in range(width)]
     elif names[0].lower() in LABELS:
         names = ["time_s", *names[1:]]
     return _distinct(names), units, attributes
+
+
+def _pair(line: str) -> tuple[str, str] | None:
+    """Key and value of a header line such as `# hit = "+x"`; None where it is none."""
+    found = SEPARATORS.search(line)
+    if found is None:
+        return None
+    key = line[: found.start()].strip().removeprefix("#").strip().strip('"').strip()
+    value = line[found.end() :].strip().removeprefix('"')
+    value = re.split(r'[,;\t"]', value, maxsplit=1)[0].strip()
+    usable = value and re.fullmatch(r"[\w .()/-]+", key)
+    return (key, value) if usable else None
 
 
 def _is_pair(cells: list[str]) -> bool:

@@ -39,8 +39,7 @@ def read_uff(path: Path) -> tuple[Record, ...]:
         )
     _check_numbers(path, times + frfs)
     records: list[Record] = []
-    if times:
-        records.append(_time_record(path, times))
+    records += [_time_record(path, hit) for hit in _by_hit(times)]
     if frfs:
         coherences = [s for s in sets if s["func_type"] == 6]
         records.append(_frf_record(path, frfs, coherences))
@@ -109,6 +108,23 @@ def _unit(path: Path, s: dict[str, Any]) -> tuple[str, str, float]:
     return known
 
 
+def _by_hit(sets: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Time histories hit by hit, where a file holds a whole run of them.
+
+    The n-th force and the n-th history of each response are the n-th hit; where they are not
+    equally many, nothing says which belong together, and all stay one record.
+    """
+    each: dict[tuple, list[dict[str, Any]]] = {}
+    for s in sets:
+        force = _QUANTITY.get(int(s["ordinate_spec_data_type"])) == "force"
+        response = int(s["rsp_node"]), int(s["rsp_dir"])
+        each.setdefault(("force",) if force else response, []).append(s)
+    counts = {len(of_one) for of_one in each.values()}
+    if ("force",) not in each or len(counts) != 1:
+        return [sets] if sets else []
+    return [list(hit) for hit in zip(*each.values(), strict=True)]
+
+
 def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
     grids = {(round(float(s["abscissa_min"]), 9), _rate(path, s), len(s["data"])) for s in sets}
     rates = {round(g[1], 6) for g in grids}
@@ -150,14 +166,14 @@ def _frf_record(
 ) -> FrfRecord:
     frequency = np.asarray(sets[0]["x"], dtype=float)
     values, coherence, kinds = [], [], set()
-    found = {_places(c): c for c in coherences}
+    found = {_place(c): c for c in coherences}
     for s in sets:
         if len(s["x"]) != len(frequency) or not np.allclose(s["x"], frequency):
             raise InputError(f"{path} mixes FRFs over different frequency lines; export one grid.")
         quantity, unit, factor = _unit_of_ratio(s)
         kinds.add((quantity, unit))
         values.append(np.asarray(s["data"], dtype=complex) * factor)
-        match = found.get(_places(s))
+        match = found.get(_place(s))
         same = match is not None and len(match["data"]) == len(frequency)
         coherence.append(
             np.real(match["data"]) if match and same else np.full(len(frequency), np.nan)
@@ -177,15 +193,23 @@ def _frf_record(
         np.array(coherence),
         remarks,
         _simulated(sets),
-        tuple(str(int(s["rsp_node"])) for s in sets),
-        tuple(str(int(s["ref_node"])) for s in sets),
+        _nodes(sets, "rsp"),
+        _nodes(sets, "ref"),
     )
 
 
-def _places(s: dict[str, Any]) -> tuple[int, int, int, int]:
-    """Nodes and directions of response and reference."""
-    rsp, ref = (int(s["rsp_node"]), int(s["rsp_dir"])), (int(s["ref_node"]), int(s["ref_dir"]))
-    return *rsp, *ref
+def _place(s: dict[str, Any]) -> tuple[int, ...]:
+    """Where it was felt and hit: nodes and directions."""
+    return tuple(int(s[f"{end}_{what}"]) for end in ("rsp", "ref") for what in ("node", "dir"))
+
+
+def _nodes(sets: list[dict[str, Any]], end: str) -> tuple[str, ...]:
+    """Names of the nodes at one end ("rsp", "ref"): numbers, else the entities' names."""
+    numbers = [str(int(s[f"{end}_node"])) for s in sets]
+    if any(number != "0" for number in numbers):
+        return tuple(numbers)
+    names = [str(s[f"{end}_ent_name"]).strip() for s in sets]
+    return tuple("0" if name.upper() in ("", "NONE", "NULL") else name for name in names)
 
 
 def _unit_of_ratio(s: dict[str, Any]) -> tuple[str, str, float]:

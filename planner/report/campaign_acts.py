@@ -4,16 +4,19 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from rich.markup import escape
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
+from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 
 
 @dataclass(frozen=True)
 class NewCampaign(Answer):
-    """Answer of `new`: `campaign` is the folder, `modes` how many of them are modelled."""
+    """Answer of `new`: `campaign` is the folder, `modes` how many of them are modelled.
+
+    `findings` are what a check of the robot warns of.
+    """
 
     campaign: str
     robot: str
@@ -21,23 +24,48 @@ class NewCampaign(Answer):
     modes: int
     acquisition: str
     remarks: tuple[str, ...]
+    findings: tuple[CheckRemark, ...] = ()
 
     @classmethod
     def of(cls, campaign: Campaign) -> "NewCampaign":
         """Of a campaign that was just started."""
-        config, robot = campaign.cell.config, campaign.cell.robot
+        cell = campaign.cell
+        config, robot, said = cell.config, cell.robot, tuple(cell.remarks)
+        warned = (r for r in cell.examined.remarks if r.severity == "warning")
         return cls(
             str(campaign.directory), robot.name, tuple(robot.joint_names), config.modes.count,
-            config.acquisition.name, tuple(campaign.cell.remarks),
+            config.acquisition.name, said, tuple(r for r in warned if r.what not in said),
         )  # fmt: skip
 
     def text(self) -> str:
         """What was started, and how it goes on."""
-        remarks = "".join(f"{escape(remark)}\n" for remark in self.remarks)
+        warned = (f"Check: {finding.sentence}" for finding in self.findings)
+        remarks = "".join(f"{remark}\n" for remark in (*self.remarks, *warned))
         return (
-            f"Campaign in {escape(self.campaign)}: robot {escape(self.robot)}, "
+            f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"
-            f"{remarks}Next: planner next {escape(self.campaign)}"
+            f"{remarks}Next: planner next {self.campaign}"
+        )
+
+
+@dataclass(frozen=True)
+class ExampleFolder(Answer):
+    """Answer of `new --example`: the folder, and the files in it to begin with."""
+
+    example: str
+    robot: str
+    campaign: str
+    files: tuple[str, ...]
+
+    def text(self) -> str:
+        """What to do with it."""
+        toml, folder = self.robot, self.example
+        return (
+            f"An example of one's own to change is in {folder}: robot/robot.toml, "
+            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script.\n"
+            f"  planner check {toml}\n"
+            f"  planner new {folder}/cell --robot {toml} --campaign {self.campaign}\n"
+            f"  planner next {folder}/cell"
         )
 
 
@@ -67,7 +95,7 @@ class WithdrawnPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {escape(self.withdrawn)} is set aside; its recordings are kept."
+        return f"Pose {self.withdrawn} is set aside; its recordings are kept."
 
 
 @dataclass(frozen=True)
@@ -79,7 +107,7 @@ class SkippedPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        return f"Pose {escape(self.skipped)} will not be offered again."
+        return f"Pose {self.skipped} will not be offered again."
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,4 +120,4 @@ class ConfirmedPose(Answer):
     def text(self) -> str:
         """One sentence."""
         sd = ", ".join(f"{v:.1f} %" for v in self.frequency_sd_percent)
-        return f"The hits of pose {escape(self.confirmed)} are used; sd of frequencies: {sd}."
+        return f"The hits of pose {self.confirmed} are used; sd of frequencies: {sd}."

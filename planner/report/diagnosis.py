@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -12,7 +12,7 @@ from rich.text import Text
 from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
+from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from planner.diagnosis.verdict import Ranked
 
 SHOWN = 6  # candidates in the table
+LEAST_SAID = 1e-3  # of a probability in the table
 VERDICTS = {
     "consistent": "The simulation explains the recordings once its own parameters are refitted.",
     "explained": "The simulation lacks something, and this explains the recordings:",
@@ -155,21 +156,25 @@ class DiagnosisReport(Answer):
         found, robot = self.diagnosis, self.diagnosis.problem.simulation.robot
         parts = found.best.effect.parts()
         places = {(e.name, e.at or None) for e in parts}
-        share = sum(c.probability for c in found.candidates if set(c.places) == places)
+        # As the answer has it, so that file and table agree.
+        said = [(c, {(e.effect, e.at) for e in c.effects}) for c in self.candidates]
+        share = sum(c.probability for c, its in said if its == (places or {("none", None)}))
         path = write_explained(folder, robot, found, Candidate(parts, share, found.best))
         mark = SIMULATED_TITLE if self.simulated else ""
         figures = diagnosis_figures(found, self.explained.recorded.poses, mark)
         plots = Pictures(folder).write(figures, robot.name)["plots"]
-        return replace(self, robot=str(path), plots=plots)
+        written = replace(self, robot=str(path), plots=plots)
+        (folder / "diagnosis.json").write_bytes(encoded(written))  # for planner report
+        return written
 
     def text(self) -> Group:
         """Verdict, findings, where, candidates, agreement, and the hit that would tell more."""
-        parts: list[RenderableType] = [Text(VERDICTS[self.verdict], style="bold")]
+        parts: list[RenderableType] = [Text(self.verdict_text, style="bold")]
         parts += [Text(f"  {finding.text}") for finding in self.findings]
         parts.append(Text(self.where.sentence))
         made = table("What was considered", "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
-            made.add_row(c.effect.replace("_", " "), c.at or "–", f"{100 * c.probability:.1f} %")
+            made.add_row(c.effect.replace("_", " "), c.at or "–", _percent(c.probability))
         parts += [made, self._agreement(), Text(self.shares.sentence)]
         if self.next:
             parts.append(Text(self.next.sentence, style="bold"))
@@ -178,6 +183,26 @@ class DiagnosisReport(Answer):
         parts += [Text(f"{what}: {path}") for what, path in files if path]
         parts += drawn(self.plots)
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+    def to_json(self) -> dict[str, Any]:
+        """With the verdict in words."""
+        return super().to_json() | {"verdict_text": self.verdict_text}
+
+    @property
+    def verdict_text(self) -> str:
+        """The verdict in words; where nothing describes it all, what comes nearest too."""
+        known = [c for c in self.candidates if c.effect not in (UNKNOWN, "none")]
+        first = self.candidates[0] if self.candidates else None
+        if self.verdict != "unexplained" or not known or first is None:
+            return VERDICTS[self.verdict]
+        near = in_words([(e.effect, e.at) for e in known[0].effects], known[0].probability)
+        agrees = self.fit.explained.frac
+        return (
+            f"With {100 * first.probability:.0f} % probability something is there that no effect "
+            f"of the library describes to within the noise. Of what it has, {near} comes nearest; "
+            f"the best fit has FRAC {agrees:.4f}. Most of the mismatch may be that, with something "
+            f"else beside it."
+        )
 
     def _agreement(self) -> RenderableType:
         made = table(
@@ -239,6 +264,10 @@ def alternatives(candidates: Sequence["Ranked"]) -> tuple[tuple[EffectAtPlace, .
         if instead and place[0] not in ("none", UNKNOWN):
             out.append(tuple(EffectAtPlace(*one) for one in (place, *instead)))
     return tuple(out)
+
+
+def _percent(probability: float) -> str:
+    return f"{100 * probability:.1f} %" if probability >= LEAST_SAID else "below 0.1 %"
 
 
 def _of_fits(found: "Diagnosis") -> tuple[EstablishedEffect, ...]:

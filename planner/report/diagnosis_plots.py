@@ -5,6 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from planner.diagnosis.effects.effect import Effect
@@ -15,7 +17,9 @@ from planner.diagnosis.residual_location import Where, where
 from planner.recording.points import TOOL
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
+from planner.report.plot_text import plain_text
 
+LEAST, DARK, MOST_SHOWN = 0.1, 50.0, 1000.0  # residuals: of the scale; from which text is white
 MOST = 4  # poses whose FRFs are shown, those that differed most
 SIDES = (
     ("as given", "tab:blue", ":"),
@@ -42,8 +46,9 @@ def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") ->
         for (side, _, _), h in zip(SIDES, sides, strict=True):
             title = f"{mark}Map of H {axis}{axis}, simulation {side}"
             figures[f"map_{axis}{axis}_{side.replace(' ', '_')}"] = frf_map(
-                number, measured[:, i, i], h[:, i, i], lines[0], "pose, in recorded order", title
-            )
+                number, measured[:, i, i], h[:, i, i], lines[0], "pose, in recorded order", title,
+                names=names,
+            )  # fmt: skip
     for k in np.argsort(-before.by_pose)[:MOST].tolist():
         name = re.sub(r"[^\w.-]", "_", str(names[k]))
         curves = [h[k] for h in sides]
@@ -75,7 +80,7 @@ def _overlay(
         panel.grid(True, which="both", alpha=0.25)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
     panels[-1].set_xlabel("frequency (Hz)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(plain_text(title), fontsize=10)
     return figure
 
 
@@ -95,14 +100,18 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
         panel.set_xlabel(what)
         panel.set_ylabel("mean square residual (1: noise)", fontsize=8)
         panel.legend()
-    poses.set_xticks(np.arange(len(names)), names, rotation=60, fontsize=7)
+    poses.set_xticks(np.arange(len(names)), [plain_text(n) for n in names], rotation=60, fontsize=7)
+    scale, image = LogNorm(LEAST, MOST_SHOWN), ScalarMappable()
     for panel, place, label in ((left, before, "refitted"), (right, after, "explained")):
-        panel.imshow(np.log10(np.maximum(place.by_direction, 0.1)), cmap="magma", vmin=-1, vmax=3)
-        for i in range(3):
-            for j in range(3):
-                panel.text(j, i, f"{place.by_direction[i, j]:.2g}", ha="center", color="tab:cyan")
+        image = panel.imshow(np.maximum(place.by_direction, LEAST), cmap="Reds", norm=scale)
+        for i, j in np.ndindex(3, 3):
+            value = place.by_direction[i, j]
+            colour = "white" if value > DARK else "black"
+            panel.text(j, i, f"{value:.3g}", ha="center", va="center", color=colour)
         panel.set_xticks(range(3), [f"hit {a}" for a in AXES])
         panel.set_yticks(range(3), [f"response {a}" for a in AXES])
         panel.set_title(f"by direction, {label}", fontsize=9)
+    # One scale for both, so that what an explanation takes away is seen.
+    figure.colorbar(image, ax=[left, right], label="mean square residual (1: noise)", shrink=0.9)
     figure.suptitle(f"{mark}Residuals in units of the noise's variance", fontsize=10)
     return figure

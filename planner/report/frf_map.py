@@ -1,12 +1,17 @@
 """FRF map of a path: magnitude over frequency and pose (Birk et al. 2025, section 2.5)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
+from planner.report.plot_text import plain_text
+
 FAINTEST_DB = 50.0  # below the strongest resonance; what is fainter is drawn alike
+MOST_NAMES = 40  # of poses that fit beside each other at an axis
 DIFFERENCE_DB = 20.0  # a factor of ten saturates the colours of the difference
 
 
@@ -18,12 +23,14 @@ def frf_map(
     pose_label: str = "pose",
     title: str = "",
     log_frequency: bool = False,
+    names: Sequence[str] = (),
 ) -> Figure:
     """One FRF along a path: panels measured, simulated, and simulated − measured, in dB.
 
     pose_axis (n,) is where on the path a pose is (number, angle, length; any order); measured and
     simulated (n, F), complex or magnitudes, in m/s²/N, on frequency_hz (F,). One of the two may be
-    None: then the other is the only panel. NaN stays blank. Raises ValueError if shapes disagree.
+    None: then the other is the only panel. NaN stays blank. `names` (n,) of the poses stand at the
+    axis instead of numbers. Raises ValueError if shapes disagree.
     """
     shape = len(pose_axis), len(frequency_hz)
     order = np.argsort(pose_axis, kind="stable")
@@ -45,8 +52,12 @@ def frf_map(
     for panel in panels:
         panel.set_xlabel(pose_label)
         panel.set_yscale("log" if log_frequency else "linear")
+        if len(names):
+            every = -(-len(names) // MOST_NAMES)
+            shown = [plain_text(name) for name in names][::every]
+            panel.set_xticks(np.asarray(pose_axis)[::every], shown, rotation=90, fontsize=7)
     panels[0].set_ylabel("frequency (Hz)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(plain_text(title), fontsize=10)
     return figure
 
 

@@ -8,6 +8,8 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from planner.report.plot_text import plain_text
+
 AXES = ("x", "y", "z")
 MEASURED, MODEL = "black", "tab:red"
 
@@ -47,7 +49,7 @@ def frf_figure(
         panel.grid(True, which="both", alpha=0.25)
     panels[0].legend(fontsize=8, loc="upper left")
     panels[-1].set_xlabel("frequency (Hz)")
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(plain_text(title), fontsize=10)
     return figure
 
 

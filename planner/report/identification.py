@@ -158,11 +158,11 @@ class IdentificationReport(Answer):
         low, high = self.band_hz
         made = table(
             f"Elastic parameters from {len(self.misfit_by_pose)} poses, {low:g} to {high:g} Hz",
-            *("joint and axis", "stiffness (N·m/rad)", "told", "damping (N·m·s/rad)", "told"),
+            *("joint and axis", "stiffness (N·m/rad)", "known", "damping (N·m·s/rad)", "known"),
         )
         for spring in self.parameters:
             made.add_row(*spring.cells)
-        parts: list[RenderableType] = [made, Text("  told: identified by the data.")]
+        parts: list[RenderableType] = [made, Text("  known: identified by the recordings.")]
         if self.undetermined:
             parts.append(Text("What these recordings cannot tell:"))
             parts += [Text(f"  {text}") for text in self.undetermined]

@@ -12,6 +12,7 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
+from planner.report.plot_text import plain_text
 
 BEFORE, AFTER = ("tab:blue", "--"), ("tab:red", "-")
 
@@ -54,6 +55,7 @@ def identification_figures(
                 lines,
                 "pose, in recorded order",
                 f"{mark}Map of H {axis}{axis}, {when} identification",
+                names=[pose.name for pose in poses],
             )
     for pose in sorted(poses, key=lambda pose: not pose.held_out)[:most]:
         name = re.sub(r"[^\w.-]", "_", pose.name)
@@ -83,7 +85,7 @@ def direct_figure(
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     panels[-1].set_xlabel("frequency (Hz)")
     role = "held out: identified without it" if pose.held_out else "used"
-    figure.suptitle(f"{mark}Pose {pose.name} ({role})", fontsize=10)
+    figure.suptitle(f"{mark}Pose {plain_text(pose.name)} ({role})", fontsize=10)
     return figure
 
 

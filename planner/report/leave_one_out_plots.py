@@ -6,6 +6,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.stats import binom
 
+from planner.report.plot_text import plain_text
 from planner.surrogate.leave_one_out import LeaveOneOut
 
 SHARES = np.linspace(0.02, 0.98, 49)
@@ -17,7 +18,7 @@ def left_out_figure(found: LeaveOneOut, poses: tuple[str, ...], title: str = "")
     """Coverage against nominal level (left), errors by pose in what was expected (right)."""
     figure = Figure(figsize=(11.0, 4.8), layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(plain_text(title), fontsize=11)
     left, right = figure.subplots(1, 2, width_ratios=(1, 1.8))
     _coverage(left, found)
     _errors(right, found, poses)
@@ -52,10 +53,15 @@ def _errors(panel: Axes, found: LeaveOneOut, poses: tuple[str, ...]) -> None:
     for i in found.worst(NAMED).tolist():
         k = int(np.nanargmax(np.abs(score[i]))) if np.isfinite(score[i]).any() else 0
         if abs(score[i, k]) > 1.96:
-            text = f"{poses[i]}, mode {k + 1}: {100 * found.error[i, k]:+.1f} %"
+            text = f"{plain_text(poses[i])}, mode {k + 1}: {100 * found.error[i, k]:+.1f} %"
             panel.annotate(text, (i, score[i, k]), xytext=(4, 4), textcoords="offset points",
                            fontsize=8)  # fmt: skip
-    panel.set_xticks(place, poses, rotation=90, fontsize=7 if len(poses) < 40 else 5)
+    panel.set_xticks(
+        place,
+        [plain_text(pose) for pose in poses],
+        rotation=90,
+        fontsize=7 if len(poses) < 40 else 5,
+    )
     panel.set_ylabel("measured − predicted frequency, in expected sds")
     panel.margins(x=0.02, y=0.12)
     panel.legend(fontsize=8, ncols=min(score.shape[1], 4))

@@ -20,6 +20,7 @@ from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
 from planner.recording.folder import files_in
+from planner.recording.read import READERS
 from planner.recording.records import FrfRecord
 from planner.report.answer import Answer, RefusedFile
 from planner.report.plot_files import Pictures
@@ -186,7 +187,7 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
     found: list[Path] = []
     for path in paths:
         if path.is_dir():
-            found += files_in(path)
+            found += files_in(path, READERS)
         elif path.is_file():
             found.append(path)
         else:

@@ -11,8 +11,11 @@ from matplotlib.ticker import MaxNLocator
 
 from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
+from planner.modal.matrix_modes import MatrixModes
+from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
+from planner.modal.operating import OperatingModes
 from planner.modal.pole_identification import PoleIdentification
 from planner.modal.stabilisation import stable
 from planner.report.frf_plots import AXES, MEASURED, MODEL
@@ -26,6 +29,7 @@ from planner.report.plot_marks import (
     number_modes,
     panels,
 )
+from planner.report.plot_text import plain_text
 
 SINGULAR = ("black", "0.4", "0.65")
 STABLE = {"marker": "o", "color": "tab:green", "ms": 3.5, "ls": ""}
@@ -54,17 +58,23 @@ def modal_figures(
 
 
 def stabilisation_figure(
-    found: PoleIdentification, modal: ModalModel, title: str = "", scaled: bool = True
+    found: PoleIdentification | MatrixPoles,
+    modal: ModalModel | MatrixModes,
+    title: str = "",
+    scaled: bool = True,
+    singular: np.ndarray | None = None,
 ) -> Figure:
     """Poles of all model orders (right axis) over the singular values of the responses (left).
 
     The singular values of the FRF matrix over frequency are the complex mode indicator function
     (CMIF; Shih et al., Mech. Syst. Signal Process. 2, 1988). `scaled` is False where the
-    responses are spectra of free decays, whose size means nothing.
+    responses are spectra of free decays, whose size means nothing, or not in SI units. `singular`
+    (k, F), decreasing, where it is known already.
     """
     figure, grid = panels((12.0, 7.0 if len(modal.modes) <= COLUMNS else 10.0), title)
     panel, data = grid[0, 0], found.data
-    singular = np.linalg.svd(np.moveaxis(data.response, -1, 0), compute_uv=False).T
+    if singular is None:
+        singular = np.linalg.svd(np.moveaxis(data.response, -1, 0), compute_uv=False).T
     for k, values in enumerate(singular):
         colour = SINGULAR[min(k, len(SINGULAR) - 1)]
         panel.semilogy(data.frequency_hz, values, color=colour, lw=1.1, label=f"CMIF {k + 1}")
@@ -81,8 +91,15 @@ def stabilisation_figure(
     orders.set_ylabel("model order")
     orders.yaxis.set_major_locator(MaxNLocator(integer=True))
     label_modes(panel, modal)
-    handles = [*panel.get_lines()[: len(singular)], *orders.get_lines()]
+    handles: list[Any] = [*panel.get_lines()[: len(singular)], *orders.get_lines()]
     handles.append(Line2D([], [], color=MODE, label="mode"))
+    for beyond in (
+        (panel.get_xlim()[0], modal.band_hz[0]),
+        (modal.band_hz[1], panel.get_xlim()[1]),
+    ):
+        if beyond[0] < beyond[1]:
+            panel.axvspan(*beyond, color="0.92", lw=0, zorder=0)
+    handles.append(Patch(color="0.92", label="outside the band"))
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
     return figure
 
@@ -104,7 +121,7 @@ def cmif_figure(
     return figure
 
 
-def _poles(found: PoleIdentification) -> tuple[np.ndarray, np.ndarray]:
+def _poles(found: PoleIdentification | MatrixPoles) -> tuple[np.ndarray, np.ndarray]:
     """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others."""
     lines = stable(found.diagram)
     kept = {(int(o), complex(p)) for x in lines for o, p in zip(x.orders, x.poles, strict=True)}
@@ -134,7 +151,7 @@ def matrix_figure(
         size, phase = grid[2 * i, k], grid[2 * i + 1, k]
         h, sd = frf.accelerance[i, columns[k]], np.sqrt(frf.variance[i, columns[k]] / 2)
         for panel in (size, phase):
-            mark_band(panel, frf)
+            mark_band(panel, frf, i, columns[k])
         _magnitude(size, frf, h, sd)
         _phase(phase, frf.frequency_hz, h, sd)
         size.plot(found.data.frequency_hz, np.abs(fitted[i, k]), **FITTED)
@@ -203,7 +220,7 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     figure, grid = panels((13.0, 7.5), title, 3, len(columns))
     for i, k in np.ndindex(3, len(columns)):
         panel, values = grid[i, k], frf.coherence[i, columns[k]]
-        mark_band(panel, frf)
+        mark_band(panel, frf, i, columns[k])
         if np.any(np.isfinite(values)):
             panel.plot(frf.frequency_hz, values, color=MEASURED, lw=1.0)
         else:
@@ -220,7 +237,7 @@ def coherence_figure(frf: Frf, modal: ModalModel, title: str = "") -> Figure:
     return figure
 
 
-def mac_figure(modal: ModalModel, title: str = "") -> Figure:
+def mac_figure(modal: ModalModel | MatrixModes | OperatingModes, title: str = "") -> Figure:
     """AutoMAC of the shapes, with its values in the cells."""
     count = len(modal.modes)
     side = float(np.clip(0.6 * count, 4.0, 14.0))
@@ -268,7 +285,7 @@ def frequency_figure(
         style = {"color": colour, "lw": 1.4, "marker": "o", "ms": 4, "capsize": 3}
         panel.errorbar(x[order], frequency_hz[order, k], error, **style)
     if named:
-        panel.set_xticks(x, place, rotation=90 if len(place) > 12 else 0)
+        panel.set_xticks(x, [plain_text(p) for p in place], rotation=90 if len(place) > 12 else 0)
     panel.set_xlabel(axis)
     panel.set_ylabel("natural frequency (Hz)")
     panel.grid(True, alpha=0.25)

@@ -9,9 +9,13 @@ from matplotlib.figure import Figure
 from scipy.optimize import isotonic_regression
 
 from planner.frf.frf import Frf
+from planner.modal.matrix_modes import MatrixModes
 from planner.modal.modes import ModalModel
+from planner.modal.operating import OperatingModes
+from planner.report.plot_text import plain_text
 
 MODE, USABLE = "tab:blue", "tab:green"
+COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines) an FRF is shaded
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
 
@@ -21,7 +25,7 @@ def panels(
     """A figure (size in inches) with panels (rows, columns) that share the frequency axis."""
     figure = Figure(figsize=size, layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(plain_text(title), fontsize=11)
     return figure, figure.subplots(rows, columns, sharex=True, squeeze=False, **layout)
 
 
@@ -46,7 +50,7 @@ def with_sd(value: float, sd: float) -> str:
     return f"{value:.{decimals}f} ± {small}"
 
 
-def label_modes(panel: Axes, modal: ModalModel) -> None:
+def label_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -> None:
     """Modes as vertical lines, with frequency, damping and probability above the panel."""
     upright = len(modal.modes) > COLUMNS
     low, high = panel.get_xlim()
@@ -75,7 +79,7 @@ def label_modes(panel: Axes, modal: ModalModel) -> None:
         )
 
 
-def number_modes(panel: Axes, modal: ModalModel) -> None:
+def number_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) -> None:
     """Modes as thin vertical lines, with their numbers inside at the top."""
     low, high = panel.get_xlim()
     frequency = np.array([mode.frequency_hz for mode in modal.modes])
@@ -89,12 +93,38 @@ def number_modes(panel: Axes, modal: ModalModel) -> None:
         )  # fmt: skip
 
 
-def mark_band(panel: Axes, frf: Frf) -> None:
-    """The whole frequency axis of the FRF, its usable band shaded."""
+def mark_band(panel: Axes, frf: Frf, response: int, hit: int) -> None:
+    """The whole frequency axis of an FRF; shaded where it can be used.
+
+    That is the FRF matrix' usable band, from where this FRF's coherence first holds.
+    """
     panel.set_xlim(0, frf.frequency_hz[-1])
-    panel.axvspan(*frf.usable_band_hz, color=USABLE, alpha=0.08, lw=0)
+    low, high = frf.usable_band_hz
+    begins = _trusted_from(frf, response, hit, low, high)
+    if begins is not None:
+        panel.axvspan(begins, high, color=USABLE, alpha=0.08, lw=0)
     panel.grid(True, alpha=0.25)
     panel.tick_params(labelsize=8)
+
+
+def _trusted_from(frf: Frf, response: int, hit: int, low: float, high: float) -> float | None:
+    """The first line (Hz) around which an FRF is coherent; None where it never is.
+
+    Where a single hit tells no coherence, the share of the signal in |H|² stands for it.
+    """
+    inside = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
+    coherence = frf.coherence[response, hit, inside]
+    if not np.any(np.isfinite(coherence)):
+        power = np.abs(frf.accelerance[response, hit, inside]) ** 2
+        coherence = power / (power + np.nan_to_num(frf.variance[response, hit, inside]))
+    coherence = np.nan_to_num(coherence)
+    if coherence.size < WINDOW:
+        return low if coherence.size and np.median(coherence) >= COHERENT else None
+    around = np.median(np.lib.stride_tricks.sliding_window_view(coherence, WINDOW), axis=1)
+    good = np.flatnonzero(around >= COHERENT)
+    if not good.size:
+        return None
+    return low if good[0] == 0 else float(frf.frequency_hz[inside][good[0] + WINDOW // 2])
 
 
 def label_ends(panel: Axes, x: np.ndarray, values: np.ndarray, names: list[str]) -> None:

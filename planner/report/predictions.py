@@ -40,8 +40,10 @@ class ExpectedMode:
 
     @property
     def cells(self) -> tuple[str, str]:
-        """Frequency (Hz) and damping (%) as a table shows them."""
+        """Frequency (Hz) and damping (%) as a table shows them; what is not known is no number."""
         damping = with_sd(100 * self.damping_ratio, 100 * self.damping_sd)
+        if not self.damping_sd < self.damping_ratio:
+            damping = "not known"
         return with_sd(self.frequency_hz, self.sd_hz), damping
 
 

@@ -6,17 +6,19 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.events import Proposal, Question
+from planner.campaign.events import Question
 from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
+from planner.report.pose_screen import PosePage
 
-KEYS = "[a] accept  [r] refuse  [s] star  [k] skip  [n] propose anew  [u] undo  [q] quit  [?] help"
 HELP = """\
 a, Enter  import the hits that wait          r  set the waiting hits aside, do not import them
 k         skip this pose, do not offer it    n  propose anew
+b, h      late hits: of the pose before, or of this one
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
+LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
 SIMULATED = "SIMULATED RECORDINGS: nothing here was measured on a real robot"
 
 
@@ -25,27 +27,6 @@ def _table(*columns: str) -> Table:
     for i, column in enumerate(columns):
         table.add_column(column, justify="left" if i == 0 else "right")
     return table
-
-
-def proposal_panel(proposal: Proposal, model: Model, number: int) -> RenderableType:
-    """Where to go, and what to expect there."""
-    angles = _table("joint", "angle (°)")
-    for name, value in zip(model.cell.robot.joint_names, proposal.joints_deg, strict=True):
-        angles.add_row(name, f"{value:.3f}")
-    expected = _table("mode", "expected (Hz)", "damping (%)")
-    p = model.predict(np.deg2rad([proposal.joints_deg]))
-    for k in range(p.frequency_hz.shape[1]):
-        expected.add_row(
-            str(k + 1),
-            f"{p.frequency_hz[0, k]:.2f} ± {p.frequency_sd_hz[0, k]:.2f}",
-            f"{100 * p.damping_ratio[0, k]:.1f} ± {100 * p.damping_sd[0, k]:.1f}",
-        )
-    both = Table.grid(padding=(0, 4))
-    both.add_row(angles, expected)
-    x, y, z = proposal.position_m
-    place = Text(f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m\n{proposal.reason}")
-    title = f"Measurement {number}: go to pose {proposal.pose}"
-    return Panel(Group(both, Text(""), place), title=title, title_align="left", expand=False)
 
 
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
@@ -113,10 +94,34 @@ def uncertainty_line(model: Model) -> Text:
     return Text(f"sd of frequencies over the workspace: {each} (target {target:g} %)")
 
 
+def incomplete(page: PosePage) -> str:
+    """What is missing where a pose is accepted too early."""
+    counts = ", ".join(f"{a} {page.counts[a]}/{page.per_axis}" for a in page.proposal.hits)
+    return f"Hits are missing ({counts}): hit on, or press a again to accept the pose as it is."
+
+
+def result_line(report: ImportReport) -> str:
+    """What came out against what was expected, in one sentence."""
+    said = f"{report.pose}: {len(report.accepted)} hits in, {len(report.refused)} refused"
+    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    if labelled is None:
+        return f"{said}; no modes"
+    before = report.model_before.predict(np.deg2rad([labelled.joints_deg]))
+    each = []
+    for k, mode in enumerate(labelled.modes):
+        if mode is None:
+            each.append(f"mode {k + 1} not found")
+            continue
+        sd = np.hypot(before.frequency_sd_hz[0, k], mode.frequency_sd_hz)
+        off = (mode.frequency_hz - before.frequency_hz[0, k]) / sd
+        each.append(f"{mode.frequency_hz:.2f} Hz ({off:+.1f} sd)")
+    return f"{said}; {', '.join(each)}"
+
+
 def progress_line(
     history: list[float], target: float, seconds_per_pose: float | None, minimum: int
 ) -> Text:
-    """Time per pose, and about how long until the target, judging by the trend so far.
+    """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
     `history` is the overall sd (%) after each measurement; it falls about geometrically.
     """
@@ -124,21 +129,42 @@ def progress_line(
     if seconds_per_pose is not None:
         parts.append(f"{seconds_per_pose / 60:.1f} min per pose")
     left = poses_to_go(history, target, minimum)
-    if left == 0:
-        parts.append("target reached")
+    if left == (0, 0):
+        parts.append("overall sd below the target")
     elif left is not None:
-        parts.append(f"about {left} more pose{'s' if left > 1 else ''}")
+        parts.append(f"{_span(left)} more pose{'s' if left != (1, 1) else ''} by the trend so far")
         if seconds_per_pose is not None:
-            parts.append(f"about {left * seconds_per_pose / 60:.0f} min to go")
+            minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
+            rounded = [None if m is None else max(1, round(m)) for m in minutes]
+            parts.append(f"{_span((rounded[0] or 1, rounded[1]))} min to go")
+    elif len(history) > 1:
+        parts.append("no trend yet that tells how many more it takes")
     return Text("; ".join(parts))
 
 
-def poses_to_go(history: list[float], target: float, minimum: int) -> int | None:
-    """Poses until `history` falls to `target`; None while there is no trend to judge by."""
+def _span(of: tuple[int, int | None]) -> str:
+    low, high = of
+    if high is None:
+        return f"{low} or more"
+    return f"{low}" if low == high else f"{low} to {high}"
+
+
+def poses_to_go(history: list[float], target: float, minimum: int) -> tuple[int, int | None] | None:
+    """From how many to how many poses until `history` falls to `target`.
+
+    By its mean fall and the standard error of that; None at the end where that is beyond
+    MOST_TOLD, None as a whole where there is no trend to judge by or all of it is beyond.
+    """
     missing = max(0, minimum - len(history))
     if history and history[-1] <= target:
-        return missing
-    if len(history) < 2 or history[-1] >= history[0]:
+        return missing, missing
+    if len(history) < LEAST_TREND:
         return None
-    rate = np.log(history[-1] / history[0]) / (len(history) - 1)
-    return max(missing, int(np.ceil(np.log(target / history[-1]) / rate)))
+    falls = -np.diff(np.log(history))
+    mean, error = float(np.mean(falls)), float(np.std(falls, ddof=1) / np.sqrt(len(falls)))
+    far = float(np.log(history[-1] / target))
+    if mean <= error or far / (mean + error) > MOST_TOLD:
+        return None
+    quick = max(missing, 1, int(np.ceil(far / (mean + error))))
+    slow = int(np.ceil(far / (mean - error)))
+    return quick, (None if slow > MOST_TOLD else max(quick, slow))

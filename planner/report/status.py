@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from rich.console import Group
 from rich.text import Text
@@ -92,6 +93,57 @@ class RefusedHit:
 
 
 @dataclass(frozen=True, eq=False)
+class DecisionStatus:
+    """How sure it is whether the cut of campaign.toml is stable, at each of the poses (u, dof).
+
+    `measurements_left` until each answer is right with the probability of [stop]; None where so
+    many cannot be foreseen: the cut is too near its limit somewhere.
+    """
+
+    speed_rpm: float
+    depth_m: float
+    joints_deg: np.ndarray
+    stable_probability: np.ndarray
+    sure: bool
+    measurements_left: int | None
+    probability: float
+
+    @classmethod
+    def of(cls, model: "Model") -> "DecisionStatus | None":
+        """Of a campaign's model; None where campaign.toml names no cut."""
+        from planner.campaign.decision import measurements_left
+
+        decision, table = model.decision, model.cell.config.cut
+        if decision is None or table is msgspec.UNSET or not model.labelled:
+            return None
+        probability = model.cell.config.stop.probability
+        sure = decision.sure(probability)
+        return cls(
+            table.speed_rpm, table.depth_m, np.rad2deg(decision.q), decision.probability, sure,
+            measurements_left(model), probability,
+        )  # fmt: skip
+
+    @property
+    def text(self) -> str:
+        """One or two sentences."""
+        p = self.stable_probability
+        least = int(np.argmin(np.abs(p - 0.5)))
+        stable, not_stable = np.sum(p >= self.probability), np.sum(1 - p >= self.probability)
+        at = f"{self.speed_rpm:g} rpm and {1e3 * self.depth_m:g} mm"
+        said = (
+            f"The cut at {at} is stable at {stable} of {len(p)} poses, not stable at "
+            f"{not_stable}, undecided at {len(p) - stable - not_stable} (with "
+            f"{100 * self.probability:g} % probability each); least sure is pose {least + 1}, "
+            f"stable with {100 * p[least]:.0f} %. "
+        )
+        if self.sure:
+            return said + "The decision is sure."
+        if self.measurements_left is None:
+            return said + "It is too near its limit there for a few measurements to make it sure."
+        return said + f"About {self.measurements_left} more measured poses make it sure."
+
+
+@dataclass(frozen=True, eq=False)
 class ModelStatus:
     """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
 
@@ -103,6 +155,7 @@ class ModelStatus:
     forecast: Forecast
     remarks: tuple[str, ...]
     leave_one_out: LeftOutValues
+    decision: DecisionStatus | None = None
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -117,6 +170,7 @@ class ModelStatus:
             forecast=model.forecast,
             remarks=model.remarks,
             leave_one_out=left_out(model),
+            decision=DecisionStatus.of(model),
         )
 
 
@@ -151,6 +205,7 @@ class StatusReport(Answer):
     plots: tuple[str, ...] = ()
     rrd: str | None = None
     held: tuple["HeldPose", ...] = ()
+    decision: Any = msgspec.UNSET
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -201,6 +256,8 @@ class StatusReport(Answer):
             f"Held, not used: {h.question.text} Answer with planner confirm, or withdraw."
             for h in self.held
         ]
+        if self.decision is not msgspec.UNSET:
+            lines.append(self.decision.text)
         lines += [*self.remarks, *self.leave_one_out.text]
         return lines + [f"refused {r.file}: {r.reason}" for r in self.refused]
 
@@ -231,5 +288,6 @@ def status(campaign: Campaign) -> StatusReport:
         stored_but_not_imported=tuple(campaign.orphans()),
         leave_one_out=believed.leave_one_out,
         held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
+        decision=msgspec.UNSET if believed.decision is None else believed.decision,
         model=lambda: campaign.model,
     )

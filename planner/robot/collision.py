@@ -54,8 +54,13 @@ class Collisions:
             f"collision geometry: look at each pose before the robot moves there."
         )
 
+    @property
+    def always_touching(self) -> tuple[str, ...]:
+        """Pairs of links that touch at every pose and are not checked, one phrase each."""
+        return self._geometry[3]
+
     @cached_property
-    def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data]:
+    def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data, tuple[str, ...]]:
         robot = self.robot
         geometry = _link_geometry(robot)
         links = list(range(geometry.ngeoms))
@@ -63,13 +68,13 @@ class Collisions:
             a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
             if not self._ignored(geometry, i, j) and not _neighbours(robot.model, a, b):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
-        self._drop_overlapping(geometry)
+        always = self._drop_overlapping(geometry)
         for box in [geometry.addGeometryObject(obj) for obj in _obstacles(robot)]:
             for i in links:
                 moves = geometry.geometryObjects[i].parentJoint > 0
                 if moves and not self._ignored(geometry, i, box):
                     geometry.addCollisionPair(pin.CollisionPair(i, box))
-        return geometry, self._data(geometry), robot.model.createData()
+        return geometry, self._data(geometry), robot.model.createData(), always
 
     def _data(self, geometry: pin.GeometryModel) -> pin.GeometryData:
         data = geometry.createData()
@@ -88,10 +93,10 @@ class Collisions:
         names = {self._name(geometry, i), self._name(geometry, j)}
         return any(names == set(pair) for pair in self.robot.config.collision.ignore)
 
-    def _drop_overlapping(self, geometry: pin.GeometryModel) -> None:
-        """Remove pairs of links that touch at every one of a spread of poses."""
+    def _drop_overlapping(self, geometry: pin.GeometryModel) -> tuple[str, ...]:
+        """Remove pairs of links that touch at every one of a spread of poses; names them."""
         if not len(geometry.collisionPairs):
-            return
+            return ()
         rng = np.random.default_rng(0)
         robot, data, kinematics = self.robot, self._data(geometry), self.robot.model.createData()
         always = np.ones(len(geometry.collisionPairs), dtype=bool)
@@ -99,8 +104,11 @@ class Collisions:
             q = rng.uniform(robot.lower_rad, robot.upper_rad)
             pin.computeCollisions(robot.model, kinematics, geometry, data, q, False)
             always &= np.array([r.isCollision() for r in data.collisionResults], dtype=bool)
-        for pair in [p for p, a in zip(list(geometry.collisionPairs), always, strict=True) if a]:
+        dropped = [p for p, a in zip(list(geometry.collisionPairs), always, strict=True) if a]
+        names = [(self._name(geometry, p.first), self._name(geometry, p.second)) for p in dropped]
+        for pair in dropped:
             geometry.removeCollisionPair(pair)
+        return tuple(dict.fromkeys(" touches ".join(pair) for pair in names))
 
     def limits(self, q: np.ndarray) -> tuple[str, ...]:
         """Violated joint limits, one phrase each."""
@@ -120,7 +128,7 @@ class Collisions:
 
     def contacts(self, q: np.ndarray) -> tuple[str, ...]:
         """Pairs in contact (closer than margin_m) at finite q (dof,), one phrase each."""
-        geometry, data, kinematics = self._geometry
+        geometry, data, kinematics, _ = self._geometry
         if not len(geometry.collisionPairs):
             return ()
         q = np.asarray(q, dtype=float)
@@ -136,7 +144,7 @@ class Collisions:
         """Whether the pose is within limits and touches nothing (stops at the first contact)."""
         if self.limits(q):
             return False
-        geometry, data, kinematics = self._geometry
+        geometry, data, kinematics, _ = self._geometry
         if not len(geometry.collisionPairs):
             return True
         q = np.asarray(q, dtype=float)

@@ -1,6 +1,7 @@
 """robot.toml: what URDF cannot say."""
 
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -152,13 +153,33 @@ class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     matters_percent: float = 3.0
 
 
+class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the robot's controller counts its axes: its angle is sign · the URDF's + offset.
+
+    `joints` are the URDF's in the controller's order (none: the URDF's own), `signs` and
+    `offsets_deg` go with it. `external` names those that are no axes of the arm (E1, E2, …).
+    Programs drive at `speed_percent` of the controller's full speed.
+    """
+
+    joints: tuple[str, ...] = ()
+    signs: tuple[Literal[1, -1], ...] = ()
+    offsets_deg: tuple[float, ...] = ()
+    external: tuple[str, ...] = ()
+    speed_percent: float = 10.0
+
+
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
-    With `geometric_stiffness` the robot is linearised where it sags under gravity, and gravity's
-    own stiffness, of the size of weight times height, is added: so it is unless robot.toml says
-    false (None is what it says where it says nothing; `load_config` puts a bool there).
-    `stiffness_sd_percent` is how well each stated stiffness is known (None: as the caller thinks),
+    `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
+    `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
+    m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
+    `held` says where joints stay that do not move in the tests, as rails and turntables:
+    NAME_m = 1.2 for a sliding one, NAME_deg = 30 for a turning one.
+
+    Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
+    gravity's own stiffness, of the size of weight times height, is added.
+    `stiffness_sd_percent` is how well each stated stiffness is known,
     `stiffness_bias_sd_percent` by how much all of them may be off together, as gear makers' are.
     """
 
@@ -168,7 +189,8 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor_frame: str
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     band_hz: tuple[float, float] = (4.0, 90.0)
-    geometric_stiffness: bool | None = None
+    held: dict[str, float] = {}
+    geometric_stiffness: bool | None = None  # a bool once `load_config` has read it
     stiffness_sd_percent: float | None = None
     stiffness_bias_sd_percent: float | None = None
     compliance: tuple[Compliance, ...] = ()
@@ -183,9 +205,12 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sensor: SensorTable = SensorTable()
     readback: ReadbackTable = ReadbackTable()
     diagnose: DiagnoseTable = DiagnoseTable()
+    controller: ControllerTable = ControllerTable()
 
 
 LARGEST_SD_PERCENT = 1000.0  # a factor of 11 either way: beyond, nothing is stated
+# Of springs (N·m/rad, N/m) and dampers: 10⁷ times a heavy robot's.
+LARGEST_STIFFNESS = 1e14
 LISTS = "compliance", "payload", "resonator", "harmonic"  # that effects add to
 
 
@@ -253,6 +278,11 @@ def _check(config: RobotConfig, path: Path) -> None:
     check_sds(config.sensor, f"{path}: [sensor]")
     check_sds(config.readback, f"{path}: [readback]")
     check_sds(config.diagnose, f"{path}: [diagnose]")
+    if not 0 < config.controller.speed_percent <= 100:
+        raise InputError(
+            f"{path}: [controller] speed_percent is {config.controller.speed_percent}; it must lie "
+            f"above 0 and at most at 100."
+        )
     margin = config.collision.margin_m
     if not 0 <= margin < 1:
         raise InputError(
@@ -269,13 +299,15 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
     first: dict[str, Compliance] = {}
     for number, block in enumerate(config.compliance, 1):
         entry = f"{path}: [[compliance]] number {number} ({block.joint})"
-        if not 0 < block.stiffness < float("inf"):
+        if not 0 < block.stiffness <= LARGEST_STIFFNESS:
             raise InputError(
-                f"{entry} has stiffness {block.stiffness}; it must be above 0 N·m/rad."
+                f"{entry} has stiffness {block.stiffness}; it must be above 0 N·m/rad and at most "
+                f"{LARGEST_STIFFNESS:g} (leave out what does not give)."
             )
-        if not 0 <= block.damping < float("inf"):
+        if not 0 <= block.damping <= LARGEST_STIFFNESS:
             raise InputError(
-                f"{entry} has damping {block.damping}; it must be 0 N·m·s/rad or more."
+                f"{entry} has damping {block.damping}; it must be 0 N·m·s/rad or more, and at most "
+                f"{LARGEST_STIFFNESS:g}."
             )
         length = sum(a * a for a in block.axis) ** 0.5
         if not abs(length - 1) < 1e-3:

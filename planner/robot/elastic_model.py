@@ -217,6 +217,20 @@ class ElasticModel:
                 out[i, b] = jacobian[:, self._elastic]
         return out
 
+    def sag(self, q: np.ndarray) -> np.ndarray:
+        """By how much the springs give (n, e) under the weight at q (n, dof), in rad (slides: m).
+
+        To first order, and also where robot.toml leaves gravity's own stiffness out.
+        """
+        q, data = np.atleast_2d(q), self._weighed.createData()
+        out = np.empty((len(q), self.size))
+        for i, row in enumerate(q):
+            full = np.zeros(self._model.nq)
+            full[self._virtual.rigid] = row
+            weight = pin.computeGeneralizedGravity(self._weighed, data, full)
+            out[i] = -weight[self._elastic] / (self._carrying + self._with_angle(row))
+        return out
+
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), sagged unless robot.toml says otherwise."""
         full = np.zeros(self._model.nq)

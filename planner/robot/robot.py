@@ -43,14 +43,14 @@ class Robot:
         """
         config = load_config(robot_toml, geometric_stiffness)
         urdf = (robot_toml.parent / config.urdf).resolve()
-        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml))
+        return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
 
     def described(self, config: RobotConfig, urdf_text: str) -> "Robot":
         """The robot that its two files describe with this config and text in their stead.
 
         `config` is as the file has it: its lists are without what its effects add.
         """
-        root = parse_urdf(urdf_text, self.urdf_path)
+        root = parse_urdf(urdf_text, self.urdf_path, self.config.held)
         return self._built(with_effects(config, self.path), self.path, self.urdf_path, root)
 
     @classmethod

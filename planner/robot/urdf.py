@@ -6,7 +6,7 @@ import shutil
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,12 +14,17 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.robot.held_joints import hold
 
+LARGEST, FARTHEST_M = 1e7, 1e3  # kg, kg·m, kg·m² of what turns; between joints: no robot has it
 FIXED, TURNING = ("fixed",), ("revolute", "continuous")
 
 
-def read_urdf(urdf: Path, robot_toml: Path) -> ElementTree.Element:
-    """The checked XML; continuous joints are given limits of ±180°. Raises InputError."""
+def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> ElementTree.Element:
+    """The checked XML; continuous joints are given limits of ±180°. Raises InputError.
+
+    `held` is robot.toml's: joints that stay where they are become fixed ones.
+    """
     try:
         text = urdf.read_bytes()
     except FileNotFoundError:
@@ -31,10 +36,10 @@ def read_urdf(urdf: Path, robot_toml: Path) -> ElementTree.Element:
             f"{robot_toml}: its URDF {urdf} cannot be read ({error.strerror}); correct the entry "
             f"urdf."
         ) from None
-    return parse_urdf(text, urdf)
+    return parse_urdf(text, urdf, held)
 
 
-def parse_urdf(text: bytes | str, urdf: Path) -> ElementTree.Element:
+def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> ElementTree.Element:
     """The same of a URDF's text; errors name the file `urdf`."""
     try:
         root = ElementTree.fromstring(text)
@@ -42,6 +47,7 @@ def parse_urdf(text: bytes | str, urdf: Path) -> ElementTree.Element:
         raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
     if root.tag != "robot":
         raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
+    hold(root, held, urdf)
     turning = [joint for joint in root.findall("joint") if joint.get("type") not in FIXED]
     for joint in turning:
         _complete(joint, urdf)
@@ -86,16 +92,32 @@ def find_mesh(urdf: Path, name: str) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def copy_meshes(urdf: Path, target: Path) -> None:
-    """Copy the meshes that a URDF names to where the same URDF, at `target`, looks for them."""
+def copy_meshes(urdf: Path, target: Path) -> tuple[str, ...]:
+    """Copy the meshes that a URDF names to beside the same URDF at `target`.
+
+    Nothing is read outside the folders in which meshes are looked for, nor written outside that of
+    `target`; returns the names of meshes that would be.
+    """
     names = re.findall(r"<mesh\b[^>]*\bfilename\s*=\s*[\"']([^\"']+)", urdf.read_text("utf-8"))
-    for name in names:
+    left = []
+    for name in dict.fromkeys(names):
         file = _mesh_file(name)
-        for folder, there in zip(mesh_folders(urdf), mesh_folders(target), strict=True):
-            found, copy = Path(folder) / file, Path(there) / file
-            if not Path(file).is_absolute() and found.is_file() and not copy.exists():
+        if Path(file).is_absolute():
+            continue  # found by the same name from everywhere
+        for folder in mesh_folders(urdf):
+            found, copy = Path(folder) / file, target.parent / file
+            if not found.is_file():
+                continue
+            if not (_inside(found, Path(folder)) and _inside(copy, target.parent)):
+                left.append(name)
+            elif not copy.exists():
                 copy.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(found, copy)
+    return tuple(dict.fromkeys(left))
+
+
+def _inside(path: Path, folder: Path) -> bool:
+    return path.resolve().is_relative_to(folder.resolve())
 
 
 def _mesh_file(name: str) -> str:
@@ -146,9 +168,14 @@ def _complete(joint: ElementTree.Element, urdf: Path) -> None:
     """Check a moving joint's type, axis and limits; give a continuous one limits of ±180°."""
     name, kind, limit = joint.get("name", "?"), joint.get("type"), joint.find("limit")
     if kind not in TURNING:
+        unit = "_m" if kind == "prismatic" else ""
+        remedy = (
+            f"give [held] {name}{unit} in robot.toml, where it stands in the tests"
+            if unit
+            else "make it a fixed joint"
+        )
         raise InputError(
-            f"{urdf}: joint {name} is of type {kind}; only revolute, continuous and fixed "
-            f"joints are supported."
+            f"{urdf}: joint {name} is of type {kind}, but only turning joints move here; {remedy}."
         )
     axis = _numbers(_axis_text(joint))
     if axis.shape != (3,) or not 1e-6 < np.linalg.norm(axis) < np.inf:
@@ -157,8 +184,9 @@ def _complete(joint: ElementTree.Element, urdf: Path) -> None:
         )
     if joint.find("mimic") is not None:
         raise InputError(
-            f"{urdf}: joint {name} follows another joint (<mimic>), which is not supported; "
-            f"make it a fixed joint."
+            f"{urdf}: joint {name} follows another joint (<mimic>), which is not simulated; give "
+            f"[held] {name}_deg in robot.toml if it stands still in the tests, or leave <mimic> "
+            f"out and state its angle in every pose."
         )
     if kind == "continuous":
         speed = "3.14" if limit is None else limit.get("velocity", "3.14")
@@ -213,8 +241,25 @@ def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
                 )
 
 
+def _said(values: np.ndarray) -> str:
+    return "(" + ", ".join(f"{v:.3g}" for v in values) + ")"
+
+
 def _check_inertias(model: pin.Model, urdf: Path) -> None:
-    for name, inertia in list(zip(model.names, model.inertias, strict=True))[1:]:
+    for name, inertia, place in zip(
+        list(model.names)[1:], list(model.inertias)[1:], list(model.jointPlacements)[1:],
+        strict=True,
+    ):  # fmt: skip
+        numbers = np.array(inertia.toDynamicParameters())
+        if not np.all(np.abs([*numbers, *inertia.lever]) < LARGEST):
+            raise InputError(
+                f"{urdf}: the links that turn with {name} have mass {inertia.mass:.4g} kg and "
+                f"centre of mass {_said(inertia.lever)} m; give kg, m and kg·m²."
+            )
+        if not np.all(np.abs(place.translation) < FARTHEST_M):
+            raise InputError(
+                f"{urdf}: joint {name} is {_said(place.translation)} m from the one before; give m."
+            )
         moments = np.linalg.eigvalsh(inertia.inertia)
         if inertia.mass < 0 or moments[0] < -1e-9 * abs(moments[-1]):
             raise InputError(

@@ -54,10 +54,10 @@ def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
         for frame in robot.model.frames
         if frame.type == pin.FrameType.BODY and frame.parentJoint == joint and frame.name in links
     ]
-    return max(frames, key=lambda frame: _inertia(links[frame.name]).mass)
+    return max(frames, key=lambda frame: link_inertia(links[frame.name]).mass)
 
 
-def _inertia(link: ElementTree.Element) -> pin.Inertia:
+def link_inertia(link: ElementTree.Element) -> pin.Inertia:
     """Of a link in its own frame; 0 where the URDF states none."""
     inertial = link.find("inertial")
     if inertial is None:
@@ -101,7 +101,7 @@ def _spread(values: np.ndarray) -> np.ndarray:
 
 def _change(link: ElementTree.Element, values: np.ndarray) -> float:
     """Add the share of `values` (10,) that is possible to a link; returns it."""
-    nominal = np.array(_inertia(link).toDynamicParameters())
+    nominal = np.array(link_inertia(link).toDynamicParameters())
     share = _possible(_spread(nominal), _spread(values))
     if share > 0:
         _write(link, pin.Inertia.FromDynamicParameters(nominal + share * values))

@@ -9,6 +9,8 @@ from planner.errors import PlannerError
 from planner.recording.folder import TABLE
 from planner.recording.read import READERS, read
 
+TEXT, TEXT_LONGER = (".csv", ".tsv", ".txt"), 3.0
+
 
 @dataclass
 class Inbox:
@@ -19,7 +21,7 @@ class Inbox:
     """
 
     folder: Path
-    quiet_s: float = 1.0
+    quiet_s: float = 0.6
     _seen: dict[Path, tuple[int, float, float]] = field(default_factory=dict)
     _digests: dict[Path, tuple[tuple[int, float], str, str]] = field(default_factory=dict)
 
@@ -56,7 +58,9 @@ class Inbox:
         if known is None or known[:2] != (size, modified):
             self._seen[path] = (size, modified, time.monotonic())
             return self.quiet_s <= 0
-        return time.monotonic() - known[2] >= self.quiet_s
+        # A text table that is cut off between two rows reads to its end: it gets more time.
+        longer = TEXT_LONGER if path.suffix.lower() in TEXT else 1.0
+        return time.monotonic() - known[2] >= longer * self.quiet_s
 
     def _content(self, path: Path, size: int, modified: float) -> tuple[str, str]:
         """Content hash and, if the file does not read to its end, why."""

@@ -10,8 +10,11 @@ from matplotlib.figure import Figure
 COLOURS = {
     "bias": "0.6", "linear": "tab:olive", "quadratic": "tab:cyan", "cubic": "tab:purple",
     "rbf": "tab:blue", "GP": "tab:blue", "AR1": "tab:green", "NARGP": "tab:orange",
-    "MFDGP": "tab:brown", "simulation": "0.6", "ours": "tab:red",
-    "scatter allows": "0.8", "one by one": "tab:blue", "together": "tab:red",
+    "averaged RBF": "lightskyblue", "averaged AR1": "limegreen", "AR1-NARGP": "gold",
+    "MFDGP": "tab:brown", "simulation": "0.6", "fused modes": "tab:red", "diagnosed": "black",
+    "x": "tab:blue", "y": "tab:orange", "z": "tab:green",
+    "scatter allows": "0.8", "one by one": "tab:blue", "by kind": "tab:red",
+    "all at once": "tab:orange",
 }  # fmt: skip
 
 

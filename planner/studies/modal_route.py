@@ -6,8 +6,8 @@ frequency that changes smoothly, and that the simulation follows.
 
 import numpy as np
 
-from planner.modal.estimate_modes import estimate_modes
 from planner.modal.tracking import Guide, Tracks, track
+from planner.progress import quietly
 from planner.studies.busch2020_data import ACROSS, BAND_HZ, BEYOND_DEG, SWEEP_DEG, Sweep
 from planner.surrogate.frf_bands import frf_moments
 from planner.surrogate.modal_surrogate import ModalObservations, fit_surrogate
@@ -17,7 +17,7 @@ EXTRA_MODES = 2  # simulated, beyond those in the band, which a measured one may
 
 def predict_beyond(seen: Sweep) -> tuple[np.ndarray, np.ndarray]:
     """Amplitude and sd (f, p) at BEYOND_DEG in m/s²/N, from the modes of what was measured."""
-    modes = [estimate_modes(seen.frf(i), BAND_HZ).modes for i in range(len(seen.angles_deg))]
+    modes = [list(each) for each in seen.struck.modes(BAND_HZ, quietly)]
     count = max(len(each) for each in modes)
     guide = seen.modes(seen.angles_deg, count + EXTRA_MODES)
     x = _scaled(seen.angles_deg)

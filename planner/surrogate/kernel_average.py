@@ -44,6 +44,12 @@ class KernelAverage:
         return mean, np.sqrt(np.sum(w * (sds**2 + (means - mean) ** 2), axis=0))
 
 
+def either(first: KernelAverage, second: KernelAverage) -> KernelAverage:
+    """Both, by evidence: equally likely before the data, which must be the same for both."""
+    models = (*first.models, *second.models)
+    return KernelAverage((*first.kernels, *second.kernels), models, _by_evidence(models))
+
+
 def fit_shapes(
     data: TrainingData,
     with_low: tuple[OutputPrior, ...],
@@ -57,6 +63,10 @@ def fit_shapes(
     models = tuple(
         fit_ar1(data, with_low, without_low, centre, samples, kept, kernel) for kernel in kernels
     )
+    return KernelAverage(kernels, models, _by_evidence(models))
+
+
+def _by_evidence(models: tuple[AR1, ...]) -> np.ndarray:
     evidence = np.array([m.posterior.log_evidence for m in models])
     weights = np.exp(evidence - evidence.max(axis=0))
-    return KernelAverage(kernels, models, weights / weights.sum(axis=0))
+    return weights / weights.sum(axis=0)

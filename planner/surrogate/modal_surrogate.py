@@ -14,7 +14,7 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.hedged import PRIOR_BELIEF, HedgedAR1, fit_hedged
-from planner.surrogate.kernel_average import KernelAverage, fit_shapes
+from planner.surrogate.kernel_average import KernelAverage, either, fit_shapes
 from planner.surrogate.plain_discrepancy import fit_plain_or_free
 from planner.surrogate.training_data import TrainingData
 
@@ -187,14 +187,23 @@ def fit_primary(
 
 
 def fit_damping(seen: ModalObservations, taught: bool = False) -> KernelAverage:
-    """Fit log ζ of every label: no simulation knows it that was not `taught`."""
+    """Fit log ζ of every label: no simulation knows it that was not `taught`.
+
+    A simulation that was is believed as far as the measured damping ratios bear it out, beside
+    what they say alone: brakes and friction leave nothing of C = βK in some robots.
+    """
     y = _log(seen.damping_ratio)
     count = y.shape[1]
     low = _log(seen.simulated.damping_ratio) if taught else np.full_like(y, np.nan)
     data = TrainingData(seen.x, y, seen.damping_sd / np.exp(y), low)
     centre = _centre(low, np.full(count, np.nan))
     with_low, without_low = (DAMPING_PRIOR_TAUGHT,) * count, (DAMPING_PRIOR,) * count
-    return fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
+    fitted = fit_shapes(data, with_low, without_low, centre, DAMPING_KERNELS)
+    if not taught or not np.isfinite(y).any():  # nothing measured is no reason to doubt
+        return fitted
+    nothing = np.full(count, np.nan)
+    alone = replace(data, low=np.full_like(y, np.nan))
+    return either(fitted, fit_shapes(alone, with_low, without_low, nothing, DAMPING_KERNELS))
 
 
 def fit_surrogate(

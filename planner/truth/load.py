@@ -58,7 +58,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
 
 def _read(robot_toml: Path) -> tuple[dict, ElementTree.Element]:
     try:
-        table = tomllib.loads(robot_toml.read_text(encoding="utf-8"))
+        table = tomllib.loads(robot_toml.read_text(encoding="utf-8-sig"))
         root = ElementTree.parse(robot_toml.parent / table["urdf"]).getroot()
     except (OSError, ValueError, KeyError, ElementTree.ParseError) as error:
         raise InputError(

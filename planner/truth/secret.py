@@ -7,6 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from planner.errors import InputError
+from planner.truth.brakes import DampingScatter
 from planner.truth.deviation import Deviation
 from planner.truth.handling import Aim, MeasuringChain
 from planner.truth.hits import AXES, Hammer, SimulatedHit, noisy, pulse, sampled
@@ -98,7 +99,7 @@ class Secret:
     deviation: Deviation
     ports: tuple[Port, ...] = ()
     loss_factor: float | None = None
-    drift: StiffnessDrift | JointDrift | None = None
+    drift: StiffnessDrift | JointDrift | DampingScatter | None = None
     load: LoadChange | None = None
     tone: Tone | None = None
     artefact: Artefact = field(default_factory=Artefact)

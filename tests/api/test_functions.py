@@ -94,7 +94,7 @@ def diagnosed(dataset, recorded):
     """With a single effect in the library: what all of them find is tested elsewhere."""
     with pytest.MonkeyPatch.context() as patch:
         few = [e for e in library(recorded_simulation(recorded)) if e.name == "base_compliance"]
-        patch.setattr(linear_diagnosis, "library", lambda simulation: few[:1])
+        patch.setattr(linear_diagnosis, "library", lambda simulation, sensors: few[:1])
         offered = {"there": dataset.q[0] + 0.1}
         return diagnose(dataset, recorded[2], offered=offered)
 

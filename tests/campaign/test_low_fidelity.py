@@ -8,7 +8,11 @@ from planner.dynamics.mode_families import undamped_modes
 from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import estimate
 from planner.identification.feasible_inertias import pseudo_inertia
-from planner.identification.frequency_uncertainty import frequency_sd, frequency_sensitivity
+from planner.identification.frequency_uncertainty import (
+    frequency_sd,
+    frequency_sensitivity,
+    log_frequency_slope,
+)
 from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedResonator, Deviation
@@ -127,3 +131,33 @@ def test_physics_that_no_joint_has_is_noticed_and_said(tmp_path):
     assert after.simulation is not None
     body = pseudo_inertia(after.simulation.elastic.inertia)
     assert np.all(np.linalg.eigvalsh(body[after.simulation.elastic.inertia[:, 0] > 0]) > 0)
+
+
+def test_a_joint_that_only_creeps_is_no_modes_stiffness(right):
+    """A soft joint's overdamped mode lies among the others and is no natural frequency."""
+    before, _, other, _ = right
+    nominal, p, q = before.nominal, parametrise(before.nominal, PRIORS), other[:3]
+    last = next(i for i, b in enumerate(nominal.elasticity.stiffness) if b == min(
+        nominal.elasticity.stiffness))  # fmt: skip
+    soft = nominal.elasticity.stiffness.copy()
+    soft[last] /= 100
+
+    def creeping(factor: float = 1.0) -> Simulation:
+        stiffness, damping = soft.copy(), nominal.elasticity.damping * 0
+        stiffness[last] *= factor
+        damping[last] = nominal.elasticity.damping[last] * 3
+        return nominal.changed(
+            type(nominal.elasticity)(stiffness, damping, nominal.elasticity.loss_factor),
+            p.inertia_change(np.zeros(len(p.nuisances))),
+        )
+
+    own = next(
+        i for i, one in enumerate(p.parameters) if one.kind == "stiffness" and last in one.blocks
+    )
+    slope = log_frequency_slope(creeping(), p, q, COUNT)[:, :, own]
+    hertz = creeping().modes(q, len(soft)).frequency_hz
+    assert np.all(np.isnan(hertz[:, -1])), "one mode does not swing"
+    step = 1e-3
+    moved = np.log(creeping(1 + step).modes(q, COUNT).frequency_hz)
+    by_difference = (moved - np.log(creeping(1 - step).modes(q, COUNT).frequency_hz)) / (2 * step)
+    np.testing.assert_allclose(slope, by_difference, atol=0.05)

@@ -43,6 +43,13 @@ CASES = {
     "weak joint": Concealed(
         unlike(scaled=(ScaledJoint("joint_3", 0.4),)), said=(("joint_stiffness", "joint_3"),)
     ),
+    "weak joint, another gear a little uneven": Concealed(
+        unlike(
+            scaled=(ScaledJoint("joint_3", 0.4),),
+            harmonics=(StiffnessRipple("joint_2", 1, 0.015, 0.01),),
+        ),
+        said=(("joint_stiffness", "joint_3"),),
+    ),
     "quiet channel": Concealed(
         artefact=Artefact(gain=(1.0, 0.75, 1.0)), said=(("sensor_gain", "sensor_y"),)
     ),

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.mfdgp import fit_mfdgp
 from planner.studies.models.multitask import fit_multitask
+from planner.studies.models.quadrature_mfdgp import fit_quadrature_mfdgp
 from planner.studies.models.sparse_gp import fit_sparse
 from planner.surrogate import gp, marginal
 from planner.surrogate.ar1 import OutputPrior, fit_ar1
@@ -90,7 +90,7 @@ def test_without_a_simulation_the_hedge_is_a_gp():
 def test_a_deep_gp_that_does_not_look_below_is_a_sparse_gp():
     x, y = samples(12)
     s = Samples.of(x, y[:, 0], 0.02)
-    deep = fit_mfdgp(s, Exact(lambda x: x[:, 0]), kernel="rbf[0:2]")
+    deep = fit_quadrature_mfdgp(s, Exact(lambda x: x[:, 0]), kernel="rbf[0:2]")
     plain = fit_sparse(s, "rbf")
     np.testing.assert_allclose(deep.predict(GRID), plain.predict(GRID), atol=0.01)
 

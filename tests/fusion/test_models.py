@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.studies.models.ar1_nargp import fit_ar1_nargp
 from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import PRIOR, fit_recursive
 from planner.studies.models.single_output_gp import fit_gp
 from tests.support.compilations import compilations
@@ -35,8 +35,8 @@ MODELS = {
     "AR1 on samples": lambda s: fit_recursive(
         s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", GRID_PRIOR), SPREAD
     ),
-    "NARGP": lambda s: fit_nargp(s, exact_low(), SPREAD),
-    "NARGP on samples": lambda s: fit_nargp(
+    "AR1-NARGP": lambda s: fit_ar1_nargp(s, exact_low(), SPREAD),
+    "AR1-NARGP on samples": lambda s: fit_ar1_nargp(
         s, fit_gp(Samples.of(GRID, low(GRID)), "rbf", GRID_PRIOR), SPREAD
     ),
     "mixture": lambda s: fit_fused(s, exact_low(), SPREAD),
@@ -131,7 +131,7 @@ def test_an_uncertain_low_level_makes_the_prediction_uncertain():
             return self.function(x), np.where(x[:, 0] > 0.5, 0.2, 0.0)
 
     s = samples(10)
-    for fit_one in (fit_recursive, fit_nargp):
+    for fit_one in (fit_recursive, fit_ar1_nargp):
         sure = fit_one(s, exact_low(), SPREAD).predict(GRID)[1]
         model = fit_one(s, Unsure(low), SPREAD)
         left, right = GRID[:, 0] < 0.4, GRID[:, 0] > 0.6
@@ -141,18 +141,18 @@ def test_an_uncertain_low_level_makes_the_prediction_uncertain():
         assert np.median(sure) < 0.1
 
 
-def test_nargp_without_a_bend_is_ar1():
+def test_ar1_nargp_without_a_bend_is_ar1():
     """ℓ of the cheap level → ∞: the product kernel no longer sees it."""
     s = samples(8)
     mean = fit_recursive(s, exact_low(), SPREAD, "rbf").predict(GRID)[0]
     wide = replace(PRIOR, length_spread=1e-6)
     one = fit_recursive(s, exact_low(), SPREAD, "rbf+rbf", wide)
-    two = fit_nargp(s, exact_low(), SPREAD, "rbf[0:2]*bias+rbf[0:2]", wide)
+    two = fit_ar1_nargp(s, exact_low(), SPREAD, "rbf[0:2]*bias+rbf[0:2]", wide)
     np.testing.assert_allclose(one.predict(GRID)[0], two.predict(GRID)[0], atol=1e-8)
     np.testing.assert_allclose(mean, two.predict(GRID)[0], atol=0.1)
 
 
-def test_nargp_follows_a_bent_relation_that_ar1_cannot():
+def test_ar1_nargp_follows_a_bent_relation_that_ar1_cannot():
     x = np.random.default_rng(3).random((14, 1))
     wave = Exact(lambda x: np.sin(8 * np.pi * x[:, 0]))  # Perdikaris et al. 2017, section 3.1
 
@@ -163,7 +163,7 @@ def test_nargp_follows_a_bent_relation_that_ar1_cannot():
     s = Samples.of(x, bent(x))
     off = [
         np.sqrt(np.mean((f(s, wave, 0.7).predict(grid)[0] - bent(grid)) ** 2))
-        for f in (fit_nargp, fit_recursive)
+        for f in (fit_ar1_nargp, fit_recursive)
     ]
     assert off[0] < 0.25 * off[1]
 

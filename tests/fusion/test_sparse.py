@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.mfdgp import fit_mfdgp
+from planner.studies.models.quadrature_mfdgp import fit_quadrature_mfdgp
 from planner.studies.models.sparse_gp import PRIOR, bound, choose_inducing, fit_sparse
 from planner.surrogate.kernels import parse
 
@@ -56,7 +56,7 @@ def test_the_bound_is_below_the_evidence_and_rises_with_inducing_points():
     variance = (s.sd / s.y.std()) ** 2
     values = []
     for count in (5, 15, 60):
-        u = choose_inducing("rbf", theta, s.x, count)
+        u = choose_inducing(parse("rbf", 2), theta, s.x, count)
         values.append(float(bound("rbf", 0 * theta, s.x, y, variance, np.ones(80), u, mean, sd)[0]))
     assert values[0] < values[1] < values[2] + 1e-6
     fitted = fit_sparse(s, "rbf", 10)
@@ -97,7 +97,7 @@ def test_a_deep_gp_follows_a_bent_relation_and_its_low_level():
 
     low = rng.random((150, 2))
     below = fit_sparse(Samples.of(low, wave(low)), "rbf", 80)
-    deep = fit_mfdgp(Samples.of(x, bent(x)), below, 80)
+    deep = fit_quadrature_mfdgp(Samples.of(x, bent(x)), below, 80)
     plain = fit_sparse(Samples.of(x, bent(x)), "rbf", 25)
     off = [np.sqrt(np.mean((m.predict(GRID)[0] - bent(GRID)) ** 2)) for m in (deep, plain)]
     assert off[0] < 0.6 * off[1]
@@ -108,6 +108,6 @@ def test_an_unsure_first_layer_makes_the_deep_gp_unsure():
         def predict(self, x):
             return self.function(x), np.full(len(x), 0.4)
 
-    sure = fit_mfdgp(data(25, sd=0.01), Exact(wave), 25)
+    sure = fit_quadrature_mfdgp(data(25, sd=0.01), Exact(wave), 25)
     unsure = replace(sure, low=Unsure(wave))
     assert unsure.predict(GRID)[1].mean() > 2 * sure.predict(GRID)[1].mean()

@@ -33,7 +33,7 @@ def test_between_measured_poses_the_surface_is_met(model, monkeypatch):
     assert median.shape == sd.shape == (40, 4)
     assert (median > 0).all()
     known = np.log(3 * simulated(LINES, wanted) / measured(LINES, wanted))
-    if model == "GP":  # five poses alone say less than the simulation does
+    if model == "log GP":  # five poses alone say less than the simulation does
         assert np.sqrt(np.mean(off**2)) < 0.5
     else:
         assert np.sqrt(np.mean(off**2)) < 0.5 * np.sqrt(np.mean(known**2))

@@ -125,3 +125,14 @@ def test_hits_that_tilt_as_hands_do_agree():
         alone += any(screen_repeats(tuple(hits[4:]), BAND)[i] for i in range(3))
         assert screen_repeats(tuple(hits), BAND) == ((),) * 7
     assert alone > 0  # without the other axes nobody could tell
+
+
+def test_a_coarse_converter_is_no_overload_and_no_error():
+    """Stored in a few steps only, a weak channel is often at its top."""
+    good = make_hit(np.random.default_rng(9), noise=0.05)
+    samples = good.acceleration_m_s2.copy()
+    step = np.max(np.abs(samples[2]))
+    samples[2] = np.round(samples[2] / step) * step
+    assert "clipped" not in refused(replace(good, acceleration_m_s2=samples))
+    samples[2] = step * (np.arange(samples.shape[1]) % 2)
+    assert "clipped" not in refused(replace(good, acceleration_m_s2=samples))

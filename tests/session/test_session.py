@@ -82,7 +82,7 @@ def test_a_session_shows_imports_and_goes_on(cell):
     proposal = campaign.next()[0]
     analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
     script = Script(console, [
-        (wait("9 of 9 hits wait"), "?"), (wait("set the waiting hits aside"), "s"),
+        (wait("all hits are in"), "?"), (wait("set the waiting hits aside"), "s"),
         (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("not be offered"), "u"),
         (wait("Took back"), "q"),
     ])  # fmt: skip
@@ -124,7 +124,7 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
     campaign, truth, tmp_path = cell
     deliver(truth, tmp_path, campaign.next()[0], 0)
     console = screen()
-    script = Script(console, [(wait("9 of 9"), "r"), (wait("set aside"), "a"),
+    script = Script(console, [(wait("all hits are in"), "r"), (wait("set aside"), "a"),
                               (wait("No whole new file"), "q")])  # fmt: skip
     watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
           quiet_s=0.05, limit_s=30)  # fmt: skip
@@ -137,7 +137,7 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
     assert again.state.measurements == {}
     # Taken back, they wait again, at the same pose.
     console = screen()
-    script = Script(console, [(wait("[q] quit"), "u"), (wait("9 of 9"), "a"),
+    script = Script(console, [(wait("[u] undo"), "u"), (wait("all hits are in"), "a"),
                               (wait("P001: 9 hits in"), "q")])  # fmt: skip
     watch(again, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
           quiet_s=0.05, limit_s=30)  # fmt: skip
@@ -183,7 +183,7 @@ def test_without_anybody_to_ask_hits_of_another_pose_are_held(four):
 def test_the_question_survives_the_session_and_is_answered_by_a_key(four, key, said, used, refused):
     campaign, tmp_path, stated, true = four
     console, inbox = screen(), tmp_path / "inbox"
-    script = Script(console, [(wait("9 of 9"), "a"), (wait("Is the robot at"), "q")])
+    script = Script(console, [(wait("all hits are in"), "a"), (wait("Is the robot at"), "q")])
     first = watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
                   limit_s=30)  # fmt: skip
     assert list(first.questions) == [stated]

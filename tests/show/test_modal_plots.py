@@ -1,5 +1,6 @@
 """The pictures of a modal analysis hold its data, and their labels can be read."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.collections import FillBetweenPolyCollection
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from planner.frf.frf import Frf
@@ -14,7 +16,7 @@ from planner.modal.estimate_modes import estimate_modes, identification
 from planner.modal.mac import mac
 from planner.report.frf_plots import save
 from planner.report.modal_plots import frequency_figure, mac_figure, modal_figures
-from planner.report.plot_marks import spread, with_sd
+from planner.report.plot_marks import mark_band, spread, with_sd
 from tests.support.modal_systems import exact_frf, noisy, random_system
 
 BAND = (4.0, 60.0)
@@ -265,3 +267,23 @@ def test_the_same_modes_give_the_same_file(five, tmp_path, form):
     for name in ("first", "second"):
         save(mac_figure(five[3]), tmp_path / f"{name}.{form}")
     assert (tmp_path / f"first.{form}").read_bytes() == (tmp_path / f"second.{form}").read_bytes()
+
+
+def test_the_usable_band_begins_where_the_frf_becomes_coherent(five):
+    frf = five[1]
+    low, high = frf.usable_band_hz
+    begins = low + 0.3 * (high - low)
+    coherence = frf.coherence.copy()
+    coherence[0, 0, frf.frequency_hz < begins] = 0.2
+    coherence[1, 0] = 0.1
+    partly = replace(frf, coherence=coherence)
+    spans = []
+    for response in range(3):
+        panel = Figure().subplots()
+        mark_band(panel, partly, response, 0)
+        spans.append([(p.get_x(), p.get_x() + p.get_width()) for p in panel.patches])
+    step = frf.frequency_hz[1]
+    assert abs(spans[0][0][0] - begins) <= 4 * step
+    assert spans[0][0][1] == high
+    assert spans[1] == []
+    assert spans[2] == [(low, high)]

@@ -5,13 +5,22 @@ import pytest
 
 from planner.errors import InputError
 from planner.studies import (
+    birk2025,
+    birk2025_data,
+    birk2025_design,
     busch2020_data,
     busch2022_data,
+    lei2023,
     lei2023_data,
+    lei2023_hits,
     registry,
     seyedhosseini2025,
+    seyedhosseini2025_data,
 )
+from planner.studies.busch2022_frf import saltelli
 from planner.studies.report import PaperClaim, Report, Table, check_folder, write
+from planner.truth.arms import KR210
+from planner.truth.load import load_truth
 
 
 @pytest.fixture(scope="module")
@@ -19,18 +28,23 @@ def truth():
     return lei2023_data.true_robot(1)
 
 
-def test_the_sweep_has_the_papers_points():
-    seen = busch2020_data.sweep(1)
-    assert seen.simulated.size == 12_801
-    assert seen.amplitude.size == 2_622
+@pytest.fixture(scope="module")
+def swept():
+    return busch2020_data.sweep(1)
+
+
+def test_the_sweep_has_the_papers_points(swept):
+    assert swept.simulated.size == 12_801
+    assert swept.amplitude.size == 2_622
+    seen = swept
     assert seen.angles_deg.max() == 105
     assert busch2020_data.BEYOND_DEG.min() > 105
     assert np.array_equal(seen.every(3).angles_deg, seen.angles_deg[::3])
 
 
-def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks():
+def test_the_swept_robot_has_a_resonance_that_its_simulation_lacks(swept):
     """In the band, across the arm: two simulated, three true ones (and in-plane ones in both)."""
-    seen, truth = busch2020_data.sweep(1), busch2020_data.true_robot(1)
+    seen, truth = swept, busch2020_data.true_robot(1)
     for angle in (70.0, 105.0, 120.0):
         simulated = seen.modes(np.array([angle]), 6)
         f, _, residue = truth.modes(busch2020_data.poses(np.array([angle]))[0], 6)
@@ -64,12 +78,28 @@ def test_parameters_of_the_plane_are_reciprocal(truth):
             assert min(off) < 1e-6 * np.linalg.norm(right / right[np.argmin(off)])
 
 
-def test_scatter_is_relative(truth):
-    clean = lei2023_data.parameters(truth, lei2023_data.postures(truth)[0][:3])
-    sd = lei2023_data.scatter(clean)
-    assert np.allclose(sd[..., 0], 0.002 * clean[..., 0])
-    assert np.allclose(sd[..., 1], 0.05 * clean[..., 1])
-    assert np.allclose(sd[..., 2], sd[..., 7])
+def test_hits_tell_the_parameters_of_the_plane(truth):
+    """f within a percent, the largest entry of R within a tenth, wherever a mode is found."""
+    q, x = lei2023_data.postures(truth)
+    few = slice(0, 36, 6)
+    told = lei2023_hits.measured(truth, q[few], x[few], 1, lambda text, share: None)
+    true = lei2023_data.parameters(truth, q[few], told.reference)
+    low = slice(0, 4)
+    assert np.isfinite(told.values[:, low, 0]).mean() > 0.9
+    off = told.values[:, low, 0] / true[:, low, 0] - 1
+    assert np.nanmedian(np.abs(off)) < 0.01
+    size = np.linalg.norm(true[:, low, lei2023_data.RIGHT], axis=2)
+    off = np.linalg.norm((told.values - true)[:, low, lei2023_data.RIGHT], axis=2) / size
+    assert np.nanmedian(off) < 0.3
+
+
+def test_missing_parameters_are_filled_from_neighbours():
+    x = np.linspace(0, 1, 9)[:, None]
+    y = np.column_stack([np.arange(9.0), np.arange(9.0)])
+    y[4, 1] = np.nan
+    filled = lei2023._filled(x, y)
+    assert filled[4, 1] == 4.0  # the mean of 2, 3, 5, 6
+    assert np.array_equal(np.delete(filled, 4, 0), np.delete(y, 4, 0))
 
 
 def test_splits_are_nested_spread_and_complete():
@@ -86,9 +116,10 @@ def test_splits_are_nested_spread_and_complete():
 
 def test_modes_of_a_posture_give_its_frf_back(tmp_path):
     """Six true modes nearly are the truth's FRF in their band."""
-    truth = seyedhosseini2025.load_truth(seyedhosseini2025.KR210.write(tmp_path, 3))
+    truth = load_truth(KR210.write(tmp_path, 3))
     q = np.deg2rad([0.0, -80.0, 90.0, 0.0, 70.0, 180.0])
-    predicted = seyedhosseini2025._synthesised(seyedhosseini2025._parameters(truth, q)[None])[0]
+    whole = seyedhosseini2025_data.parameters(*truth.modes(q, seyedhosseini2025_data.MODES))
+    predicted = seyedhosseini2025._synthesised(whole[None])[0]
     true = truth.accelerance(q, seyedhosseini2025.LINES_HZ)[np.arange(3), np.arange(3)]
     assert np.linalg.norm(predicted - true) < 0.1 * np.linalg.norm(true)
 
@@ -100,7 +131,7 @@ def test_a_report_is_written_as_tables_and_pictures(tmp_path):
     table = Table("t", "T", ("a", "b"), (("x", 1.5),))
     made = Report("busch2022", "data", (table,), (PaperClaim("p", "h", True),), {"f": figure})
     files = write(made, tmp_path)
-    assert [f.rsplit("/", 1)[1] for f in files] == ["t.csv", "f.png"]
+    assert [f.rsplit("/", 1)[1] for f in files] == ["t.csv", "busch2022_claims.csv", "f.png"]
     assert (tmp_path / "t.csv").read_text().split() == ["a,b", "x,1.5"]
     assert made.table("t") is table
     assert write(made, None) == []
@@ -115,6 +146,48 @@ def test_bad_input_is_one_sentence(tmp_path):
         check_folder(file)
     with pytest.raises(InputError, match="name another folder"):
         check_folder(file / "below")
+
+
+def test_the_most_informative_points_come_first():
+    """Of D-optimal points the first few tell more than as many neighbours on one path."""
+    simulation = birk2025._simulation("12P")
+    truth = birk2025_data.true_robot()
+    q, path = birk2025_data.poses(truth, 6)
+    assert list(path[:6]) == ["S1"] * 6
+    chosen = birk2025_design.best_points(simulation, (), q, 4, 1.0, (5.0, 200.0))
+    assert len(set(chosen.tolist())) == 4
+    told = [
+        birk2025_design.determined(simulation, (), q, rows, 1.0, (5.0, 200.0))
+        for rows in (chosen, np.array([0, 1, 2, 3]))
+    ]
+    assert told[0] >= told[1]
+    covariance, information = birk2025_design._open(simulation, (), q, 1.0, (5.0, 200.0))
+
+    def gain(rows):
+        whole = np.eye(len(covariance)) + covariance @ information[rows].sum(axis=0)
+        return np.linalg.slogdet(whole)[1]
+
+    assert all(gain([chosen[0]]) >= gain([i]) for i in range(len(q)))
+    assert gain(chosen) > gain([0, 1, 2, 3])
+
+
+def test_the_truth_of_birk_is_of_another_class():
+    truth = birk2025_data.true_robot()
+    assert len(truth.deviation.beams) == 3
+    assert len(birk2025_data.gears(truth)) == 6
+    stated = birk2025._simulation("24P").elasticity.stiffness
+    own = np.array([spring.stiffness for spring in truth.springs[: len(stated)]])
+    assert np.std(np.log(own / stated)) > 0.1
+
+
+def test_saltellis_points_are_two_halves_of_one_sequence():
+    points = saltelli(3, 1000)
+    assert points.shape == (1000, 3)
+    assert points.min() > 0
+    assert points.max() < 1
+    # Far more even than random numbers: their mean errs by 1/√12,000 = 0.009.
+    np.testing.assert_allclose(points.mean(axis=0), 0.5, atol=0.003)
+    assert abs(np.corrcoef(points[:500, 0], points[500:, 0])[0, 1]) < 0.1
 
 
 def test_studies_are_found_by_their_former_names_too():

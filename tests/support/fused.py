@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from planner.studies.models import recursive_ar1, single_output_gp
+from planner.studies.models.ar1_nargp import fit_ar1_nargp
 from planner.studies.models.fidelity_levels import AveragedModel, FidelityLevel, Samples
-from planner.studies.models.nargp import fit_nargp
 from planner.studies.models.recursive_ar1 import fit_recursive, scales
 from planner.studies.models.single_output_gp import fit_gp
 from planner.surrogate.ar1 import OutputPrior
@@ -24,7 +24,7 @@ ALIKE = 0.15  # sd of ρ about 1, where simulation and truth vary by the same am
 LONG, LONG_SPREAD, GENTLE = 3.0, 0.5, 0.5  # length scale and amplitude of a gentle discrepancy
 # Before any data. AR1's ρ may be 0, so it forgives a simulation of no use; a GP cannot thank a good
 # one. Chosen on `development_problems`: at three points the GP's share is error for nothing.
-BELIEF = {"AR1": 0.7, "NARGP": 0.2, "GP": 0.1}
+BELIEF = {"AR1": 0.7, "AR1-NARGP": 0.2, "GP": 0.1}
 
 
 def fit_low(samples: Samples) -> Mixture:
@@ -44,7 +44,7 @@ def fit_low(samples: Samples) -> Mixture:
 def fit_fused(
     measured: Samples, low: FidelityLevel, low_spread: float, nugget: float = 1e-3
 ) -> Mixture:
-    """Mixture of AR1, NARGP and a GP that ignores the simulation.
+    """Mixture of AR1, AR1-NARGP and a GP that ignores the simulation.
 
     `low_spread` is the sd of the low level over the workspace, `nugget` the median prior of noise
     beyond the samples' sds, over the scale of the output: 1e-6 for values known to be exact.
@@ -58,7 +58,7 @@ def fit_fused(
             name: fit_recursive(measured, low, low_spread, kernel, prior)
             for name, (kernel, prior) in _discrepancies(fused, measured.x.shape[1]).items()
         },
-        "NARGP": {k: fit_nargp(measured, low, low_spread, k, fused) for k in BENDS},
+        "AR1-NARGP": {k: fit_ar1_nargp(measured, low, low_spread, k, fused) for k in BENDS},
         "GP": {k: fit_gp(measured, k, alone, scale) for k in SHAPES},
     }
     models = {f"{name}, {k}": m for name, family in families.items() for k, m in family.items()}

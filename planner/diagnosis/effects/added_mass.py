@@ -46,6 +46,7 @@ class AddedMass(Effect):
     joint: str = ""
 
     name = "added_mass"
+    absorbed = True
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["AddedMass", ...]:

@@ -86,7 +86,8 @@ class Effect:
     """An effect at a place. Each kind overrides what it changes.
 
     `springs` names the parameters of `priors` that belong to the effect: they are reported with
-    `quantities`, the ones that it adds.
+    `quantities`, the ones that it adds. `absorbed`: springs and inertias that are refitted can take
+    its place, so that only its own size says how much it matters, not what FRFs lack without it.
     """
 
     at: str
@@ -94,6 +95,7 @@ class Effect:
 
     name = "none"
     artefact = False
+    absorbed = False
 
     @property
     def prior(self) -> float:

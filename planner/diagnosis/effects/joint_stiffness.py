@@ -19,6 +19,7 @@ class JointStiffness(Effect):
     only_own: bool = False
 
     name = "joint_stiffness"
+    absorbed = True
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["JointStiffness", ...]:

@@ -1,10 +1,11 @@
-"""FRF-level fusion: amplitude over (frequency, pose coordinate), as in Busch et al. 2020.
+"""FRF-level fusion of the logarithm of the amplitude over (frequency, pose coordinate).
 
-The logarithm of the amplitude is modelled, so that it stays positive. The simulated surface is a
-complete grid (`grid_gp`). The measured surface ignores it (GP), adds a discrepancy to it (AR1), is
-a smooth function of it (NARGP) or of its distribution (MFDGP). None of them extrapolates well over
-the pose where resonances move: a peak that moves is, to a surface, one that ends and another that
-begins. Fusing the modes (`planner.surrogate`) does.
+Not as published: Busch et al. 2020 model the amplitude itself (`published_surface`); its logarithm
+stays positive. The simulated surface is a complete grid (`grid_gp`). The measured surface ignores
+it (log GP), adds a discrepancy to it (log AR1), is a smooth function of it (log sparse NARGP) or of
+its distribution (log quadrature MFDGP). None of them extrapolates well over the pose where
+resonances move: a peak that moves is, to a surface, one that ends and another that begins. Fusing
+the modes (`planner.surrogate`) does.
 """
 
 from collections.abc import Callable
@@ -15,7 +16,8 @@ import numpy as np
 from planner.errors import InputError
 from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.grid_gp import GridGP, fit_grid
-from planner.studies.models.mfdgp import MFDGP, fit_mfdgp
+from planner.studies.models.nargp import perdikaris
+from planner.studies.models.quadrature_mfdgp import QuadratureMFDGP, fit_quadrature_mfdgp
 from planner.studies.models.sparse_gp import SparseGP, fit_sparse
 
 INDUCING = 300  # points of the sparse models, of 2,622
@@ -81,7 +83,7 @@ class Discrepancy:
 
 @dataclass(frozen=True, eq=False)
 class Bent:
-    """NARGP over a surface: a sparse GP of (x, y_L(x))."""
+    """NARGP over a surface, but sparse: a sparse GP of (x, y_L(x)), priors on its kernel."""
 
     low: GridGP
     high: SparseGP
@@ -91,17 +93,22 @@ class Bent:
         return self.high.predict(np.column_stack([x, self.low.predict(x)[0]]))
 
 
-def fit_surface(measured: Grid, simulated: Grid, model: str = "AR1") -> Surface:
-    """Fit one of SURFACES; InputError for another name, or amplitudes that are not positive."""
-    if model not in SURFACES:
-        raise InputError(f"No model {model!r} of an FRF surface: use one of {', '.join(SURFACES)}.")
+def frame_of(measured: Grid, simulated: Grid) -> Frame:
+    """The frame that holds both; InputError for amplitudes that are not positive."""
     for grid in (measured, simulated):
         if not (grid.amplitude > 0).all():
             raise InputError("An amplitude is missing or not positive: leave its line out.")
     lines = np.concatenate([measured.frequency_hz, simulated.frequency_hz])
     poses = np.concatenate([measured.pose, simulated.pose])
     extent = np.array([np.ptp(lines), np.ptp(poses)])
-    frame = Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
+    return Frame(np.array([lines.min(), poses.min()]), np.where(extent > 0, extent, 1.0))
+
+
+def fit_surface(measured: Grid, simulated: Grid, model: str = "log AR1") -> Surface:
+    """Fit one of SURFACES; InputError for another name, or amplitudes that are not positive."""
+    if model not in SURFACES:
+        raise InputError(f"No model {model!r} of an FRF surface: use one of {', '.join(SURFACES)}.")
+    frame = frame_of(measured, simulated)
     return Surface(SURFACES[model](frame, measured, simulated), frame)
 
 
@@ -132,18 +139,17 @@ def _nargp(frame: Frame, measured: Grid, simulated: Grid) -> Bent:
     low = _grid(frame, simulated, np.log(simulated.amplitude))
     s = _samples(frame, measured)
     wide = np.column_stack([s.x, low.predict(s.x)[0]])
-    kernel = "rbf[0:2]*rbf[2:3]+rbf[0:2]"
-    return Bent(low, fit_sparse(Samples(wide, s.y, s.sd), kernel, INDUCING))
+    return Bent(low, fit_sparse(Samples(wide, s.y, s.sd), perdikaris(2), INDUCING))
 
 
-def _mfdgp(frame: Frame, measured: Grid, simulated: Grid) -> MFDGP:
+def _mfdgp(frame: Frame, measured: Grid, simulated: Grid) -> QuadratureMFDGP:
     low = _grid(frame, simulated, np.log(simulated.amplitude))
-    return fit_mfdgp(_samples(frame, measured), low, INDUCING)
+    return fit_quadrature_mfdgp(_samples(frame, measured), low, INDUCING)
 
 
 SURFACES: dict[str, Callable[[Frame, Grid, Grid], FidelityLevel]] = {
-    "GP": _gp,
-    "AR1": _ar1,
-    "NARGP": _nargp,
-    "MFDGP": _mfdgp,
+    "log GP": _gp,
+    "log AR1": _ar1,
+    "log sparse NARGP": _nargp,
+    "log quadrature MFDGP": _mfdgp,
 }

@@ -27,6 +27,16 @@ RELATIVE_JITTER = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
+class Normalised:
+    """Outputs y (n, t) at x (n, d), each over its own mean and sd, `centre` and `scale` (t,)."""
+
+    x: np.ndarray
+    y: np.ndarray
+    centre: np.ndarray
+    scale: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Tasks:
     """What is to be fitted: x (n, d), y (n, t) scaled, kernel expression."""
 
@@ -151,12 +161,8 @@ def fit_multitask(
 
     InputError where a value is missing.
     """
-    if not np.isfinite(y).all():
-        which = int(np.argmin(np.isfinite(y).all(axis=0))) + 1
-        raise InputError(f"Output {which} has no value at some pose: leave it or the pose out.")
-    centre, scale = y.mean(axis=0), y.std(axis=0)
-    scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
-    tasks = Tasks(x, (y - centre) / scale, kernel)
+    data = normalised(x, y)
+    tasks = Tasks(x, data.y, kernel)
     guess = first_guess(tasks)
     middle, width = guess.flat(), prior_sds(guess)
 
@@ -175,7 +181,17 @@ def fit_multitask(
         others = np.arange(len(middle)) >= len(_lower(guess.root)[0])
         z = climb(climb(np.zeros(len(middle)), REACH * others, 20), REACH, iterations)
     h = guess.like(middle + width * z)
-    return MultiTaskGP(tasks, h, solve(tasks, h), centre, scale)
+    return MultiTaskGP(tasks, h, solve(tasks, h), data.centre, data.scale)
+
+
+def normalised(x: np.ndarray, y: np.ndarray) -> Normalised:
+    """Of y (n, t) at x (n, d); InputError where a value is missing."""
+    if not np.isfinite(y).all():
+        which = int(np.argmin(np.isfinite(y).all(axis=0))) + 1
+        raise InputError(f"Output {which} has no value at some pose: leave it or the pose out.")
+    centre, scale = y.mean(axis=0), y.std(axis=0)
+    scale = np.where(scale > 1e-12 * np.maximum(np.abs(centre), 1e-300), scale, 1.0)
+    return Normalised(x, (y - centre) / scale, centre, scale)
 
 
 def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:

@@ -1,50 +1,85 @@
-"""NARGP: the expensive level is any smooth function of the pose and of the cheap level.
+"""NARGP as published (Perdikaris et al. 2017): each level is a GP of the pose and the level below.
 
-y = g(x, l(x)) (Perdikaris et al. 2017, eq. 2.13), with a Gaussian process g whose kernel is
-k_ρ(x) k_f(l) + k_δ(x), and here AR1's ρ·l + b in front, so that it is AR1 where nothing bends.
-Where the cheap level is uncertain, its uncertainty is carried through g by quadrature.
+f_t(x) = g_t(x, f_{t−1}(x)) with g_t ~ GP(0, k_ρ(x, x') k_f(f(x), f(x')) + k_δ(x, x')) (eqs. 2.12
+and 2.13 there), nothing in front; all kernels RBF with a length scale per coordinate. Each
+level's hyperparameters are those of the greatest likelihood, level after level, g_t trained at the
+posterior mean of the level below. A prediction is the integral over the level below (eq. 2.14), by
+Gauss–Hermite quadrature with its mean and variance, where the paper and emukit use Monte Carlo.
+AR1 in front, and averaged hyperparameters, are in `ar1_nargp`.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.stats import norm
 
 from planner.studies.models.fidelity_levels import FidelityLevel, Samples
-from planner.studies.models.recursive_ar1 import PRIOR, ScaledAR1
-from planner.surrogate.ar1 import OutputPrior
-from planner.surrogate.predictive import Predictive
+from planner.studies.models.likelihood_gp import (
+    STARTS,
+    LikelihoodGP,
+    Normalisation,
+    fit_likelihood,
+)
 
-NODES = norm.ppf((np.arange(9) + 0.5) / 9)  # equally probable values of the cheap level
-NODES = NODES / np.std(NODES)
-CERTAIN = 1e-6  # sd of the cheap level over its scale, below which one value is enough
+NODE_COUNT = 21  # of the quadrature: exact for polynomials of degree 41
+NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(NODE_COUNT)
+WEIGHTS = WEIGHTS / WEIGHTS.sum()
 
 
-class NARGP(ScaledAR1):
-    """Fitted by `fit_nargp`; `model` takes (x, l)."""
+@dataclass(frozen=True, eq=False)
+class NARGP:
+    """Fitted by `fit_nargp`: the level below, and g of (x, f_low)."""
 
-    def predictive(self, x: np.ndarray) -> Predictive:
-        """The noise-free output at x (q, d), one Gaussian per sample of the hyperparameters."""
-        low, sd = self.scaled_low(x)
-        nodes = NODES if np.max(sd, initial=0.0) > CERTAIN else np.zeros(1)
-        low = (low[None, :] + nodes[:, None] * sd[None, :]).reshape(-1)
-        wide = np.column_stack([np.tile(x, (len(nodes), 1)), low])
-        base, offset = self.model.split(low[:, None])
-        each = self.model.posterior.predictive(0, wide, offset[:, 0])
-        shape = len(each.weights), len(nodes), len(x)
-        means, sds = (each.means + base[:, 0]).reshape(shape), each.sds.reshape(shape)
-        sds = np.sqrt(np.mean(sds**2, axis=1) + np.var(means, axis=1))
-        moments = Predictive(each.weights, np.mean(means, axis=1), sds)
-        return moments.scaled(self.centre, self.scale)
+    low: FidelityLevel
+    high: LikelihoodGP
+    low_units: Normalisation
+
+    def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and sd (q,) of the noise-free expensive output at x (q, d)."""
+        below, unsure = self.low.predict(x)
+        nodes = below[None, :] + NODES[:, None] * unsure[None, :]
+        wide = _widened(np.tile(x, (NODE_COUNT, 1)), nodes.reshape(-1), self.low_units)
+        mean, sd = (part.reshape(NODE_COUNT, len(x)) for part in self.high.predict(wide))
+        middle = WEIGHTS @ mean
+        return middle, np.sqrt(WEIGHTS @ (sd**2 + (mean - middle) ** 2))
 
 
 def perdikaris(d: int, shape: str = "rbf") -> str:
-    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l)."""
+    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l) (eq. 2.13)."""
     return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
 
 
 def fit_nargp(
-    measured: Samples, low: FidelityLevel, low_spread: float, kernel: str = "product",
-    prior: OutputPrior = PRIOR,
-) -> NARGP:  # fmt: skip
-    """NARGP of the measured samples; `kernel` over (x, l), or "product": `perdikaris`."""
-    expression = perdikaris(measured.x.shape[1]) if kernel == "product" else kernel
-    return NARGP.fit(measured, low, low_spread, expression, prior, sees_low=True)
+    measured: Samples,
+    low: FidelityLevel,
+    low_units: Normalisation,
+    noise: float | None = None,
+    units: Normalisation | None = None,
+    starts: int = STARTS,
+    seed: int = 0,
+) -> NARGP:
+    """NARGP of the measured samples over a cheap level, which is fitted already or exact.
+
+    Args:
+        measured: expensive values at x (n, d).
+        low: the cheap level; `fit_low` fits one to samples.
+        low_units: by what the cheap level's value is normalised as an input.
+        noise, units, starts, seed: as of `fit_likelihood`.
+    """
+    below, _ = low.predict(measured.x)
+    wide = Samples(_widened(measured.x, below, low_units), measured.y, measured.sd)
+    kernel = perdikaris(measured.x.shape[1])
+    return NARGP(low, fit_likelihood(wide, kernel, noise, units, starts, seed), low_units)
+
+
+def fit_low(
+    samples: Samples, noise: float = 1e-2, starts: int = STARTS, seed: int = 0
+) -> LikelihoodGP:
+    """The lowest level: an RBF GP of the cheap samples.
+
+    Its noise is held, as in emukit, whose intermediate levels have a variance of 1e-4.
+    """
+    return fit_likelihood(samples, "rbf", noise, starts=starts, seed=seed)
+
+
+def _widened(x: np.ndarray, below: np.ndarray, units: Normalisation) -> np.ndarray:
+    return np.column_stack([x, (below - units.centre) / units.scale])

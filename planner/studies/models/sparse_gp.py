@@ -8,6 +8,7 @@ the other (Burt et al. 2020).
 """
 
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import jax
 import jax.numpy as jnp
@@ -65,7 +66,7 @@ def fit_sparse(
     mean, sd = PRIOR.of_theta(parse(kernel, x.shape[1]))
     peak, u = Peak(np.zeros(len(mean)), -np.inf), x[:1]
     for steps in ROUNDS:
-        u = choose_inducing(kernel, mean + sd * peak.x, x, inducing)
+        u = choose_inducing(parse(kernel, x.shape[1]), mean + sd * peak.x, x, inducing)
         data = x, y, variance, w, u, mean, sd
         peak = maximise(
             lambda z, data=data: bound(kernel, z, *data), [peak.x], -REACH, REACH, steps
@@ -77,9 +78,20 @@ def fit_sparse(
     return SparseGP(kernel, theta, u, root, inner, projected, centre, scale, evidence)
 
 
-def choose_inducing(kernel: str, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
+class Covarying(Protocol):
+    """What kernels are asked for here; see `planner.surrogate.kernels.Kernel`."""
+
+    def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
+        """(a, b) of xa (a, d), xb (b, d)."""
+        ...
+
+    def variance(self, xp: Any, theta: Any, x: Any) -> Any:
+        """Its diagonal (a,)."""
+        ...
+
+
+def choose_inducing(k: Covarying, theta: np.ndarray, x: np.ndarray, count: int) -> np.ndarray:
     """`count` rows of x at most, each where those before leave most variance unexplained."""
-    k = parse(kernel, x.shape[1])
     left = k.variance(np, theta, x).astype(float)
     whole = float(left.max())
     rows: list[int] = []

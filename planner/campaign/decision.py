@@ -1,0 +1,139 @@
+"""Whether the cut that campaign.toml names is stable, as sure as the campaign's model is."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import msgspec
+import numpy as np
+from scipy.stats import norm
+
+from planner.campaign.acquisition_inputs import open_parameters, poses_at
+from planner.design.frequency_posterior import Target
+from planner.design.stability import stability
+from planner.errors import InputError
+from planner.frf.frequency_lines import frequency_lines
+from planner.milling.cut import Cut
+from planner.milling.cutter_frf import of_accelerance
+from planner.milling.decision import PoseDecision, decide
+from planner.milling.structure import of_frf
+
+if TYPE_CHECKING:
+    from planner.campaign.config import CutTable
+    from planner.campaign.model import Model
+
+POSES = 16  # of the workspace at which a cut is looked at, where no path is given
+AHEAD = 8  # measurements that are looked ahead
+NEAR = 0.05  # relative: how far a fitted mode may be from a label's frequency to be that mode
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """At poses q (u, dof) in rad: what is known of the cut's stability."""
+
+    q: np.ndarray
+    poses: tuple[PoseDecision, ...]
+
+    @property
+    def probability(self) -> np.ndarray:
+        """(u,) of being stable."""
+        return np.array([pose.probability for pose in self.poses])
+
+    @property
+    def certainty(self) -> np.ndarray:
+        """(u,) probability of the likelier answer."""
+        p = self.probability
+        return np.maximum(p, 1 - p)
+
+    def sure(self, probability: float) -> bool:
+        """Whether each pose's answer is right with at least this probability."""
+        return bool(np.all(self.certainty >= probability))
+
+    def shrunk(self, share: float, probability: float) -> bool:
+        """Whether it were sure if the variance of every margin were this share of what it is."""
+        size = [abs(pose.margin) / (pose.sd * np.sqrt(max(share, 1e-12))) for pose in self.poses]
+        return bool(np.min(norm.cdf(size)) >= probability)
+
+
+def decided(model: "Model") -> Decision | None:
+    """At the poses of the path, or of the workspace; None where no cut is named."""
+    cell = model.cell
+    table, cut = cell.config.cut, cell.cut
+    if table is msgspec.UNSET or cut is None:
+        return None
+    q = _poses(model, table)
+    lines = frequency_lines(cell.config.modes.band_hz)
+    mean, sd = model.frf(q, lines)
+    found = [_at(cut, table, f"pose {i + 1} of the cut", lines, mean[i], sd[i])
+             for i in range(len(q))]  # fmt: skip
+    return Decision(q, tuple(found))
+
+
+def _poses(model: "Model", table: "CutTable") -> np.ndarray:
+    if table.joints_deg is not None:
+        return np.deg2rad(np.array(table.joints_deg, dtype=float))
+    return model.cell.candidates.q[: min(POSES, model.cell.spread)]
+
+
+def _at(
+    cut: Cut, table: "CutTable", name: str, lines: np.ndarray, mean: np.ndarray, sd: np.ndarray
+) -> PoseDecision:
+    structure = of_frf(of_accelerance(name, lines, mean, sd), cut)
+    return decide(structure, cut, table.speed_rpm, table.depth_m)
+
+
+def decision_target(model: "Model") -> Target:
+    """Poses at which the decision is unsure, and modes on which it hangs, as a target."""
+    decision = model.decision
+    if decision is None:
+        raise InputError(
+            'Acquisition "stability" needs [cut] in campaign.toml, with speed_rpm and depth_m.'
+        )
+    open_ = open_parameters(model.cell, model.low, model.frf_noise)
+    poses, _ = poses_at(model.cell, model.low, model.surrogate, open_, decision.q)
+    expected = model.predict(decision.q).frequency_hz
+    importance = np.array([
+        _importance(pose, hertz) for pose, hertz in zip(decision.poses, expected, strict=True)
+    ])  # fmt: skip
+    total = importance.sum()
+    if not total > 0:
+        return Target.evenly(poses)
+    return Target(poses, importance / total)
+
+
+def _importance(pose: PoseDecision, expected_hz: np.ndarray) -> np.ndarray:
+    """(k,) of each label: square of the slope, weighed by how near the limit the pose may be."""
+    weight = float(norm.pdf(pose.margin / pose.sd)) / pose.sd
+    found = np.zeros(len(expected_hz))
+    for k, hertz in enumerate(expected_hz):
+        off = np.abs(pose.frequency_hz / hertz - 1)
+        nearest = int(np.argmin(off))
+        if off[nearest] < NEAR:
+            found[k] = weight * pose.slope[nearest] ** 2
+    return found
+
+
+def measurements_left(model: "Model") -> int | None:
+    """How many more poses to measure until the decision is sure; None: more than looked ahead.
+
+    By the acquisition's own choice of them, if every margin's variance falls as that of the
+    frequencies on which the decision hangs.
+    """
+    decision = model.decision
+    probability = model.cell.config.stop.probability
+    if decision is None:
+        return None
+    if decision.sure(probability):
+        return 0
+    outputs, poses = model.deciding
+    target = outputs.goal
+    expected = model.predict(decision.q)
+    relative = np.nan_to_num(expected.frequency_sd_hz / expected.frequency_hz)
+    total = left = float(np.sum(target.importance * relative**2))
+    for count in range(1, AHEAD + 1):
+        gain = stability(outputs, poses)
+        best = int(np.argmax(gain))
+        left -= float(gain[best])
+        if decision.shrunk(left / total, probability):
+            return count
+        outputs = outputs.planning(poses.one(best))
+    return None

@@ -1,0 +1,57 @@
+"""Results as rows: a list of dictionaries with one mode each, as pandas.DataFrame takes it."""
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planner.campaign.state import Measurement
+
+if TYPE_CHECKING:
+    from planner.surrogate.frf_bands import ModalPrediction
+
+
+def measured_records(
+    joint_names: Sequence[str], measurements: Iterable[Measurement]
+) -> list[dict[str, Any]]:
+    """One row a measured mode: pose, joint angles in degrees, Hz, ratios, sds, probability."""
+    return [
+        {
+            "pose": m.pose,
+            **_angles(joint_names, m.joints_deg),
+            "mode": k,
+            "frequency_hz": mode.frequency_hz,
+            "frequency_sd_hz": mode.frequency_sd_hz,
+            "damping_ratio": mode.damping_ratio,
+            "damping_sd": mode.damping_sd,
+            "probability": mode.probability,
+            "withdrawn": m.withdrawn,
+        }
+        for m in measurements
+        for k, mode in enumerate((x for x in m.modes if x.likely), 1)
+    ]
+
+
+def predicted_records(
+    joint_names: Sequence[str], q_rad: np.ndarray, prediction: "ModalPrediction"
+) -> list[dict[str, Any]]:
+    """One row for each mode of each pose q (n, dof) in rad of a prediction."""
+    p = prediction
+    return [
+        {
+            "pose": i + 1,
+            **_angles(joint_names, np.rad2deg(row).tolist()),
+            "mode": k + 1,
+            "frequency_hz": float(p.frequency_hz[i, k]),
+            "frequency_sd_hz": float(p.frequency_sd_hz[i, k]),
+            "damping_ratio": float(p.damping_ratio[i, k]),
+            "damping_sd": float(p.damping_sd[i, k]),
+        }
+        for i, row in enumerate(q_rad)
+        for k in range(p.frequency_hz.shape[1])
+    ]
+
+
+def _angles(joint_names: Sequence[str], joints_deg: Sequence[float]) -> dict[str, float]:
+    pairs = zip(joint_names, joints_deg, strict=True)
+    return {f"{name}_deg": float(value) for name, value in pairs}

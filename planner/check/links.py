@@ -1,0 +1,121 @@
+"""Checks of a URDF's links: masses, centres of mass and moments that no such body has."""
+
+import numpy as np
+
+from planner.check.remark import CheckRemark
+from planner.robot.link_bodies import LinkBody
+from planner.robot.robot import Robot
+
+# Limits by which units are told; chosen between robots from 5 to 1,500 kg and a factor of 1000.
+HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.02
+GYRATION = 0.02, 1.2  # radius of gyration over the size of a link; a ball of that size has 0.18
+SMALLEST_SIZE_M = 0.02  # smaller links tell nothing
+OUTSIDE = 0.5  # of its size may a centre of mass lie outside the box around a link
+LONGEST_REACH_M, SHORTEST_REACH_M = 12.0, 0.1
+
+
+def check_links(robot: Robot, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
+    """What looks wrong in the links of a robot."""
+    found = _lengths(robot)
+    for link in links:
+        if link.joint:
+            found += _stated(robot, link, links) if not link.stated else _body(robot, link)
+    return found
+
+
+def _where(robot: Robot, link: LinkBody) -> str:
+    return f"{robot.urdf_path.name}, link {link.name}"
+
+
+def _lengths(robot: Robot) -> list[CheckRemark]:
+    reach, where = robot.reach_m, f"{robot.urdf_path.name}, joint origins"
+    if SHORTEST_REACH_M <= reach <= LONGEST_REACH_M:
+        return []
+    unit = "millimetres" if reach > LONGEST_REACH_M else "another unit"
+    return [
+        CheckRemark(
+            "warning",
+            f"The tool reaches {reach:.4g} m from the first joint, as if lengths were in {unit}.",
+            where,
+            "A URDF's lengths are in m.",
+        )
+    ]
+
+
+def _stated(robot: Robot, link: LinkBody, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
+    """A link without <inertial>: a frame may be one, a part of the arm may not."""
+    turned = [other for other in links if other.joint == link.joint]
+    whole = any(other.mass > 0 for other in turned)
+    if link.first and not whole:
+        text = f"What {link.joint} turns has no mass: no <inertial>, here or on what is fixed to it"
+    elif link.shapes or link.visuals:
+        text = "It has shapes but no <inertial>, so that the simulation takes it for weightless"
+    else:
+        return []
+    return [
+        CheckRemark(
+            "warning",
+            f"{text}: simulated frequencies come out too high.",
+            _where(robot, link),
+            "Add its mass (kg), centre of mass (m) and moments of inertia (kg·m²).",
+        )
+    ]
+
+
+def _body(robot: Robot, link: LinkBody) -> list[CheckRemark]:
+    found, where = [], _where(robot, link)
+    if link.mass == 0:
+        return [CheckRemark("warning", "It has an <inertial> of mass 0.", where, "State its mass.")]
+    if not LIGHTEST_KG <= link.mass <= HEAVIEST_KG:
+        text = f"It has a mass of {link.mass:.4g} kg."
+        remedy = "Masses are in kg, neither in g nor in t."
+        found.append(CheckRemark("warning", text, where, remedy))
+    low, mid, high = link.moments
+    if low + mid < high * (1 - 1e-6) - 1e-12:
+        text = (
+            f"No body has principal moments of {low:.3g}, {mid:.3g} and {high:.3g} kg·m²: "
+            f"each is at most the sum of the two others."
+        )
+        found.append(CheckRemark("warning", text, where, "Correct <inertia>."))
+    if high == 0:
+        text = f"Its {link.mass:.4g} kg have no moments of inertia, as if they were in one point."
+        found.append(CheckRemark("warning", text, where, "State ixx, iyy, izz in kg·m²."))
+    elif link.size_m > SMALLEST_SIZE_M:
+        found += _gyration(link, where)
+    return found + _centre(robot, link, where)
+
+
+def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
+    """How far from its centre of mass the mass would have to be."""
+    gyration = float(np.sqrt(link.moments[2] / link.mass))
+    least, most = (share * link.size_m for share in GYRATION)
+    if least <= gyration <= most:
+        return []
+    word = "far outside" if gyration > most else "at the middle of"
+    return [
+        CheckRemark(
+            "warning",
+            f"Its largest moment of inertia, {link.moments[2]:.3g} kg·m², puts its "
+            f"{link.mass:.4g} kg at {gyration:.3g} m from their centre, {word} a link of "
+            f"{link.size_m:.2g} m.",
+            where,
+            "Moments are in kg·m² about the centre of mass, neither in kg·mm² nor about the joint.",
+        )
+    ]
+
+
+def _centre(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
+    # Where neither shapes nor a next joint tell its size, the arm's own does.
+    size = link.size_m if link.size_m > SMALLEST_SIZE_M else 0.5 * robot.reach_m
+    over = np.maximum(link.low_m - link.com_m, link.com_m - link.high_m).max()
+    if over <= OUTSIDE * size:
+        return []
+    place = ", ".join(f"{v:.4g}" for v in link.com_m)
+    return [
+        CheckRemark(
+            "warning",
+            f"Its centre of mass, ({place}) m, lies {over:.3g} m outside the link.",
+            where,
+            "It is given in m, in the link's own frame.",
+        )
+    ]

@@ -1,0 +1,86 @@
+"""Checks of collision geometry, and of the workspace against the robot."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from planner.check.remark import CheckRemark
+from planner.errors import InputError, NoPoseLeftError
+from planner.robot.collision import Collisions
+from planner.robot.link_bodies import LinkBody
+from planner.robot.robot import Robot
+from planner.robot.workspace import Candidates, Workspace, WorkspaceRanges
+
+SPREAD = 8  # poses of the workspace that are looked at
+RADIANS = 6.3  # ranges of joints in degrees that stay below are most likely radians
+NARROW_DEG = 15.0  # unless other joints move by this much
+
+
+def check_collision(
+    robot: Robot, links: tuple[LinkBody, ...], home: np.ndarray
+) -> list[CheckRemark]:
+    """What collision geometry lacks, and what touches at home (dof,) in rad."""
+    collisions, urdf = Collisions(robot), robot.urdf_path.name
+    if collisions.unchecked is not None:
+        remedy = "Add <collision> boxes or cylinders to its links."
+        return [CheckRemark("warning", collisions.unchecked, f"{urdf}, <collision>", remedy)]
+    found = []
+    shaped = {link.joint for link in links if link.shapes}
+    bare = [name for name in robot.joint_names if name not in shaped]
+    if bare:
+        text = f"What {', '.join(bare)} turns has no collision shape and is not checked."
+        remedy = "Add <collision> boxes or cylinders to these links."
+        found.append(CheckRemark("warning", text, f"{urdf}, <collision>", remedy))
+    if not robot.config.obstacle:
+        text = "There is no [[obstacle]]: floor, table and fence are not checked."
+        remedy = "Add boxes: name, center_m, size_m."
+        found.append(CheckRemark("note", text, robot.path.name, remedy))
+    touching = collisions.contacts(home)
+    if touching:
+        text = f"At home {'; '.join(touching)}."
+        remedy = "Shrink the shapes, or list the pair in [collision] ignore."
+        found.append(CheckRemark("note", text, f"{urdf}, <collision>", remedy))
+    always = collisions.always_touching
+    if always:
+        text = f"At every pose {'; '.join(always)}: not checked."
+        remedy = "Shrink the shapes if they are to be checked."
+        found.append(CheckRemark("note", text, f"{urdf}, <collision>", remedy))
+    return found
+
+
+def look_around(
+    robot: Robot, table: WorkspaceRanges, file: str
+) -> tuple[Candidates | None, list[CheckRemark]]:
+    """A few poses of the workspace, and what looks wrong in it."""
+    where, found = f"{file}, [workspace]", _units(table.joints_deg, table.position_m, file)
+    try:
+        candidates = Workspace.from_table(table, robot).candidates(robot, SPREAD, 0)
+    except NoPoseLeftError as error:
+        return None, [*found, CheckRemark("error", str(error), where)]
+    except InputError as error:
+        return None, [*found, CheckRemark("error", str(error), file)]
+    kept, lost = len(candidates.q), sum(candidates.rejected.values())
+    if lost > kept:
+        most = max(candidates.rejected, key=lambda reason: candidates.rejected[reason])
+        text = f"Of {kept + lost} poses looked at the robot can reach {kept} (most often: {most})."
+        found.append(CheckRemark("warning", text, where, "Narrow the workspace."))
+    return candidates, found
+
+
+def _units(
+    joints_deg: Sequence[tuple[float, float]] | None,
+    position_m: Sequence[tuple[float, float]] | None,
+    file: str,
+) -> list[CheckRemark]:
+    if joints_deg is not None:
+        box = np.array(joints_deg, dtype=float)
+        wide = np.ptp(box, axis=1).max() if box.size else 0.0
+        if 0 < np.abs(box).max(initial=0.0) < RADIANS and wide < NARROW_DEG:
+            text = f"No joint moves by more than {wide:.3g}°, as if the ranges were in radians."
+            where = f"{file}, [workspace] joints_deg"
+            return [CheckRemark("warning", text, where, "Give degrees.")]
+    elif position_m is not None and np.abs(np.array(position_m, dtype=float)).max() > 50:
+        text = "Positions of more than 50 m, as if they were in millimetres."
+        where = f"{file}, [workspace] position_m"
+        return [CheckRemark("warning", text, where, "Give metres.")]
+    return []

@@ -1,0 +1,55 @@
+"""What explains the rest (`planner schema`, `planner manual`)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planner.cli.answer import AsJson, respond
+from planner.report.answer import Answer
+
+
+@dataclass(frozen=True)
+class WrittenManual(Answer):
+    """Answer of `manual`: the file."""
+
+    manual: str
+
+    def text(self) -> str:
+        """One sentence."""
+        return f"The manual: {self.manual}"
+
+
+def schema(
+    file: Annotated[str, typer.Argument(metavar="FILE", help="robot or campaign.")] = "robot",
+    as_json: AsJson = False,
+) -> int:
+    """Every entry of robot.toml or campaign.toml, from the types that read them.
+
+    --json holds a JSON Schema, which editors complete and check by.
+
+    Example: planner schema campaign
+    """
+    from planner.report.schema import schema as entries
+
+    return respond(entries(file), as_json)
+
+
+def manual(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="Where the manual goes.")] = Path(
+        "planner_manual.html"
+    ),
+    as_json: AsJson = False,
+) -> int:
+    """Write the manual as one HTML file: tutorial, files, commands, what numbers mean.
+
+    Example: planner manual --out manual.html
+    """
+    from planner.report.manual.build import write_manual
+
+    assert context.parent is not None
+    commands = getattr(context.parent.command, "commands", {})
+    told = [(name, command.help or "") for name, command in commands.items()]
+    return respond(WrittenManual(str(write_manual(out, told))), as_json)

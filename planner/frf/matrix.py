@@ -1,0 +1,169 @@
+"""FRFs between any points: a matrix of responses × references, as complete as it was measured."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import InputError, RefusedError
+from planner.frf.quantities import DERIVATIVE, convert
+from planner.recording.dof import Dof
+from planner.recording.records import FrfRecord
+
+
+@dataclass(frozen=True, eq=False)
+class FrfMatrix:
+    """Accelerance between degrees of freedom; NaN where it was not measured.
+
+    `accelerance[o, i]` is the response at `responses[o]` to a force at `references[i]`, both along
+    positive axes: what was measured along negative ones is turned. In m/s²/N where `scaled`.
+    `coherence` is NaN where the files state none. `turned` are the degrees of freedom that were
+    measured against their axis, `files` where FRFs come from.
+    """
+
+    frequency_hz: np.ndarray  # (F,) increasing, > 0
+    responses: tuple[Dof, ...]
+    references: tuple[Dof, ...]
+    accelerance: np.ndarray  # (o, i, F) complex
+    coherence: np.ndarray  # (o, i, F)
+    scaled: bool
+    remarks: tuple[str, ...] = ()
+    simulated: bool = False
+
+    @property
+    def measured(self) -> np.ndarray:
+        """(o, i) bool: which entries were measured."""
+        return np.all(np.isfinite(self.accelerance), axis=-1)
+
+    @property
+    def count(self) -> int:
+        """How many FRFs there are."""
+        return int(np.count_nonzero(self.measured))
+
+    @property
+    def driving(self) -> tuple[tuple[int, int], ...]:
+        """(response, reference) of the driving points: entries hit where they were felt."""
+        found = ((self.index(d), i) for i, d in enumerate(self.references) if d in self.responses)
+        return tuple((o, i) for o, i in found if self.measured[o, i])
+
+    def index(self, dof: Dof) -> int:
+        """Which response a degree of freedom is."""
+        return self.responses.index(dof)
+
+    def transposed(self) -> "FrfMatrix":
+        """Responses and references exchanged, as Maxwell's reciprocity allows."""
+        return FrfMatrix(
+            self.frequency_hz,
+            self.references,
+            self.responses,
+            np.swapaxes(self.accelerance, 0, 1),
+            np.swapaxes(self.coherence, 0, 1),
+            self.scaled,
+            self.remarks,
+            self.simulated,
+        )
+
+
+def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfMatrix:
+    """One matrix of all FRFs of all files, by node and direction.
+
+    `quantity` says what FRFs are whose file does not. An FRF that is there several times is
+    averaged. Raises RefusedError for lines that differ, InputError for an unknown direction.
+    """
+    frequency, remarks = _lines(records), [r for record in records for r in record.remarks]
+    sums: dict[tuple[Dof, Dof], list[np.ndarray]] = {}
+    coherences: dict[tuple[Dof, Dof], np.ndarray] = {}
+    scaled, keep, dead = True, frequency > 0, []
+    for record in records:
+        kind, known = _kind(record, quantity, remarks)
+        scaled &= known
+        values = convert(frequency[keep], record.values[:, keep], kind, "accelerance")
+        for k, (felt, hit) in enumerate(_places(record)):
+            if not np.any(values[k]):
+                dead.append(f"{felt} hit at {hit}")
+                continue
+            key = felt.positive, hit.positive
+            sums.setdefault(key, []).append(felt.sign * hit.sign * values[k])
+            coherences[key] = record.coherence[k][keep]
+    if not sums:
+        raise RefusedError(f"{records[0].source}: all FRFs are zero; export them again.")
+    if dead:
+        named = ", ".join(dead[:3]) + (" …" if len(dead) > 3 else "")
+        remarks.append(f"{len(dead)} FRFs are zero throughout and were left out: {named}.")
+    twice = [key for key, values in sums.items() if len(values) > 1]
+    if twice:
+        remarks.append(
+            f"{len(twice)} FRFs were measured more than once (the first: {twice[0][0]} hit at "
+            f"{twice[0][1]}); their mean is used."
+        )
+    return _matrix(frequency[keep], sums, coherences, scaled, remarks, records)
+
+
+def _matrix(
+    frequency: np.ndarray,
+    sums: dict[tuple[Dof, Dof], list[np.ndarray]],
+    coherences: dict[tuple[Dof, Dof], np.ndarray],
+    scaled: bool,
+    remarks: list[str],
+    records: Sequence[FrfRecord],
+) -> FrfMatrix:
+    responses = tuple(sorted({felt for felt, _ in sums}, key=by_number))
+    references = tuple(sorted({hit for _, hit in sums}, key=by_number))
+    shape = len(responses), len(references), frequency.size
+    values, coherence = np.full(shape, np.nan + 0j), np.full(shape, np.nan)
+    for (felt, hit), entries in sums.items():
+        at = responses.index(felt), references.index(hit)
+        values[at] = np.mean(entries, axis=0)
+        coherence[at] = coherences[felt, hit]
+    simulated = any(record.simulated for record in records)
+    told = tuple(dict.fromkeys(remarks))
+    return FrfMatrix(frequency, responses, references, values, coherence, scaled, told, simulated)
+
+
+def by_number(dof: Dof) -> tuple[int, int, str, int]:
+    """Order of degrees of freedom: numbers by size, then names; x before y before z."""
+    digits = dof.node.lstrip("-").isdigit()
+    return not digits, int(dof.node) if digits else 0, dof.node, abs(dof.number)
+
+
+def _places(record: FrfRecord) -> list[tuple[Dof, Dof]]:
+    ends = (
+        (record.response_node, record.response_direction),
+        (record.reference_node, record.reference_direction),
+    )
+    felt, hit = (
+        [Dof.of_uff(n, d) for n, d in zip(nodes, directions, strict=True)]
+        for nodes, directions in ends
+    )
+    return list(zip(felt, hit, strict=True))
+
+
+def _lines(records: Sequence[FrfRecord]) -> np.ndarray:
+    """The frequency lines that all have."""
+    first = np.asarray(records[0].frequency_hz, float)
+    for record in records[1:]:
+        other = np.asarray(record.frequency_hz, float)
+        # Headers state the spacing to five digits or so.
+        if other.size != first.size or not np.allclose(other, first, rtol=1e-4, atol=1e-9):
+            raise RefusedError(
+                f"{record.source} has other frequency lines than {records[0].source}; export one "
+                "grid."
+            )
+    return first
+
+
+def _kind(record: FrfRecord, quantity: str | None, remarks: list[str]) -> tuple[str, bool]:
+    """What the FRFs are, and whether they are in SI units."""
+    if record.quantity in DERIVATIVE:
+        if not record.unit:
+            remarks.append(f"{record.source.name}: the unit is not known, shapes are not scaled.")
+        return record.quantity, bool(record.unit)
+    if quantity is not None:
+        if quantity not in DERIVATIVE:
+            raise InputError(f"--quantity {quantity} is not known; give {', '.join(DERIVATIVE)}.")
+        return quantity, False
+    remarks.append(
+        f"{record.source.name} does not say whether its FRFs are accelerance, mobility or "
+        "receptance; they are taken for accelerance and shapes are not scaled. Say --quantity."
+    )
+    return "accelerance", False

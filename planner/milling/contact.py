@@ -1,0 +1,146 @@
+"""When teeth are in the cut, and points of time at which the cutting force is asked for.
+
+The force jumps where a tooth enters or leaves; between two such angles it is smooth. Elements lie
+between them, so that polynomials through the points of an element converge.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from planner.milling.cut import Cut
+from planner.milling.directional import (
+    Coefficients,
+    chip_direction,
+    force_direction,
+    tooth_matrix,
+)
+
+APART = 1e-9  # rad: breakpoints closer than this are one
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """Lobatto points (s+1,) of a polynomial of degree s on [0, 1], and its integrals.
+
+    `points` (s+1, q) and `values` (s+1, q, s+1): Gauss points of [0, c_i], as shares of c_i, with
+    the Lagrange polynomials there times the weights. `weights` (s+1,) integrate over [0, 1].
+    """
+
+    nodes: np.ndarray
+    points: np.ndarray
+    values: np.ndarray
+    weights: np.ndarray
+
+
+@cache
+def lobatto(degree: int) -> Rule:
+    """The rule of a polynomial degree, 1 or more."""
+    inner = legendre.legroots(legendre.legder([0.0] * degree + [1.0])) if degree > 1 else []
+    nodes = (np.concatenate([[-1.0], np.sort(np.real(inner)), [1.0]]) + 1) / 2
+    x, w = legendre.leggauss(degree + 12)  # polynomial times an exponential over one element
+    x, w = (x + 1) / 2, w / 2
+    values = lagrange(nodes, nodes[:, None] * x[None, :]) * w[None, :, None]
+    whole = np.einsum("qj,q->j", lagrange(nodes, x), w)
+    return Rule(nodes, np.broadcast_to(x, (len(nodes), len(x))), values, whole)
+
+
+def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """(..., n): the Lagrange polynomials of nodes (n,) at points (...)."""
+    at = np.asarray(at)[..., None]
+    found = np.ones((*at.shape[:-1], len(nodes)))
+    for j, node in enumerate(nodes):
+        others = np.delete(nodes, j)
+        found[..., j] = np.prod((at - others) / (node - others), axis=-1)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Elements of one period in which teeth cut, as angles (rad) of the first tooth's tip.
+
+    `start`, `end` (e,): of each element, within [0, `period`] after the first entry. `teeth`: which
+    teeth cut in it. `segment` (e,): elements with the same number follow without a jump.
+    """
+
+    period: float
+    offset: float
+    start: np.ndarray
+    end: np.ndarray
+    teeth: tuple[tuple[int, ...], ...]
+    segment: np.ndarray
+
+
+def tooth_angles(cut: Cut) -> np.ndarray:
+    """(teeth,): by how much each tooth is ahead of the first one."""
+    return np.concatenate([[0.0], np.cumsum(cut.pitches_rad)[:-1]])
+
+
+def contact(cut: Cut, depth_m: float, longest_rad: float) -> Contact:
+    """Elements no longer than `longest_rad`; with a helix they depend on the depth.
+
+    One tooth's period if all teeth follow alike, else a turn of the spindle.
+    """
+    start, end = cut.immersion_rad
+    period = 2 * np.pi / cut.teeth if cut.even else 2 * np.pi
+    lag = cut.lag_rad_m * depth_m
+    ahead = tooth_angles(cut)
+    edges = np.array([start, start + lag, end, end + lag])
+    breaks = np.mod(edges[None, :] - ahead[:, None] - start, period).ravel()
+    breaks = _distinct(np.append(breaks, [0.0, period]), period)
+    found: list[tuple[float, float, tuple[int, ...], int]] = []
+    for k, (a, b) in enumerate(pairwise(breaks)):
+        tip = np.mod((a + b) / 2 + ahead, 2 * np.pi) + start
+        inside = tip < end + lag
+        cutting = tuple(int(j) for j in np.flatnonzero(inside))
+        if cutting:
+            cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
+            found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
+    return Contact(
+        float(period),
+        start,
+        np.array([f[0] for f in found]),
+        np.array([f[1] for f in found]),
+        tuple(f[2] for f in found),
+        np.array([f[3] for f in found]),
+    )
+
+
+def _distinct(values: np.ndarray, period: float) -> np.ndarray:
+    kept = [0.0]
+    for value in np.sort(values):
+        if value - kept[-1] > APART and period - value > APART:
+            kept.append(float(value))
+    return np.array([*kept, period])
+
+
+def directions(
+    cut: Cut, k: Coefficients, teeth: tuple[int, ...], angle: np.ndarray, depth_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Chip rows (m, r, 2) and force columns (m, 2, r) at tip angles (m,) of the first tooth.
+
+    Force per depth = columns · rows · displacement. r is 1 where one tooth without helix cuts.
+    """
+    ahead = tooth_angles(cut)
+    if len(teeth) == 1 and cut.lag_rad_m == 0:
+        phi = angle + ahead[teeth[0]]
+        return chip_direction(phi)[:, None, :], force_direction(phi, k)[:, :, None]
+    matrix = sum(each_tooth(cut, k, j, angle, depth_m) for j in teeth)
+    return np.broadcast_to(np.eye(2), (len(angle), 2, 2)), np.asarray(matrix)
+
+
+def each_tooth(
+    cut: Cut, k: Coefficients, tooth: int, angle: np.ndarray, depth_m: float
+) -> np.ndarray:
+    """(m, 2, 2) of one tooth that is known to cut, at tip angles (m,) of the first tooth."""
+    start, _ = cut.immersion_rad
+    phi = np.mod(angle + tooth_angles(cut)[tooth] - start + APART, 2 * np.pi) + start - APART
+    lag = cut.lag_rad_m * depth_m
+    if lag == 0:
+        return force_direction(phi, k)[:, :, None] * chip_direction(phi)[:, None, :]
+    # The upper part of a long helix may still cut where the tip came round again.
+    turns = 2 * np.pi * np.arange(1 + int(lag // (2 * np.pi) + 1))
+    return tooth_matrix(cut, k, phi[:, None] + turns, depth_m).sum(axis=1)

@@ -1,0 +1,218 @@
+"""Receptance coupling: the tested tool taken off, another one put on, at one pose.
+
+All motions and rotations at once, cross terms included (Schmitz and Donaldson, CIRP Annals 49,
+2000; Özşahin and Altintas, Int. J. Mach. Tools Manuf. 92, 2015; Lei et al. 2023, eqs. 1–4). A tool
+maps the state (motion, force) of its tip to that of its holder. With the state of the tested
+tool's tip, (C f, f), that of the target's tip is M (C f, f), where M = T₂⁻¹ T₁, and so
+
+    C₂ = (M_uu C + M_uf) (M_fu C + M_ff)⁻¹,
+
+which is eq. 4 of Lei et al. without its differences of large free-free receptances. An error δ in
+C becomes (M_uu − C₂ M_fu) δ (M_fu C + M_ff)⁻¹: this says line by line how noise is amplified.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.milling.interface import NUMBERS
+from planner.milling.tool import Tool
+
+MOTIONS = ("x", "y", "z", "rx", "ry", "rz")
+# Above this a 1 % error of every measured FRF is more than a tenth of the coupled one.
+AMPLIFICATION_LIMIT = 10.0
+SHARE = 1e-9  # of an axis in another: rounding
+
+
+@dataclass(frozen=True, eq=False)
+class TipReceptance:
+    """Receptances at the tip of the tested tool, and how they came from what was measured.
+
+    C = left · measured · right + offset, in m/N, m/(N·m), rad/N and rad/(N·m), over the motions
+    `kept` (numbers in MOTIONS, rotations about x, y, z) along the columns of `frame` (3, 3), which
+    are given in the axes of the FRFs. `sd` is that of each measured value, and of C's own rest
+    `offset_sd`, each taken for itself; where values err together, `errors` (D, F, n, n) says how,
+    independent of each other and of one sd each, instead of `sd`.
+    """
+
+    frequency_hz: np.ndarray  # (F,) > 0
+    kept: tuple[int, ...]  # k of the six
+    measured: np.ndarray  # (F, n, n) complex
+    sd: np.ndarray  # (F, n, n)
+    left: np.ndarray  # (F, k, n)
+    right: np.ndarray  # (F, n, k)
+    offset: np.ndarray  # (F, k, k)
+    offset_sd: np.ndarray  # (F, k, k)
+    frame: np.ndarray = field(default_factory=lambda: np.eye(3))
+    remarks: tuple[str, ...] = ()
+    errors: np.ndarray | None = None
+    simulated: bool = False  # the source says that it holds simulated, not measured, data
+
+    @property
+    def receptance(self) -> np.ndarray:
+        """C (F, k, k)."""
+        return self.left @ self.measured @ self.right + self.offset
+
+    @classmethod
+    def known(
+        cls,
+        frequency_hz: np.ndarray,
+        receptance: np.ndarray,
+        sd: np.ndarray | None = None,
+        kept: tuple[int, ...] = tuple(range(6)),
+    ) -> "TipReceptance":
+        """From all receptances (k, k, F) of the motions `kept`, in the FRFs' axes, and their sd."""
+        c = np.moveaxis(np.asarray(receptance, complex), -1, 0)
+        spread = np.zeros(c.shape) if sd is None else np.moveaxis(np.asarray(sd, float), -1, 0)
+        eye = np.broadcast_to(np.eye(len(kept), dtype=complex), c.shape)
+        nothing = np.zeros(c.shape)
+        return cls(np.asarray(frequency_hz, float), kept, c, spread, eye, eye, nothing, nothing)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledFrf:
+    """Receptances (6, 6, F) at the tip of the target tool, their sd, and how noise grew.
+
+    In the axes of the FRFs. The motions not `kept` were not measured: they are taken as held, and
+    theirs are NaN. `amplification` (F,) is the relative error of the 3 × 3 of motions per force,
+    in the Frobenius norm, for relative errors of one unit in every measured value, each by itself.
+    """
+
+    frequency_hz: np.ndarray
+    kept: tuple[int, ...]
+    receptance: np.ndarray
+    sd: np.ndarray
+    amplification: np.ndarray
+    remarks: tuple[str, ...] = ()
+    simulated: bool = False
+
+    @property
+    def accelerance(self) -> np.ndarray:
+        """(6, 6, F) in m/s²/N and the like."""
+        return self.receptance * (2j * np.pi * self.frequency_hz) ** 2
+
+    @property
+    def accelerance_sd(self) -> np.ndarray:
+        """(6, 6, F): root of E|δH|²."""
+        return self.sd * (2 * np.pi * self.frequency_hz) ** 2
+
+
+def couple(tip: TipReceptance, target: Tool | None, reference: Tool | None = None) -> CoupledFrf:
+    """The tip of the target tool, from receptances at the tip of the reference tool.
+
+    Without a reference they are those of the holder itself; without a target the reference is only
+    taken off. Uncertainty is linearised: measured values, and each number of each contact that
+    states `sd_percent`.
+    """
+    omega = 2 * np.pi * tip.frequency_hz
+    blocks = _Blocks.between(tip, target, reference, omega)
+    c = tip.receptance
+    coupled, left, right = blocks.applied(c)
+    variance = _measured(left @ tip.left, tip, tip.right @ right)
+    variance += _carried(left, tip.offset_sd**2, right)
+    for other in _uncertain(target, reference):
+        moved = _Blocks.between(tip, *other, omega).applied(c)[0]
+        variance += np.abs(moved - coupled) ** 2
+    own = tuple(k for k, motion in enumerate(tip.kept) if motion < 3)
+    noise = _carried(left @ tip.left, np.abs(tip.measured) ** 2, tip.right @ right)
+    size = np.sum(np.abs(coupled[np.ix_(range(len(omega)), own, own)]) ** 2, axis=(1, 2))
+    grown = np.sum(noise[np.ix_(range(len(omega)), own, own)], axis=(1, 2))
+    return CoupledFrf(
+        tip.frequency_hz,
+        tip.kept,
+        _whole(coupled, tip.kept, tip.frame),
+        np.sqrt(_whole(variance, tip.kept, tip.frame**2)),
+        np.sqrt(grown / np.maximum(size, 1e-300)),
+        tip.remarks,
+        tip.simulated,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """M of the kept motions, each (F, k, k)."""
+
+    uu: np.ndarray
+    uf: np.ndarray
+    fu: np.ndarray
+    ff: np.ndarray
+
+    @classmethod
+    def between(
+        cls, tip: TipReceptance, target: Tool | None, reference: Tool | None, omega: np.ndarray
+    ) -> "_Blocks":
+        m = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
+        if reference is not None:
+            m = turned(reference.transfer(omega), tip.frame.T @ reference.frame)
+        if target is not None:
+            own = turned(target.transfer(omega), tip.frame.T @ target.frame)
+            m = inverse(own) @ m
+        u = np.array(tip.kept)
+        f = u + 6
+        rows = np.arange(len(omega))
+        return cls(*(m[np.ix_(rows, a, b)] for a, b in ((u, u), (u, f), (f, u), (f, f))))
+
+    def applied(self, c: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """C₂, and what stands to the left and right of an error of C in an error of C₂."""
+        right = np.linalg.inv(self.fu @ c + self.ff)
+        coupled = (self.uu @ c + self.uf) @ right
+        return coupled, self.uu - coupled @ self.fu, right
+
+
+def turned(transfer: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """A tool's transfer (F, 12, 12) in the axes in which the columns of `frame` are its own."""
+    turn = np.kron(np.eye(4), frame)
+    return turn @ transfer @ turn.T
+
+
+def inverse(transfer: np.ndarray) -> np.ndarray:
+    """Of (F, 12, 12): reciprocity makes it symplectic, so that nothing has to be solved."""
+    uu, uf = transfer[:, :6, :6], transfer[:, :6, 6:]
+    fu, ff = transfer[:, 6:, :6], transfer[:, 6:, 6:]
+    swapped = [np.swapaxes(block, 1, 2) for block in (ff, -uf, -fu, uu)]
+    return np.concatenate(
+        [np.concatenate(swapped[:2], axis=2), np.concatenate(swapped[2:], axis=2)], axis=1
+    )
+
+
+def _carried(left: np.ndarray, variance: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Variance of left · δ · right, of independent entries δ."""
+    return np.abs(left) ** 2 @ variance @ np.abs(right) ** 2
+
+
+def _measured(left: np.ndarray, tip: TipReceptance, right: np.ndarray) -> np.ndarray:
+    """Variance of left · δ · right of the measured values' errors δ."""
+    if tip.errors is None:
+        return _carried(left, tip.sd**2, right)
+    return np.sum([np.abs(left @ error @ right) ** 2 for error in tip.errors], axis=0)
+
+
+def _uncertain(
+    target: Tool | None, reference: Tool | None
+) -> list[tuple[Tool | None, Tool | None]]:
+    """Target and reference with one number of one contact an sd away."""
+    out: list[tuple[Tool | None, Tool | None]] = []
+    for which, tool in enumerate((target, reference)):
+        if tool is None:
+            continue
+        for number, contact in tool.contacts():
+            if contact.sd_percent <= 0:
+                continue
+            for name in NUMBERS:
+                moved = tool.held(number, contact.scaled(name, 1 + contact.sd_percent / 100))
+                out.append((moved, reference) if which == 0 else (target, moved))
+    return out
+
+
+def _whole(values: np.ndarray, kept: tuple[int, ...], frame: np.ndarray) -> np.ndarray:
+    """(F, k, k) as (6, 6, F) in the axes in which `frame` is given, NaN where nothing is known."""
+    out = np.zeros((len(values), 6, 6), values.dtype)
+    out[np.ix_(range(len(values)), kept, kept)] = values
+    turn = np.kron(np.eye(2), frame)
+    whole = np.moveaxis(turn @ out @ turn.T, 0, -1)
+    # A direction is not known where motions that were not kept have a share in it.
+    lacking = [k for k in range(6) if k not in kept]
+    unknown = np.any(np.abs(turn[:, lacking]) > SHARE, axis=1)
+    whole[unknown] = np.nan
+    whole[:, unknown] = np.nan
+    return whole

@@ -1,0 +1,156 @@
+"""cut.toml: which cut is asked about, as a typed table."""
+
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from planner.errors import InputError
+from planner.toml_file import load_toml
+
+MOST_TEETH = 64
+MOST_POINTS = 20_000  # of speeds, or of depths
+UNIT = 1e-3  # by how much the length of a stated direction may differ from one, or be oblique
+SLOT = 1.0  # radial immersion of a slot
+
+
+class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A cutter, its immersion, the cutting coefficients, and which speeds and depths are asked for.
+
+    `feed` is the tool's direction over the workpiece, `axis` that of the tool from its tip to the
+    spindle, both in the frame of the FRFs; the spindle turns clockwise seen from behind it.
+    `kt_n_m2` and `kr_n_m2` are the tangential and radial force per area of the chip's section,
+    `kr_n_m2` positive where it pushes the cutter away. `pitch_deg` are the angles from each tooth
+    to the one ahead of it (none: all alike), `helix_deg` how far the teeth are wound.
+    `kt_sd_percent` and `kr_sd_percent` say how well the coefficients are known.
+    """
+
+    teeth: int
+    diameter_m: float
+    milling: Literal["slot", "down", "up"]
+    kt_n_m2: float
+    kr_n_m2: float
+    spindle_rpm: tuple[float, float, int]
+    depth_m: tuple[float, float, int]
+    radial_immersion: float = SLOT
+    feed: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    method: Literal["full_discretisation", "semi_discretisation", "zeroth_order"] = (
+        "full_discretisation"
+    )
+    pitch_deg: list[float] | None = None
+    helix_deg: float = 0.0
+    kt_sd_percent: float = 0.0
+    kr_sd_percent: float = 0.0
+
+    @property
+    def speeds_rpm(self) -> np.ndarray:
+        """(n,) spindle speeds that are asked for."""
+        low, high, count = self.spindle_rpm
+        return np.linspace(low, high, count)
+
+    @property
+    def depths_m(self) -> np.ndarray:
+        """(n,) axial depths that are asked for."""
+        low, high, count = self.depth_m
+        return np.linspace(low, high, count)
+
+    @property
+    def plane(self) -> np.ndarray:
+        """(2, 3) unit vectors of the cut in the frame of the FRFs: feed, and axis × feed."""
+        feed, axis = _unit(self.feed), _unit(self.axis)
+        return np.array([feed, np.cross(axis, feed)])
+
+    @property
+    def immersion_rad(self) -> tuple[float, float]:
+        """Angles of the teeth, from the normal towards the feed, at which they enter and leave."""
+        if self.milling == "slot":
+            return 0.0, float(np.pi)
+        swept = float(np.arccos(1 - 2 * self.radial_immersion))
+        return (0.0, swept) if self.milling == "up" else (float(np.pi) - swept, float(np.pi))
+
+    @property
+    def pitches_rad(self) -> np.ndarray:
+        """(teeth,) angles from each tooth to the one ahead of it, which cuts before."""
+        if self.pitch_deg is None:
+            return np.full(self.teeth, 2 * np.pi / self.teeth)
+        return np.deg2rad(self.pitch_deg)
+
+    @property
+    def even(self) -> bool:
+        """Whether all teeth follow at the same angle."""
+        return bool(np.ptp(self.pitches_rad) < 1e-9)
+
+    @property
+    def lag_rad_m(self) -> float:
+        """By how much a tooth lags behind its tip, in rad per metre of depth."""
+        return 2 * float(np.tan(np.deg2rad(self.helix_deg))) / self.diameter_m
+
+
+def load_cut(path: Path) -> Cut:
+    """Read and check cut.toml; InputError with one sentence where it is wrong."""
+    cut = load_toml(path, Cut, "cut.toml")
+    _check(cut, path)
+    return cut
+
+
+def _unit(direction: tuple[float, float, float]) -> np.ndarray:
+    found = np.array(direction, dtype=float)
+    return found / np.linalg.norm(found)
+
+
+def _check(cut: Cut, path: Path) -> None:
+    limits = [
+        ("teeth", cut.teeth, 1, MOST_TEETH),
+        ("diameter_m", cut.diameter_m, 1e-5, 1.0),
+        ("radial_immersion", cut.radial_immersion, 1e-4, 1.0),
+        ("kt_n_m2", cut.kt_n_m2, 1e5, 1e12),
+        ("kr_n_m2", cut.kr_n_m2, -1e12, 1e12),
+        ("helix_deg", cut.helix_deg, 0.0, 80.0),
+        ("kt_sd_percent", cut.kt_sd_percent, 0.0, 100.0),
+        ("kr_sd_percent", cut.kr_sd_percent, 0.0, 100.0),
+    ]
+    for name, value, low, high in limits:
+        if not low <= value <= high:
+            raise InputError(
+                f"{path}: {name} is {value}; it must lie between {low:g} and {high:g}."
+            )
+    _check_range(cut.spindle_rpm, 1.0, 1e6, f"{path}: spindle_rpm")
+    _check_range(cut.depth_m, 0.0, 1.0, f"{path}: depth_m")
+    if cut.depth_m[1] <= 0:
+        raise InputError(f"{path}: depth_m ends at 0; let it end at a depth above 0 m.")
+    if cut.milling == "slot" and cut.radial_immersion != SLOT:
+        raise InputError(
+            f"{path}: milling is a slot and radial_immersion {cut.radial_immersion:g}; leave it "
+            f'out, or say "up" or "down".'
+        )
+    _check_directions(cut, path)
+    if cut.pitch_deg is not None and (
+        len(cut.pitch_deg) != cut.teeth
+        or min(cut.pitch_deg) <= 0
+        or abs(sum(cut.pitch_deg) - 360) > 1e-6
+    ):
+        raise InputError(
+            f"{path}: pitch_deg needs {cut.teeth} angles above 0 that sum to 360; correct it."
+        )
+
+
+def _check_range(given: tuple[float, float, int], least: float, most: float, name: str) -> None:
+    low, high, count = given
+    if not least <= low <= high <= most:
+        raise InputError(
+            f"{name} goes from {low:g} to {high:g}; it must rise between {least:g} and {most:g}."
+        )
+    if not 1 <= count <= MOST_POINTS or (count == 1 and low != high):
+        raise InputError(
+            f"{name} asks for {count} values; give 2 to {MOST_POINTS}, or 1 if both ends agree."
+        )
+
+
+def _check_directions(cut: Cut, path: Path) -> None:
+    for name, given in (("feed", cut.feed), ("axis", cut.axis)):
+        if not abs(np.linalg.norm(given) - 1) < UNIT:
+            raise InputError(f"{path}: {name} is not of length 1; give a unit vector.")
+    if abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
+        raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")

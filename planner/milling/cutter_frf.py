@@ -1,0 +1,196 @@
+"""FRFs at the cutter: read from files, seen in the plane of a cut, and as modes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.frf.quantities import convert
+from planner.milling.cut import Cut
+from planner.milling.cutter_modes import CutterModes
+from planner.modal.rational_fit import RationalFit, rational_fit
+from planner.recording.read import read
+from planner.recording.records import AXES, FrfRecord
+
+SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
+SECOND = 1e-3  # share of the FRF at a mode below which a residue's second part does not count
+LEAST_LINES = 16
+FAR = 3.0  # times the highest line
+
+
+@dataclass(frozen=True, eq=False)
+class CutterFrf:
+    """Receptance (3, 3, F) in m/N at lines (F,) above 0 Hz: response axis, then force axis.
+
+    Entries that are not known are NaN. `sd` (3, 3, F) is the root of E|H − mean|², None if unknown;
+    `name` says of what.
+    """
+
+    name: str
+    frequency_hz: np.ndarray
+    receptance: np.ndarray
+    sd: np.ndarray | None = None
+    simulated: bool = False
+
+    def in_plane(self, cut: Cut) -> "PlaneFrf":
+        """In the plane of the cut; InputError where an axis that this needs is not known."""
+        h = _turned(self.receptance, cut.plane)
+        if not np.all(np.isfinite(h)):
+            missing = [AXES[i] for i in range(3) if not np.all(np.isfinite(self.receptance[i, i]))]
+            missing = missing or ["each axis, of hits along the other"]
+            raise InputError(
+                f"{self.name} lacks FRFs along {', '.join(missing)}, which the cut's plane needs; "
+                f"measure them, or check feed and axis in the cut's file."
+            )
+        sd = None
+        if self.sd is not None:
+            # Errors of different entries are taken as independent of each other.
+            square = _turned(np.nan_to_num(self.sd) ** 2, cut.plane**2)
+            sd = np.sqrt(square.real)
+        return PlaneFrf(self.name, self.frequency_hz, h, sd, self.simulated)
+
+
+def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
+    """(2, 2, F) of (3, 3, F); entries that the plane does not see may be NaN."""
+    weight = np.where(np.abs(plane) > SEEN, plane, 0.0)
+    share = np.einsum("ia,jb->ijab", weight, weight)
+    parts = np.where(share[..., None] == 0, 0.0, share[..., None] * values)
+    return parts.sum(axis=(2, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneFrf:
+    """Receptance (2, 2, F) in m/N in the plane of a cut, and its sd."""
+
+    name: str
+    frequency_hz: np.ndarray
+    receptance: np.ndarray
+    sd: np.ndarray | None = None
+    simulated: bool = False
+
+    def fitted(self) -> CutterModes:
+        """As modes."""
+        fit = rational_fit(self.frequency_hz, self.receptance)
+        return as_modes(fit, float(self.frequency_hz[-1]))
+
+    def error(self, modes: CutterModes) -> float:
+        """Root mean square over lines of ‖H − modes‖/‖H‖."""
+        off = self.receptance - modes.receptance(self.frequency_hz).transpose(1, 2, 0)
+        share = np.linalg.norm(off, axis=(0, 1)) / np.linalg.norm(self.receptance, axis=(0, 1))
+        return float(np.sqrt(np.mean(share**2)))
+
+
+def as_modes(fit: RationalFit, highest_hz: float) -> CutterModes:
+    """Poles with a shape and a drive each; a residue of rank two takes its pole twice.
+
+    Poles far above the highest line are what is left of the modes there: their compliance.
+    """
+    poles, shapes, drives = [], [], []
+    far = np.abs(fit.poles) > FAR * 2 * np.pi * highest_hz
+    rest = fit.rest - 2 * np.real(fit.residues[far] / fit.poles[far, None, None]).sum(axis=0)
+    for pole, residue in zip(fit.poles[~far], fit.residues[~far], strict=True):
+        left, sizes, right = np.linalg.svd(residue)
+        there = np.linalg.norm(fit.response(np.array([pole.imag / (2 * np.pi)])))
+        for k in range(1 + int(sizes[1] > SECOND * there * -pole.real)):
+            poles.append(pole)
+            shapes.append(left[:, k] * sizes[k])
+            drives.append(right[k])
+    return CutterModes(np.array(poles), np.array(shapes), np.array(drives), rest)
+
+
+def read_frf(path: Path, pose: str | None) -> CutterFrf:
+    """An npz of `predict` or `couple`, or exported FRFs; InputError in one sentence."""
+    if not path.is_file():
+        raise InputError(f"{path} does not exist; name FRFs, modes or a campaign.")
+    if path.suffix.lower() == ".npz":
+        return _npz(path, pose)
+    if pose is not None:
+        raise InputError(f"{path} holds FRFs of one pose only; leave --pose out.")
+    return _exported(path)
+
+
+def of_accelerance(
+    name: str, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray | None
+) -> CutterFrf:
+    """From an accelerance (3, 3, F) in m/s²/N."""
+    keep = frequency_hz > 0
+    hertz = frequency_hz[keep]
+    if np.count_nonzero(keep) < LEAST_LINES or np.any(np.diff(hertz) <= 0):
+        raise InputError(
+            f"{name} has {np.count_nonzero(keep)} lines above 0 Hz; give {LEAST_LINES} or more, "
+            f"in rising order."
+        )
+    h = convert(hertz, mean[..., keep], "accelerance", "receptance")
+    spread = None if sd is None else sd[..., keep] / (2 * np.pi * hertz) ** 2
+    return CutterFrf(name, hertz, h, spread)
+
+
+def read_all(path: Path) -> list[CutterFrf]:
+    """Every pose of an npz of `predict`, in its order."""
+    if path.suffix.lower() != ".npz":
+        return [read_frf(path, None)]
+    names = _held(path)[0]
+    return [read_frf(path, name) for name in names]
+
+
+def _npz(path: Path, pose: str | None) -> CutterFrf:
+    poses, hertz, mean, sd = _held(path)
+    if pose is None and len(poses) > 1:
+        raise InputError(f"{path} holds {len(poses)} poses; say which with --pose, as {poses[0]}.")
+    if pose is not None and pose not in poses:
+        raise InputError(f"{path} has no pose {pose}; choose one of {', '.join(poses[:10])}.")
+    i = 0 if pose is None else poses.index(pose)
+    return of_accelerance(f"{path}, pose {poses[i]}", hertz, mean[i], None if sd is None else sd[i])
+
+
+def _held(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray | None]:
+    """Poses, lines, mean and sd that an npz holds."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            held = {name: file[name] for name in file.files}
+    except (OSError, ValueError, EOFError, KeyError):
+        raise InputError(
+            f"{path} cannot be read as an npz; write it with planner predict."
+        ) from None
+    for name in ("frequency_hz", "frf_mean"):
+        if name not in held:
+            raise InputError(f"{path} holds no {name}; write it with planner predict.")
+    mean, sd, hertz = held["frf_mean"], held.get("frf_sd"), np.asarray(held["frequency_hz"])
+    poses = [str(name) for name in np.atleast_1d(held.get("pose", np.array(["1"])))]
+    shape = (len(poses), 3, 3, len(hertz))
+    if mean.shape != shape or (sd is not None and sd.shape != shape):
+        raise InputError(
+            f"{path}: frf_mean must be of shape (poses, 3, 3, lines) = {shape}, and frf_sd too; "
+            f"write it with planner predict."
+        )
+    return poses, hertz, mean, sd
+
+
+def _exported(path: Path) -> CutterFrf:
+    records = [record for record in read(path) if isinstance(record, FrfRecord)]
+    if not records:
+        raise InputError(f"{path} holds no FRFs; export FRFs, or give modes as TOML.")
+    first = records[0]
+    h = np.full((3, 3, len(first.frequency_hz)), np.nan + 0j)
+    for record in records:
+        if record.quantity == "unknown" or not record.unit:
+            raise InputError(
+                f"{path}: it is not stated whether these FRFs are accelerance, mobility or "
+                f"receptance, and in which unit; label them."
+            )
+        if not np.array_equal(record.frequency_hz, first.frequency_hz):
+            raise InputError(f"{path} mixes frequency lines; export one grid.")
+        above = record.frequency_hz > 0
+        values = np.zeros_like(record.values)
+        values[:, above] = convert(
+            record.frequency_hz[above], record.values[:, above], record.quantity, "accelerance"
+        )
+        pairs = zip(record.response_direction, record.reference_direction, strict=True)
+        for row, (i, j) in enumerate(pairs):
+            if not (1 <= abs(i) <= 3 and 1 <= abs(j) <= 3):
+                raise InputError(
+                    f"{path}: FRF {row + 1} does not state its directions; label them."
+                )
+            h[abs(i) - 1, abs(j) - 1] = np.sign(i) * np.sign(j) * values[row]
+    return of_accelerance(str(path), np.asarray(first.frequency_hz, dtype=float), h, None)

@@ -1,0 +1,95 @@
+"""A cut along a path: the tightest pose at each speed, the best speed for all, the better feed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from planner.milling.cut import Cut
+from planner.milling.cutter_modes import CutterModes
+from planner.milling.directional import Coefficients
+from planner.milling.lobes import Loss, losses
+from planner.milling.machine import Machine
+from planner.milling.structure import Structure
+from planner.milling.uncertainty import PROBABILITY, sampled_limits
+from planner.progress import Tell, quietly, within
+
+TURNS_DEG = np.arange(0.0, 360.0, 15.0)  # of the feed about the tool's axis that are tried
+
+
+@dataclass(frozen=True, eq=False)
+class PathLimits:
+    """Of p poses at n speeds: first losses, and depths (p, n) in m that are stable at 95 %.
+
+    inf where nothing is lost up to the largest depth.
+    """
+
+    names: tuple[str, ...]
+    found: tuple[tuple[Loss, ...], ...]
+    robust_m: np.ndarray
+
+    @property
+    def depth_m(self) -> np.ndarray:
+        """(p, n) first losses, inf where there is none."""
+        depth = np.array([[loss.depth_m for loss in row] for row in self.found])
+        return np.where(np.isnan(depth), np.inf, depth)
+
+    @property
+    def tightest(self) -> np.ndarray:
+        """(n,) number of the pose that allows the least at each speed."""
+        return np.argmin(self.robust_m, axis=0)
+
+    @property
+    def best_speed(self) -> int:
+        """Number of the speed at which the path's tightest pose allows the most."""
+        return int(np.argmax(np.min(self.robust_m, axis=0)))
+
+
+def along(
+    poses: Sequence[tuple[str, Structure]], cut: Cut, samples: int, tell: Tell = quietly
+) -> PathLimits:
+    """Limits at every pose, with so many samples of what is uncertain."""
+    found, robust = [], []
+    for i, (_, structure) in enumerate(poses):
+        part = within(tell, i / len(poses), (i + 1) / len(poses))
+        own = losses(structure.machine(cut))
+        drawn = structure.samples(cut, samples)
+        depth = np.array([loss.depth_m for loss in own])
+        depth = np.where(np.isnan(depth), np.inf, depth)
+        robust.append(sampled_limits(drawn, own, part).robust(PROBABILITY) if drawn else depth)
+        found.append(own)
+        part("poses", 1.0)
+    return PathLimits(tuple(name for name, _ in poses), tuple(found), np.array(robust))
+
+
+def by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.ndarray:
+    """(TURNS_DEG,) depth in m that all poses allow at a speed if the feed is turned.
+
+    About the tool's axis, from the feed towards axis × feed; inf where nothing is lost.
+    """
+    one = _at_one_speed(cut, rpm)
+    limit = []
+    for turn in np.deg2rad(TURNS_DEG):
+        each = [_limit(_turned(structure.modes, turn), one) for _, structure in poses]
+        limit.append(min(each))
+    return np.array(limit)
+
+
+def _at_one_speed(cut: Cut, rpm: float) -> Cut:
+    """The cut at one speed."""
+    return msgspec.structs.replace(cut, spindle_rpm=(rpm, rpm, 1))
+
+
+def _limit(modes: CutterModes, cut: Cut) -> float:
+    (loss,) = losses(Machine(modes, cut, Coefficients.of(cut)))
+    return float(np.inf if np.isnan(loss.depth_m) else loss.depth_m)
+
+
+def _turned(modes: CutterModes, turn: float) -> CutterModes:
+    c, s = np.cos(turn), np.sin(turn)
+    plane = np.array([[c, s], [-s, c]])
+    return replace(
+        modes, shapes=modes.shapes @ plane.T, drives=modes.drives @ plane.T,
+        residual=plane @ modes.residual @ plane.T,
+    )  # fmt: skip

@@ -1,0 +1,243 @@
+"""One period of milling as matrices: what chips, then forces, do to the structure.
+
+The structure's state z is carried over exactly; only the force is interpolated, by polynomials
+through the points of each element. So both the vibration now and that of the tooth before enter
+at these points, and not between: a full discretisation (Ding et al., Int. J. Machine Tools &
+Manufacture 50, 2010) whose steps may be of any degree.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.milling.contact import (
+    Contact,
+    contact,
+    directions,
+    each_tooth,
+    lagrange,
+    lobatto,
+)
+from planner.milling.cut import Cut
+from planner.milling.cutter_modes import CutterModes
+from planner.milling.directional import Coefficients
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """How finely the force is resolved: degree of its polynomials, length of an element in rad."""
+
+    degree: int
+    element_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class Period:
+    """Matrices of one period over states z (s,), n chips y, v of this and the last one, m forces.
+
+    y = S z₀ + b L (N y − B v) and z₁ = E z₀ + b W (N y − B v), where E is `free`, S `seen`, L
+    `reply`, W `push`, N `now`, B `before` (None: the identity); b is the depth. States are real
+    parts of the modes', then imaginary ones. `time_s`, `weight_s` and `force` (m, 2) are of the
+    points at which forces act.
+    """
+
+    duration_s: float
+    free: np.ndarray
+    seen: np.ndarray
+    reply: np.ndarray
+    push: np.ndarray
+    now: np.ndarray | None
+    before: np.ndarray | None
+    time_s: np.ndarray
+    weight_s: np.ndarray
+    force: np.ndarray
+
+    def monodromy(self, depths: np.ndarray) -> np.ndarray:
+        """(B, s + n, s + n): (z, v) one period later, at depths (B,) in m."""
+        b = np.asarray(depths, dtype=float)[:, None, None]
+        states, chips = len(self.free), len(self.seen)
+        reply_now, push_now = self._times(self.now)
+        reply_before, push_before = self._times(self.before)
+        solved = np.linalg.solve(
+            np.eye(chips) - b * reply_now,
+            np.concatenate(
+                [np.broadcast_to(self.seen, (len(b), *self.seen.shape)), -b * reply_before], 2
+            ),
+        )
+        found = np.empty((len(b), states + chips, states + chips))
+        found[:, states:] = solved
+        found[:, :states] = b * (push_now @ solved)
+        found[:, :states, :states] += self.free
+        found[:, :states, states:] -= b * push_before
+        return found
+
+    def _times(self, matrix: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            (self.reply, self.push) if matrix is None else (self.reply @ matrix, self.push @ matrix)
+        )
+
+    def forces(self, vector: np.ndarray, multiplier: complex, depth: float) -> np.ndarray:
+        """(m,): forces of the vibration that an eigenvector (z, v) of the monodromy stands for."""
+        v = vector[len(self.free) :]
+        y = multiplier * v
+        now = y if self.now is None else self.now @ y
+        return depth * (now - (v if self.before is None else self.before @ v))
+
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Points of all elements, one after another: (p,) time, element, place in it, chip, force."""
+
+    time: np.ndarray
+    element: np.ndarray
+    place: np.ndarray
+    shared: np.ndarray  # number of the point, the same where elements meet without a jump
+    angle: np.ndarray
+    rows: np.ndarray  # (p, 2)
+    columns: np.ndarray  # (p, 2)
+    teeth: tuple[tuple[int, ...], ...]
+
+
+def period(
+    modes: CutterModes, cut: Cut, k: Coefficients, rpm: float, grid: Grid, depth_m: float = 0.0
+) -> Period:
+    """Of modes in the cut's plane at a speed; `depth_m` counts where the cutter has a helix."""
+    speed = rpm * 2 * np.pi / 60
+    found = contact(cut, depth_m, grid.element_rad)
+    even = cut.even
+    points = _points(found, cut, k, speed, grid.degree, depth_m, _seen(modes) if even else None)
+    built = _build(modes, found, points, speed, grid.degree)
+    return built if even else _uneven(built, found, points, cut, k, speed, grid.degree, depth_m)
+
+
+def _seen(modes: CutterModes) -> np.ndarray | None:
+    """(2,): the only direction in which the structure moves, None if it moves in both."""
+    moved = np.concatenate([modes.shapes.real, modes.shapes.imag, modes.residual.T])
+    _, sizes, rows = np.linalg.svd(moved)
+    return rows[0] if sizes[1] < 1e-12 * sizes[0] else None
+
+
+def _points(
+    found: Contact, cut: Cut, k: Coefficients, speed: float, degree: int, depth_m: float,
+    seen: np.ndarray | None,
+) -> _Points:  # fmt: skip
+    nodes = lobatto(degree).nodes
+    parts: list[tuple[np.ndarray, ...]] = []
+    number = -1
+    for e, teeth in enumerate(found.teeth):
+        angle = found.start[e] + nodes * (found.end[e] - found.start[e])
+        rows, columns = directions(cut, k, teeth, angle + found.offset, depth_m)
+        if seen is not None and rows.shape[1] == 2:
+            columns = np.einsum("mij,mjk,k->mi", columns, rows, seen)[:, :, None]
+            rows = np.broadcast_to(seen, (len(nodes), 1, 2))
+        if not cut.even:
+            rows = columns = np.broadcast_to(np.eye(2), (len(nodes), 2, 2))
+        rank = rows.shape[1]
+        joined = e > 0 and found.segment[e] == found.segment[e - 1]
+        first = number + 1 - rank if joined else number + 1
+        count = rank * len(nodes)
+        shared = first + np.arange(count)
+        number = first + count - 1
+        parts.append((
+            np.repeat(angle, rank), np.full(count, e), np.repeat(np.arange(len(nodes)), rank),
+            shared, rows.reshape(-1, 2), columns.transpose(0, 2, 1).reshape(-1, 2),
+        ))  # fmt: skip
+    angle, element, place, shared, rows, columns = map(np.concatenate, zip(*parts, strict=True))
+    return _Points(angle / speed, element, place, shared, angle, rows, columns, found.teeth)
+
+
+def _build(
+    modes: CutterModes, found: Contact, points: _Points, speed: float, degree: int
+) -> Period:
+    rule, weight = lobatto(degree), modes.weight
+    duration = found.period / speed
+    length, end = (found.end - found.start) / speed, found.end / speed
+    seen = (modes.shapes @ points.rows.T) * weight[:, None]  # (k, p)
+    drive = modes.drives @ points.columns.T
+    part = _integrals(modes.poles, length, degree)  # (k, e, i, j)
+    whole = part[:, points.element, -1, points.place] * drive  # (k, p): at the element's end
+    later = points.element[:, None] > points.element[None, :]
+    since = np.where(later, points.time[:, None] - end[points.element][None, :], 0.0)
+    reply = np.einsum("ki,kij,kj->ij", seen, np.exp(modes.poles[:, None, None] * since), whole).real
+    reply *= later
+    own = points.element[:, None] == points.element[None, :]
+    i, j = np.nonzero(own)
+    inner = part[:, points.element[i], points.place[i], points.place[j]]
+    reply[i, j] = np.einsum("kp,kp,kp->p", seen[:, i], inner, drive[:, j]).real
+    at_once = own & (points.place[:, None] == points.place[None, :])
+    reply += at_once * (points.rows @ modes.residual @ points.columns.T)
+    to_end = np.exp(modes.poles[:, None] * (duration - end[points.element])) * whole
+    over = seen * np.exp(modes.poles[:, None] * points.time)
+    first, together = _joined(points.shared)
+    return Period(
+        duration_s=float(duration),
+        free=_rotations(np.exp(modes.poles * duration)),
+        seen=np.concatenate([over.real, -over.imag]).T[first],
+        reply=reply[first] @ together,
+        push=np.concatenate([to_end.real, to_end.imag]) @ together,
+        now=None,
+        before=None,
+        time_s=points.time[first],
+        weight_s=(rule.weights[points.place] * length[points.element]) @ together,
+        force=points.columns[first],
+    )
+
+
+def _integrals(poles: np.ndarray, length_s: np.ndarray, degree: int) -> np.ndarray:
+    """(k, e, i, j): state at point i of an element from the polynomial of point j."""
+    rule = lobatto(degree)
+    span = rule.nodes * length_s[:, None]  # (e, i)
+    decay = np.exp(poles[:, None, None, None] * span[..., None] * (1 - rule.points))
+    return np.einsum("keiq,iqj->keij", decay, rule.values) * span[None, ..., None]
+
+
+def _joined(shared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Index (n,) of each point's first appearance, and (p, n) that adds those of a shared one."""
+    numbers, first, which = np.unique(shared, return_index=True, return_inverse=True)
+    together = np.zeros((len(shared), len(numbers)))
+    together[np.arange(len(shared)), which] = 1.0
+    return first, together
+
+
+def _rotations(e: np.ndarray) -> np.ndarray:
+    """(2k, 2k): of states as real and imaginary parts."""
+    return np.block([[np.diag(e.real), -np.diag(e.imag)], [np.diag(e.imag), np.diag(e.real)]])
+
+
+def _uneven(
+    built: Period, found: Contact, points: _Points, cut: Cut, k: Coefficients, speed: float,
+    degree: int, depth_m: float,
+) -> Period:  # fmt: skip
+    """The same where teeth follow at different angles: each has a delay of its own.
+
+    What the tooth before left is interpolated in the element that it was left in.
+    """
+    first, _ = _joined(points.shared)
+    now = np.zeros((len(first), len(first)))
+    before = np.zeros_like(now)
+    angle, element = points.angle[first], points.element[first]
+    delay = cut.pitches_rad  # to the tooth ahead, which cut before
+    nodes = lobatto(degree).nodes
+    for p in range(0, len(first), 2):
+        for tooth in found.teeth[element[p]]:
+            matrix = each_tooth(cut, k, tooth, angle[p : p + 1] + found.offset, depth_m)[0]
+            now[p : p + 2, p : p + 2] += matrix
+            at = angle[p] - delay[tooth]
+            target, turn = (now, -1.0) if at >= -1e-9 else (before, 1.0)
+            at = at if at >= -1e-9 else at + found.period
+            e = _element_at(found, at)
+            share = (at - found.start[e]) / (found.end[e] - found.start[e])
+            values = lagrange(nodes, np.array(share))
+            own = np.unique(points.shared[points.element == e])
+            for n, value in enumerate(values):
+                to = own[2 * n : 2 * n + 2]
+                target[p : p + 2, to] += turn * value * matrix
+    return Period(
+        built.duration_s, built.free, built.seen, built.reply, built.push, now, before,
+        built.time_s, built.weight_s, built.force,
+    )  # fmt: skip
+
+
+def _element_at(found: Contact, angle: float) -> int:
+    inside = np.flatnonzero((found.start <= angle + 1e-9) & (angle <= found.end + 1e-9))
+    return int(inside[0])

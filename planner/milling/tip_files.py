@@ -1,0 +1,234 @@
+"""Files that say how the tip of a tested tool answers: npz of `predict` or `couple`, FRFs, modes.
+
+A TOML with modes holds `lines_hz = [from, to, how many]` and, mode by mode, `frequency_hz`,
+`damping_ratio`, and `right` and `left`: [[re, im], …] of motion and of force at (tip x, tip y,
+second point x, second point y), with H = Σ right·leftᵀ / (iω − λ) + conjugate; `from_tip_m` is
+where the second point was for that mode (Lei et al. 2023, eq. 15).
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+import numpy as np
+
+from planner.errors import InputError
+from planner.frf.quantities import convert
+from planner.frf.synthesis import pole
+from planner.milling.coupling import TipReceptance
+from planner.milling.rotations import TwoPoints, two_point_receptance
+from planner.milling.smoothing import smoothed
+from planner.milling.tool import Tool
+from planner.recording.read import read
+from planner.recording.records import AXES, FrfRecord
+from planner.toml_file import load_toml
+
+MEASURE = (
+    "measure FRFs at two points of the tested tool, its tip and one some 20 mm behind it, both "
+    "across its axis, and give them as UFF 58 with --reference naming the points"
+)
+MOST_LINES = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class TipMotion:
+    """FRFs of motion alone at one pose: receptances (3, 3, F) in m/N and sd; no rotations.
+
+    `joints_rad` (dof,) where the file says how the robot stood.
+    """
+
+    pose: str
+    frequency_hz: np.ndarray
+    receptance: np.ndarray
+    sd: np.ndarray
+    joints_rad: np.ndarray | None
+
+
+def read_tip(
+    path: Path, tool: Tool | None, pose: str | None, noise: float
+) -> TipReceptance | TipMotion:
+    """What a file holds; `tool` is the tested one, `noise` a relative sd where it states none.
+
+    Raises InputError in one sentence.
+    """
+    if path.suffix.lower() == ".npz":
+        return _npz(path, pose)
+    if path.suffix.lower() == ".toml":
+        return _modes(path, noise)
+    return _frfs(path, tool, noise)
+
+
+def _npz(path: Path, pose: str | None) -> TipReceptance | TipMotion:
+    stored = _arrays(path)
+    frequency = np.asarray(stored["frequency_hz"], float)
+    names = [str(name) for name in stored["pose"]] if "pose" in stored else ["1"]
+    row = _row(path, names, pose)
+    keep = frequency > 0
+    full = "frf6_mean" in stored
+    kind = "frf6" if full else "frf"
+    mean, sd = (np.asarray(stored[f"{kind}_{what}"]) for what in ("mean", "sd"))
+    size = 6 if full else 3
+    for name, values in ((f"{kind}_mean", mean), (f"{kind}_sd", sd)):
+        if values.shape != (len(names), size, size, len(frequency)):
+            raise InputError(
+                f"{path}: {name} has the shape {values.shape}, where {len(names)} poses, "
+                f"{size} × {size} and {len(frequency)} lines are stated; write it again."
+            )
+    s2 = (2j * np.pi * frequency[keep]) ** 2
+    h, spread = mean[row][..., keep] / s2, np.abs(sd[row][..., keep] / s2)
+    if full:
+        kept = tuple(int(k) for k in stored["motions"]) if "motions" in stored else tuple(range(6))
+        h, spread = h[np.ix_(kept, kept)], spread[np.ix_(kept, kept)]
+        if np.all(np.isfinite(h)) and np.all(np.isfinite(spread)):
+            return TipReceptance.known(frequency[keep], h, spread, kept)
+    if not (np.all(np.isfinite(h)) and np.all(np.isfinite(spread))):
+        raise InputError(f"{path}: FRFs of {names[row]} are not finite; measure what lacks.")
+    angles = np.deg2rad(stored["joints_deg"][row]) if "joints_deg" in stored else None
+    return TipMotion(names[row], frequency[keep], h, spread, angles)
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; name an npz of predict.") from None
+    except Exception as error:  # zip, pickle and array faults of a broken file
+        raise InputError(
+            f"{path} cannot be read as npz ({type(error).__name__}); write it again with predict."
+        ) from None
+    lacking = [name for name in ("frequency_hz", "frf_mean", "frf_sd") if name not in arrays]
+    if lacking:
+        raise InputError(f"{path} lacks {', '.join(lacking)}; write it with predict --out.")
+    frequency = arrays["frequency_hz"]
+    if frequency.ndim != 1 or len(frequency) < 2 or not np.all(np.diff(frequency) > 0):
+        raise InputError(f"{path}: frequency_hz does not increase; write it with predict --out.")
+    return arrays
+
+
+def _row(path: Path, names: list[str], pose: str | None) -> int:
+    if pose is None and len(names) == 1:
+        return 0
+    if pose is None:
+        raise InputError(f"{path} holds {len(names)} poses; name one of {_few(names)} by --pose.")
+    if pose not in names:
+        raise InputError(f"{path} holds no pose {pose}; name one of {_few(names)}.")
+    return names.index(pose)
+
+
+def _few(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
+
+
+def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
+    records = [r for r in read(path) if isinstance(r, FrfRecord)]
+    if not records:
+        raise InputError(f"{path} holds no FRFs; {MEASURE}.")
+    if tool is None or len(tool.points) < 2:
+        raise InputError(
+            f"{path}: where its points are is not stated; give --reference with two [[point]] "
+            f"(node, from_tip_m)."
+        )
+    tip, back = sorted(tool.points, key=lambda p: p.from_tip)[:2]
+    if tip.from_tip > 0:
+        raise InputError(f"No [[point]] of {tool.name} is at its tip; give one from_tip_m = 0.")
+    frequency, found = _entries(records, (tip.node, back.node))
+    directions = tuple(k for k in range(3) if any(key[1] == k for key in found))
+    wanted = [(node, k) for node in (tip.node, back.node) for k in directions]
+    lacking = [(a, b) for a in wanted for b in wanted if (*a, *b) not in found]
+    if lacking or len(directions) < 2:
+        raise InputError(f"{path}: {_lacks(lacking)}; {MEASURE}.")
+    values = np.array([[found[(*a, *b)] for b in wanted] for a in wanted])
+    seen = TwoPoints(frequency, directions, values, noise * np.abs(values))
+    found = two_point_receptance(seen, tool, back)
+    found = replace(found, simulated=any(record.simulated for record in records))
+    if noise > 0:
+        return smoothed(found)
+    text = "How noisy the FRFs are is not stated: no sd counts it; say so by --noise PERCENT."
+    return replace(found, remarks=(text,))
+
+
+def _lacks(lacking: list[tuple]) -> str:
+    if not lacking:
+        return "directions and nodes are not stated, so there are no rotations"
+    (response, i), (hit, j) = lacking[0]
+    return (
+        f"{len(lacking)} FRFs lack, first the one at node {response} along {AXES[i]} from a hit at "
+        f"node {hit} along {AXES[j]}, so there are no rotations"
+    )
+
+
+def _entries(
+    records: list[FrfRecord], nodes: tuple[str, str]
+) -> tuple[np.ndarray, dict[tuple, np.ndarray]]:
+    """Lines above 0 Hz, and receptances by (node, direction, hit node, hit direction)."""
+    frequency = np.asarray(records[0].frequency_hz, float)
+    keep = frequency > 0
+    found: dict[tuple, np.ndarray] = {}
+    for record in records:
+        if record.quantity == "unknown" or not record.unit:
+            raise InputError(
+                f"{record.source}: it is not stated whether these FRFs are accelerance, mobility "
+                f"or receptance, and in which unit; label them."
+            )
+        if len(record.frequency_hz) != len(frequency):
+            raise InputError(f"{record.source} has other frequency lines; export one grid.")
+        places = zip(
+            record.response_node, record.response_direction, record.reference_node,
+            record.reference_direction, record.values, strict=True,
+        )  # fmt: skip
+        for node, i, hit, j, values in places:
+            if not (1 <= abs(i) <= 3 and 1 <= abs(j) <= 3 and {node, hit} <= set(nodes)):
+                continue
+            moved = convert(frequency[keep], values[keep], record.quantity, "receptance")
+            found[(node, abs(i) - 1, hit, abs(j) - 1)] = np.sign(i) * np.sign(j) * moved
+    return frequency[keep], found
+
+
+Pair = tuple[float, float]
+Four = Annotated[tuple[Pair, ...], msgspec.Meta(min_length=4, max_length=4)]
+
+
+class TipModeTable(msgspec.Struct, forbid_unknown_fields=True):
+    """[[mode]] of a file with modes of two points."""
+
+    frequency_hz: float
+    damping_ratio: float
+    right: Four
+    left: Four
+    from_tip_m: float
+
+
+class TipModesTable(msgspec.Struct, forbid_unknown_fields=True):
+    """A whole file with modes of two points, along x and y of the FRFs."""
+
+    lines_hz: tuple[float, float, int]
+    mode: tuple[TipModeTable, ...]
+
+
+def _modes(path: Path, noise: float) -> TipReceptance:
+    table = load_toml(path, TipModesTable, "file of modes at two points")
+    low, high, count = table.lines_hz
+    if not (0 < low < high and 2 <= count <= MOST_LINES):
+        raise InputError(f"{path}: lines_hz has to be [from above 0, to, how many]; correct it.")
+    frequency = np.linspace(low, high, count)
+    iw = 2j * np.pi * frequency
+    c = np.zeros((4, 4, count), complex)
+    for number, mode in enumerate(table.mode, 1):
+        if not (mode.frequency_hz > 0 and 0 < mode.damping_ratio < 1 and mode.from_tip_m > 0):
+            raise InputError(
+                f"{path}, mode {number}: frequency_hz and from_tip_m have to be above zero and "
+                f"damping_ratio between 0 and 1; correct it."
+            )
+        shape = [_tip_and_turn(side, mode.from_tip_m) for side in (mode.right, mode.left)]
+        residue = np.outer(*shape)[..., None]
+        p = pole(np.array(mode.frequency_hz), np.array(mode.damping_ratio))
+        c += residue / (iw - p) + residue.conj() / (iw - p.conj())
+    return TipReceptance.known(frequency, c, noise * np.abs(c), (0, 1, 3, 4))
+
+
+def _tip_and_turn(side: tuple[Pair, ...], distance: float) -> np.ndarray:
+    """(x, y, θx, θy) at the tip, the second point lying at −z of it."""
+    tip_x, tip_y, back_x, back_y = (complex(*pair) for pair in side)
+    return np.array([tip_x, tip_y, -(tip_y - back_y) / distance, (tip_x - back_x) / distance])

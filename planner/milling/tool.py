@@ -1,0 +1,326 @@
+"""A tool as a TOML file states it: segments from the holder to the tip, materials, contacts.
+
+    name = "end mill, 12 mm"
+    axis = [0.0, 0.0, 1.0]          # from the holder to the tip, in the axes of the FRFs
+
+    [material.carbide]
+    youngs_modulus_pa = 5.4e11
+    density_kg_m3 = 14500.0
+    poisson_ratio = 0.25
+    loss_factor = 0.001             # structural damping
+
+    [[segment]]                     # the shank
+    material = "carbide"
+    length_m = 0.030
+    diameter_m = 0.012
+    [segment.contact]               # what holds it at its lower end; none: held rigidly
+    stiffness_n_m = 4.5e7
+    stiffness_nm_rad = 4.2e6
+    damping_ns_m = 210.0
+    damping_nms_rad = 1.5
+
+    [[segment]]                     # the flutes, bending like a rod of 80 % of their diameter
+    material = "carbide"
+    length_m = 0.026
+    diameter_m = 0.012
+    flutes = 4
+
+Further keys of a segment: `end_diameter_m` (towards the tip), `bore_m`, `equivalent_diameter_m`
+of flutes, `mass_kg` at its end towards the tip. `[[point]]` says where a tested tool was hit and
+measured: `node` in the FRFs' file, `from_tip_m`, `place_sd_m`, `sensor_mass_kg`.
+"""
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from planner.errors import InputError
+from planner.milling.beam import Segment, ToolMaterial, transfer
+from planner.milling.interface import NUMBERS, ToolContact
+from planner.toml_file import load_toml
+
+# Of the cutting diameter, as which flutes bend (Kops and Vo, CIRP Annals 39, 1990).
+FLUTED = 0.8
+SAME_PLACE = 1e-9  # m
+
+
+class ContactTable(msgspec.Struct, forbid_unknown_fields=True):
+    """[segment.contact]."""
+
+    stiffness_n_m: float
+    stiffness_nm_rad: float
+    damping_ns_m: float = 0.0
+    damping_nms_rad: float = 0.0
+    sd_percent: float = 0.0
+
+
+class MaterialTable(msgspec.Struct, forbid_unknown_fields=True):
+    """[material.NAME]."""
+
+    youngs_modulus_pa: float
+    density_kg_m3: float
+    poisson_ratio: float
+    loss_factor: float = 0.0
+
+
+class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
+    """[[segment]]."""
+
+    length_m: float
+    diameter_m: float
+    material: str
+    end_diameter_m: float | None = None
+    bore_m: float = 0.0
+    flutes: int = 0
+    equivalent_diameter_m: float | None = None
+    mass_kg: float = 0.0
+    contact: ContactTable | None = None
+
+
+class ToolPointTable(msgspec.Struct, forbid_unknown_fields=True):
+    """[[point]]: where a tested tool was hit and measured."""
+
+    node: int | str
+    from_tip_m: float
+    place_sd_m: float = 0.0
+    sensor_mass_kg: float = 0.0
+
+
+class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
+    """A whole tool.toml."""
+
+    segment: tuple[SegmentTable, ...]
+    material: dict[str, MaterialTable]
+    name: str = ""
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    point: tuple[ToolPointTable, ...] = ()
+
+
+@dataclass(frozen=True)
+class ToolPart:
+    """A segment, and the contact that holds it at its holder's side; None: rigidly."""
+
+    segment: Segment
+    contact: ToolContact | None = None
+
+
+@dataclass(frozen=True)
+class Point:
+    """Where a tested tool was hit and measured; how far off that may be (sd); sensor's mass, kg."""
+
+    node: str
+    from_tip: float
+    place_sd: float = 0.0
+    sensor_mass: float = 0.0
+
+
+@dataclass(frozen=True)
+class Tool:
+    """Parts from the holder to the tip, the unit axis (3,) from holder to tip, measured points."""
+
+    name: str
+    axis: tuple[float, float, float]
+    parts: tuple[ToolPart, ...]
+    points: tuple[Point, ...] = ()
+
+    @property
+    def length(self) -> float:
+        """In m."""
+        return sum(part.segment.length for part in self.parts)
+
+    @property
+    def mass(self) -> float:
+        """In kg."""
+        return sum(part.segment.weight for part in self.parts)
+
+    @property
+    def frame(self) -> np.ndarray:
+        """(3, 3): columns are the tool's own x, y, z in the axes of the FRFs."""
+        z = np.array(self.axis)
+        first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
+        x = first - z * (z @ first)
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z])
+
+    def transfer(self, omega: np.ndarray) -> np.ndarray:
+        """(F, 12, 12) of the state from the tip to below the lowest contact; omega in rad/s."""
+        total = np.broadcast_to(np.eye(12, dtype=complex), (len(omega), 12, 12))
+        for part in self.parts[::-1]:
+            total = transfer([part.segment], omega) @ total
+            if part.contact is not None:
+                total = part.contact.transfer(omega) @ total
+        return total
+
+    def above(self, from_tip: float) -> "Tool":
+        """The part of it between the tip and a section so many m away."""
+        parts = _split(self.parts, from_tip)
+        length, kept = 0.0, 0
+        while kept < len(parts) and length < from_tip - SAME_PLACE:
+            kept += 1
+            length += parts[-kept].segment.length
+        own = [replace(p) for p in parts[len(parts) - kept :]]
+        if own:  # what holds the lowest is below the section
+            own[0] = replace(own[0], contact=None)
+        return replace(self, parts=tuple(own))
+
+    def contacts(self) -> list[tuple[int, ToolContact]]:
+        """Contacts, and the number of the part that each holds."""
+        return [(k, p.contact) for k, p in enumerate(self.parts) if p.contact is not None]
+
+    def held(self, number: int, contact: ToolContact) -> "Tool":
+        """The same with another contact below a part."""
+        parts = list(self.parts)
+        parts[number] = replace(parts[number], contact=contact)
+        return replace(self, parts=tuple(parts))
+
+
+def _split(parts: tuple[ToolPart, ...], from_tip: float) -> tuple[ToolPart, ...]:
+    """Parts with an end so many m from the tip."""
+    out, left = list(parts), from_tip
+    for k in range(len(parts) - 1, -1, -1):
+        s = parts[k].segment
+        if left <= SAME_PLACE:
+            break
+        if left < s.length - SAME_PLACE:
+            width = s.end_diameter + left / s.length * (s.diameter - s.end_diameter)
+            below = replace(s, length=s.length - left, end_diameter=width, mass=0.0)
+            above = replace(s, length=left, diameter=width)
+            out[k : k + 1] = [replace(parts[k], segment=below), ToolPart(above)]
+            break
+        left -= s.length
+    return tuple(out)
+
+
+def _loaded(parts: tuple[ToolPart, ...], from_tip: float, mass: float) -> tuple[ToolPart, ...]:
+    """Parts with a mass (kg) so many m from the tip."""
+    parts, length = _split(parts, from_tip), 0.0
+    for k in range(len(parts) - 1, -1, -1):
+        if abs(length - from_tip) < 10 * SAME_PLACE:
+            segment = replace(parts[k].segment, mass=parts[k].segment.mass + mass)
+            return (*parts[:k], replace(parts[k], segment=segment), *parts[k + 1 :])
+        length += parts[k].segment.length
+    return parts  # at the very lowest end: the holder's, not the tool's
+
+
+def load_tool(path: Path) -> Tool:
+    """A tool from its TOML file; InputError naming the file, the fault and the remedy."""
+    try:
+        table = load_toml(path, ToolTable, "tool.toml")
+    except InputError as error:
+        raise InputError(_with_unit(path, str(error))) from None
+    _check(path, table)
+    materials = {
+        name: ToolMaterial(m.youngs_modulus_pa, m.density_kg_m3, m.poisson_ratio, m.loss_factor)
+        for name, m in table.material.items()
+    }
+    parts = tuple(_part(s, materials[s.material]) for s in table.segment)
+    points = tuple(
+        Point(str(p.node), p.from_tip_m, p.place_sd_m, p.sensor_mass_kg) for p in table.point
+    )
+    x, y, z = (float(a) for a in np.array(table.axis) / np.linalg.norm(table.axis))
+    tool = Tool(table.name or path.stem, (x, y, z), parts, points)
+    for point in points:
+        if point.from_tip > tool.length:
+            raise InputError(
+                f"{path}: node {point.node} is {point.from_tip} m from the tip of a tool that is "
+                f"{tool.length:g} m long; correct from_tip_m."
+            )
+        if point.sensor_mass > 0:
+            loaded = _loaded(tool.parts, point.from_tip, point.sensor_mass)
+            tool = replace(tool, parts=loaded)
+    return tool
+
+
+def _part(s: SegmentTable, material: ToolMaterial) -> ToolPart:
+    end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
+    start = s.diameter_m
+    if s.flutes:
+        start, end = FLUTED * start, FLUTED * end
+    if s.equivalent_diameter_m is not None:
+        start = end = s.equivalent_diameter_m
+    contact = None
+    if s.contact is not None:
+        contact = ToolContact(
+            **{name: getattr(s.contact, name) for name in (*NUMBERS, "sd_percent")}
+        )
+    return ToolPart(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), contact)
+
+
+UNITS = {
+    "length": "length_m", "diameter": "diameter_m", "end_diameter": "end_diameter_m",
+    "bore": "bore_m", "mass": "mass_kg", "density": "density_kg_m3", "from_tip": "from_tip_m",
+    "youngs_modulus": "youngs_modulus_pa", "stiffness": "stiffness_n_m and stiffness_nm_rad",
+    "damping": "damping_ns_m and damping_nms_rad", "place_sd": "place_sd_m",
+    "equivalent_diameter": "equivalent_diameter_m", "sensor_mass": "sensor_mass_kg",
+}  # fmt: skip
+
+
+def _with_unit(path: Path, sentence: str) -> str:
+    """The fault in words where a key only lacks its unit, or has another one."""
+    found = re.search(r"unknown field `(\w+)`(?:.*at `([^`]+)`)?", sentence)
+    if found is None:
+        return sentence
+    key, place = found.group(1), (found.group(2) or "").removeprefix("$.")
+    stem = max((s for s in UNITS if key == s or key.startswith(f"{s}_")), key=len, default=None)
+    if stem is None:
+        return sentence
+    where = f"{path}, {place}" if place else str(path)
+    return f"{where}: {key} does not state the unit that is read here; write {UNITS[stem]}."
+
+
+def _check(path: Path, table: ToolTable) -> None:
+    if not table.segment:
+        raise InputError(f"{path} has no [[segment]]; list them from the holder to the tip.")
+    if not np.all(np.isfinite(table.axis)) or np.linalg.norm(table.axis) == 0:
+        raise InputError(f"{path}: axis has no direction; give it from the holder to the tip.")
+    for name, m in table.material.items():
+        where = f"{path}, material {name}"
+        _positive(where, youngs_modulus_pa=m.youngs_modulus_pa, density_kg_m3=m.density_kg_m3)
+        _not_negative(where, loss_factor=m.loss_factor)
+        if not -1 < m.poisson_ratio < 0.5:
+            raise InputError(f"{where}: poisson_ratio is {m.poisson_ratio:g}; correct it.")
+    for number, s in enumerate(table.segment, 1):
+        _check_segment(f"{path}, segment {number}", s, table.material)
+    for number, p in enumerate(table.point, 1):
+        _not_negative(
+            f"{path}, point {number}",
+            from_tip_m=p.from_tip_m, place_sd_m=p.place_sd_m, sensor_mass_kg=p.sensor_mass_kg,
+        )  # fmt: skip
+    if len({str(p.node) for p in table.point}) < len(table.point):
+        raise InputError(f"{path} lists a [[point]] with the same node twice; correct node.")
+
+
+def _check_segment(where: str, s: SegmentTable, materials: dict[str, MaterialTable]) -> None:
+    if s.material not in materials:
+        raise InputError(
+            f"{where} is of {s.material!r}, which has no [material.{s.material}]; add that."
+        )
+    end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
+    _positive(where, length_m=s.length_m, diameter_m=s.diameter_m, end_diameter_m=end)
+    _not_negative(where, bore_m=s.bore_m, mass_kg=s.mass_kg, flutes=s.flutes)
+    if s.equivalent_diameter_m is not None:
+        _positive(where, equivalent_diameter_m=s.equivalent_diameter_m)
+    narrow = min(s.diameter_m, end, s.equivalent_diameter_m or np.inf)
+    if s.bore_m >= narrow * (FLUTED if s.flutes and s.equivalent_diameter_m is None else 1.0):
+        raise InputError(f"{where}: a bore of {s.bore_m} m leaves nothing of it; correct bore_m.")
+    if s.contact is not None:
+        c = s.contact
+        _positive(f"{where}, contact", stiffness_n_m=c.stiffness_n_m,
+                  stiffness_nm_rad=c.stiffness_nm_rad)  # fmt: skip
+        _not_negative(f"{where}, contact", damping_ns_m=c.damping_ns_m,
+                      damping_nms_rad=c.damping_nms_rad, sd_percent=c.sd_percent)  # fmt: skip
+
+
+def _positive(where: str, **values: float) -> None:
+    for name, value in values.items():
+        if not (np.isfinite(value) and value > 0):
+            raise InputError(f"{where}: {name} is {value:g}; it has to be above zero, correct it.")
+
+
+def _not_negative(where: str, **values: float) -> None:
+    for name, value in values.items():
+        if not (np.isfinite(value) and value >= 0):
+            raise InputError(f"{where}: {name} is {value:g}; it cannot be negative, correct it.")

@@ -1,0 +1,183 @@
+"""Modes of any matrix of FRFs: poles common to all, one shape per mode over all points."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.errors import RefusedError
+from planner.frf.matrix import FrfMatrix, by_number
+from planner.modal.consistency import Consistency, check
+from planner.modal.matrix_poles import MatrixPoles, identify_matrix
+from planner.modal.pole_identification import natural, probability, support
+from planner.modal.rank_one_fit import Entries, fit_halves, fit_shape
+from planner.modal.residues import realign
+from planner.modal.shape_measures import (
+    phase_collinearity,
+    phase_deviation_deg,
+    real_normal_modes,
+)
+from planner.recording.dof import Dof
+
+# A band that the user does not state begins at this line: the first ones hold offsets and drift.
+FIRST_LINE = 3
+# Rows and columns are fitted apart where together they leave χ² this many times too large, and
+# apart this many times less.
+ASYMMETRIC = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixMode:
+    """A mode over all points.
+
+    `shape` (n,) has unit modal mass (kg^-1/2) where `scaled`, else unit length; `shape_sd` (n,) is
+    the standard deviation of real and imaginary part each. `collinearity` is the MPC, `deviation`
+    the MPD in degrees, `modal_mass_kg` that of the shape with largest component 1 (NaN unscaled).
+    `misfit` is χ² per degree of freedom that one shape leaves in the residues. `scatter_hz` is the
+    sd of the frequency from set to set (of the points that roved), beyond their noise.
+    """
+
+    frequency_hz: float
+    frequency_sd_hz: float
+    damping_ratio: float
+    damping_sd: float
+    shape: np.ndarray
+    shape_sd: np.ndarray
+    scaled: bool
+    probability: float
+    collinearity: float
+    deviation_deg: float
+    modal_mass_kg: float
+    misfit: float
+    scatter_hz: float = 0.0
+
+    @property
+    def pole(self) -> complex:
+        """Pole λ in rad/s."""
+        w = 2 * np.pi * self.frequency_hz
+        return complex(-self.damping_ratio * w, w * np.sqrt(max(0.0, 1 - self.damping_ratio**2)))
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixModes:
+    """Modes in increasing frequency; `dofs` name the entries of every shape."""
+
+    dofs: tuple[Dof, ...]
+    modes: tuple[MatrixMode, ...]
+    band_hz: tuple[float, float]
+    remarks: tuple[str, ...]
+    found: MatrixPoles
+    checks: Consistency
+
+
+def modes_of_matrix(matrix: FrfMatrix, band_hz: tuple[float, float] | None = None) -> MatrixModes:
+    """All modes that a matrix of FRFs holds in a band (Hz; default: all lines but the first few).
+
+    Raises RefusedError where no mode can be found.
+    """
+    frequency = matrix.frequency_hz
+    band = band_hz or (float(frequency[min(FIRST_LINE, frequency.size) - 1]), float(frequency[-1]))
+    found = identify_matrix(matrix, band)
+    hz = np.abs(found.fit.poles) / (2 * np.pi) if found else np.zeros(0)
+    inside = [
+        k for k in np.argsort(hz) if found and found.weak[k] <= 1 and _within(float(hz[k]), band)
+    ]
+    if found is None or not inside:
+        raise RefusedError(
+            f"No mode could be found between {band[0]:g} and {band[1]:g} Hz in {matrix.count} FRFs:"
+            " check that the band holds a resonance."
+        )
+    checks = check(matrix, found, np.array(inside))
+    found = _turned_back(matrix, found, checks)
+    dofs, entries = _points(matrix, found, checks)
+    modes = tuple(_mode(found, int(k), entries, len(dofs), matrix.scaled) for k in inside)
+    remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
+    return MatrixModes(dofs, modes, band, remarks, found, checks)
+
+
+def _turned_back(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
+    """With the residues of columns whose sign is turned as they should be."""
+    sign = np.array([-1.0 if dof in checks.turned else 1.0 for dof in matrix.references])
+    residue = found.fit.residue * sign[found.columns][:, None]
+    return replace(found, fit=replace(found.fit, residue=residue))
+
+
+def _within(frequency_hz: float, band_hz: tuple[float, float]) -> bool:
+    return band_hz[0] <= frequency_hz <= band_hz[1]
+
+
+def _points(
+    matrix: FrfMatrix, found: MatrixPoles, checks: Consistency
+) -> tuple[tuple[Dof, ...], Entries]:
+    """All points hit or felt, and the entries by their indices.
+
+    References whose column does not go with their row are points of their own, behind the others.
+    A point that was only hit is among them where a driving point ties its size to the rest.
+    """
+    tied = [d for d in matrix.references if d not in checks.untied] if checks.driving else []
+    seen = {matrix.responses[o] for o in found.rows}
+    dofs = tuple(sorted({*seen, *tied}, key=by_number))
+    apart = [d for d in matrix.references if d not in tied]
+    place = {dof: k for k, dof in enumerate(dofs)}
+    hit_at = place | {dof: len(dofs) + k for k, dof in enumerate(apart)}
+    felt = np.array([place[matrix.responses[o]] for o in found.rows])
+    hit = np.array([hit_at[matrix.references[i]] for i in found.columns])
+    return dofs, Entries(felt, hit, len(dofs) + len(apart))
+
+
+def _mode(found: MatrixPoles, k: int, entries: Entries, points: int, scaled: bool) -> MatrixMode:
+    fit, m = found.fit, found.fit.poles.size
+    pole = complex(fit.poles[k])
+    index = [k, m + k]
+    covariance = found.scale[k] * fit.covariance[np.ix_(index, index)]
+    frequency, damping, sd = natural(pole, covariance)
+    variance = found.scale[k] * fit.residue_variance[:, k]
+    given = entries, fit.residue[:, k], variance, pole.imag
+    fitted = fit_shape(*given)
+    if fitted.misfit > ASYMMETRIC:
+        halves = fit_halves(*given)
+        fitted = halves if halves.misfit < fitted.misfit / ASYMMETRIC else fitted
+    group, odd = entries.groups
+    scaled = scaled and bool(np.all(odd[group[:points]]))
+    shape, shape_sd = _shrunk(fitted.shape[:points], fitted.sd[:points])
+    if scaled:
+        shape = shape * (np.sign(shape[np.argmax(np.abs(shape))].real) or 1.0)
+    else:
+        size = np.linalg.norm(shape)
+        shape, shape_sd = shape * realign(shape) / size, shape_sd / size
+    mass = 1 / float(np.max(np.abs(shape)) ** 2) if scaled else float("nan")
+    spread = np.sqrt(fit.spread[m + k]) / (2 * np.pi)
+    return MatrixMode(
+        frequency, float(sd[0]), damping, float(sd[1]), shape, shape_sd, scaled,
+        probability(float(found.presence[k]), _support(found, pole), float(found.weak[k])),
+        phase_collinearity(shape), phase_deviation_deg(shape), mass, fitted.misfit, float(spread),
+    )  # fmt: skip
+
+
+def _shrunk(shape: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A shape whose hardly determined points are drawn towards zero, and its sds.
+
+    No point moves much farther than the farthest of the well determined half (normal prior): where
+    poles of a set nearly coincide, its residues alone would be anything.
+    """
+    known = sd <= np.median(sd)
+    power = float(np.max(np.abs(shape[known]) ** 2))
+    share = power / np.maximum(power + 2 * sd**2, 1e-300)
+    return shape * share, sd * np.sqrt(share)
+
+
+def _support(found: MatrixPoles, pole: complex) -> float:
+    """Share of the upper model orders that have this pole."""
+    return support(pole, found.diagram.sets)
+
+
+def with_normal_modes(found: MatrixModes) -> MatrixModes:
+    """With the real normal modes behind the complex shapes; frequencies and damping stay."""
+    poles = np.array([mode.pole for mode in found.modes])
+    shapes = np.stack([mode.shape for mode in found.modes], axis=1)
+    _, real = real_normal_modes(poles, shapes)
+    modes = []
+    for mode, shape in zip(found.modes, real.T, strict=True):
+        mass = 1 / float(np.max(np.abs(shape)) ** 2) if mode.scaled else float("nan")
+        modes.append(replace(mode, shape=shape.astype(complex), modal_mass_kg=mass))
+    remark = "Shapes are real normal modes; MPC and MPD are those of the complex ones."
+    return replace(found, modes=tuple(modes), remarks=(*found.remarks, remark))

@@ -1,0 +1,137 @@
+"""Poles of a matrix of FRFs of any size: many references at once, missing entries allowed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import RefusedError
+from planner.frf.matrix import FrfMatrix
+from planner.modal.fit_data import Data
+from planner.modal.matrix_selection import common, established, judged
+from planner.modal.plscf import PoleSet, plscf, row_errors
+from planner.modal.pole_identification import ladder
+from planner.modal.set_poles import SetPoles
+from planner.modal.stabilisation import Diagram, diagram, stable
+
+MARGIN = 0.05  # of the band, beyond its edges
+MAX_ORDER = 36
+MOST_REFERENCES = 6  # at once: the order of the polynomial counts for each of them
+LEAST_LINES = 16
+ABOVE = 1.05  # times the last line: where the pole starts that stands for modes above
+# Of rows that fit the denominator of all the worse than the median by more than this, the weight is
+# taken down, so many times over; fewer rows than these cannot tell.
+ODD, REWEIGHED, LEAST_ROWS = 3.0, 3, 6
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixPoles:
+    """Poles common to all FRFs and what they came from; entries by `rows` and `columns`.
+
+    `fit.residue` (e, m) of each entry; `scale` (m,) by which noise around a mode exceeds its
+    variance; `weak` (m,) as `mode_selection.weakness`, `presence` (m,) share of the response.
+    """
+
+    data: Data
+    fit: SetPoles
+    diagram: Diagram
+    rows: np.ndarray
+    columns: np.ndarray
+    sets: tuple[np.ndarray, ...]
+    scale: np.ndarray
+    weak: np.ndarray
+    presence: np.ndarray
+    order: int
+
+    @property
+    def fit_error(self) -> float:
+        """‖H − fit‖/‖H‖."""
+        error = np.linalg.norm(self.data.response[:, 0] - self.fit.fitted)
+        return float(error / np.linalg.norm(self.data.response))
+
+
+def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPoles | None:
+    """All poles that the matrix holds in and right beside a band; None where there is none.
+
+    Raises RefusedError where too few lines lie in the band.
+    """
+    f = matrix.frequency_hz
+    chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
+    if np.count_nonzero(chosen) < LEAST_LINES:
+        raise RefusedError(
+            f"Only {np.count_nonzero(chosen)} frequency lines lie between {band_hz[0]:g} and"
+            f" {band_hz[1]:g} Hz: widen the band or record longer."
+        )
+    rows, columns = np.nonzero(matrix.measured)
+    data = Data(f[chosen], matrix.accelerance[rows, columns][:, None, chosen], None, pooled=True)
+    orders, found = _diagram(matrix, chosen)
+    start = np.array([line.pole for line in stable(found)])
+    if not start.size:
+        return None
+    start = _with_one_above(start, f[chosen][-1])
+    sets = _sets(matrix, rows, columns)
+    felt = len(matrix.responses) >= len(matrix.references)
+    places = (rows, columns) if felt else (columns, rows)
+    variance, poles = common(data, start)
+    fit, variance = established(data, sets, variance, poles, places)
+    if not fit.poles.size:
+        return None
+    scale, weak, presence = judged(data, fit, variance)
+    return MatrixPoles(data, fit, found, rows, columns, sets, scale, weak, presence, orders[-1])
+
+
+def _with_one_above(poles: np.ndarray, last_hz: float) -> np.ndarray:
+    """Beside the poles one above the last line, for all modes that lie there."""
+    if np.max(poles.imag) / (2 * np.pi) > last_hz:
+        return poles
+    ratio = float(np.median(-poles.real / np.abs(poles)))
+    return np.append(poles, 2 * np.pi * ABOVE * last_hz * (1j - ratio))
+
+
+def _diagram(matrix: FrfMatrix, chosen: np.ndarray) -> tuple[tuple[int, ...], Diagram]:
+    """Poles of every model order, from the rows that hold all of the references used."""
+    table, measured = matrix.accelerance[..., chosen], matrix.measured
+    if len(matrix.responses) < len(matrix.references):
+        table, measured = np.swapaxes(table, 0, 1), measured.T
+    columns = _references(measured)
+    complete = np.all(measured[:, columns], axis=1)
+    block = table[complete][:, columns]
+    level = np.mean(np.abs(block) ** 2, axis=(1, 2))
+    weight = np.ones(block.shape[::2]) / np.maximum(level, 1e-300)[:, None]
+    orders = ladder(max(2, min(MAX_ORDER, block.shape[-1] // 3)))
+    frequency = matrix.frequency_hz[chosen]
+    weight = _without_odd_rows(frequency, block, orders[-1], weight)
+    sets: tuple[PoleSet, ...] = plscf(frequency, block, orders, weight)
+    return orders, diagram(sets, (frequency[0] * 0.95, frequency[-1] * 1.05))
+
+
+def _without_odd_rows(
+    frequency: np.ndarray, block: np.ndarray, order: int, weight: np.ndarray
+) -> np.ndarray:
+    """Weights (o, F) with those rows taken down that do not go with the others."""
+    if block.shape[0] < LEAST_ROWS or block.shape[1] < 2:
+        return weight
+    changed = weight
+    for _ in range(REWEIGHED):
+        errors = row_errors(frequency, block, order, changed)
+        usual = max(float(np.median(errors)), 1e-300)
+        changed = weight * np.minimum(1.0, ODD * usual / np.maximum(errors, 1e-300))[:, None] ** 2
+    return changed
+
+
+def _references(measured: np.ndarray) -> np.ndarray:
+    """Columns of measured (o, i) used together: as many FRFs as possible in complete rows."""
+    columns = list(np.argsort(-np.sum(measured, axis=0), kind="stable"))
+    best, size = columns[:1], 0
+    for count in range(1, min(len(columns), MOST_REFERENCES) + 1):
+        complete = int(np.sum(np.all(measured[:, columns[:count]], axis=1))) * count
+        if complete > size:
+            best, size = columns[:count], complete
+    return np.array(best)
+
+
+def _sets(matrix: FrfMatrix, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Entries measured together: those of one node of the side that roved (the longer one)."""
+    felt = len(matrix.responses) >= len(matrix.references)
+    dofs, index = (matrix.responses, rows) if felt else (matrix.references, columns)
+    nodes = np.array([dofs[k].node for k in index])
+    return tuple(np.flatnonzero(nodes == node) for node in dict.fromkeys(nodes.tolist()))

@@ -1,0 +1,284 @@
+"""Which poles of a matrix of FRFs are modes, when every set has poles of its own."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from planner.modal.fit_data import Data
+from planner.modal.matched_filter import falls
+from planner.modal.mode_selection import MAX_DAMPING, excess, running_mean
+from planner.modal.refine import refine
+from planner.modal.residues import unit
+from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
+
+# Row and column of each entry, columns being those of the few references.
+Places = tuple[np.ndarray, np.ndarray]
+# Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
+# are fitted: one in so many is kept.
+NEAR, THINNED = 10.0, 3
+# Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
+# and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
+PRESENT, PRESENT_ADDED = 0.03, 0.2
+MOST_ADDED = 6
+ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
+PASSES = 2  # of leaving out and adding
+# A pole that only the error tells of is no more damped than this, and lies above so many lines.
+DAMPING_ADDED, LINES_BELOW = 0.1, 6
+MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
+# Poles of one mode take part at the references alike (MAC of the participation).
+ALIKE = 0.8
+MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
+# Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
+# it.
+REACH, LINES_AROUND = 12.0, 12
+
+
+def common(data: Data, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Variance (e, F) and poles where all entries share them."""
+    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
+    variance = np.broadcast_to(power, data.response.shape)
+    for _ in range(2):
+        found = refine(data.lines, data.response, variance, poles, data.allowed)
+        poles = found.poles
+        shown = found.residues.residue @ unit(data.lines, poles)
+        shown += found.residues.residue.conj() @ unit(data.lines, poles.conj())
+        fitted = shown + found.residues.rest @ data.lines.rest
+        variance = _variance(data, fitted[:, 0], poles.size)[:, None]
+    return variance[:, 0], poles
+
+
+def _variance(data: Data, fitted: np.ndarray, modes: int) -> np.ndarray:
+    """(e, F) from the error of a fit: a level for each entry times one profile of lines."""
+    square = np.abs(data.response[:, 0] - fitted) ** 2
+    flat = np.mean(square, axis=-1, keepdims=True)
+    lines = square.shape[1]
+    floor = 1e-20 * np.mean(np.abs(data.response[:, 0]) ** 2, axis=-1, keepdims=True)
+    profile = running_mean(np.mean(square / np.maximum(flat, floor), axis=0), max(10, lines // 20))
+    lost = max(0.1, 1 - (modes + 3) / lines)
+    return flat * (0.9 * profile + 0.1) / lost + floor
+
+
+def established(
+    data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
+    places: Places,
+) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
+    """Fit with every set's own poles, weak modes left out and missing ones added."""
+    fit = _fit(data, sets, variance, poles, rounds=ROUGH_ROUNDS)
+    tested: set[tuple[int, int]] = set()
+    for number in range(PASSES):
+        variance = _variance(data, fit.fitted, fit.poles.size)
+        poles = _pruned(data, fit, variance)
+        if poles.size == fit.poles.size:
+            poles = _unsplit(data, sets, fit, variance, places, tested)
+        split = poles.size < fit.poles.size
+        if number == 0:
+            poles = np.append(poles, _missing(data, sets, fit, variance))
+        if not poles.size:
+            return replace(fit, poles=poles), variance
+        same = not split and poles.size == fit.poles.size
+        if same and number:
+            break
+        known = fit.own if same else None
+        fit = _fit(data, sets, variance, fit.poles if same else poles, known)
+        if same:
+            break
+    return fit, _variance(data, fit.fitted, fit.poles.size)
+
+
+def _fit(
+    data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
+    known: np.ndarray | None = None, rounds: int = ROUNDS,
+) -> SetPoles:  # fmt: skip
+    """Fit on thinned lines; poles that stray are left out."""
+    while True:
+        try:
+            lines = _thinned(data, poles)
+            return fit_sets(data, sets, variance, poles, rounds, known, lines)
+        except StrayedError as error:
+            poles, known = poles[~error.astray], None
+
+
+def _thinned(data: Data, poles: np.ndarray) -> np.ndarray:
+    """Lines near a resonance, and some of the others."""
+    f = data.frequency_hz
+    kept = np.arange(f.size) % THINNED == 0
+    for pole in poles:
+        kept |= np.abs(f - pole.imag / (2 * np.pi)) < NEAR * abs(pole.real) / (2 * np.pi)
+    return np.flatnonzero(kept)
+
+
+def _part(data: Data, lines: np.ndarray) -> Data:
+    return replace(data, frequency_hz=data.frequency_hz[lines], response=data.response[..., lines])
+
+
+def _pruned(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """The poles that stand."""
+    _, weak, presence = judged(data, fit, variance)
+    return fit.poles[(weak <= 1) & (presence >= PRESENT)]
+
+
+def judged(
+    data: Data, fit: SetPoles, variance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(m,) noise beyond its variance, weakness (above 1: not established) and presence."""
+    poles, m = fit.poles, fit.poles.size
+    frequency = np.abs(poles) / (2 * np.pi)
+    scale = np.interp(frequency, data.frequency_hz, _excess(data, fit, variance))
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    decay = np.maximum(-poles.real, 1e-12 * np.abs(poles))
+    weak = [
+        data.threshold * scale / np.maximum(fit.significance, 1e-300),
+        2 * np.sqrt(scale) * np.maximum(sd[:m], sd[m:]) / decay,
+        -poles.real / (MAX_DAMPING * np.abs(poles)),
+    ]
+    return scale, np.max(weak, axis=0), presences(data, poles, fit.residue)
+
+
+def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """(F,) χ² per degree of freedom around each line, at least 1."""
+    error = (data.response[:, 0] - fit.fitted)[:, None]
+    free = 2 * error.size - 2 * fit.poles.size - data.entries * 2 * (fit.poles.size + 3)
+    return excess(data, error, variance[:, None], free)
+
+
+def presences(data: Data, poles: np.ndarray, residue: np.ndarray) -> np.ndarray:
+    """(m,) ‖response of the mode‖/‖response‖ at the line nearest its frequency."""
+    lines = [int(np.argmin(np.abs(data.frequency_hz - p.imag / (2 * np.pi)))) for p in poles]
+    ones = unit(data.lines, poles)[np.arange(poles.size), lines]
+    whole = np.linalg.norm(data.response[:, 0][:, lines], axis=0)
+    return np.linalg.norm(residue * ones, axis=0) / np.maximum(whole, 1e-300)
+
+
+def _missing(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
+) -> np.ndarray:
+    """Poles that the error still tells of, each tried on the lines around it."""
+    added: list[complex] = []
+    error = data.response[:, 0] - fit.fitted
+    weight = 2 / variance / _excess(data, fit, variance)
+    poles, fall = falls(data, weight, weight * error)
+    failed, step = 0, data.frequency_hz[1] - data.frequency_hz[0]
+    fall[poles.imag / (2 * np.pi) < LINES_BELOW * step] = 0.0
+    for _ in range(MOST_ADDED):
+        best = int(np.argmax(fall))
+        if fall[best] <= data.threshold or failed == MOST_FAILED:
+            break
+        pole = complex(poles[best])
+        found = _tried(data, sets, fit, variance, pole)
+        fall[np.abs(poles - pole) < REACH * abs(pole.real)] = 0.0
+        if found is not None and any(abs(found - p) < abs(p.real) for p in added):
+            found = None
+        failed = failed + 1 if found is None else 0
+        if found is not None:
+            added.append(found)
+            fall[np.abs(poles - found) < REACH * abs(found.real)] = 0.0
+    return np.array(added, complex)
+
+
+def _tried(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray, pole: complex
+) -> complex | None:
+    """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
+    local, lines, near = _around(data, fit, pole)
+    start = np.append(fit.poles[near], pole)
+    together = np.broadcast_to(variance[:, None, lines], local.response.shape)
+    quick = refine(local.lines, local.response, together, start, local.allowed)
+    if presences(local, quick.poles, quick.residues.residue[:, 0])[-1] < PRESENT_ADDED / 2:
+        return None
+    try:
+        own = fit.own[:, near]
+        before = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=own)
+        own = np.column_stack([own, np.full(len(own), quick.poles[-1])])
+        start = np.append(fit.poles[near], quick.poles[-1])
+        after = fit_sets(local, sets, variance[:, lines], start, known=own)
+    except StrayedError:
+        return None
+    new = after.poles[-1]
+    inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
+    present = presences(local, after.poles, after.residue)[-1]
+    real = inside and present >= PRESENT_ADDED and -new.real < DAMPING_ADDED * abs(new)
+    better = _explains(local, before, after, variance[:, lines])
+    return complex(new) if real and better else None
+
+
+def _around(data: Data, fit: SetPoles, pole: complex) -> tuple[Data, np.ndarray, np.ndarray]:
+    """The lines around a pole less the modes far from it, their indices, which modes are near."""
+    step, centre = data.frequency_hz[1] - data.frequency_hz[0], pole.imag / (2 * np.pi)
+    reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
+    lines = np.flatnonzero(np.abs(data.frequency_hz - centre) < reach)
+    local = _part(data, lines)
+    near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
+    far = fit.residue[:, ~near] @ unit(local.lines, fit.poles[~near])
+    far += fit.residue[:, ~near].conj() @ unit(local.lines, fit.poles[~near].conj())
+    return replace(local, response=local.response - far[:, None]), lines, near
+
+
+def _explains(local: Data, less: SetPoles, more: SetPoles, variance: np.ndarray) -> bool:
+    """Whether a fit with one mode more is better than chance makes it."""
+    chi = [
+        float(np.sum(2 / variance * np.abs(local.response[:, 0] - fit.fitted) ** 2))
+        for fit in (less, more)
+    ]
+    scale = max(1.0, chi[1] / (2 * local.response.size))
+    return chi[0] - chi[1] > local.threshold * scale
+
+
+def _unsplit(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
+    places: Places, tested: set[tuple[int, int]],
+) -> np.ndarray:  # fmt: skip
+    """Poles with those pairs made one that sets of slightly different poles explain as well.
+
+    What one pole for all sets cannot follow, two poles within a bandwidth imitate; they excite and
+    are excited alike. `tested` are pairs (lines) that were found to be two.
+    """
+    poles = fit.poles[np.argsort(fit.poles.imag)]
+    kept: list[complex] = list(poles[:1])
+    for pole in poles[1:]:
+        last = kept[-1]
+        width = 2 * max(abs(last.real), abs(pole.real))
+        step = 2 * np.pi * (data.frequency_hz[1] - data.frequency_hz[0])
+        pair = round(last.imag / step), round(pole.imag / step)
+        near = abs(pole.imag - last.imag) < width and pair not in tested
+        if (
+            near
+            and _alike(fit, places, last, pole)
+            and _is_one(data, sets, fit, variance, last, pole)
+        ):
+            kept[-1] = (last + pole) / 2
+        else:
+            tested.add(pair)
+            kept.append(pole)
+    return np.array(kept)
+
+
+def _alike(fit: SetPoles, places: Places, first: complex, second: complex) -> bool:
+    """Whether two poles take part at the references alike; always so at a single one."""
+    rows, columns = places
+    vectors = []
+    for pole in (first, second):
+        near = int(np.argmin(np.abs(fit.poles - pole)))
+        table = np.zeros((rows.max() + 1, columns.max() + 1), complex)
+        table[rows, columns] = fit.residue[:, near]
+        vectors.append(np.linalg.svd(table, full_matrices=False)[2][0])
+    return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
+
+
+def _is_one(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
+    first: complex, second: complex,
+) -> bool:  # fmt: skip
+    middle = (first + second) / 2
+    local, lines, near = _around(data, fit, middle)
+    pair = (np.abs(fit.poles - first) < 1e-9) | (np.abs(fit.poles - second) < 1e-9)
+    if np.count_nonzero(pair) < 2:
+        return False
+    others = near & ~pair
+    own = np.column_stack([fit.own[:, others], np.full(len(sets), middle)])
+    start = np.append(fit.poles[others], middle)
+    try:
+        one = fit_sets(local, sets, variance[:, lines], start, MERGED_ROUNDS, own)
+        two = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
+    except StrayedError:
+        return False
+    return not _explains(local, one, two, variance[:, lines])

@@ -1,0 +1,81 @@
+"""Where the points of a test lie: nodes and trace lines of universal files."""
+
+import io
+import warnings
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+# Datasets: nodes (15 and 2411), trace lines (82), units (164).
+NODES, TRACES, UNITS = (15, 2411), 82, 164
+SUFFIXES = (".uff", ".unv", ".uf58", ".txt")
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Points by name and what joins them: position_m (n, 3), lines as pairs of names."""
+
+    nodes: tuple[str, ...]
+    position_m: np.ndarray
+    lines: tuple[tuple[str, str], ...] = ()
+
+    def at(self, node: str) -> np.ndarray | None:
+        """Position (3,) of a node, None where it is not known."""
+        return self.position_m[self.nodes.index(node)] if node in self.nodes else None
+
+
+def read_geometry(paths: tuple[Path, ...]) -> Geometry | None:
+    """Nodes and trace lines that universal files hold, the later ones first; None without nodes.
+
+    Lengths are in m where a file states its units (dataset 164), else as they stand.
+    """
+    position: dict[str, np.ndarray] = {}
+    lines: list[tuple[str, str]] = []
+    for path in paths:
+        if path.suffix.lower() in SUFFIXES:
+            _add(_sets(path), position, lines)
+    if not position:
+        return None
+    known = tuple(dict.fromkeys(line for line in lines if set(line) <= set(position)))
+    return Geometry(tuple(position), np.array(list(position.values())), known)
+
+
+def _add(
+    sets: list[dict[str, Any]], position: dict[str, np.ndarray], lines: list[tuple[str, str]]
+) -> None:
+    factors = [float(s.get("length", 1.0)) for s in sets if s["type"] == UNITS]
+    # A dataset 164 states how many of the file's lengths make a metre.
+    scale = 1 / factors[-1] if factors and factors[-1] > 0 else 1.0
+    for s in sets:
+        if s["type"] in NODES:
+            places = np.stack([np.asarray(s[axis], float) for axis in "xyz"], axis=1)
+            for number, place in zip(s["node_nums"], places, strict=True):
+                position[str(int(number))] = scale * place
+        elif s["type"] == TRACES:
+            lines += _trace([int(n) for n in s["nodes"]])
+
+
+def _trace(numbers: list[int]) -> list[tuple[str, str]]:
+    """Pairs of neighbours along a trace line; 0 lifts the pen."""
+    return [(str(a), str(b)) for a, b in pairwise(numbers) if a and b and a != b]
+
+
+def _sets(path: Path) -> list[dict[str, Any]]:
+    """Datasets of geometry; what cannot be read is left out: it is no measurement."""
+    import pyuff
+
+    found: list[Any] = []
+    with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
+        warnings.simplefilter("ignore")
+        file = pyuff.UFF(str(path))
+        for index, kind in enumerate(file.get_set_types()):
+            if kind in (*NODES, TRACES, UNITS):
+                try:
+                    found.append(file.read_sets(index))
+                except Exception:
+                    continue
+    return found

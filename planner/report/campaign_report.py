@@ -1,0 +1,57 @@
+"""Answer of `report`: where the file is."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from planner.campaign.campaign import Campaign
+from planner.errors import InputError
+from planner.report.answer import Answer
+
+
+@dataclass(frozen=True)
+class WrittenReport(Answer):
+    """Answer of `report`: the file, its size, and what it is about."""
+
+    report: str
+    bytes: int
+    measurements: int
+    simulated: bool
+    diagnosis: str | None
+    seconds: float
+
+    def text(self) -> str:
+        """One sentence."""
+        size = self.bytes / 1e6
+        return f"Report of {self.measurements} poses ({size:.1f} MB): {self.report}"
+
+
+def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> WrittenReport:
+    """Write the report of a campaign, by default report.html in its folder.
+
+    `diagnosis` names what `planner diagnose --out` has written. Raises InputError where the file
+    cannot be written.
+    """
+    from planner.report.page.build import page
+    from planner.report.page.explained import diagnosis_of
+
+    started = time.perf_counter()
+    kept = diagnosis_of(campaign.directory, diagnosis)
+    file = (out or campaign.directory / "report.html").absolute()
+    if file.is_dir():
+        raise InputError(f"{file} is a folder; name a file for the report.")
+    data = page(campaign, kept).encode("utf-8", "replace")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(data)
+    except OSError as error:
+        raise InputError(f"{file} cannot be written ({error.strerror}); name another.") from None
+    state = campaign.state
+    return WrittenReport(
+        report=str(file),
+        bytes=len(data),
+        measurements=len(state.used),
+        simulated=any(m.simulated for m in state.recorded),
+        diagnosis=str(kept) if kept else None,
+        seconds=time.perf_counter() - started,
+    )

@@ -1,0 +1,171 @@
+"""Answer of `couple`: the FRFs of another tool, how sure they are, and the hit that would tell."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.errors import InputError
+from planner.milling.coupling import AMPLIFICATION_LIMIT, MOTIONS, CoupledFrf
+from planner.milling.interface import NUMBERS
+from planner.milling.verification import Resonance, VerifyingHit, resonances, verifying_hit
+from planner.report.answer import NOT_IN_JSON, Answer
+from planner.report.coupling_plots import coupling_figures
+from planner.report.plot_files import Pictures
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+
+
+@dataclass(frozen=True)
+class Amplification:
+    """How noise grows: the worst line, the limit, and the bands (Hz) in which it is exceeded."""
+
+    worst: float
+    at_hz: float
+    limit: float
+    above_limit_hz: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of(cls, frequency_hz: np.ndarray, values: np.ndarray) -> "Amplification":
+        """From values (F,) line by line."""
+        worst = int(np.argmax(values))
+        over = np.concatenate([[0], (values > AMPLIFICATION_LIMIT).astype(int), [0]])
+        change = np.diff(over)
+        starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
+        bands = (
+            (float(frequency_hz[a]), float(frequency_hz[b]))
+            for a, b in zip(starts, ends, strict=True)
+        )
+        return cls(
+            float(values[worst]), float(frequency_hz[worst]), AMPLIFICATION_LIMIT, tuple(bands)
+        )
+
+    @property
+    def sentence(self) -> str:
+        """What the engineer should mind; empty where nothing is above the limit."""
+        if not self.above_limit_hz:
+            return ""
+        bands = [f"{low:.4g} to {high:.4g} Hz" for low, high in self.above_limit_hz[:3]]
+        more = ", …" if len(self.above_limit_hz) > 3 else ""
+        return (
+            f"Errors of the measured FRFs grow more than {self.limit:g} times at "
+            f"{', '.join(bands)}{more}: do not rely on the coupled FRFs there."
+        )
+
+
+@dataclass(frozen=True)
+class CouplingReport(Answer):
+    """Answer of `couple`; receptances in m/N, FRFs of `npz` in m/s²/N."""
+
+    tool: str
+    reference: str | None
+    pose: str
+    npz: str
+    frequency_hz: tuple[float, float]
+    lines: int
+    motions: tuple[str, ...]
+    resonances: tuple[Resonance, ...]
+    amplification: Amplification
+    verify: VerifyingHit
+    contact: "dict[str, object] | msgspec.UnsetType" = msgspec.UNSET
+    simulated: bool = False
+    remarks: tuple[str, ...] = ()
+    plots: tuple[str, ...] = ()
+    before: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
+    coupled: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
+
+    def text(self) -> Group:
+        """A table of resonances, then what to mind and what to hit."""
+        made = table(
+            f"{self.tool} at {self.pose}",
+            *("direction", "peak (Hz)", "receptance (µm/N)", "sd (%)", "amplification"),
+        )
+        for peak in self.resonances:
+            size = f"{1e6 * peak.receptance_m_n:.3g}"
+            sd, grown = f"{peak.sd_percent:.1f}", f"{peak.amplification:.2f}"
+            made.add_row(peak.direction, f"{peak.frequency_hz:.4g}", size, sd, grown)
+        worst = self.amplification
+        lines = [
+            Text(f"Errors grow at most {worst.worst:.3g} times, at {worst.at_hz:.4g} Hz."),
+            Text(self.verify.sentence),
+            Text(f"FRFs (m/s²/N) with sd: {self.npz}"),
+        ]
+        if isinstance(self.contact, dict):
+            lines.append(Text(_contact_sentence(self.contact)))
+        if self.simulated:
+            lines.append(SIMULATED)
+        return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots))
+
+    def with_pictures(self, pictures: Pictures) -> "CouplingReport":
+        """The same, its pictures drawn."""
+        if not pictures.wanted or self.coupled is None:
+            return self
+        mark = SIMULATED_TITLE if self.simulated else ""
+        title = f"{mark}{self.tool} at {self.pose}"
+        before = "as measured" if self.reference is None else f"measured: {self.reference}"
+        figures = coupling_figures(self.before, self.coupled, title, before)
+        written = pictures.write(figures, self.tool)
+        return replace(self, plots=tuple(written["plots"]))
+
+
+def _contact_sentence(contact: dict[str, Any]) -> str:
+    numbers = [
+        f"{name} = {contact[name]['value']:.4g} "
+        + (
+            "(not determined)"
+            if contact[name]["sd_percent"] is None
+            else f"± {contact[name]['sd_percent']:.2g} %"
+        )
+        for name in NUMBERS
+    ]
+    return (
+        f"Contact identified: {', '.join(numbers)}; misfit {contact['misfit_before_percent']:.3g} "
+        f"% as stated, {contact['misfit_percent']:.3g} % now."
+    )
+
+
+def coupling_report(
+    before: CoupledFrf, coupled: CoupledFrf, tool: str, reference: str | None, pose: str, npz: Path
+) -> CouplingReport:
+    """Write the npz and say what it holds; `before` is the tested tool's tip."""
+    save_coupled(npz, coupled, pose)
+    amplification = Amplification.of(coupled.frequency_hz, coupled.amplification)
+    said = [*coupled.remarks]
+    if amplification.sentence:
+        said.append(amplification.sentence)
+    held = [MOTIONS[k] for k in range(3) if k not in coupled.kept]
+    if held:
+        said.append(
+            f"Nothing was measured along the tool's own {', '.join(held)}: FRFs there are NaN."
+        )
+    return CouplingReport(
+        tool, reference, pose, str(npz.resolve()),
+        (float(coupled.frequency_hz[0]), float(coupled.frequency_hz[-1])),
+        len(coupled.frequency_hz), tuple(MOTIONS[k] for k in coupled.kept),
+        resonances(coupled), amplification, verifying_hit(coupled), simulated=coupled.simulated,
+        remarks=tuple(said),
+        before=before, coupled=coupled,
+    )  # fmt: skip
+
+
+def save_coupled(path: Path, coupled: CoupledFrf, pose: str) -> None:
+    """Write as `predict` does, and all six motions beside.
+
+    `frf6_mean`, `frf6_sd` (1, 6, 6, F) are accelerances of (x, y, z, θx, θy, θz), `motions` says
+    which of them are known, `amplification` (F,) how errors grew. InputError if that cannot be.
+    """
+    mean, sd = coupled.accelerance[None], coupled.accelerance_sd[None]
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with open(path, "wb") as file:
+            np.savez_compressed(
+                file, allow_pickle=False, frequency_hz=coupled.frequency_hz,
+                frf_mean=mean[:, :3, :3], frf_sd=sd[:, :3, :3], pose=np.array([pose]),
+                frf6_mean=mean, frf6_sd=sd, motions=np.array(coupled.kept),
+                amplification=coupled.amplification,
+            )  # fmt: skip
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

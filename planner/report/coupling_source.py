@@ -1,0 +1,104 @@
+"""What `couple` starts from: a file or a campaign, as receptances of the tested tool's tip."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.campaign import Campaign
+from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
+from planner.milling.contact_fit import ContactFit, fit_contact
+from planner.milling.coupling import TipReceptance
+from planner.milling.cutter_frf import read_frf
+from planner.milling.simulated_rotations import completed
+from planner.milling.tip_files import MEASURE, TipMotion, read_tip
+from planner.milling.tool import Tool
+from planner.robot.robot import Robot
+
+LINES = 1e-6  # Hz by which lines of two files may differ
+
+
+def tip_of(
+    source: Path, tested: Tool | None, pose: str | None, robot: Path | None, noise: float
+) -> tuple[TipReceptance, str]:
+    """Receptances at the tip of the tested tool, and the name of the pose.
+
+    `noise` is the relative sd of FRFs whose file states none. Raises InputError in one sentence.
+    """
+    if source.is_dir():
+        return _campaign(source, pose)
+    found = read_tip(source, tested, pose, noise)
+    if isinstance(found, TipReceptance):
+        return found, pose or source.stem
+    if robot is None:
+        raise InputError(
+            f"{source} holds motions alone, no rotations; {MEASURE}, or let the robot's "
+            f"simulation tell them: --robot ROBOT_TOML."
+        )
+    loaded = Robot.load(robot)
+    q = found.joints_rad
+    if q is None or len(q) != len(loaded.joint_names):
+        raise InputError(
+            f"{source} does not say the {len(loaded.joint_names)} joint angles of {robot}; write "
+            f"it with predict --out."
+        )
+    return completed(found, Simulation(loaded), q), found.pose
+
+
+def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
+    campaign = Campaign(directory)
+    state = campaign.state
+    stands = {name: m.joints_deg for name, m in state.measurements.items()}
+    stands |= {name: p.joints_deg for name, p in state.proposals.items() if name not in stands}
+    if pose is None or pose not in stands:
+        some = ", ".join(list(stands)[:5]) or "none yet"
+        raise InputError(
+            f"{directory}: name one of its poses by --pose ({some}); for another, "
+            f"write its FRFs with predict --out and couple that file with --robot."
+        )
+    q = np.deg2rad(np.array(stands[pose], float))
+    simulation = campaign.model.low.simulation
+    if simulation is None:
+        raise InputError(f"{directory} has no simulation to tell rotations by; {MEASURE}.")
+    lines = campaign.frequency_lines
+    mean, sd = campaign.frf(q[None], lines)
+    s2 = (2j * np.pi * lines) ** 2
+    motion = TipMotion(pose, lines, mean[0] / s2, sd[0] / np.abs(s2), q)
+    simulated = any(m.simulated for m in state.recorded)
+    return replace(completed(motion, simulation, q), simulated=simulated), pose
+
+
+def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path) -> TipReceptance:
+    """The lines of a band. Raises InputError where they do not cover it."""
+    if band_hz is None:
+        return tip
+    low, high = band_hz
+    f = tip.frequency_hz
+    step = float(np.max(np.diff(f)))
+    if not low < high or low < f[0] - step or high > f[-1] + step:
+        raise InputError(
+            f"{source} covers {f[0]:.4g} to {f[-1]:.4g} Hz, not {low:g} to {high:g} Hz; measure "
+            f"that band, or ask for less."
+        )
+    chosen = (f >= low) & (f <= high)
+    if np.count_nonzero(chosen) < 2:
+        raise InputError(f"{source} has no two lines within {low:g} to {high:g} Hz; ask for more.")
+    names = ("frequency_hz", "measured", "sd", "left", "right", "offset", "offset_sd")
+    errors = None if tip.errors is None else tip.errors[:, chosen]
+    return replace(tip, errors=errors, **{name: getattr(tip, name)[chosen] for name in names})
+
+
+def fitted_contact(
+    tip: TipReceptance, target: Tool, tested: Tool | None, seen: Path, pose: str | None
+) -> ContactFit:
+    """The target's contact from its FRFs in a file, of the same pose and lines as the source."""
+    frf = read_frf(seen, pose if seen.suffix.lower() == ".npz" else None)
+    place = np.searchsorted(frf.frequency_hz, tip.frequency_hz - LINES)
+    place = np.minimum(place, len(frf.frequency_hz) - 1)
+    if np.any(np.abs(frf.frequency_hz[place] - tip.frequency_hz) > 2 * LINES):
+        raise InputError(
+            f"{seen} does not hold the lines of the source, {tip.frequency_hz[0]:.4g} to "
+            f"{tip.frequency_hz[-1]:.4g} Hz; export the same grid, or name a band by --band-hz."
+        )
+    return fit_contact(tip, target, tested, frf.receptance[..., place])

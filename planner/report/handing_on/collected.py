@@ -1,0 +1,86 @@
+"""What is handed on: measured and predicted FRFs and modes, pose by pose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import MeasuredMode
+from planner.campaign.state import Measurement
+from planner.frf.frf import Frf
+from planner.surrogate.frf_bands import ModalPrediction
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredOf:
+    """A measured pose: joint angles in degrees, FRFs, likely modes."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    frf: Frf
+    modes: tuple[MeasuredMode, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class PredictedOf:
+    """The model at n poses: joint angles (n, dof) in degrees, modes, FRFs (n, 3, 3, F) with sd."""
+
+    poses: tuple[str, ...]
+    joints_deg: np.ndarray
+    frequency_hz: np.ndarray
+    frf_mean: np.ndarray
+    frf_sd: np.ndarray
+    modes: ModalPrediction
+
+
+@dataclass(frozen=True, eq=False)
+class Collected:
+    """All of a campaign that other programs can use."""
+
+    name: str
+    joint_names: tuple[str, ...]
+    simulated: bool
+    measured: tuple[MeasuredOf, ...]
+    predicted: PredictedOf
+
+    @property
+    def label(self) -> str:
+        """What stands first in every file."""
+        return f"{'SIMULATED ' if self.simulated else ''}planner campaign {self.name}"
+
+
+def collect(
+    campaign: Campaign, poses: Sequence[str], joints_deg: Sequence[Sequence[float]]
+) -> Collected:
+    """Measured poses, and the model's predictions at `poses` (none: at the measured ones)."""
+    state, cell = campaign.state, campaign.cell
+    table = cell.config.modes
+    measured = [_measured(campaign, m) for m in state.used]
+    names, angles = tuple(poses), np.array(joints_deg, dtype=float)
+    if not names:
+        names = tuple(m.pose for m in measured)
+        angles = np.array([m.joints_deg for m in measured])
+    angles = angles.reshape(len(names), len(cell.robot.joint_names))
+    lines = campaign.frequency_lines
+    q = np.deg2rad(angles)
+    count = table.count
+    if names:
+        mean, sd = campaign.frf(q, lines)
+        modes = campaign.predict(q)
+    else:
+        mean, sd = np.empty((0, 3, 3, len(lines)), complex), np.empty((0, 3, 3, len(lines)))
+        none = np.empty((0, count))
+        modes = ModalPrediction(none, none, none, none, np.empty((0, count, 3, 3)), none)
+    return Collected(
+        campaign.directory.name,
+        tuple(cell.robot.joint_names),
+        any(m.simulated for m in state.recorded),
+        tuple(measured),
+        PredictedOf(names, angles, lines, mean, sd, modes),
+    )
+
+
+def _measured(campaign: Campaign, m: Measurement) -> MeasuredOf:
+    frf = campaign.frf_of(m, campaign.cell.config.modes)
+    return MeasuredOf(m.pose, m.joints_deg, frf, tuple(mode for mode in m.modes if mode.likely))

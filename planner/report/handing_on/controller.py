@@ -1,0 +1,172 @@
+"""Poses as a program of the robot's controller: KRL, RAPID, URScript, or a table."""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from planner.errors import InputError
+from planner.robot.config import ControllerTable
+from planner.robot.robot import Robot
+
+ARM_AXES, EXTERNAL_AXES = 6, 6  # that KRL and RAPID have words for
+UNUSED = "9E9"  # an external axis that is not there, in RAPID
+WARNING = (
+    "Only the poses themselves were checked for collision, not the ways between them.",
+    "Run it slowly first, with a hand at the stop.",
+)
+
+
+@dataclass(frozen=True)
+class PoseToDrive:
+    """A pose in the URDF's joints (degrees), and what is to be hit there."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    hits: tuple[str, ...] = ("x", "y", "z")
+
+    @property
+    def note(self) -> str:
+        """What to do there, in plain ASCII."""
+        return f"{plain(self.pose)}: hit along {', '.join(plain(h) for h in self.hits)}"
+
+
+@dataclass(frozen=True)
+class DrivenPose:
+    """A pose in the controller's axes, in degrees: those of the arm, and external ones."""
+
+    name: str  # an identifier
+    note: str
+    arm: tuple[float, ...]
+    external: tuple[float, ...]
+
+
+def plain(text: str) -> str:
+    """Text that no controller takes for more than a comment."""
+    return re.sub(r"[^A-Za-z0-9 _.,+-]", "_", text)
+
+
+def identifier(text: str, start: str = "P_") -> str:
+    """A name of at most 24 letters, digits and underscores that begins with a letter."""
+    name = re.sub(r"\W", "_", text, flags=re.ASCII)[:24]
+    return name if re.match(r"[A-Za-z]", name) else f"{start}{name}"[:24]
+
+
+def program(kind: str, robot: Robot, name: str, poses: Sequence[PoseToDrive]) -> str:
+    """The program that drives to the poses one after the other and waits at each.
+
+    Raises InputError where the robot's axes do not suit the controller.
+    """
+    table, axes = robot.config.controller, axes_of(robot)
+    arm = [axis for axis in axes if axis[0] not in table.external]
+    external = [axis for axis in axes if axis[0] in table.external]
+    most = ARM_AXES if kind != "poses" else len(axes)
+    if len(arm) > most or len(external) > EXTERNAL_AXES:
+        raise InputError(
+            f"{robot.path}: {kind} has {ARM_AXES} axes of the arm, the robot {len(arm)}; name the "
+            f"others in [controller] external, or export poses."
+        )
+    if kind == "urscript" and (external or len(arm) != ARM_AXES):
+        raise InputError(f"{robot.path}: urscript drives {ARM_AXES} joints; export poses instead.")
+    used: set[str] = set()
+    driven = []
+    for pose in poses:
+        values = dict(zip(robot.joint_names, pose.joints_deg, strict=True))
+        one = unique(identifier(pose.pose), used)
+        turned = [tuple(s * values[n] + o for n, s, o in group) for group in (arm, external)]
+        driven.append(DrivenPose(one, pose.note, *turned))
+    return PROGRAMS[kind](identifier(name, "C_"), driven, table)
+
+
+def unique(name: str, used: set[str]) -> str:
+    """The name, with a number where it was used already; it counts as used then."""
+    found, number = name, 2
+    while found.lower() in used:
+        found, number = f"{name[:20]}_{number}", number + 1
+    used.add(found.lower())
+    return found
+
+
+def axes_of(robot: Robot) -> list[tuple[str, float, float]]:
+    """The controller's axes in order: joint of the URDF, sign, offset in degrees."""
+    table, joints = robot.config.controller, robot.joint_names
+    order = table.joints or joints
+    if sorted(order) != sorted(joints):
+        raise InputError(
+            f"{robot.path}: [controller] joints names {', '.join(order)}; it needs each of "
+            f"{', '.join(joints)} once."
+        )
+    for entry, values in (("signs", table.signs), ("offsets_deg", table.offsets_deg)):
+        if values and len(values) != len(order):
+            raise InputError(
+                f"{robot.path}: [controller] {entry} has {len(values)} numbers, the robot "
+                f"{len(order)} joints; give one a joint."
+            )
+    missing = [name for name in table.external if name not in joints]
+    if missing:
+        raise InputError(
+            f'{robot.path}: [controller] external names "{missing[0]}", which is no joint of the '
+            f"robot; it has {', '.join(joints)}."
+        )
+    signs = table.signs or (1.0,) * len(order)
+    offsets = table.offsets_deg or (0.0,) * len(order)
+    return list(zip(order, signs, offsets, strict=True))
+
+
+def _krl(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+    """KUKA Robot Language: point-to-point to each pose, halt there."""
+    speed = f"{table.speed_percent:g}"
+    lines = [f"DEF {name}( )", *(f"; {line}" for line in WARNING), "BAS(#INITMOV, 0)",
+             f"BAS(#VEL_PTP, {speed})", f"BAS(#ACC_PTP, {speed})"]  # fmt: skip
+    for pose in poses:
+        values = [f"A{k} {v:.4f}" for k, v in enumerate(pose.arm, 1)]
+        values += [f"E{k} {v:.4f}" for k, v in enumerate(pose.external, 1)]
+        lines += [f"; {pose.note}", f"PTP {{{', '.join(values)}}}", "HALT"]
+    return "\r\n".join([*lines, "END", ""])
+
+
+def _rapid(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+    """ABB RAPID: absolute joint moves, stop at each."""
+    lines = [f"MODULE {name}", *(f"  ! {line}" for line in WARNING)]
+    for pose in poses:
+        arm = [f"{v:.4f}" for v in pose.arm] + ["0"] * (ARM_AXES - len(pose.arm))
+        outer = [f"{v:.4f}" for v in pose.external]
+        outer += [UNUSED] * (EXTERNAL_AXES - len(pose.external))
+        target = f"[[{','.join(arm)}],[{','.join(outer)}]]"
+        lines.append(f"  CONST jointtarget {pose.name}:={target};")
+    lines += ["  PROC main()", f"    VelSet {table.speed_percent:g},1000;"]
+    for pose in poses:
+        lines += [f"    ! {pose.note}", f"    MoveAbsJ {pose.name}\\NoEOffs,v100,fine,tool0;",
+                  "    Stop;"]  # fmt: skip
+    return "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""])
+
+
+def _urscript(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+    """URScript: joint moves, a dialogue at each."""
+    lines = [f"def {name}():", *(f"  # {line}" for line in WARNING)]
+    speed = f"{table.speed_percent / 100 * FASTEST_UR_RAD_S:.3f}"
+    for pose in poses:
+        values = ", ".join(f"d2r({v:.4f})" for v in pose.arm)
+        lines += [f"  # {pose.note}", f"  movej([{values}], a=0.5, v={speed})",
+                  f'  popup("{pose.note}", title="planner", blocking=True)']  # fmt: skip
+    return "\n".join([*lines, "end", ""])
+
+
+FASTEST_UR_RAD_S = 3.14  # joint speed of which `speed_percent` is a share, as UR's manuals state it
+
+
+def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+    """A table: axes as the controller counts them, in degrees."""
+    first = poses[0] if poses else None
+    arm = [f"A{k}_deg" for k in range(1, len(first.arm) + 1)] if first else []
+    arm += [f"E{k}_deg" for k in range(1, len(first.external) + 1)] if first else []
+    rows = [",".join(["pose", *arm, "note"])]
+    for pose in poses:
+        numbers = [f"{v:.4f}" for v in (*pose.arm, *pose.external)]
+        rows.append(",".join([pose.name, *numbers, f'"{pose.note}"']))
+    return "\n".join([*rows, ""])
+
+
+PROGRAMS: dict[str, Callable[[str, Sequence[DrivenPose], ControllerTable], str]] = {
+    "krl": _krl, "rapid": _rapid, "urscript": _urscript, "poses": _poses,
+}  # fmt: skip
+SUFFIXES = {"krl": ".src", "rapid": ".mod", "urscript": ".script", "poses": ".csv"}

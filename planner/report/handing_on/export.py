@@ -1,0 +1,158 @@
+"""Answer of `export`: a campaign's results or proposals in another program's format."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.campaign.campaign import Campaign
+from planner.errors import InputError
+from planner.recording.folder import read_poses
+from planner.recording.records import PoseRow
+from planner.report.answer import Answer
+from planner.report.handing_on import uff
+from planner.report.handing_on.collected import Collected, collect
+from planner.report.handing_on.controller import (
+    PROGRAMS,
+    SUFFIXES,
+    PoseToDrive,
+    identifier,
+    program,
+    unique,
+)
+from planner.report.handing_on.model_file import LOADER, model_arrays
+from planner.report.handing_on.tables import frfs_csv, mat_arrays, modes_csv
+
+DATA = ("uff", "mat", "csv", "model")
+KINDS = (*PROGRAMS, *DATA)
+
+
+@dataclass(frozen=True)
+class ExportedFiles(Answer):
+    """Answer of `export`: the files, and the poses in them; `loader` reads a model's file."""
+
+    kind: str
+    files: tuple[str, ...]
+    poses: tuple[str, ...]
+    simulated: bool
+    loader: str | None = None
+    error_percent: tuple[float, ...] | None = None
+
+    def text(self) -> Group:
+        """The files, and how well a model's holds."""
+        lines = [Text("\n  ".join([f"Exported as {self.kind}:", *self.files]))]
+        if self.error_percent:
+            each = ", ".join(f"mode {k} {e:.2g} %" for k, e in enumerate(self.error_percent, 1))
+            lines.append(Text(f"Interpolating errs by (rms; part of the sds): {each}."))
+        return Group(*lines)
+
+
+def export(
+    campaign: Campaign, kind: str, out: Path | None, poses_csv: Path | None
+) -> ExportedFiles:
+    """Write a campaign in another format.
+
+    Args:
+        campaign: The campaign.
+        kind: One of KINDS; those of PROGRAMS drive the robot to the open proposals.
+        out: A folder, by default DIR/export.
+        poses_csv: Other poses, for programs and predictions.
+
+    Raises:
+        InputError: The kind is unknown, there is nothing to export, or a file can't be written.
+    """
+    if kind not in KINDS:
+        raise InputError(f"{kind} is no format; give one of {', '.join(KINDS)}.")
+    rows = read_poses(poses_csv, campaign.cell.robot.joint_names) if poses_csv else ()
+    for row in rows:
+        campaign.cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}")
+    folder = (out or campaign.directory / "export").absolute()
+    if kind in PROGRAMS:
+        return _program(campaign, kind, folder, rows)
+    found = collect(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
+    if not found.measured and not found.predicted.poses and kind != "model":
+        raise InputError(f"{campaign.directory} has no measured pose yet; name poses with --poses.")
+    loader = errors = None
+    if kind == "model":
+        arrays = model_arrays(campaign, found)
+        file = f"{identifier(found.name)}_model.npz"
+        coordinates = ", ".join(str(name) for name in arrays["names"])
+        files: dict[str, Any] = {file: arrays}
+        loader = LOADER.format(file=file, coordinates=coordinates)
+        files[f"{identifier(found.name)}_model.py"] = loader.lstrip()
+        errors = tuple(arrays["error_percent"].tolist())
+    else:
+        files = _WRITERS[kind](found)
+    written = _write(folder, files)
+    poses = dict.fromkeys([*(m.pose for m in found.measured), *found.predicted.poses])
+    return ExportedFiles(kind, written, tuple(poses), found.simulated, loader, errors)
+
+
+def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow]) -> ExportedFiles:
+    state, name = campaign.state, campaign.directory.name
+    drive = [PoseToDrive(r.pose, tuple(r.joints_deg)) for r in rows]
+    if not drive:
+        found = (state.proposals[pose] for pose in state.open)
+        drive = [PoseToDrive(p.pose, p.joints_deg, p.hits) for p in found]
+    if not drive:
+        raise InputError(
+            f"{campaign.directory} has no open proposal; ask planner next first, or name --poses."
+        )
+    text = program(kind, campaign.cell.robot, f"planner_{name}", drive)
+    files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
+    simulated = any(m.simulated for m in state.recorded)
+    return ExportedFiles(kind, _write(folder, files), tuple(d.pose for d in drive), simulated)
+
+
+def _uff(found: Collected) -> dict[str, Any]:
+    """A file for each pose: FRFs and modes as measured, FRFs as predicted."""
+    files, used = {}, set[str]()
+    for one in found.measured:
+        name, title = unique(identifier(one.pose), used), f"{found.label}, pose {one.pose}"
+        files[f"{name}_measured.unv"] = uff.measured_sets(one.frf, f"{title}, measured")
+        files[f"{name}_modes.unv"] = uff.mode_sets(one.modes, f"{title}, measured")
+    p, used = found.predicted, set[str]()
+    for i, pose in enumerate(p.poses):
+        title = f"{found.label}, pose {pose}, predicted"
+        text = uff.frf_sets(p.frequency_hz, p.frf_mean[i], title, None)
+        files[f"{unique(identifier(pose), used)}_predicted.unv"] = text
+    return files
+
+
+def _csv(found: Collected) -> dict[str, Any]:
+    return {"modes.csv": modes_csv(found), "frfs.csv": frfs_csv(found)}
+
+
+def _mat(found: Collected) -> dict[str, Any]:
+    return {f"{identifier(found.name)}.mat": mat_arrays(found)}
+
+
+_WRITERS: dict[str, Callable[[Collected], dict[str, Any]]] = {
+    "uff": _uff, "mat": _mat, "csv": _csv,
+}  # fmt: skip
+
+
+def _write(folder: Path, files: dict[str, Any]) -> tuple[str, ...]:
+    """Write texts, and arrays as .npz or .mat by the name; returns the paths."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in files.items():
+            path = folder / name
+            if isinstance(content, str):
+                path.write_text(content, encoding="utf-8", newline="")
+            elif path.suffix == ".mat":
+                from scipy.io import savemat
+
+                savemat(path, content, do_compression=True, long_field_names=True)
+            else:
+                with open(path, "wb") as file:
+                    np.savez_compressed(file, allow_pickle=False, **content)
+    except OSError as error:
+        raise InputError(
+            f"{folder} cannot be written ({error.strerror}); name another folder."
+        ) from None
+    return tuple(str(folder / name) for name in files)

@@ -1,0 +1,196 @@
+"""Pictures of the modes of a matrix of FRFs: diagram, driving points, geometry, shapes, MAC."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from planner.frf.matrix import FrfMatrix
+from planner.modal.matrix_modes import MatrixModes
+from planner.recording.geometry import Geometry
+from planner.report.frf_plots import MEASURED, MODEL
+from planner.report.modal_plots import mac_figure, stabilisation_figure
+from planner.report.plot_marks import number_modes, panels
+from planner.report.shape_motion import motions, moved
+
+MOST_SINGULAR = 4  # curves of the mode indicator
+MOST_SHOWN = 24  # modes that have a panel of their own
+AHEAD, BESIDE = "tab:red", "tab:blue"
+
+
+def matrix_figures(
+    matrix: FrfMatrix, found: MatrixModes, geometry: Geometry | None, name: str
+) -> dict[str, Figure]:
+    """Every picture by its name."""
+    mark = "SIMULATED recordings · " if matrix.simulated else ""
+    end = f" · {name}"
+    figures = {
+        "stabilisation": stabilisation_figure(
+            found.found, found, f"{mark}Stabilisation diagram of {matrix.count} FRFs{end}",
+            scaled=matrix.scaled, singular=_singular(matrix, found),
+        ),
+        "mac": mac_figure(found, f"{mark}AutoMAC{end}"),
+        "complexity": complexity_figure(found, f"{mark}Mode shapes in the complex plane{end}"),
+    }  # fmt: skip
+    if matrix.driving:
+        figures["driving_points"] = driving_figure(matrix, found, f"{mark}Driving points{end}")
+    if geometry is not None:
+        figures["geometry"] = geometry_figure(matrix, geometry, f"{mark}Points{end}")
+        figures["shapes"] = shapes_figure(found, geometry, f"{mark}Mode shapes{end}")
+    else:
+        figures["shapes"] = bars_figure(found, f"{mark}Mode shapes{end}")
+    return figures
+
+
+def _singular(matrix: FrfMatrix, found: MatrixModes) -> np.ndarray:
+    """(k, F) singular values of the complete rows, the few largest."""
+    lines = np.isin(matrix.frequency_hz, found.found.data.frequency_hz)
+    table = matrix.accelerance[..., lines]
+    table = np.where(np.isfinite(table), table, 0.0)
+    values = np.linalg.svd(np.moveaxis(table, -1, 0), compute_uv=False).T
+    return values[:MOST_SINGULAR]
+
+
+def _grid(count: int, title: str, size: float, **options: Any) -> tuple[Figure, list[Any]]:
+    """A figure of so many equal panels, side by side."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    columns = min(count, int(np.ceil(np.sqrt(1.6 * count))))
+    rows = -(-count // columns)
+    figure = Figure(figsize=(size * columns + 0.6, size * rows + 0.9), layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(title, fontsize=11)
+    return figure, [figure.add_subplot(rows, columns, k + 1, **options) for k in range(count)]
+
+
+def complexity_figure(found: MatrixModes, title: str = "") -> Figure:
+    """Every shape's points in the complex plane: on one line where all move in phase."""
+    shown = found.modes[:MOST_SHOWN]
+    figure, axes = _grid(len(shown), title, 2.1)
+    for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
+        shape = mode.shape / np.max(np.abs(mode.shape))
+        zero = np.zeros(shape.size)
+        panel.plot([zero, shape.real], [zero, shape.imag], color=MEASURED, lw=0.8, alpha=0.6)
+        panel.plot(shape.real, shape.imag, ".", color=MODEL, ms=4)
+        panel.set_xlim(-1.1, 1.1)
+        panel.set_ylim(-1.1, 1.1)
+        panel.set_aspect("equal")
+        panel.axhline(0, color="0.8", lw=0.6, zorder=0)
+        panel.axvline(0, color="0.8", lw=0.6, zorder=0)
+        panel.set_xticks([])
+        panel.set_yticks([])
+        panel.set_title(
+            f"{k + 1}: {mode.frequency_hz:.4g} Hz\nMPC {mode.collinearity:.3f}, "
+            f"MPD {mode.deviation_deg:.1f}°",
+            fontsize=8,
+        )
+    return figure
+
+
+def driving_figure(matrix: FrfMatrix, found: MatrixModes, title: str = "") -> Figure:
+    """FRFs of points hit where they were felt, with the fit, and how right their sign is."""
+    pairs = matrix.driving[:4]
+    figure, grid = panels((12.0, 2.6 * len(pairs) + 1.2), title, len(pairs))
+    data = found.found.data
+    places = {
+        (int(o), int(i)): e
+        for e, (o, i) in enumerate(zip(found.found.rows, found.found.columns, strict=True))
+    }
+    for panel, (o, i) in zip(grid[:, 0], pairs, strict=True):
+        size = np.abs(matrix.accelerance[o, i])
+        panel.semilogy(matrix.frequency_hz, size, color=MEASURED, lw=1.0, label="measured")
+        fitted = np.abs(found.found.fit.fitted[places[o, i]])
+        panel.semilogy(data.frequency_hz, fitted, color=MODEL, lw=1.0, label="fit")
+        panel.set_xlim(data.frequency_hz[0], data.frequency_hz[-1])
+        panel.grid(True, alpha=0.25)
+        panel.set_ylabel("|H| (m/s²/N)" if matrix.scaled else "|H|", fontsize=8)
+        point = next(p for p in found.checks.driving if p.dof == matrix.references[i])
+        panel.set_title(
+            f"{point.dof}: Im H > 0 for {100 * point.positive:.0f} % of it, residues of the right "
+            f"sign {100 * point.modes:.0f} %",
+            fontsize=9, loc="left", pad=3,
+        )  # fmt: skip
+        number_modes(panel, found)
+    grid[-1, 0].set_xlabel("frequency (Hz)")
+    grid[0, 0].legend(fontsize=8, loc="lower right")
+    return figure
+
+
+def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> Figure:
+    """Points with their numbers and lines; those hit and felt are marked."""
+    figure, (panel,) = _grid(1, title, 8.0, projection="3d")
+    _draw_lines(panel, geometry, geometry.position_m, "0.7")
+    felt = {dof.node for dof in matrix.responses}
+    hit = {dof.node for dof in matrix.references}
+    for group, style in ((felt, {"marker": ".", "color": MEASURED}),
+                         (hit, {"marker": "^", "color": AHEAD, "s": 60})):  # fmt: skip
+        at = np.array([p for n, p in zip(geometry.nodes, geometry.position_m, strict=True)
+                       if n in group])  # fmt: skip
+        if at.size:
+            panel.scatter(*at.T, **style)
+    if len(geometry.nodes) <= 150:
+        for node, place in zip(geometry.nodes, geometry.position_m, strict=True):
+            panel.text(*place, f" {node}", fontsize=6.5)
+    handles = [
+        Line2D([], [], marker=".", ls="", color=MEASURED, label="long side of the matrix"),
+        Line2D([], [], marker="^", ls="", color=AHEAD, label="reference"),
+    ]
+    panel.legend(handles=handles, fontsize=8)
+    _finish(panel, geometry.position_m)
+    panel.set_xlabel("x (m)")
+    panel.set_ylabel("y (m)")
+    return figure
+
+
+def _draw_lines(panel: Any, geometry: Geometry, position: np.ndarray, colour: str) -> None:
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+    index = {node: k for k, node in enumerate(geometry.nodes)}
+    ends = [(position[index[a]], position[index[b]]) for a, b in geometry.lines]
+    panel.add_collection3d(Line3DCollection(ends, colors=colour, lw=0.9))
+
+
+def _finish(panel: Any, position: np.ndarray) -> None:
+    """Equal scales on all axes and little besides the structure."""
+    middle = (position.max(axis=0) + position.min(axis=0)) / 2
+    half = 0.52 * max(float(np.max(np.ptp(position, axis=0))), 1e-9)
+    panel.set_xlim(middle[0] - half, middle[0] + half)
+    panel.set_ylim(middle[1] - half, middle[1] + half)
+    panel.set_zlim(middle[2] - half, middle[2] + half)
+    panel.set_box_aspect((1, 1, 1), zoom=1.8)
+    panel.view_init(elev=28, azim=-60)
+
+
+def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Figure:
+    """Every shape at its largest motion, coloured by it, beside the structure at rest."""
+    shown = found.modes[:MOST_SHOWN]
+    figure, axes = _grid(len(shown), title, 3.0, projection="3d")
+    for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
+        motion = motions(found.dofs, mode.shape, geometry)
+        _draw_lines(panel, geometry, geometry.position_m, "0.85")
+        place = moved(geometry, motion, 0.0)
+        _draw_lines(panel, geometry, place, "0.4")
+        size = np.linalg.norm(np.real(motion), axis=1)
+        panel.scatter(*place.T, c=size, cmap="plasma", s=9, depthshade=False)
+        panel.set_title(f"{k + 1}: {mode.frequency_hz:.4g} Hz", fontsize=9, pad=0)
+        _finish(panel, geometry.position_m)
+        panel.set_axis_off()
+    return figure
+
+
+def bars_figure(found: MatrixModes, title: str = "") -> Figure:
+    """Real parts of all shapes with 2 sd over the degrees of freedom, where no place is known."""
+    shown = found.modes[:MOST_SHOWN]
+    figure, axes = _grid(len(shown), title, 2.6)
+    names = [str(dof) for dof in found.dofs]
+    for k, (panel, mode) in enumerate(zip(axes, shown, strict=True)):
+        x = np.arange(len(names))
+        style = {"fmt": ".", "ms": 3, "lw": 0.8, "color": MEASURED}
+        panel.errorbar(x, np.real(mode.shape), 2 * mode.shape_sd, **style)
+        panel.axhline(0, color="0.7", lw=0.6)
+        step = max(1, len(names) // 6)
+        panel.set_xticks(x[::step], names[::step], rotation=90, fontsize=6)
+        panel.tick_params(axis="y", labelsize=6)
+        panel.set_title(f"{k + 1}: {mode.frequency_hz:.4g} Hz", fontsize=8)
+    return figure

@@ -1,0 +1,168 @@
+"""Answer of `check`: what a robot's description says, and what looks wrong in it."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.check.examine import Examination
+from planner.check.remark import SEVERITIES, CheckRemark
+from planner.report.answer import NOT_IN_JSON, Answer
+from planner.report.plot_files import Pictures
+from planner.report.text import drawn, number, table
+
+COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
+SHOWN_MODES = 6  # in the text; JSON has all
+
+
+@dataclass(frozen=True)
+class CheckedLink:
+    """A link: what turns it (null: nothing), mass, centre of mass and principal moments."""
+
+    link: str
+    joint: str | None
+    mass_kg: float
+    com_m: tuple[float, ...]
+    moments_kg_m2: tuple[float, ...]
+    inertial: bool
+    collision_shapes: int
+
+
+@dataclass(frozen=True)
+class CheckedJoint:
+    """A joint's limits in degrees and its speed."""
+
+    joint: str
+    lower_deg: float
+    upper_deg: float
+    speed_deg_s: float
+
+
+@dataclass(frozen=True)
+class CheckedPose:
+    """What the simulation says at a pose: frequencies and damping ratios, from the lowest."""
+
+    pose: str
+    joints_deg: tuple[float, ...]
+    position_m: tuple[float, ...]
+    frequency_hz: tuple[float, ...]
+    damping_ratio: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class RobotCheckReport(Answer):
+    """Answer of `check`; `ok` is whether a campaign can begin, errors come first in `findings`."""
+
+    robot: str
+    robot_toml: str
+    ok: bool
+    findings: tuple[CheckRemark, ...]
+    mass_kg: float
+    moving_mass_kg: float
+    reach_m: float
+    band_hz: tuple[float, float]
+    links: tuple[CheckedLink, ...]
+    joints: tuple[CheckedJoint, ...]
+    poses: tuple[CheckedPose, ...]
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+    found: Examination | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
+
+    @classmethod
+    def of(cls, found: Examination) -> "RobotCheckReport":
+        """Of what was found."""
+        robot = found.robot
+        links = tuple(
+            CheckedLink(
+                b.name, b.joint or None, b.mass, tuple(b.com_m.tolist()),
+                tuple(b.moments.tolist()), b.stated, b.shapes,
+            )
+            for b in found.links
+        )  # fmt: skip
+        limits = np.rad2deg([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
+        return cls(
+            robot=robot.name,
+            robot_toml=str(robot.path.absolute()),
+            ok=not found.errors,
+            findings=found.remarks,
+            mass_kg=sum(b.mass for b in found.links),
+            moving_mass_kg=sum(b.mass for b in found.links if b.joint),
+            reach_m=robot.reach_m,
+            band_hz=robot.config.band_hz,
+            links=links,
+            joints=tuple(
+                CheckedJoint(name, *row)
+                for name, row in zip(robot.joint_names, limits.tolist(), strict=True)
+            ),
+            poses=_poses(found),
+            found=found,
+        )
+
+    def with_pictures(self, pictures: Pictures) -> "RobotCheckReport":
+        """The same once the robot is drawn at home, where that is wanted."""
+        if not pictures.wanted or self.found is None:
+            return self
+        from planner.report.robot_picture import robot_figure
+
+        figure = robot_figure(self.found.robot, self.found.q[0], self.found.links)
+        return replace(self, **pictures.write({"robot": figure}, self.robot))
+
+    def text(self) -> Group:
+        """Masses, modes, then what was found, worst first."""
+        masses = table(
+            f"{self.robot}: {self.moving_mass_kg:.4g} kg move, reach at most {self.reach_m:.3g} m",
+            *("link", "turned by", "mass (kg)", "centre of mass (m)", "collision shapes"),
+        )
+        for link in self.links:
+            if link.inertial or link.collision_shapes:
+                place = ", ".join(f"{v:.3g}" for v in link.com_m) if link.mass_kg else "–"
+                mass = f"{link.mass_kg:.4g}" if link.inertial else "–"
+                cells = link.joint or "–", mass, place, str(link.collision_shapes)
+                masses.add_row(Text(link.link), *cells)
+        modes = table("simulated modes", "pose", "frequency in Hz (damping in %), from the lowest")
+        for pose in self.poses:
+            modes.add_row(pose.pose, _cell(pose))
+        low, high = self.band_hz
+        said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_line, self.findings)]
+        parts = [masses, *([modes] if self.poses else []), *said, _summary(self.findings)]
+        return Group(*parts, *drawn(self.plots))
+
+
+def _poses(found: Examination) -> tuple[CheckedPose, ...]:
+    if not found.frequency_hz.size:
+        return ()
+    places = found.robot.forward_batch(found.q)[1]
+    made = []
+    for i, name in enumerate(found.poses):
+        known = np.isfinite(found.frequency_hz[i])
+        made.append(
+            CheckedPose(
+                name,
+                tuple(np.rad2deg(found.q[i]).round(4).tolist()),
+                tuple(places[i].tolist()),
+                tuple(found.frequency_hz[i][known].tolist()),
+                tuple(found.damping_ratio[i][known].tolist()),
+            )
+        )
+    return tuple(made)
+
+
+def _cell(pose: CheckedPose) -> str:
+    pairs = list(zip(pose.frequency_hz, pose.damping_ratio, strict=True))[:SHOWN_MODES]
+    more = " …" if len(pose.frequency_hz) > SHOWN_MODES else ""
+    return "   ".join(f"{number(f, '.1f')} ({number(100 * d, '.1f')})" for f, d in pairs) + more
+
+
+def _line(remark: CheckRemark) -> Text:
+    return Text(f"{remark.severity}: {remark.sentence}", style=COLOURS[remark.severity])
+
+
+def _summary(findings: tuple[CheckRemark, ...]) -> Text:
+    counts = [sum(f.severity == name for f in findings) for name in SEVERITIES]
+    if not any(counts[:2]):
+        return Text("Nothing looks wrong.", style="green")
+    said = ", ".join(
+        f"{n} {name}{'s' if n != 1 else ''}" for n, name in zip(counts, SEVERITIES, strict=True)
+    )
+    return Text(said + ".")

@@ -1,0 +1,122 @@
+"""Picture of a robot at a pose: links, joint axes, tool and sensor frames, masses, obstacles."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from planner.report.plot_text import plain_text
+from planner.robot.drawing import RobotLines, robot_lines
+from planner.robot.link_bodies import LinkBody
+from planner.robot.robot import Robot
+
+LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
+AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them
+VIEWS = (("seen from the side", (0, 2)), ("seen from above", (0, 1)))
+FRAME = 0.14  # length of a drawn frame, in units of the reach
+AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the whole
+
+
+def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Figure:
+    """The robot at q (dof,) in rad: from the side, from above, and in space."""
+    lines = robot_lines(robot, q, links)
+    figure = Figure(figsize=(15.0, 6.0), layout="constrained")
+    FigureCanvasAgg(figure)
+    angles = ", ".join(f"{v:.0f}" for v in np.rad2deg(q))
+    title = f"{plain_text(robot.name)} at joint angles ({angles})°"
+    figure.suptitle(title, fontsize=12)
+    grid = figure.add_gridspec(1, 3)
+    for column, (name, pair) in enumerate(VIEWS):
+        panel = figure.add_subplot(grid[0, column])
+        _flat(panel, lines, pair, FRAME * robot.reach_m)
+        panel.set(title=name, xlabel=f"{'xyz'[pair[0]]} (m)", ylabel=f"{'xyz'[pair[1]]} (m)")
+    _space(figure.add_subplot(grid[0, 2], projection="3d"), lines, FRAME * robot.reach_m)
+    return figure
+
+
+def _flat(panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float) -> None:
+    a, b = pair
+    for box, colour in ((lines.obstacles, OBSTACLE), (lines.shapes, SHAPE)):
+        for corners in box:
+            hull = _outline(corners[:, pair])
+            panel.fill(hull[:, 0], hull[:, 1], color=colour, alpha=0.12, lw=0)
+            panel.plot(*np.vstack([hull, hull[:1]]).T, color=colour, lw=0.6, alpha=0.6)
+    for start, end in lines.links:
+        panel.plot([start[a], end[a]], [start[b], end[b]], color=LINK, lw=3, solid_capstyle="round")
+    for k, (name, place, axis) in enumerate(lines.joints):
+        tip = place + 0.6 * length * axis
+        arrow = {"arrowstyle": "->", "color": "black", "lw": 1.4}
+        panel.annotate("", (tip[a], tip[b]), (place[a], place[b]), arrowprops=arrow)
+        panel.plot(place[a], place[b], "o", color="white", mec="black", ms=6)
+        side = 1 if k % 2 else -1
+        panel.annotate(
+            plain_text(name), (place[a], place[b]), xytext=(side * 26, -10 * side),
+            textcoords="offset points", fontsize=8, ha="left" if side > 0 else "right",
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": "0.5"},
+        )  # fmt: skip
+    whole = sum(mass for mass, _ in lines.masses) or 1.0
+    for k, (mass, place) in enumerate(lines.masses):
+        label = "centre of mass, area ~ mass" if k == 0 else None
+        panel.scatter(place[a], place[b], s=AREA_PER_SHARE * mass / whole, color=MASS, alpha=0.6,
+                      zorder=3, lw=0, label=label)  # fmt: skip
+    for k, (name, place, rotation) in enumerate(lines.frames):
+        _frame(panel, pair, place, rotation, 0.7 * length)
+        panel.annotate(plain_text(name), (place[a], place[b]), xytext=(8, 22 if k else -26),
+                       textcoords="offset points", fontsize=9, weight="bold")  # fmt: skip
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.grid(True, alpha=0.25)
+    if lines.masses:
+        panel.legend(fontsize=8, loc="lower right")
+
+
+def _frame(panel: Axes, pair: tuple[int, int], place: np.ndarray, rotation: np.ndarray, length):
+    """The three axes of a frame; one that points at the viewer is a dot."""
+    a, b = pair
+    for k, colour in enumerate(AXIS_COLOURS):
+        tip = place + length * rotation[:, k]
+        panel.plot([place[a], tip[a]], [place[b], tip[b]], color=colour, lw=1.8, zorder=4)
+        if np.hypot(tip[a] - place[a], tip[b] - place[b]) > 0.2 * length:
+            panel.text(tip[a], tip[b], "xyz"[k], color=colour, fontsize=8, zorder=5)
+
+
+def _space(panel, lines: RobotLines, length: float) -> None:
+    for start, end in lines.links:
+        panel.plot(*np.array([start, end]).T, color=LINK, lw=3)
+    for boxes, colour in ((lines.obstacles, OBSTACLE), (lines.shapes, SHAPE)):
+        for corners in boxes:
+            for i, j in _edges(corners):
+                panel.plot(*corners[[i, j]].T, color=colour, lw=0.5, alpha=0.6)
+    for _, place, axis in lines.joints:
+        panel.plot(*np.array([place, place + 0.6 * length * axis]).T, color="black", lw=1.2)
+    for name, place, rotation in lines.frames:
+        for k, colour in enumerate(AXIS_COLOURS):
+            panel.plot(*np.array([place, place + length * rotation[:, k]]).T, color=colour, lw=1.8)
+        panel.text(*place, f"  {plain_text(name)}", fontsize=8)
+    panel.set_aspect("equal")
+    panel.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    panel.tick_params(labelsize=7)
+
+
+def _edges(corners: np.ndarray) -> list[tuple[int, int]]:
+    """Pairs of the eight corners of a box, counted in binary, that an edge joins."""
+    return [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
+
+
+def _outline(points: np.ndarray) -> np.ndarray:
+    """Convex hull of points (n, 2), in order (Andrew's monotone chain)."""
+
+    def half(ordered: list[np.ndarray]) -> list[np.ndarray]:
+        found: list[np.ndarray] = []
+        for point in ordered:
+            while len(found) > 1 and _turn(found[-2], found[-1], point) <= 1e-12:
+                found.pop()
+            found.append(point)
+        return found[:-1]
+
+    ordered = [points[i] for i in np.lexsort((points[:, 1], points[:, 0]))]
+    hull = half(ordered) + half(ordered[::-1])
+    return np.array(hull) if len(hull) > 2 else points
+
+
+def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))

@@ -1,0 +1,148 @@
+"""Every entry of robot.toml and campaign.toml, told by the types that read them."""
+
+import inspect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+from msgspec import inspect as types
+from rich.console import Group
+from rich.text import Text
+
+from planner.campaign.config import CampaignConfig
+from planner.errors import InputError
+from planner.report.answer import Answer
+from planner.report.text import table
+from planner.robot.config import RobotConfig
+
+FILES: dict[str, type[msgspec.Struct]] = {"robot": RobotConfig, "campaign": CampaignConfig}
+REQUIRED = "required"
+
+
+@dataclass(frozen=True)
+class SchemaEntry:
+    """One entry: what it takes, and what holds where it is left out."""
+
+    name: str
+    takes: str
+    default: str
+
+
+@dataclass(frozen=True)
+class SchemaTable:
+    """A table of a file; "" for what stands at its top. `about` may have several sentences."""
+
+    name: str
+    about: str
+    entries: tuple[SchemaEntry, ...]
+
+
+@dataclass(frozen=True)
+class SchemaReport(Answer):
+    """Answer of `schema`: tables in the file's order; `json_schema` is for editors."""
+
+    file: str
+    tables: tuple[SchemaTable, ...]
+    json_schema: dict[str, Any]
+
+    def text(self) -> Group:
+        """One table after the other."""
+        parts: list[Any] = []
+        for one in self.tables:
+            made = table("", "entry", "takes", "if left out")
+            made.title = Text(one.name or self.file, style="bold")
+            for column in made.columns:
+                column.justify = "left"
+            for entry in one.entries:
+                made.add_row(*(Text(v) for v in (entry.name, entry.takes, entry.default)))
+            parts += [made, Text(one.about + "\n")]
+        return Group(*parts)
+
+
+def schema(file: str) -> SchemaReport:
+    """Of "robot" or "campaign"; InputError for others."""
+    if file not in FILES:
+        raise InputError(f"There is no file {file}; name one of {', '.join(FILES)}.")
+    kind = FILES[file]
+    return SchemaReport(f"{file}.toml", tuple(_tables(kind, "")), msgspec.json.schema(kind))
+
+
+def _tables(kind: type[msgspec.Struct], name: str) -> Iterator[SchemaTable]:
+    """The table of a type, then those of its entries that are tables themselves."""
+    info = types.type_info(kind)
+    assert isinstance(info, types.StructType)
+    entries, inner = [], []
+    for field in info.fields:
+        struct, many = _struct(field.type)
+        if struct is None:
+            entries.append(SchemaEntry(field.encode_name, _takes(field.type), _default(field)))
+        else:
+            path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
+            inner.append((struct, f"[[{path}]]" if many else f"[{path}]"))
+    yield SchemaTable(name, _about(kind), tuple(entries))
+    for struct, path in inner:
+        yield from _tables(struct, path)
+
+
+def _about(kind: type) -> str:
+    paragraphs = (inspect.getdoc(kind) or "").split("\n\n")
+    return " ".join(" ".join(p.split()) for p in paragraphs)
+
+
+def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, bool]:
+    """The type of a table, or of the tables in a list; None for other entries."""
+    for one in _alternatives(given):
+        if isinstance(one, types.StructType):
+            return one.cls, False
+        if isinstance(one, types.VarTupleType | types.ListType) and isinstance(
+            one.item_type, types.StructType
+        ):
+            return one.item_type.cls, True
+    return None, False
+
+
+def _alternatives(given: types.Type) -> tuple[types.Type, ...]:
+    return given.types if isinstance(given, types.UnionType) else (given,)
+
+
+_WORDS: dict[type, str] = {
+    types.StrType: "text", types.IntType: "whole number", types.FloatType: "number",
+    types.BoolType: "true or false",
+}  # fmt: skip
+
+
+def _takes(given: types.Type) -> str:
+    """What an entry takes, in words."""
+    known = [
+        t for t in _alternatives(given) if not isinstance(t, types.NoneType)
+        and type(t).__name__ != "UnsetType"
+    ]  # fmt: skip
+    return " or ".join(_word(t) for t in known)
+
+
+def _word(given: types.Type) -> str:
+    if isinstance(given, types.LiteralType):
+        return " or ".join(f'"{v}"' if isinstance(v, str) else str(v) for v in given.values)
+    if isinstance(given, types.TupleType):
+        return f"[{', '.join(_takes(t) for t in given.item_types)}]"
+    if isinstance(given, types.VarTupleType | types.ListType):
+        return f"list of {_takes(given.item_type)}"
+    if isinstance(given, types.DictType):
+        return "table"
+    return _WORDS.get(type(given), "value")
+
+
+def _default(field: types.Field) -> str:
+    if field.required:
+        return REQUIRED
+    value = field.default
+    if value is msgspec.NODEFAULT:
+        value = field.default_factory() if callable(field.default_factory) else None
+    if value is None or value is msgspec.UNSET:
+        return "not used"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple | list | dict):
+        return "[" + ", ".join(str(v) for v in value) + "]" if value else "none"
+    return f'"{value}"' if isinstance(value, str) else f"{value:g}"

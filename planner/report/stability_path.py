@@ -1,0 +1,210 @@
+"""Answer of `stability` along a path: the tightest pose, the best speed, the better feed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Group
+from rich.text import Text
+
+from planner.errors import InputError
+from planner.milling.cut import Cut
+from planner.milling.cutter_frf import CutterFrf, of_accelerance, read_all
+from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
+from planner.milling.structure import Structure, beyond, of_frf
+from planner.progress import Tell, quietly
+from planner.report.answer import Answer
+from planner.report.plot_files import Pictures
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_ROWS = 24
+WORTH_PERCENT = 5.0  # more depth from a turned feed: less is not worth a change of the program
+
+
+@dataclass(frozen=True)
+class FeedAdvice:
+    """What turning the feed about the tool's axis would allow at the best speed.
+
+    Angles in degrees from the feed as it is towards axis × feed, depths in m that all poses allow.
+    """
+
+    turn_deg: tuple[float, ...]
+    depth_m: tuple[float, ...]
+
+    @property
+    def best(self) -> int:
+        """Number of the best angle."""
+        return int(np.argmax(self.depth_m))
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if not np.isfinite(self.depth_m[0]):
+            return ""
+        gain = 100 * (self.depth_m[self.best] / self.depth_m[0] - 1)
+        if not gain > WORTH_PERCENT:
+            return "Another feed direction gains less than 5 % of depth."
+        if not np.isfinite(gain):
+            return f"Turned by {self.turn_deg[self.best]:g}° the feed allows every depth asked for."
+        return (
+            f"Turned by {self.turn_deg[self.best]:g}° about the tool's axis, the feed allows "
+            f"{gain:.0f} % more depth."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class PathReport(Answer):
+    """Answer of `stability` along a path, per speed (n,) the pose that allows the least.
+
+    Depths are null where all poses are stable up to the largest depth. `best_depth_m_at_95` is
+    what the whole path allows at `best_spindle_rpm`.
+    """
+
+    spindle_rpm: np.ndarray
+    depth_limit_m: np.ndarray
+    kind: tuple[str | None, ...]
+    chatter_hz: np.ndarray
+    depth_limit_m_at_95: np.ndarray
+    tightest_pose: tuple[str, ...]
+    poses: tuple[str, ...]
+    best_spindle_rpm: float
+    best_depth_m_at_95: float
+    feed: FeedAdvice
+    method: str
+    remarks: tuple[str, ...] = ()
+    simulated: bool = False
+    plots: tuple[str, ...] = ()
+    rrd: str | None = None
+
+    def text(self) -> Group:
+        """A table of speeds, then the best of them."""
+        made = table(
+            f"{len(self.poses)} poses, {self.method.replace('_', ' ')}",
+            *("spindle (rpm)", "depth limit (mm)", "at 95 % (mm)", "chatter (Hz)", "tightest pose"),
+        )
+        for i in range(0, len(self.spindle_rpm), max(1, -(-len(self.spindle_rpm) // MOST_ROWS))):
+            made.add_row(
+                f"{self.spindle_rpm[i]:.0f}",
+                number(_or_none(1e3 * self.depth_limit_m[i]), ".4f"),
+                number(_or_none(1e3 * self.depth_limit_m_at_95[i]), ".4f"),
+                number(self.chatter_hz[i], ".1f"),
+                self.tightest_pose[i],
+            )
+        deep = 1e3 * self.best_depth_m_at_95
+        best = f"{deep:.3f} mm" if np.isfinite(deep) else "every depth that was asked for"
+        said = (
+            f"Best speed for the whole path: {self.best_spindle_rpm:.0f} rpm allows {best} with "
+            f"95 % probability. {self.feed.text}"
+        )
+        parts = [made, Text(said), *remarks(self.remarks), *drawn(self.plots)]
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def path_report(
+    source: Path, poses_csv: Path | None, cut: Cut, samples: int,
+    pictures: Pictures, tell: Tell = quietly,
+) -> PathReport:  # fmt: skip
+    """Of every pose of an npz, or of a campaign at the poses of a CSV."""
+    frfs = _of_campaign(source, poses_csv) if source.is_dir() else read_all(source)
+    poses = [(_short(frf.name), of_frf(frf, cut)) for frf in frfs]
+    limits = along(poses, cut, samples, tell)
+    answer = _answer(poses, limits, cut, any(frf.simulated for frf in frfs))
+    if not pictures.wanted:
+        return answer
+    from dataclasses import replace
+
+    mark = SIMULATED_TITLE if answer.simulated else ""
+    written = pictures.write({"path": _figure(limits, answer, cut, mark)}, source.name)
+    return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
+
+
+def _short(name: str) -> str:
+    return name.rsplit("pose ", 1)[-1]
+
+
+def _of_campaign(directory: Path, poses_csv: Path | None) -> list[CutterFrf]:
+    from dataclasses import replace
+
+    from planner.campaign.campaign import Campaign
+    from planner.recording.folder import read_poses
+
+    if poses_csv is None:
+        raise InputError(f"{directory} is a campaign: name the path's poses with --path POSES_CSV.")
+    campaign = Campaign(directory)
+    cell, rows = campaign.cell, read_poses(poses_csv, campaign.cell.robot.joint_names)
+    q = [cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}") for row in rows]
+    mean, sd = campaign.frf(np.array(q))
+    simulated = any(m.simulated for m in campaign.state.recorded)
+    return [
+        replace(
+            of_accelerance(f"pose {row.pose}", campaign.frequency_lines, mean[i], sd[i]),
+            simulated=simulated,
+        )
+        for i, row in enumerate(rows)
+    ]
+
+
+def _answer(
+    poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut, simulated: bool
+) -> PathReport:
+    first, depth = np.argmin(limits.depth_m, axis=0), np.min(limits.depth_m, axis=0)
+    tightest = [limits.found[p][i] for i, p in enumerate(first)]
+    robust, best = np.min(limits.robust_m, axis=0), limits.best_speed
+    rpm = cut.speeds_rpm
+    said = [
+        f"{name}: {text}" for (name, structure), row in zip(poses, limits.found, strict=True)
+        if (text := beyond(structure, np.array([loss.chatter_hz for loss in row])))
+    ]  # fmt: skip
+    turned = by_feed(poses, cut, float(rpm[best]))
+    return PathReport(
+        spindle_rpm=rpm,
+        depth_limit_m=depth,
+        kind=tuple(loss.kind for loss in tightest),
+        chatter_hz=np.array([loss.chatter_hz for loss in tightest]),
+        depth_limit_m_at_95=robust,
+        tightest_pose=tuple(limits.names[i] for i in limits.tightest),
+        poses=limits.names,
+        best_spindle_rpm=float(rpm[best]),
+        best_depth_m_at_95=float(robust[best]),
+        feed=FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned))),
+        method=cut.method,
+        remarks=tuple(said),
+        simulated=simulated,
+    )
+
+
+def _figure(limits: PathLimits, answer: PathReport, cut: Cut, mark: str) -> "Figure":
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 6.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    upper, lower = figure.subplots(2, 1, height_ratios=(3, 1))
+    rpm, top = cut.speeds_rpm, 1e3 * cut.depth_m[1]
+    robust = np.minimum(1e3 * limits.robust_m, 2 * top)
+    for row in robust:
+        upper.plot(rpm, row, color="grey", lw=0.7, alpha=0.7)
+    least = np.min(robust, axis=0)
+    upper.fill_between(rpm, 0, least, color="#dcefd9", lw=0)
+    upper.plot(rpm, least, color="tab:green", lw=2, label="whole path, 95 % probability")
+    upper.axvline(answer.best_spindle_rpm, color="tab:red", lw=1, ls="--", label="best speed")
+    upper.set_ylim(0, min(top, 1.25 * float(np.max(np.where(robust > top, 0, robust))) or top))
+    upper.set_xlabel("spindle speed (rpm)")
+    upper.set_ylabel("axial depth (mm)")
+    upper.set_title(f"{mark}Stability along {len(limits.names)} poses (grey: each)", fontsize=11)
+    upper.legend(fontsize=9, loc="upper left")
+    lower.plot(answer.feed.turn_deg, 1e3 * np.array(answer.feed.depth_m), ".-")
+    lower.set_ylim(bottom=0)
+    lower.set_xlabel("feed turned about the tool's axis (°)")
+    lower.set_ylabel("depth (mm)")
+    for panel in (upper, lower):
+        panel.grid(True, alpha=0.3)
+    return figure

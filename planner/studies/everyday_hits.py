@@ -1,0 +1,130 @@
+"""Hits as a careful hand makes them, at many poses of a true robot: to FRFs and modes, in memory.
+
+Three axes, three force levels each; hits miss axis and point, the chain is within its tolerances,
+joints stand beside their readback, the floor rumbles (`planner.truth.handling.EVERYDAY`). Joints
+rub, so that damping depends on the force, and their damping is another one at every visit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.dataset.dataset import Dataset
+from planner.dataset.visits import Visit
+from planner.errors import RefusedError
+from planner.frf.estimator import estimate
+from planner.frf.frf import Frf
+from planner.modal.estimate_modes import estimate_modes
+from planner.modal.modes import Mode
+from planner.progress import Tell
+from planner.recording.records import Hit
+from planner.truth.brakes import DampingScatter
+from planner.truth.handling import EVERYDAY, Handling
+from planner.truth.hits import Hammer, SimulatedHit, noisy
+from planner.truth.model import Truth
+from planner.truth.nonlinear import Port
+from planner.truth.other_laws import BoucWen
+from planner.truth.secret import HitVisit, Secret, quiet_hits
+from planner.truth.visits import Visits
+
+AT_ONCE = 12  # poses that are integrated together: what memory holds
+# Chosen: friction's stiffness over a joint's own, the angle (rad) at which it slides, and the
+# log-sd of damping from visit to visit. Damping ratios of robots scatter by some ten percent
+# between visits and levels.
+RUBBING, SLIDING_RAD, BRAKES = 0.06, 4e-6, 0.35
+
+
+@dataclass(frozen=True, eq=False)
+class StruckPoses:
+    """Readback angles q (n, dof) in rad; the FRF matrix and the hits of each pose."""
+
+    q: np.ndarray
+    frfs: tuple[Frf, ...]
+    hits: tuple[tuple[Hit, ...], ...]
+
+    def dataset(self, band_hz: tuple[float, float], which: np.ndarray | None = None) -> Dataset:
+        """All hits, or those of some poses, as identification and diagnosis want them."""
+        rows = np.arange(len(self.q)) if which is None else which
+        visits = [
+            Visit(f"P{i + 1:03d}", self.q[i], k / max(len(rows) - 1, 1), self.hits[i])
+            for k, i in enumerate(rows.tolist())
+        ]
+        return Dataset.of_visits(visits, band_hz)
+
+    def modes(self, band_hz: tuple[float, float], progress: Tell) -> list[tuple[Mode, ...]]:
+        """Modes of every pose by modal analysis; none where it finds none."""
+        found: list[tuple[Mode, ...]] = []
+        for i, frf in enumerate(self.frfs):
+            progress(f"modal analysis of pose {i + 1} of {len(self.frfs)}", i / len(self.frfs))
+            try:
+                found.append(estimate_modes(frf, band_hz).modes)
+            except RefusedError:
+                found.append(())
+        return found
+
+
+def rubbing(truth: Truth, share: float = RUBBING) -> tuple[Port, ...]:
+    """Friction in the first three joints: it gives stiffness at rest, and takes energy."""
+    ports = []
+    for joint in truth.joint_names[:3]:
+        own = float(truth.own(joint) @ [spring.stiffness for spring in truth.springs])
+        ports.append(Port(BoucWen(share * own, share * own * SLIDING_RAD), joint=joint))
+    return tuple(ports)
+
+
+def everyday(
+    truth: Truth, seed: int, handling: Handling = EVERYDAY, ports: tuple[Port, ...] = ()
+) -> Secret:
+    """What is not as in the books: friction, damping that scatters, a chain within tolerance.
+
+    `ports` are further laws of joints.
+    """
+    chain = handling.chain(np.random.default_rng([seed, 3]))
+    return Secret(
+        truth.deviation, (*rubbing(truth), *ports), drift=DampingScatter(BRAKES, seed), chain=chain
+    )
+
+
+def strike(
+    truth: Truth,
+    secret: Secret,
+    q: np.ndarray,
+    hammer: Hammer,
+    band_hz: tuple[float, float],
+    seed: int,
+    progress: Tell,
+    handling: Handling = EVERYDAY,
+    axes: str = "xyz",
+) -> StruckPoses:
+    """Hit a robot at poses q (n, dof) in rad, each once visited, along `axes` at three levels."""
+    rng, own = np.random.default_rng([seed, 4]), np.random.default_rng([seed, 5])
+    visits = Visits.planned(q, hammer, handling, rng, own)
+    planned = [
+        _along(v, axes) for v in visits.visits[: len(q)]
+    ]  # without the first pose visited again
+    readback = np.deg2rad(np.array(visits.readbacks_deg[: len(q)]))
+    floor: Hammer | None = None
+    hits: list[tuple[Hit, ...]] = []
+    for first in range(0, len(q), AT_ONCE):
+        progress(f"hits at pose {first + 1} of {len(q)}", first / len(q))
+        quiet = quiet_hits(truth, secret, planned[first : first + AT_ONCE], hammer, rng)
+        if floor is None:
+            floor = handling.floor(hammer, [hit for hits in quiet for hit in hits], own)
+        hits += [_recorded([noisy(h, floor, rng) for h in each], hammer) for each in quiet]
+    frfs = tuple(estimate(each, band_hz) for each in hits)
+    return StruckPoses(readback, frfs, tuple(hits))
+
+
+def _along(visit: HitVisit, axes: str) -> HitVisit:
+    """The visit with the hits along these axes only."""
+    kept = [i for i, (axis, _) in enumerate(visit.shots) if axis[1] in axes]
+    shots, aims = [visit.shots[i] for i in kept], [visit.aims[i] for i in kept]
+    return replace(visit, shots=shots, aims=aims)
+
+
+def _recorded(hits: Sequence[SimulatedHit], hammer: Hammer) -> tuple[Hit, ...]:
+    rate, source = hammer.sampling_rate_hz, Path("simulated")
+    made = [Hit(source, h.axis, rate, h.force_n, h.acceleration_m_s2, simulated=True) for h in hits]
+    return tuple(replace(hit, repeat=i + 1) for i, hit in enumerate(made))

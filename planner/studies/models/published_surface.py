@@ -1,0 +1,81 @@
+"""Busch et al. 2020 as published: GP, NARGP and MFDGP of the amplitude over (frequency, angle).
+
+The amplitude itself is modelled, in m/s²/N, over x = (f, φ) (section 3 there): GP with RBF and bias
+kernel (eq. 7) of the measured points alone; NARGP (`nargp`) and MFDGP (`mfdgp`) of both levels. The
+cheap level of NARGP is an exact GP of the whole simulated grid (`grid_gp`), which is what a GP of
+its 12,801 points is. Ours differ from the paper's where its text leaves no choice but a computer's:
+MFDGP has fewer inducing points and steps than the paper's 800 and 35,000 (`Training`).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.studies.models.fidelity_levels import FidelityLevel, Samples
+from planner.studies.models.frf_surface import Frame, Grid, frame_of
+from planner.studies.models.grid_gp import GridGP, fit_grid
+from planner.studies.models.likelihood_gp import Normalisation, fit_likelihood
+from planner.studies.models.mfdgp import Training, fit_mfdgp
+from planner.studies.models.nargp import NARGP, fit_nargp, perdikaris
+
+FIRST_POINTS = 250  # of those measured, from which NARGP's climb on all of them begins
+SURFACE_TRAINING = Training(6000, 6000, inducing=300)
+
+
+@dataclass(frozen=True, eq=False)
+class PublishedSurface:
+    """Fitted; `model` gives the amplitude over scaled coordinates."""
+
+    model: FidelityLevel
+    frame: Frame
+
+    def predict(self, frequency_hz: np.ndarray, pose: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean amplitude and its sd (f, p) in m/s²/N; the mean may be negative, as published."""
+        mean, sd = self.model.predict(self.frame.points(frequency_hz, pose))
+        shape = len(frequency_hz), len(pose)
+        return mean.reshape(shape), sd.reshape(shape)
+
+
+def fit_published(
+    measured: Grid, simulated: Grid, model: str, training: Training = SURFACE_TRAINING
+) -> PublishedSurface:
+    """Fit one of PUBLISHED; `training` is MFDGP's. InputError for another name."""
+    if model not in PUBLISHED:
+        raise InputError(f"No published model {model!r}: use one of {', '.join(PUBLISHED)}.")
+    frame = frame_of(measured, simulated)
+    return PublishedSurface(PUBLISHED[model](frame, measured, simulated, training), frame)
+
+
+def _samples(frame: Frame, grid: Grid) -> Samples:
+    return Samples.of(frame.points(grid.frequency_hz, grid.pose), grid.amplitude.ravel())
+
+
+def _grid(frame: Frame, grid: Grid) -> GridGP:
+    return fit_grid(*frame.axes(grid.frequency_hz, grid.pose), grid.amplitude)
+
+
+def _gp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> GridGP:
+    return _grid(frame, measured)
+
+
+def _nargp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> NARGP:
+    low, s = _grid(frame, simulated), _samples(frame, measured)
+    units = Normalisation.of(simulated.amplitude.ravel())
+    some = np.random.default_rng(0).permutation(len(s.y))[:FIRST_POINTS]
+    first = fit_nargp(Samples(s.x[some], s.y[some], s.sd[some]), low, units, starts=3)
+    wide = np.column_stack([s.x, (low.predict(s.x)[0] - units.centre) / units.scale])
+    high = fit_likelihood(Samples(wide, s.y, s.sd), perdikaris(2), begin=first.high.theta)
+    return NARGP(low, high, units)
+
+
+def _mfdgp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> FidelityLevel:
+    return fit_mfdgp(_samples(frame, simulated), _samples(frame, measured), training)
+
+
+PUBLISHED: dict[str, Callable[[Frame, Grid, Grid, Training], FidelityLevel]] = {
+    "GP": _gp,
+    "NARGP": _nargp,
+    "MFDGP": _mfdgp,
+}

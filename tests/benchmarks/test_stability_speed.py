@@ -1,0 +1,88 @@
+"""How fast methods of stability converge, and what they cost at the same error."""
+
+import time
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits
+
+from planner.milling.cutter_modes import real_modes
+from planner.milling.lobes import losses
+from planner.milling.machine import Machine, multipliers
+from planner.milling.period import Grid
+from planner.milling.semi_discretisation import semi_monodromy
+from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode
+
+RPM, DEPTH_MM = 5000.0, 0.5
+
+
+def full_error(asked: Machine, degree: int, elements: int) -> float:
+    """Of |µ|, with polynomials of a degree on so many elements."""
+    built = asked.period(RPM, Grid(degree, np.pi / elements * (1 + 1e-9)), 0.0)
+    size = abs(multipliers(list(built.monodromy(np.array([DEPTH_MM * 1e-3]))))[0])
+    return abs(size - MULTIPLIERS[DEPTH_MM])
+
+
+def semi_error(asked: Machine, steps: int) -> float:
+    """Of |µ|, with so many steps."""
+    size = abs(multipliers([semi_monodromy(asked, RPM, steps, DEPTH_MM * 1e-3)])[0])
+    return abs(size - MULTIPLIERS[DEPTH_MM])
+
+
+def test_orders_of_convergence():
+    asked = machine(one_mode(), cut())
+    found = {
+        "semi-discretisation": (semi_error(asked, 80), semi_error(asked, 160)),
+        "full, degree 1": (full_error(asked, 1, 80), full_error(asked, 1, 160)),
+        "full, degree 2": (full_error(asked, 2, 16), full_error(asked, 2, 32)),
+        "full, degree 3": (full_error(asked, 3, 8), full_error(asked, 3, 16)),
+    }
+    order = {name: np.log2(coarse / fine) for name, (coarse, fine) in found.items()}
+    print({name: round(float(value), 2) for name, value in order.items()})
+    assert order["semi-discretisation"] == pytest.approx(2, abs=0.3)
+    assert order["full, degree 1"] == pytest.approx(2, abs=0.3)
+    assert order["full, degree 2"] > 3
+    assert order["full, degree 3"] > 3
+    # One element of a high degree: the error falls faster than any power.
+    assert full_error(asked, 28, 1) < 1e-2 * full_error(asked, 22, 1)
+
+
+def cpu(work, repeats: int = 3) -> float:
+    """Least processor time of one call in s."""
+    spent = []
+    for _ in range(repeats):
+        begun = time.process_time()
+        work()
+        spent.append(time.process_time() - begun)
+    return min(spent)
+
+
+@pytest.mark.slow
+def test_full_discretisation_costs_less_at_the_same_error():
+    asked = machine(one_mode(), cut())
+    wanted = 1e-3
+    steps = next(m for m in range(40, 2000, 20) if semi_error(asked, m) < wanted)
+    degree = next(d for d in range(8, 60) if full_error(asked, d, 1) < wanted)
+    with threadpool_limits(1):
+        semi = cpu(lambda: semi_error(asked, steps))
+        full = cpu(lambda: full_error(asked, degree, 1))
+    print(f"|µ| within {wanted:g}: semi {steps} steps {1e3 * semi:.1f} ms, full degree {degree} "
+          f"{1e3 * full:.1f} ms, ratio {semi / full:.0f}")  # fmt: skip
+    assert full < semi
+
+
+@pytest.mark.slow
+def test_a_diagram_of_six_modes():
+    random = np.random.default_rng(1)
+    hertz = np.array([11.0, 22.0, 31.0, 47.0, 820.0, 1400.0])
+    zeta = np.array([0.03, 0.03, 0.025, 0.02, 0.03, 0.02])
+    mass = np.array([300.0, 250.0, 200.0, 150.0, 0.8, 0.5])
+    along = random.standard_normal((6, 2))
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    modes = real_modes(hertz, zeta, mass, along)
+    given = {"spindle_rpm": (4000.0, 16000.0, 400), "depth_m": (0.0, 0.02, 200)}
+    with threadpool_limits(1):
+        full = cpu(lambda: losses(machine(modes, cut(**given))), 1)
+        zeroth = cpu(lambda: losses(machine(modes, cut(**given, method="zeroth_order"))), 1)
+    print(f"400 speeds up to 20 mm, six modes: full {full:.1f} s, zeroth order {zeroth:.2f} s")
+    assert zeroth < full

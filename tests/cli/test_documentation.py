@@ -1,0 +1,99 @@
+"""Help, schema and manual: complete, and no example in them is wrong."""
+
+import json
+import re
+import shlex
+import tomllib
+from html.parser import HTMLParser
+
+import msgspec
+import pytest
+import typer
+
+from planner.campaign.config import CampaignConfig
+from planner.campaign.example import EXAMPLE
+from planner.cli.app import app
+from planner.cli.run import run
+from planner.report.manual.words import TUTORIAL
+from planner.robot.config import RobotConfig
+
+COMMANDS = typer.main.get_command(app).commands  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def parsed(line: str) -> None:
+    """Raise where a command line names an unknown command or option, or lacks an argument."""
+    name, *rest = shlex.split(line.split("#", maxsplit=1)[0])
+    assert name == "planner"
+    command = COMMANDS[rest[0]]
+    command.make_context(rest[0], rest[1:])  # raises on bad usage
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_has_an_example_that_it_takes(name):
+    text = COMMANDS[name].help or ""
+    example = " ".join(text.partition("Example:")[2].split())
+    assert example.startswith(f"planner {name} "), text
+    parsed(example)
+
+
+def test_the_tutorials_commands_are_taken():
+    lines = [line for _, commands, _ in TUTORIAL for line in commands.splitlines()]
+    assert len(lines) > 8
+    for line in lines:
+        parsed(line)
+
+
+def names_of(kind: type[msgspec.Struct]) -> set[str]:
+    return {field.encode_name for field in msgspec.structs.fields(kind)}
+
+
+@pytest.mark.parametrize(("file", "kind"), [("robot", RobotConfig), ("campaign", CampaignConfig)])
+def test_the_schema_names_every_entry(file, kind, capsys):
+    assert run(["schema", file, "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    tables = {t["name"].strip("[]"): t for t in answer["tables"]}
+    told = {e["name"] for e in tables[""]["entries"]} | {n.split(".")[0] for n in tables if n}
+    assert told == names_of(kind)
+    assert all(t["about"] for t in answer["tables"])
+    definitions = answer["json_schema"]["$defs"]
+    assert set(definitions[kind.__name__]["properties"]) == names_of(kind)
+    assert run(["schema", file]) == 0
+    said = capsys.readouterr().out
+    assert all(f"[{name}]" in said for name in tables if name)
+
+
+def test_the_schema_tells_defaults_and_choices(capsys):
+    run(["schema", "campaign", "--json"])
+    tables = {t["name"]: t["entries"] for t in json.loads(capsys.readouterr().out)["tables"]}
+    modes = {e["name"]: e for e in tables["[modes]"]}
+    assert (modes["count"]["default"], modes["band_hz"]["takes"]) == ("4", "[number, number]")
+    assert tables["[fidelity]"][0]["takes"] == '"frozen" or "none" or "updated"'
+    assert run(["schema", "log"]) == 2
+
+
+def test_the_manual_quotes_files_that_are_right(tmp_path, capsys):
+    assert run(["manual", "--out", str(tmp_path / "manual.html")]) == 0
+    html = (tmp_path / "manual.html").read_text()
+    found: list[str] = []
+    reader = HTMLParser()
+    reader.handle_data = found.append
+    reader.feed(html)
+    text = "".join(found)
+    robot = (EXAMPLE / "robot" / "robot.toml").read_text()
+    assert robot in text
+    assert tomllib.loads(robot)["urdf"] == "robot.urdf"
+    assert all(f"planner {name}" in text for name in COMMANDS)
+    assert all(name in text for name in names_of(RobotConfig) | names_of(CampaignConfig))
+    assert not re.search(r"https?://|<script", html)
+    links = re.findall(r'href="#(\w+)"', html)
+    assert links
+    assert all(f'id="{link}"' in html for link in links)
+
+
+def test_the_shell_completes(monkeypatch, capsys):
+    monkeypatch.setenv("_PLANNER_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", "planner re")
+    monkeypatch.setenv("COMP_CWORD", "1")
+    with pytest.raises(SystemExit):
+        typer.main.get_command(app)(prog_name="planner", args=[])
+    assert {"replay", "report"} <= set(capsys.readouterr().out.split())

@@ -1,0 +1,176 @@
+"""`planner modes` of FRFs between any points: files of any kind, no robot."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.cli.run import run
+from planner.modal.mac import mac
+from tests.support.matrix_files import write_matrix
+from tests.support.struck_structures import struck, unit_mass_shapes
+from tests.support.structures import plate
+
+LINES = np.arange(1, 601) * 0.5
+REFERENCES = [0, 13, 37]
+BAND = (40.0, 280.0)
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return plate()
+
+
+@pytest.fixture(scope="module")
+def matrix(structure):
+    return struck(structure, REFERENCES, LINES, np.random.default_rng(3))
+
+
+def modes(capsys, *arguments):
+    code = run(["modes", *(str(a) for a in arguments), "--json"])
+    captured = capsys.readouterr()
+    return code, json.loads(captured.out) if captured.out else None, captured.err
+
+
+def true_modes(structure):
+    """Frequencies (m,) and shapes of unit modal mass (n, m) in the band."""
+    poles, shapes = unit_mass_shapes(structure)
+    hz = np.abs(poles) / (2 * np.pi)
+    inside = (hz > BAND[0]) & (hz < BAND[1])
+    return hz[inside], shapes[:, inside]
+
+
+def agree(answer, structure, least=0.995, scale=0.03):
+    """Every true mode is there, with its shape by node, and its scale where one is stated."""
+    hz, shapes = true_modes(structure)
+    found = np.array([m["frequency_hz"] for m in answer["modes"]])
+    rows = [list(structure.nodes).index(node) for node, _ in answer["dofs"]]
+    for f, true in zip(hz, shapes[rows].T, strict=True):
+        mode = answer["modes"][int(np.argmin(np.abs(found - f)))]
+        shape = np.array([complex(*value) for value in mode["shape"]])
+        assert mode["frequency_hz"] == pytest.approx(f, rel=1e-3)
+        assert mac(shape, true) > least
+        if scale is not None:
+            assert np.linalg.norm(shape) == pytest.approx(np.linalg.norm(true), rel=scale)
+
+
+@pytest.mark.parametrize("kind", ["accelerance", "mobility", "receptance"])
+def test_a_roving_hammer_set(structure, matrix, tmp_path, capsys, kind):
+    path = write_matrix(tmp_path / "set.uff", matrix, kind, turned=[4, 9])
+    code, answer, err = modes(capsys, path, "--band-hz", *BAND)
+    assert (code, err) == (0, "")
+    assert answer["dofs"] == [[node, "z"] for node in structure.nodes]
+    assert answer["frfs"] == 150
+    assert len(answer["modes"]) == len(true_modes(structure)[0])
+    assert all(mode["scaled"] for mode in answer["modes"])
+    agree(answer, structure)
+
+
+def keep(matrix, rng, share):
+    """Which FRFs are left when a share of the matrix is missing; driving points stay."""
+    pairs = [(o, i) for o in range(len(matrix.responses)) for i in range(len(matrix.references))]
+    return [pair for pair in pairs if pair in matrix.driving or rng.random() > share]
+
+
+def test_a_fifth_of_the_matrix_is_missing(structure, matrix, tmp_path, capsys):
+    entries = keep(matrix, np.random.default_rng(5), 0.2)
+    path = write_matrix(tmp_path / "set.uff", matrix, entries=entries)
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert (code, answer["frfs"]) == (0, len(entries))
+    agree(answer, structure)
+
+
+def test_several_files_one_per_reference_and_geometry_beside(structure, matrix, tmp_path, capsys):
+    nodes = np.array(structure.nodes)
+    place = np.array([structure.position_m[n] for n in structure.nodes])
+    sets = [{"type": 15, "node_nums": nodes, "x": place[:, 0], "y": place[:, 1], "z": place[:, 2]}]
+    geometry = write_matrix(tmp_path / "geometry.uff", matrix, before=sets, entries=[])
+    paths = [
+        write_matrix(tmp_path / f"{i}.uff", matrix, entries=[(o, i) for o in range(50)])
+        for i in range(3)
+    ]
+    code, answer, err = modes(capsys, *paths, geometry, "--band-hz", *BAND)
+    assert (code, err) == (0, "")
+    assert answer["refused"] == []
+    agree(answer, structure)
+
+
+@pytest.mark.parametrize("column", [True, False])
+def test_one_column_or_one_row(structure, matrix, tmp_path, capsys, column):
+    matrix = matrix if column else matrix.transposed()
+    entries = [(o, 1) if column else (1, o) for o in range(50)]
+    path = write_matrix(tmp_path / "set.uff", matrix, entries=entries)
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert code == 0
+    agree(answer, structure)
+
+
+def test_without_a_driving_point_shapes_are_not_scaled(structure, matrix, tmp_path, capsys):
+    entries = [(o, 0) for o in range(1, 50)]
+    path = write_matrix(tmp_path / "set.uff", matrix, entries=entries)
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert code == 0
+    assert not any(mode["scaled"] for mode in answer["modes"])
+    assert len(answer["dofs"]) == 49
+    assert "not scaled" in " ".join(answer["remarks"])
+    agree(answer, structure, scale=None)
+    for mode in answer["modes"]:
+        assert np.linalg.norm(mode["shape"]) == pytest.approx(1.0)
+
+
+def test_unstated_quantity_and_scalar_directions(structure, matrix, tmp_path, capsys):
+    unknown = {"ordinate_spec_data_type": 0, "ordinate_axis_units_lab": "NONE", "rsp_dir": 0,
+               "ref_dir": 0}  # fmt: skip
+    path = write_matrix(tmp_path / "set.uff", matrix, **unknown)
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert (code, answer["dofs"][0]) == (0, [1, "scalar"])
+    assert "--quantity" in " ".join(answer["remarks"])
+    agree(answer, structure, scale=None)
+
+
+def exchange(matrix, a, b):
+    """The matrix with two of its rows under each other's names."""
+    order = list(range(len(matrix.responses)))
+    order[a], order[b] = b, a
+    return replace(matrix, accelerance=matrix.accelerance[order])
+
+
+def test_a_turned_sign_and_exchanged_nodes_are_named(structure, matrix, tmp_path, capsys):
+    turned = matrix.accelerance.copy()
+    turned[:, 1] *= -1
+    path = write_matrix(tmp_path / "turned.uff", replace(matrix, accelerance=turned))
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert "sign of the channel at node 14, z is turned" in " ".join(answer["remarks"])
+    agree(answer, structure)
+    path = write_matrix(tmp_path / "exchanged.uff", exchange(matrix, 13, 25))
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    told = " ".join(answer["remarks"])
+    assert "Node 14's and node 26's rows (z) fit each other's places" in told
+
+
+def test_nothing_is_named_where_nothing_is_wrong(structure, matrix, tmp_path, capsys):
+    path = write_matrix(tmp_path / "set.uff", matrix)
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert answer["remarks"] == []
+
+
+def test_lines_that_differ_are_refused(matrix, tmp_path, capsys):
+    first = write_matrix(tmp_path / "a.uff", matrix, entries=[(0, 0)])
+    other = replace(matrix, frequency_hz=matrix.frequency_hz * 1.1)
+    second = write_matrix(tmp_path / "b.uff", other, entries=[(1, 0)])
+    code, _, err = modes(capsys, first, second)
+    assert code in (2, 3)
+    assert "b.uff has other frequency lines" in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_dead_channels_are_left_out_and_named(structure, matrix, tmp_path, capsys):
+    values = matrix.accelerance.copy()
+    values[10], values[20, 1] = 0.0, 0.0
+    path = write_matrix(tmp_path / "set.uff", replace(matrix, accelerance=values))
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert (code, answer["frfs"]) == (0, 146)
+    assert "4 FRFs are zero throughout" in " ".join(answer["remarks"])
+    assert [11, "z"] not in answer["dofs"]
+    agree(answer, structure)

@@ -1,0 +1,85 @@
+"""`planner modes --operating`: responses alone, a tone of a machine among them."""
+
+import json
+
+import numpy as np
+import pytest
+import pyuff
+
+from planner.cli.run import run
+from planner.modal.mac import mac
+from tests.support.running import response
+from tests.support.structures import plate
+
+RATE_HZ, TONE_HZ = 640.0, 180.0
+POINTS = [0, 5, 8, 15, 18, 23]
+BAND = (30.0, 250.0)
+
+
+@pytest.fixture(scope="module")
+def structure():
+    return plate(6, 4, ratio=(0.01, 0.01))
+
+
+@pytest.fixture(scope="module")
+def record(structure, tmp_path_factory):
+    values = response(structure, POINTS, 100.0, RATE_HZ, np.random.default_rng(0))
+    t = np.arange(values.shape[1]) / RATE_HZ
+    values += np.std(values, axis=1, keepdims=True) * np.sin(2 * np.pi * TONE_HZ * t)
+    path = tmp_path_factory.mktemp("operating") / "running.uff"
+    for number, (point, samples) in enumerate(zip(POINTS, values, strict=True)):
+        turned = -1 if number == 2 else 1
+        pyuff.UFF(str(path)).write_sets(
+            [
+                {
+                    "type": 58, "binary": 1, "func_type": 1, "id1": "simulated",
+                    "rsp_node": structure.nodes[point], "rsp_dir": 3 * turned, "ref_node": 0,
+                    "ref_dir": 0, "data": turned * samples, "x": t, "abscissa_spacing": 1,
+                    "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 12,
+                    "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 0,
+                }
+            ],
+            "add",
+        )  # fmt: skip
+    return path
+
+
+def answered(capsys, *arguments):
+    code = run(["modes", *(str(a) for a in arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_modes_without_a_scale_and_the_tone_named(structure, record, tmp_path, capsys):
+    options = ("--operating", "--band-hz", *BAND, "--json", "--plot", tmp_path)
+    code, out, err = answered(capsys, record, *options)
+    assert (code, err) == (0, "")
+    answer = json.loads(out)
+    poles, shapes = structure.poles()
+    hz, damping = np.abs(poles) / (2 * np.pi), -poles.real / np.abs(poles)
+    inside = np.flatnonzero((hz > BAND[0]) & (hz < BAND[1]))
+    assert len(answer["modes"]) == inside.size
+    for k, mode in zip(inside, answer["modes"], strict=True):
+        shape = np.array([complex(*value) for value in mode["shape"]])
+        assert mode["frequency_hz"] == pytest.approx(hz[k], rel=3e-3)
+        assert abs(mode["frequency_hz"] - hz[k]) < 4 * mode["frequency_sd_hz"]
+        assert mode["damping_ratio"] == pytest.approx(damping[k], rel=0.25)
+        assert mac(shape, shapes[POINTS, k]) > 0.98
+        assert mode["scaled"] is False
+    assert answer["dofs"] == [[structure.nodes[p], "z"] for p in POINTS]
+    assert answer["scaled"] is False
+    assert answer["tones_hz"] == [pytest.approx(TONE_HZ, rel=1e-3)]
+    assert "UNSCALED" in " ".join(answer["remarks"])
+    assert [path.rsplit("/", 1)[1] for path in answer["plots"]] == ["stabilisation.png", "mac.png"]
+
+
+def test_the_text_says_that_nothing_is_scaled(record, capsys):
+    code, out, _ = answered(capsys, record, "--operating", "--band-hz", *BAND)
+    assert code == 0
+    assert "UNSCALED" in out
+
+
+def test_two_files_are_refused(record, capsys):
+    code, out, err = answered(capsys, record, record, "--operating")
+    assert (code, out) == (2, "")
+    assert "one record at a time" in err

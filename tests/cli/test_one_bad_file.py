@@ -1,0 +1,199 @@
+"""One bad file, name, byte or disk does not keep the rest of a campaign from going on."""
+
+import errno
+import hashlib
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.campaign import journal
+from planner.campaign.campaign import Campaign
+from planner.campaign.journal import Journal
+from planner.errors import InputError
+from planner.recording.read import read
+from planner.robot.urdf import copy_meshes
+from tests.support.odd_recordings import ODD
+from tests.support.outside import call, make_cell, record, told
+from tests.support.robots import JOINTS_DEG
+
+MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
+TRIED = ["two groups of the same names, HDF5", "a flipped byte in gzip", "an acceleration of 1e200",
+         "FRFs of unequal length", "spectra that are a word", "rates that differ"]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory):
+    """A new campaign, and a pose's recordings."""
+    root = tmp_path_factory.mktemp("bench")
+    robot, campaign_toml, truth = make_cell(root)
+    assert call("new", root / "cell", "--robot", robot, "--campaign", campaign_toml)[0] == 0
+    return root, record(truth, root / "good", "G1", MIDDLE)
+
+
+@pytest.fixture
+def cell(bench, tmp_path):
+    return shutil.copytree(bench[0] / "cell", tmp_path / "cell")
+
+
+def named_columns(file: Path) -> dict:
+    (found,) = read(file)
+    by = {c.quantity + str(abs(c.direction)): c.samples for c in found.channels}
+    force = next(v for k, v in by.items() if k.startswith("force"))
+    times = {"time_s": [k / found.sampling_rate_hz for k in range(len(force))], "force_n": force}
+
+    return {k: np.array(v) for k, v in times.items()} | {
+        f"acceleration_{a}_m_s2": by[f"acceleration{i}"] for i, a in enumerate("xyz", 1)
+    }
+
+
+def test_bad_files_are_refused_and_the_others_imported(bench, cell, tmp_path):
+    _, good = bench
+    folder = shutil.copytree(good, tmp_path / "export")
+    columns = named_columns(next((folder / "data").glob("*px_1.uff")))
+    table = (folder / "recordings.csv").read_text().splitlines()
+    for number, what in enumerate(TRIED, 11):
+        name, write = ODD[what]
+        write(folder / "data" / name, columns)
+        row = table[1].split(",")
+        table.append(",".join([*row[:-2], str(number), f"data/{name}"]))
+    (folder / "recordings.csv").write_text("\n".join(table) + "\n")
+    code, out, err = call("import", cell, folder, "--json")
+    answer = json.loads(out)
+    assert code == 3, err
+    assert len(answer["accepted"]) == 9
+    assert len(answer["refused"]) == len(TRIED)
+    assert len([line for line in err.splitlines() if line.startswith("Refused")]) == len(TRIED)
+    assert "inside" not in err
+    # A kept recording that is no longer what was imported is named by whoever reads it next.
+    kept = next(p for p in (cell / "recordings").glob("*.uff"))
+    kept.write_bytes(kept.read_bytes()[:-100])
+    more = tmp_path / "more" / "again_px_1.uff"
+    more.parent.mkdir()
+    more.write_bytes(next((good / "data").glob("*px_1.uff")).read_bytes() + b"\n")
+    code, _, err = call("import", cell, more, "--pose", "G1")
+    assert (code, kept.name in err, "restore it" in err) == (2, True, True), err
+
+
+def test_a_pose_whose_name_looks_like_markup(bench, cell, tmp_path):
+    folder = shutil.copytree(bench[1], tmp_path / "export")
+    table = folder / "recordings.csv"
+    table.write_text(table.read_text().replace("G1,", "[/red],"))
+    for command in (("import", cell, folder), ("status", cell), ("withdraw", cell, "[/red]")):
+        code, out, err = call(*command)
+        assert (code, "[/red]" in out) == (0, True), err
+
+
+def rewritten(cell: Path, name: str, digest: str) -> None:
+    """Let the log's first entry name another file of the robot folder, with a right check."""
+    log = cell / "log.jsonl"
+    entry = json.loads(log.read_bytes().splitlines()[0])["entry"]
+    entry["event"]["robot"][name] = digest
+    body = json.dumps(entry, separators=(",", ":")).encode()
+    check = hashlib.sha256(body).hexdigest()[:16].encode()
+    log.write_bytes(b'{"check":"%s","entry":%s}\n' % (check, body))
+
+
+@pytest.mark.parametrize("name", ["../../evil.txt", "ABSOLUTE", "a/../../../evil.txt"])
+def test_a_crafted_campaign_writes_nothing_outside(cell, tmp_path, name):
+    target = tmp_path / "evil.txt"
+    data = b"evil"
+    digest = hashlib.sha256(data).hexdigest()
+    (cell / "recordings" / f"{digest}.robot").write_bytes(data)
+    rewritten(cell, str(target) if name == "ABSOLUTE" else name, digest)
+    code, _, err = call("replay", cell)
+    assert (code, "not one that planner wrote" in err) == (2, True), err
+    assert not list(tmp_path.rglob("evil.txt"))
+
+
+def test_a_changed_copy_of_the_robot_is_named(cell):
+    kept = next((cell / "recordings").glob("*.robot"))
+    kept.write_bytes(kept.read_bytes() + b" ")
+    code, _, err = call("replay", cell)
+    assert (code, kept.name in err) == (2, True)
+
+
+def test_meshes_are_copied_into_the_new_folder_only(tmp_path):
+    source, target = tmp_path / "deep" / "in" / "arm.urdf", tmp_path / "out" / "arm.urdf"
+    source.parent.mkdir(parents=True)
+    target.parent.mkdir()
+    for path in (source.parent / "near.stl", source.parents[2] / "far.stl"):
+        path.write_bytes(b"solid")
+    meshes = "".join(f'<mesh filename="{name}"/>' for name in ("near.stl", "../../far.stl"))
+    source.write_text(f"<robot>{meshes}</robot>")
+    assert copy_meshes(source, target) == ("../../far.stl",)
+    assert [p.name for p in (tmp_path / "out").rglob("*")] == ["near.stl"]
+    assert sorted(p.name for p in tmp_path.glob("*.stl")) == ["far.stl"]
+
+
+@pytest.mark.parametrize(
+    ("what", "line"),
+    [("frequency_sd_percent", "[stop]\nfrequency_sd_percent = nan"),
+     ("joints_deg", "[goal]\njoints_deg = [[0, inf, 0, 0, 0, 0]]"),
+     ("[goal] joints_deg", "[goal]\njoints_deg = [[1, 2, 3, 4, 5]]"),
+     ("[[forbidden]]", "[[forbidden]]\njoints_deg = [[1, 2]]")],
+)  # fmt: skip
+def test_what_no_campaign_can_be_is_refused_before_there_is_a_folder(bench, tmp_path, what, line):
+    root, _ = bench
+    text = (root / "plan" / "campaign.toml").read_text()
+    kept = [part for part in text.split("\n\n") if line.split("\n")[0] not in part]
+    plan = tmp_path / "campaign.toml"
+    plan.write_text("\n\n".join(kept) + f"\n{line}\n")
+    robot = root / "robot" / "robot.toml"
+    code, _, err = call("new", tmp_path / "bad", "--robot", robot, "--campaign", plan)
+    assert (code, what in err) == (2, True), err
+    assert not (tmp_path / "bad").exists()
+
+
+def test_a_byte_order_mark_is_no_fault(bench, tmp_path):
+    root, _ = bench
+    for folder in ("robot", "plan"):
+        shutil.copytree(root / folder, tmp_path / folder)
+    robot, plan = tmp_path / "robot" / "robot.toml", tmp_path / "plan" / "campaign.toml"
+    for path in (robot, plan):
+        path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    told("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
+    assert told("status", tmp_path / "cell")["measurements"] == []
+
+
+def test_halves_of_killed_writers_are_removed(bench, tmp_path):
+    root, _ = bench
+    (tmp_path / f".cell.{2**22 + 1}.part").mkdir()  # no process has that number
+    robot, plan = root / "robot" / "robot.toml", root / "plan" / "campaign.toml"
+    told("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
+    (tmp_path / "cell" / "recordings" / ".abc.uff.123.part").write_bytes(b"half")
+    told("next", tmp_path / "cell")
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_a_full_disk_is_said_in_a_sentence_and_loses_nothing(cell, monkeypatch):
+    before = (cell / "log.jsonl").read_bytes()
+
+    def full(handle):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(journal.os, "fsync", full)
+        code, out, err = call("next", cell)
+    assert (code, out) == (2, "")
+    assert "No space left" in err
+    assert "inside" not in err
+    assert (cell / "log.jsonl").read_bytes() == before
+    assert not list(cell.rglob("*.part"))
+    assert told("next", cell)["proposals"]
+
+
+def test_who_holds_a_campaign_is_named(cell):
+    campaign = Campaign(cell)
+    with campaign.holding():
+        campaign.next()  # the holder itself need not wait
+        with (
+            pytest.raises(InputError, match=rf"process {os.getpid()} of"),
+            Journal(cell / "log.jsonl").writing(wait_s=0.05),
+        ):
+            pass
+    assert not (cell / "log.holder").exists()
+    assert Campaign(cell).next()

@@ -1,0 +1,81 @@
+"""NARGP as published: its likelihood, its integral over the level below, and what it can bend."""
+
+import numpy as np
+from scipy.stats import multivariate_normal
+
+from planner.studies.models.fidelity_levels import Exact, Samples
+from planner.studies.models.likelihood_gp import Normalisation, fit_likelihood
+from planner.studies.models.nargp import fit_low, fit_nargp
+from planner.surrogate.kernels import parse
+
+
+def samples(n, seed=0):
+    x = np.random.default_rng(seed).random((n, 2))
+    return Samples.of(x, np.sin(5 * x[:, 0]) + x[:, 1] ** 2 + 7.0)
+
+
+def test_the_likelihood_is_that_of_one_normal_distribution():
+    s = samples(9)
+    fitted = fit_likelihood(s, "rbf", starts=1)
+    k = fitted.units.scale**2 * parse("rbf", 2).covariance(np, fitted.theta, s.x, s.x)
+    k += np.exp(2 * fitted.theta[1]) * fitted.units.scale**2 * np.eye(9)
+    mean = np.full(9, fitted.units.centre)
+    direct = multivariate_normal(mean, k, allow_singular=True).logpdf(s.y)
+    np.testing.assert_allclose(fitted.log_likelihood, direct, rtol=1e-4)
+
+
+def test_no_neighbour_of_the_hyperparameters_is_likelier():
+    s = samples(12)
+    fitted = fit_likelihood(s, "rbf", noise=0.1)
+    y = (s.y - fitted.units.centre) / fitted.units.scale
+
+    def value(theta):
+        k = parse("rbf", 2).covariance(np, theta, s.x, s.x) + 0.01 * np.eye(12)
+        return multivariate_normal(np.zeros(12), k).logpdf(y)
+
+    best = value(fitted.theta)
+    for i in (0, 2, 3):
+        for step in (-0.05, 0.05):
+            assert value(fitted.theta + step * (np.arange(4) == i)) < best
+
+
+def test_the_level_below_is_integrated_over():
+    """By quadrature as by a great many samples of it."""
+
+    class Unsure(Exact):
+        def predict(self, x):
+            return self.function(x), np.full(len(x), 0.2)
+
+    rng = np.random.default_rng(0)
+    x = rng.random((12, 1))
+    low = Unsure(lambda x: np.sin(6 * x[:, 0]))
+    model = fit_nargp(Samples.of(x, np.sin(6 * x[:, 0]) ** 2 + x[:, 0]), low, Normalisation(0, 1))
+    at = np.linspace(0.1, 0.9, 5)[:, None]
+    mean, sd = model.predict(at)
+    draws = low.function(at)[:, None] + 0.2 * rng.standard_normal((5, 40_000))
+    wide = np.column_stack([np.repeat(at, 40_000, axis=0), draws.reshape(-1)])
+    each, spread = (part.reshape(5, -1) for part in model.high.predict(wide))
+    np.testing.assert_allclose(mean, each.mean(axis=1), atol=0.01)
+    total = np.sqrt(np.mean(spread**2, axis=1) + np.var(each, axis=1))
+    np.testing.assert_allclose(sd, total, rtol=0.02)
+
+
+def test_it_bends_where_a_line_cannot():
+    """Perdikaris et al. 2017, section 3.1: y = (x − √2) l²."""
+
+    def wave(x):
+        return np.sin(8 * np.pi * x[:, 0])
+
+    def bent(x):
+        return (x[:, 0] - 2**0.5) * wave(x) ** 2
+
+    cheap, x = np.linspace(0, 1, 50)[:, None], np.linspace(0, 1, 14)[:, None]
+    low = fit_low(Samples.of(cheap, wave(cheap)), 1e-3)
+    model = fit_nargp(Samples.of(x, bent(x)), low, low.units, noise=1e-3)
+    grid = np.linspace(0, 1, 101)[:, None]
+    mean, sd = model.predict(grid)
+    alone = fit_likelihood(Samples.of(x, bent(x)), noise=1e-3).predict(grid)[0]
+    off = np.sqrt(np.mean((mean - bent(grid)) ** 2))
+    assert off < 0.1 * np.sqrt(np.mean((alone - bent(grid)) ** 2))
+    assert off < 0.03
+    assert np.all(sd >= 0)

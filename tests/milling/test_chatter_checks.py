@@ -1,0 +1,114 @@
+"""Lobes beside what knows nothing of them: steps in time, closed form, other discretisations."""
+
+import numpy as np
+import pytest
+
+from planner.milling.cut import Cut
+from planner.milling.cutter_modes import CutterModes
+from planner.milling.lobes import losses
+from planner.milling.machine import Machine
+from planner.milling.point import multiplier
+from planner.milling.time_domain import simulate
+from tests.support.milling_cases import cut, machine, one_mode, two_each_way, two_equal
+
+BAND = 0.03  # about the limit, within which a simulation of finite length need not tell
+WANTED = [
+    (one_mode(), cut()),
+    (one_mode(), cut(milling="up", radial_immersion=0.05)),
+    (two_each_way(), cut(milling="down", radial_immersion=0.5, teeth=3)),
+    (two_equal(), cut(milling="down", radial_immersion=0.3, teeth=4)),
+]
+
+
+def agreement(modes: CutterModes, given: Cut, points: int, seed: int) -> np.ndarray:
+    """Of random points outside the band: whether time and lobes say the same."""
+    asked = machine(modes, given)
+    random = np.random.default_rng(seed)
+    rpm = random.uniform(8000, 20000, points)
+    depth = asked.floor().floor_m * random.uniform(0.5, 3, points)
+
+    def stable(factor: float) -> np.ndarray:
+        found = [multiplier(asked, s, factor * b).size for s, b in zip(rpm, depth, strict=True)]
+        return np.array(found) < 1
+
+    clear = stable(1 - BAND) == stable(1 + BAND)
+    said = stable(1.0)
+    return (simulate(modes, given, rpm, depth, 150).stable == said)[clear]
+
+
+@pytest.mark.parametrize("case", [0, 2])
+def test_steps_in_time_say_the_same(case: int):
+    assert np.mean(agreement(*WANTED[case], points=8, seed=3)) == 1
+
+
+@pytest.mark.slow
+def test_steps_in_time_say_the_same_at_many_points():
+    found = np.concatenate([agreement(*case, points=60, seed=5) for case in WANTED])
+    print(f"{np.sum(found)} of {len(found)} points alike")
+    assert len(found) >= 200
+    assert np.mean(found) >= 0.99
+
+
+def test_one_degree_of_freedom_in_closed_form():
+    """The floor is −1/(2 K_s Re G) at its least, K_s the mean coefficient along the mode."""
+    found = machine(one_mode(), cut()).floor()
+    hertz = np.linspace(900, 960, 200_001)
+    real = one_mode().receptance(hertz)[:, 0, 0].real.min()
+    k_s = 2e8 / 2  # a slot's mean of sin φ (K_t cos φ + K_r sin φ) with two teeth
+    assert found.floor_m == pytest.approx(-1 / (2 * k_s * real), rel=5e-3)
+
+
+def test_isotropic_modes_give_equal_limits_up_and_down():
+    depths = []
+    for milling in ("up", "down"):
+        given = cut(milling=milling, radial_immersion=0.3, spindle_rpm=(6000.0, 18000.0, 5))
+        depths.append([loss.depth_m for loss in losses(machine(two_equal(), given))])
+    np.testing.assert_allclose(depths[0], depths[1], rtol=1e-5)
+
+
+@pytest.mark.parametrize("helix_deg", [0.0, 30.0])
+def test_semi_discretisation_agrees(helix_deg: float):
+    given = {
+        "teeth": 3, "milling": "up", "radial_immersion": 0.3, "helix_deg": helix_deg,
+        "depth_m": (0.0, 0.02, 10), "spindle_rpm": (20000.0, 20000.0, 1),
+    }  # fmt: skip
+    full = losses(machine(two_each_way(), cut(**given)))
+    semi = losses(machine(two_each_way(), cut(**given, method="semi_discretisation")))
+    for a, b in zip(full, semi, strict=True):
+        assert a.depth_m == pytest.approx(b.depth_m, rel=1e-3)
+        assert a.kind == b.kind
+
+
+def test_pitches_that_hardly_differ_change_nothing_and_others_do():
+    def depth(pitch_deg: list[float] | None) -> float:
+        given = cut(
+            teeth=3, milling="up", radial_immersion=0.3, pitch_deg=pitch_deg,
+            depth_m=(0.0, 0.02, 10), spindle_rpm=(20000.0, 20000.0, 1),
+        )  # fmt: skip
+        return losses(machine(two_each_way(), given))[0].depth_m
+
+    even = depth(None)
+    assert depth([120.00001, 119.99999, 120.0]) == pytest.approx(even, rel=1e-5)
+    assert abs(depth([100.0, 130.0, 130.0]) / even - 1) > 0.05
+
+
+def test_the_cut_turned_with_its_frame_stays_as_it_is():
+    """Feed and axis turned with the modes: only what they are to each other matters."""
+    random = np.random.default_rng(2)
+    turn = np.linalg.qr(random.standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    modes = two_each_way()
+    flat = np.zeros((4, 3), complex), np.zeros((4, 3), complex)
+    flat[0][:, :2], flat[1][:, :2] = modes.shapes, modes.drives
+    whole = CutterModes(modes.poles, flat[0] @ turn.T, flat[1] @ turn.T, np.zeros((3, 3)))
+    given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (9000.0, 9000.0, 1)}
+    turned = cut(**given, feed=tuple(turn[:, 0]), axis=tuple(turn[:, 2]))
+    found = Machine(whole.in_plane(turned.plane), turned, machine(modes, turned).coefficients)
+    straight = losses(machine(modes, cut(**given)))[0]
+    assert losses(found)[0].depth_m == pytest.approx(straight.depth_m, rel=1e-6)
+
+
+def test_no_depth_is_as_stable_as_the_structure():
+    at_rest = multiplier(machine(one_mode(), cut()), 5000.0, 0.0)
+    pole = one_mode().poles[0]
+    assert at_rest.size == pytest.approx(np.exp(pole.real * 60 / (2 * 5000)), rel=1e-9)

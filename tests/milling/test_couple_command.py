@@ -1,0 +1,165 @@
+"""`planner couple` from the shipped example, from files, and with input that makes no sense."""
+
+import io
+import json
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyuff
+
+from planner.cli.run import run
+from planner.milling.tip_files import read_tip
+
+LEI = Path(__file__).parents[2] / "campaigns" / "irb6660_lei2023"
+PAIR = ["--tool", f"{LEI}/target.toml", "--reference", f"{LEI}/reference.toml"]
+
+
+def answered(*arguments):
+    """Exit code, and the answer or what was said on stderr."""
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = run(["couple", *map(str, arguments), "--json"])
+    return code, json.loads(out.getvalue()) if out.getvalue() else err.getvalue().strip()
+
+
+@pytest.fixture(scope="module")
+def coupled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lei")
+    code, answer = answered(
+        LEI / "modes.toml", *PAIR, "--noise", 1, "--out", folder / "new.npz", "--plot", folder
+    )
+    assert code == 0
+    return answer
+
+
+def test_the_shipped_example(coupled):
+    """With that tool the paper heard chatter at 916 and 935 Hz; the rod peaks below 900 Hz."""
+    high = [p for p in coupled["resonances"] if p["frequency_hz"] > 500]
+    assert {p["direction"] for p in high} == {"x", "y"}
+    assert all(880 < p["frequency_hz"] < 940 for p in high)
+    assert max(p["frequency_hz"] for p in high) > 900
+    assert coupled["motions"] == ["x", "y", "rx", "ry"]
+    assert any("z" in remark for remark in coupled["remarks"])
+    assert 1 < coupled["amplification"]["worst"] < 10
+    assert Path(coupled["plots"][0]).stat().st_size > 10_000
+
+
+def test_the_npz_is_laid_out_as_predicts(coupled):
+    with np.load(coupled["npz"]) as stored:
+        lines = stored["frequency_hz"]
+        assert stored["frf_mean"].shape == stored["frf_sd"].shape == (1, 3, 3, len(lines))
+        assert np.iscomplexobj(stored["frf_mean"])
+        assert stored["amplification"].shape == lines.shape
+        peak = coupled["resonances"][0]
+        at = np.argmin(np.abs(lines - peak["frequency_hz"]))
+        size = np.abs(stored["frf_mean"][0, 0, 0, at]) / (2 * np.pi * lines[at]) ** 2
+        assert size == pytest.approx(peak["receptance_m_n"])
+
+
+def test_what_was_coupled_can_be_coupled_again(coupled, tmp_path):
+    """Back to the rod: its own modes come out."""
+    back = ["--tool", LEI / "reference.toml", "--reference", LEI / "target.toml"]
+    code, _ = answered(coupled["npz"], *back, "--out", tmp_path / "back.npz")
+    assert code == 0
+    tip = read_tip(LEI / "modes.toml", None, None, 0.0)
+    with np.load(tmp_path / "back.npz") as stored:
+        found = stored["frf_mean"][0, :2, :2] / (2j * np.pi * stored["frequency_hz"]) ** 2
+    assert found == pytest.approx(np.moveaxis(tip.receptance[:, :2, :2], 0, -1), rel=1e-6)
+
+
+def exported(path, tip, nodes, directions=(1, 2)):
+    """Two points of the rod as an analyser exports them: accelerance between all directions."""
+    uff, f = pyuff.UFF(str(path)), tip.frequency_hz
+    c = tip.receptance
+    turn = {1: np.array([1, 0, 0, 1.0]), 2: np.array([0, 1, -1.0, 0])}
+    places = {}
+    for node, distance in nodes:
+        for d in directions:
+            here = turn[d] * np.array([1, 1, -distance, -distance])
+            places[node, d] = here
+    for (node, i), response in places.items():
+        for (hit, j), force in places.items():
+            h = np.einsum("a,fab,b->f", response, c, force) * (2j * np.pi * f) ** 2
+            entry = {
+                "type": 58, "binary": 0, "func_type": 4, "id1": "SIMULATED", "rsp_node": node,
+                "rsp_dir": i, "ref_node": hit, "ref_dir": j, "data": h, "x": f,
+                "abscissa_spacing": 1, "abscissa_min": f[0], "abscissa_inc": f[1] - f[0],
+                "abscissa_spec_data_type": 18, "ordinate_spec_data_type": 12,
+                "ordinate_axis_units_lab": "m/s^2", "orddenom_spec_data_type": 13,
+                "orddenom_axis_units_lab": "N",
+            }  # fmt: skip
+            uff.write_sets(entry, "add")
+
+
+def rod(path, **changes):
+    points = "\n[[point]]\nnode = 1\nfrom_tip_m = 0.0\n[[point]]\nnode = 5\nfrom_tip_m = 0.02\n"
+    file = path / "rod.toml"
+    file.write_text((LEI / "reference.toml").read_text() + points)
+    return file
+
+
+@pytest.fixture(scope="module")
+def few():
+    from planner.report.coupling_source import within
+
+    tip = read_tip(LEI / "modes.toml", None, None, 0.0)
+    return within(tip, (800.0, 1000.0), LEI)
+
+
+def test_two_points_of_a_universal_file(few, tmp_path):
+    """Points that move rigidly: but for the rod's own bending of 0.02 m, the modes' answer."""
+    exported(tmp_path / "frfs.uff", few, ((1, 0.0), (5, 0.02)))
+    tools = ["--tool", LEI / "target.toml", "--reference", rod(tmp_path)]
+    code, answer = answered(tmp_path / "frfs.uff", *tools, "--out", tmp_path / "a.npz")
+    assert code == 0
+    code, other = answered(
+        LEI / "modes.toml", *PAIR, "--band-hz", 800, 1000, "--out", tmp_path / "b.npz"
+    )
+    assert code == 0
+    for one, two in zip(answer["resonances"], other["resonances"], strict=True):
+        assert one["frequency_hz"] == pytest.approx(two["frequency_hz"], rel=0.005)
+
+
+def test_a_missing_point_is_named(few, tmp_path):
+    exported(tmp_path / "one.uff", few, ((1, 0.0),))
+    tools = ["--tool", LEI / "target.toml", "--reference", rod(tmp_path)]
+    code, said = answered(tmp_path / "one.uff", *tools, "--out", tmp_path / "a.npz")
+    assert code == 2
+    assert "node 5" in said
+    assert "no rotations" in said
+
+
+def test_motions_alone_are_refused_with_what_to_measure(coupled, tmp_path):
+    with np.load(coupled["npz"]) as stored:
+        keys = ("frequency_hz", "frf_mean", "frf_sd", "pose")
+        alone = {name: stored[name] for name in keys}
+    np.savez(tmp_path / "lacking.npz", **alone)
+    code, said = answered(tmp_path / "lacking.npz", *PAIR, "--out", tmp_path / "a.npz")
+    assert code == 2
+    assert "measure what lacks" in said
+    for name in ("frf_mean", "frf_sd"):
+        alone[name] = np.nan_to_num(alone[name])
+    np.savez(tmp_path / "alone.npz", **alone)
+    code, said = answered(tmp_path / "alone.npz", *PAIR, "--out", tmp_path / "a.npz")
+    assert code == 2
+    assert "two points" in said
+    assert "--robot" in said
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "words"),
+    [
+        ("modes.toml", ["--band-hz", "800", "5000"], "covers 5 to 1200 Hz"),
+        ("modes.toml", ["--band-hz", "900", "800"], "measure"),
+        ("nothing.npz", [], "does not exist"),
+        ("reference.toml", [], "modes"),
+        ("NOTES.md", [], "format"),
+    ],
+)
+def test_input_that_makes_no_sense(tmp_path, source, more, words):
+    code, said = answered(LEI / source, *PAIR, *more, "--out", tmp_path / "a.npz")
+    assert code == 2
+    assert words in said
+    assert "\n" not in said

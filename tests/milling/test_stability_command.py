@@ -1,0 +1,155 @@
+"""`planner stability` as a user gives it: the answer's JSON, and one sentence for what is wrong."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.cli.run import run
+
+MODES = """
+[[mode]]
+frequency_hz = 922.0
+damping_ratio = 0.011
+mass_kg = 0.03993
+direction = [1.0, 0.0, 0.0]
+"""
+CUT = """
+teeth = 2
+diameter_m = 0.02
+milling = "slot"
+radial_immersion = 1.0
+kt_n_m2 = 6.0e8
+kr_n_m2 = 2.0e8
+feed = [1.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+spindle_rpm = [10000, 20000, 2]
+depth_m = [0.0, 0.01, 400]
+method = "full_discretisation"
+"""
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    modes, cut = tmp_path / "modes.toml", tmp_path / "cut.toml"
+    modes.write_text(MODES)
+    cut.write_text(CUT)
+    return modes, cut
+
+
+def test_answer_is_one_json_document(files, capsys):
+    modes, cut = files
+    assert run(["stability", str(modes), "--cut", str(cut), "--json", "--point", "5000,0.001"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["spindle_rpm"] == [10000, 20000]
+    assert said["depth_limit_m"] == pytest.approx([3.224e-4, 1.4175e-3], rel=1e-3)
+    assert said["kind"] == ["hopf", "flip"]
+    assert said["depth_limit_m_at_95"] == said["depth_limit_m"]
+    assert said["chatter_hz"] == pytest.approx([930.3, 1000.0], abs=0.1)
+    assert said["multiplier"] == pytest.approx(1.406474, abs=1e-6)
+
+
+def test_stable_up_to_the_largest_depth_is_null(files, capsys):
+    modes, cut = files
+    cut.write_text(CUT.replace("[0.0, 0.01, 400]", "[0.0, 1e-4, 10]"))
+    assert run(["stability", str(modes), "--cut", str(cut), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["depth_limit_m"] == [None, None]
+    assert said["kind"] == [None, None]
+
+
+def test_frfs_of_predict_and_the_picture(files, tmp_path, capsys):
+    from tests.support.milling_cases import two_each_way
+
+    _, cut = files
+    lines = np.arange(200.0, 2400.0, 2.0)
+    h = np.zeros((2, 3, 3, len(lines)), complex)
+    h[:, :2, :2] = two_each_way().receptance(lines).transpose(1, 2, 0)
+    h *= (2j * np.pi * lines) ** 2
+    npz = tmp_path / "frfs.npz"
+    np.savez(npz, frequency_hz=lines, frf_mean=h, frf_sd=0.02 * abs(h), pose=np.array(["A", "B"]))
+    command = ["stability", str(npz), "--cut", str(cut), "--json"]
+    assert run(command) == 2
+    assert "--pose" in capsys.readouterr().err
+    asked = ["--pose", "B", "--samples", "20", "--plot", str(tmp_path / "pictures")]
+    assert run([*command, *asked]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert all(
+        a < b for a, b in zip(said["depth_limit_m_at_95"], said["depth_limit_m"], strict=True)
+    )
+    assert (tmp_path / "pictures" / "stability.png").stat().st_size > 10_000
+
+
+WRONG_CUTS = {
+    "no teeth": ("teeth = 2", "teeth = 0"),
+    "half a tooth": ("teeth = 2", "teeth = 1.5"),
+    "negative depth": ("[0.0, 0.01, 400]", "[-0.001, 0.01, 400]"),
+    "depths that fall": ("[0.0, 0.01, 400]", "[0.02, 0.01, 400]"),
+    "depth in mm": ("[0.0, 0.01, 400]", "[0.0, 10.0, 400]"),
+    "no depth": ("[0.0, 0.01, 400]", "[0.0, 0.0, 400]"),
+    "a misspelt key": ("kt_n_m2", "kt_n_mm2"),
+    "a missing unit": ("diameter_m =", "diameter ="),
+    "coefficient in N/mm2": ("kt_n_m2 = 6.0e8", "kt_n_m2 = 600"),
+    "no speed": ("[10000, 20000, 2]", "[0, 20000, 2]"),
+    "one speed of two": ("[10000, 20000, 2]", "[10000, 20000, 1]"),
+    "feed along the axis": ("feed = [1.0, 0.0, 0.0]", "feed = [0.0, 0.0, 1.0]"),
+    "feed of no length": ("feed = [1.0, 0.0, 0.0]", "feed = [0.0, 0.0, 0.0]"),
+    "another sort of milling": ('"slot"', '"sideways"'),
+    "a narrow slot": ("radial_immersion = 1.0", "radial_immersion = 0.5"),
+    "not a number": ("kr_n_m2 = 2.0e8", "kr_n_m2 = nan"),
+    "another method": ('"full_discretisation"', '"fast"'),
+    "pitches that do not close": ("teeth = 2", "teeth = 2\npitch_deg = [100.0, 200.0]"),
+    "no TOML": ("teeth = 2", "teeth 2"),
+}
+WRONG_MODES = {
+    "no mode": (MODES, ""),
+    "zero damping": ("0.011", "0.0"),
+    "damping in percent": ("0.011", "1.1"),
+    "negative mass": ("0.03993", "-1.0"),
+    "direction too long": ("[1.0, 0.0, 0.0]", "[1.0, 1.0, 0.0]"),
+    "across the cut": ("[1.0, 0.0, 0.0]", "[0.0, 0.0, 1.0]"),
+    "a misspelt key": ("mass_kg", "mass"),
+}
+
+
+def refused(arguments: list[str], capsys) -> None:
+    assert run(arguments) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    lines = told.err.strip().splitlines()
+    assert len(lines) == 1
+    assert "failed inside" not in lines[0]
+
+
+@pytest.mark.parametrize("what", WRONG_CUTS)
+def test_wrong_cuts_are_refused_in_a_sentence(files, capsys, what: str):
+    modes, cut = files
+    assert WRONG_CUTS[what][0] in CUT
+    cut.write_text(CUT.replace(*WRONG_CUTS[what]))
+    refused(["stability", str(modes), "--cut", str(cut), "--json"], capsys)
+
+
+@pytest.mark.parametrize("what", WRONG_MODES)
+def test_wrong_modes_are_refused_in_a_sentence(files, capsys, what: str):
+    modes, cut = files
+    assert WRONG_MODES[what][0] in MODES
+    modes.write_text(MODES.replace(*WRONG_MODES[what]))
+    refused(["stability", str(modes), "--cut", str(cut), "--json"], capsys)
+
+
+@pytest.mark.parametrize(
+    "point", ["5000", "5000,-0.001", "0,0.001", "a,b", "5000,0.001,1", "nan,nan"]
+)
+def test_wrong_points_are_refused_in_a_sentence(files, capsys, point: str):
+    modes, cut = files
+    refused(["stability", str(modes), "--cut", str(cut), "--point", point], capsys)
+
+
+@pytest.mark.parametrize("name", ["missing.npz", "missing.toml", "junk.npz", "junk.uff"])
+def test_wrong_sources_are_refused_in_a_sentence(files, capsys, name: str):
+    _, cut = files
+    source = cut.parent / name
+    if name.startswith("junk"):
+        source.write_bytes(bytes(range(256)) * 8)
+    refused(["stability", str(source), "--cut", str(cut)], capsys)

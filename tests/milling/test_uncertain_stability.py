@@ -1,0 +1,145 @@
+"""FRFs instead of modes, and what is not known: fits, samples, robust depths."""
+
+import numpy as np
+import pytest
+
+from planner.errors import InputError
+from planner.frf.quantities import convert
+from planner.milling.cutter_frf import CutterFrf, of_accelerance
+from planner.milling.cutter_modes import CutterModes
+from planner.milling.lobes import losses
+from planner.milling.spread import ModeSpread, explaining, sampled
+from planner.milling.structure import Structure, of_frf
+from planner.milling.uncertainty import sampled_limits
+from planner.modal.rational_fit import rational_fit
+from tests.support.milling_cases import cut, machine, one_mode, two_each_way
+
+LINES = np.arange(200.0, 2400.0, 2.0)
+
+
+def tip(modes: CutterModes, lines: np.ndarray = LINES, sd: float | None = None) -> CutterFrf:
+    """FRFs as `predict` writes them, of modes in the plane x, y; z is not known."""
+    h = np.full((3, 3, len(lines)), np.nan + 0j)
+    h[:2, :2] = modes.receptance(lines).transpose(1, 2, 0)
+    accelerance = convert(lines, h, "receptance", "accelerance")
+    return of_accelerance("tip", lines, accelerance, None if sd is None else sd * abs(accelerance))
+
+
+def crossed() -> CutterModes:
+    """Modes whose cross FRFs differ, H_xy ≠ H_yx, with the compliance of modes above."""
+    modes = two_each_way()
+    random = np.random.default_rng(1)
+    drives = modes.drives @ np.array([[1.0, 0.2], [-0.1, 1.0]])
+    shapes = modes.shapes + 0.1 * random.standard_normal((4, 2))
+    return CutterModes(modes.poles, shapes, drives, 5e-9 * np.array([[1.0, 0.2], [0.1, 0.8]]))
+
+
+def test_rational_fit_finds_poles_residues_and_rest():
+    modes = crossed()
+    h = modes.receptance(LINES).transpose(1, 2, 0)
+    fit = rational_fit(LINES, h)
+    np.testing.assert_allclose(np.sort_complex(fit.poles), np.sort_complex(modes.poles), rtol=1e-6)
+    np.testing.assert_allclose(fit.rest, modes.residual, rtol=1e-5)
+    np.testing.assert_allclose(fit.response(LINES), h, rtol=1e-6, atol=1e-15)
+    assert fit.error < 1e-6
+
+
+def test_rational_fit_of_noisy_frfs_is_as_good_as_their_noise():
+    random = np.random.default_rng(4)
+    h = two_each_way().receptance(LINES).transpose(1, 2, 0)
+    size = 0.01 * np.linalg.norm(h, axis=(0, 1)) / 2 / np.sqrt(2)
+    noise = random.standard_normal((2, *h.shape)) * size
+    fit = rational_fit(LINES, h + noise[0] + 1j * noise[1])
+    strong = np.array([456.78, 1448.89, 516.52, 1408.45])
+    nearest = [np.min(np.abs(np.abs(fit.poles) / (2 * np.pi) / f - 1)) for f in strong]
+    assert np.max(nearest) < 2e-3
+    assert fit.error < 0.011
+
+
+@pytest.mark.parametrize("method", ["full_discretisation", "zeroth_order", "semi_discretisation"])
+def test_frfs_give_the_limits_of_their_modes(method: str):
+    given = cut(
+        milling="down", radial_immersion=0.5, spindle_rpm=(5000.0, 15000.0, 5), method=method,
+        depth_m=(0.0, 0.05, 10),
+    )  # fmt: skip
+    found = losses(of_frf(tip(crossed()), given).machine(given))
+    wanted = losses(machine(crossed(), given))
+    np.testing.assert_allclose(
+        [loss.depth_m for loss in found], [loss.depth_m for loss in wanted], rtol=2e-3
+    )
+
+
+def test_methods_agree_on_cross_frfs_and_residual_compliance():
+    given = {"milling": "down", "radial_immersion": 0.5, "spindle_rpm": (12000.0, 15000.0, 2)}
+    soft = crossed()
+    soft = CutterModes(soft.poles, soft.shapes, soft.drives, 20 * soft.residual)
+    full = losses(machine(soft, cut(**given)))
+    semi = losses(machine(soft, cut(**given, method="semi_discretisation")))
+    without = losses(machine(CutterModes(soft.poles, soft.shapes, soft.drives, 0 * soft.residual),
+                             cut(**given)))  # fmt: skip
+    for a, b, c in zip(full, semi, without, strict=True):
+        assert a.depth_m == pytest.approx(b.depth_m, rel=2e-3)
+        assert abs(a.depth_m / c.depth_m - 1) > 0.01
+
+
+def test_frfs_that_end_before_the_chatter_are_refused():
+    with pytest.raises(InputError, match="measure over the band"):
+        of_frf(tip(one_mode(), np.arange(100.0, 700.0, 2.0)), cut())
+
+
+def test_frfs_that_lack_an_axis_of_the_cut_are_refused():
+    given = cut(feed=(0.0, 0.0, 1.0), axis=(1.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="lacks FRFs along z"):
+        of_frf(tip(two_each_way()), given)
+
+
+def test_spread_of_modes_explains_the_sd_that_it_makes():
+    modes = two_each_way()
+    spread = ModeSpread(*(np.array(sds) for sds in (
+        [0.002, 0.004, 0.001, 0.003], [0.05, 0.02, 0.04, 0.03], [0.03, 0.02, 0.01, 0.05],
+    )))  # fmt: skip
+    k = machine(modes, cut()).coefficients
+    samples = sampled(modes, spread, k, (0.0, 0.0), 400, seed=1)
+    h = np.array([m.receptance(LINES) for m, _ in samples]).transpose(0, 2, 3, 1)
+    off = np.sqrt(np.mean(np.abs(h - h.mean(axis=0)) ** 2, axis=0))
+    plane = tip(modes).in_plane(cut())
+    frf = type(plane)(plane.name, LINES, plane.receptance, off)
+    found, given = explaining(modes, frf)
+    np.testing.assert_allclose(found.frequency, spread.frequency, atol=4e-4)
+    assert 0.9 < given < 1.1
+
+
+def test_what_is_known_exactly_has_one_limit():
+    given = cut()
+    structure = Structure(one_mode(), ModeSpread.of(np.zeros(4)))
+    assert structure.samples(given) == []
+
+
+def test_robust_depth_is_that_of_the_coefficients_alone():
+    """Limits go with 1/K where both coefficients err together: the quantile is known."""
+    given = cut(spindle_rpm=(9000.0, 12000.0, 3), kt_sd_percent=10.0)
+    structure = Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, 0.0, 0.1])))
+    exact = cut(spindle_rpm=(9000.0, 12000.0, 3))
+    found = losses(structure.machine(exact))
+    drawn = sampled_limits(structure.samples(exact, 60), found)
+    depth = np.array([loss.depth_m for loss in found])
+    np.testing.assert_allclose(drawn.robust(), depth * np.exp(-1.645 * 0.1), rtol=0.03)
+    assert np.all(drawn.robust_sd() < 0.05)
+    both = sampled_limits(structure.samples(given, 40), found)
+    assert np.all(both.robust() < depth)
+    assert np.all(np.diag(both.probability(depth * 0.5)) > 0.98)
+    assert np.all(np.diag(both.probability(depth * 2)) < 0.1)
+
+
+def test_samples_between_speeds_follow_what_is_expected(monkeypatch):
+    """Looked at at a few speeds only, robust depths keep the dips of the limit between them."""
+    from planner.milling import uncertainty
+
+    monkeypatch.setattr(uncertainty, "MOST_SPEEDS", 4)
+    given = cut(spindle_rpm=(9300.0, 10700.0, 10))
+    structure = Structure(one_mode(), ModeSpread.of(np.array([0.0, 0.0, 0.0, 0.1])))
+    found = losses(structure.machine(given))
+    drawn = sampled_limits(structure.samples(given, 20), found)
+    depth = np.array([loss.depth_m for loss in found])
+    share = drawn.robust() / depth
+    np.testing.assert_allclose(share, share[0], rtol=0.01)

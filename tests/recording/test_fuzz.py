@@ -1,0 +1,152 @@
+"""Mutations of valid files through the readers: refused in words or read, never a crash or hang."""
+
+import gzip
+import resource
+import shutil
+import signal
+import warnings
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.campaign.config import load_campaign_config
+from planner.campaign.journal import Journal
+from planner.dataset.screened_files import Source, read_files
+from planner.errors import PlannerError, RefusedError
+from planner.frf.exported import from_records
+from planner.recording.folder import read_poses, read_recordings
+from planner.robot.robot import Robot
+from planner.truth.hits import Hammer, SimulatedHit, write_uff
+from tests.support.bad_input import columns, write_csv, write_h5, write_mat, write_tdms
+from tests.support.outside import call, make_cell
+from tests.support.simulated_hits import RATE_HZ, make_hit
+
+LONGEST_S, LARGEST_GIB = 10, 2
+BAND = (4.0, 60.0)
+EXTREMES = (b"nan", b"inf", b"-1", b"0", b"1e308", b"-1e-300", b"99999999999999999999", b"", b"x",
+            b"2147483648", b"-inf", b"1" * 400)  # fmt: skip
+
+
+def mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """One to three changes: bytes, cuts, copies, runs, numbers of a text."""
+    made = bytearray(data)
+    for _ in range(int(rng.choice([1, 1, 1, 2, 3]))):
+        at = int(rng.integers(len(made) or 1))
+        span = int(rng.integers(1, 1 + min(64, max(1, len(made)))))
+        kind = rng.integers(8)
+        if kind == 0:
+            for place in rng.integers(len(made) or 1, size=int(rng.integers(1, 4))):
+                if made:
+                    made[place] ^= 1 << int(rng.integers(8))
+        elif kind == 1:
+            del made[at:]
+        elif kind == 2:
+            made[at:at] = made[at : at + 40 * span]
+        elif kind == 3:
+            made[at : at + span] = rng.bytes(span)
+        elif kind == 4:
+            made[at : at + span] = bytes([int(rng.choice([0, 32, 255, 10, 34]))]) * span
+        elif kind == 5:
+            made[at:at] = bytes([int(rng.choice([32, 40, 44, 49, 9]))]) * int(rng.integers(20_000))
+        elif kind == 6:
+            del made[at : at + span]
+        else:
+            numbers = [k for k in range(min(len(made), 4000)) if 48 <= made[k] <= 57]
+            if numbers:
+                place = int(rng.choice(numbers))
+                made[place : place + 1] = EXTREMES[int(rng.integers(len(EXTREMES)))]
+    return bytes(made)
+
+
+def judge(path: Path) -> None:
+    """What an import does with a file until it is an FRF; raises what it was refused for."""
+    files = read_files((Source(path, path.name),), BAND)
+    if files.records:
+        from_records(files.records)
+    if not files.verdicts[0].accepted:
+        raise RefusedError(files.verdicts[0].reason)
+
+
+def subjects(folder: Path) -> list[tuple[Path, Callable[[Path], object]]]:
+    """Valid files, and what reads them."""
+    hit = make_hit(np.random.default_rng(0), record_s=1.0)
+    table = columns(SimulatedHit("+x", hit.force_n, hit.acceleration_m_s2))
+    table["time_s"] = np.arange(hit.force_n.size) / RATE_HZ
+    hammer = Hammer(sampling_rate_hz=RATE_HZ)
+    write_uff(folder / "hit.uff", SimulatedHit("+x", hit.force_n, hit.acceleration_m_s2), hammer)
+    for write in (write_csv, write_h5, write_mat, write_tdms):
+        write(folder / f"hit.{write.__name__.removeprefix('write_')}", table)
+    (folder / "hit.csv.gz").write_bytes(gzip.compress((folder / "hit.csv").read_bytes()))
+    lines = np.linspace(0.0, 100.0, 100)
+    frfs = {"frequency_hz": lines, **{f"accelerance_{a}x": lines + 1j for a in "xyz"}}
+    write_mat(folder / "frf.mat", frfs)
+    recordings = [folder / f"hit.{s}" for s in ("uff", "csv", "h5", "mat", "tdms", "csv.gz")]
+    read = [(path, judge) for path in (*recordings, folder / "frf.mat")]
+    robot, plan, _ = make_cell(folder)
+    assert call("new", folder / "cell", "--robot", robot, "--campaign", plan)[0] == 0
+    names = Robot.load(robot).joint_names
+    header = ",".join(f"{name}_deg" for name in names)
+    angles = ",".join(["1.5"] * len(names))
+    (folder / "recordings.csv").write_text(
+        f"pose,{header},hit,repeat,file\nP1,{angles},+x,1,hit.uff\n"
+    )
+    (folder / "poses.csv").write_text(f"pose,{header}\nP1,{angles}\nP2,{angles}\n")
+    return [
+        *read,
+        (folder / "recordings.csv", lambda path: read_recordings(path.parent, names)),
+        (folder / "poses.csv", lambda path: read_poses(path, names)),
+        (robot, Robot.load),
+        (robot.parent / "arm.urdf", lambda path: Robot.load(path.with_name("robot.toml"))),
+        (plan, load_campaign_config),
+        (folder / "cell" / "log.jsonl", Journal),
+    ]
+
+
+def late(*_: object) -> None:
+    raise TimeoutError
+
+
+def fuzzed(folder: Path, count: int, seed: int) -> tuple[Counter[str], list[str]]:
+    """Outcomes by file, and what no reader may do."""
+    rng = np.random.default_rng(seed)
+    each = subjects(folder)
+    seen, wrong = Counter[str](), []
+    before = signal.signal(signal.SIGALRM, late)
+    try:
+        for number in range(count):
+            good, read = each[number % len(each)]
+            kept = good.read_bytes()
+            good.write_bytes(mutated(kept, rng))
+            signal.alarm(LONGEST_S)
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    read(good)
+                seen[f"{good.name} read"] += 1
+            except PlannerError as error:
+                seen[f"{good.name} refused"] += 1
+                if not str(error).strip().endswith((".", "]", "ROBOT_TOML")):
+                    wrong.append(f"{number} {good.name}: no sentence: {error}")
+            except Exception as error:
+                wrong.append(f"{number} {good.name}: {type(error).__name__}: {error}")
+                shutil.copy(good, folder / f"wrong-{number}-{good.name}")
+            finally:
+                signal.alarm(0)
+                good.write_bytes(kept)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    return seen, wrong
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_2000_mutated_files(tmp_path):
+    seen, wrong = fuzzed(tmp_path, 2000, seed=1)
+    print("\n" + "\n".join(f"{what}: {n}" for what, n in sorted(seen.items())))
+    print("\n".join(wrong[:40]))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    assert not wrong
+    assert peak < LARGEST_GIB * 2**30

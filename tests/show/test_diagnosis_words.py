@@ -1,0 +1,78 @@
+"""A diagnosis does not contradict itself: words, table and file say the same."""
+
+from dataclasses import fields
+from io import StringIO
+
+import numpy as np
+from matplotlib.colors import LogNorm
+from rich.console import Console
+
+from planner.diagnosis.residual_location import Where
+from planner.report.agreement import FrfSimilarity, ThreeSimilarities
+from planner.report.diagnosis import DiagnosisReport, RankedExplanation
+from planner.report.diagnosis_plots import _residuals
+
+UNKNOWN = (("unknown", None),)
+BASE = (("base_compliance", "base"), ("transverse_compliance", "joint_1"))
+
+
+def report(verdict: str, *ranked) -> DiagnosisReport:
+    """An answer with these explanations; FRAC 0.9999 with the best of them."""
+    empty = {f.name: None for f in fields(DiagnosisReport)}
+    sides = (FrfSimilarity(f, f) for f in (0.9, 0.95, 0.9999))
+    given = {
+        "verdict": verdict, "findings": (), "remarks": (), "plots": (), "simulated": False,
+        "candidates": tuple(RankedExplanation.of(p, q) for p, q in ranked),
+        "fit": ThreeSimilarities(*sides),
+    }  # fmt: skip
+    return DiagnosisReport(**(empty | given))
+
+
+def test_what_comes_nearest_is_named_beside_the_unknown():
+    said = report("unexplained", (UNKNOWN, 0.92), (BASE, 0.08)).verdict_text
+    assert "92 % probability something is there" in said
+    assert "base compliance at base and transverse compliance at joint_1 (8 %)" in said
+    assert "0.9999" in said
+
+
+def test_where_nothing_is_near_nothing_is_named():
+    said = report("unexplained", (UNKNOWN, 1.0), ((("none", None),), 0.0)).verdict_text
+    assert said == "Something is there that no effect of the library describes."
+    assert "explains" in report("explained", (BASE, 1.0)).verdict_text
+    assert report("explained", (BASE, 1.0)).to_json()["verdict_text"]
+
+
+def test_small_probabilities_are_not_called_none():
+    answer = report("explained", (BASE, 0.99), (UNKNOWN, 7e-123))
+    out = StringIO()
+    made = Console(file=out, width=120)
+    made.print(_table_of(answer))
+    assert "below 0.1 %" in out.getvalue()
+    assert "99.0 %" in out.getvalue()
+
+
+def _table_of(answer: DiagnosisReport):
+    """The table of candidates alone; the rest of the text needs a whole diagnosis."""
+    object.__setattr__(answer, "where", _Said())
+    object.__setattr__(answer, "shares", _Said())
+    object.__setattr__(answer, "held_out", _Said())
+    object.__setattr__(answer, "seconds", 1.0)
+    return answer.text()
+
+
+class _Said:
+    sentence, poses = "", ()
+
+
+def test_residuals_by_direction_share_a_scale_that_is_shown():
+    rng = np.random.default_rng(0)
+    places = [
+        Where(np.linspace(4, 60, 9), *(s * rng.uniform(1, 30, n) for n in (8, 3, (3, 3))))
+        for s in (1.0, 0.05)
+    ]
+    figure = _residuals(*places, ["A$1$", "B", "C"], "")
+    figure.canvas.draw()  # pose names are no formulas
+    images = [image for axes in figure.axes for image in axes.images]
+    assert images[0].norm is images[1].norm
+    assert isinstance(images[0].norm, LogNorm)
+    assert any("mean square residual" in axes.get_ylabel() for axes in figure.axes[4:])

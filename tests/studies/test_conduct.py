@@ -1,0 +1,100 @@
+"""`planner study all`: pages, tables of claims, and nothing that is finished runs again."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+
+from planner.errors import InputError
+from planner.progress import quietly
+from planner.studies import conduct, registry
+from planner.studies.answer import StudyAnswer
+from planner.studies.drawing import new
+from planner.studies.report import PaperClaim, Report, Table
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """Two quick studies stand for all; what ran, in order."""
+    ran = []
+
+    def find(name):
+        def study(progress, small):
+            ran.append((name, small))
+            progress("all of it", 0.5)
+            figure = new((3, 2), "empty")
+            claims = (
+                PaperClaim("It is <so>.", "R² 0.5", True),
+                PaperClaim("It is not.", "R² 0.1", False, "the data are too few: 3"),
+                PaperClaim("Ours is better.", "R² 0.9", True, ours=True),
+            )
+            table = Table(f"{name}_t", "T", ("a", "b"), (("x", float("nan")), ("y", 2.5)))
+            return Report(name, "SIMULATED: nothing", (table,), claims, {f"{name}_f": figure})
+
+        return study
+
+    monkeypatch.setattr(registry, "NAMES", ("busch2022", "lei2023"))
+    monkeypatch.setattr(registry, "find", find)
+    return ran
+
+
+def test_all_studies_leave_an_index_a_page_each_and_one_table_of_claims(ran, tmp_path):
+    told = conduct.conduct_all(tmp_path, False, quietly)
+    assert ran == [("busch2022", False), ("lei2023", False)]
+    assert told.taken == ()
+    index = (tmp_path / "index.html").read_text()
+    for name, authors in (("busch2022", "Busch, Zaeh (2022)"), ("lei2023", "Lei, Hou, Ding")):
+        page = (tmp_path / name / f"{name}.html").read_text()
+        assert f'href="{name}/{name}.html"' in index
+        assert authors in index
+        assert authors in page
+        assert "It is &lt;so&gt;." in page
+        assert "the data are too few: 3" in page
+        assert "data:image/png;base64," in page
+        # Self-contained: nothing is loaded from elsewhere.
+        assert not re.search(r'(src|href)="(?!data:)', page)
+    with (tmp_path / "claims.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6
+    assert [row["holds here?"] for row in rows[:3]] == ["yes", "no", "yes"]
+    assert rows[1]["why not"] == "the data are too few: 3"
+    assert rows[2]["claim"] == "(this program) Ours is better."
+
+
+def test_what_is_finished_is_not_run_again(ran, tmp_path):
+    first = conduct.conduct_all(tmp_path, True, quietly)
+    (tmp_path / "lei2023" / "study.json").unlink()  # as if interrupted within it
+    ran.clear()
+    second = conduct.conduct_all(tmp_path, True, quietly)
+    assert ran == [("lei2023", True)]
+    assert second.taken == ("busch2022",)
+    before, after = first.studies[0].to_json(), second.studies[0].to_json()
+    assert before == after
+    ran.clear()
+    conduct.conduct_all(tmp_path, False, quietly)  # a small version is no full one
+    assert ran == [("busch2022", False), ("lei2023", False)]
+
+
+def test_a_study_whose_picture_is_gone_runs_again(ran, tmp_path):
+    conduct.conduct_all(tmp_path, True, quietly)
+    next((tmp_path / "busch2022").glob("*.png")).unlink()
+    ran.clear()
+    conduct.conduct_all(tmp_path, True, quietly)
+    assert ran == [("busch2022", True)]
+
+
+def test_all_needs_a_folder(ran):
+    with pytest.raises(InputError, match="name a folder with --out"):
+        conduct.conduct_all(None, True, quietly)
+    assert not ran
+
+
+def test_an_answer_survives_its_json(ran):
+    answer = conduct.conduct("lei2023", None, True, quietly)
+    again = StudyAnswer.from_json(answer.to_json())
+    assert again.findings == answer.findings
+    assert again.to_json() == answer.to_json()
+    assert again.tables[0].rows[0][1] != again.tables[0].rows[0][1]  # NaN
+    assert isinstance(again.files, list)
+    assert not any(Path(file).exists() for file in again.files)

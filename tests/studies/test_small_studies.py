@@ -1,0 +1,40 @@
+"""A small version of every study from hits to claims: that it runs, and what must hold even so."""
+
+import numpy as np
+import pytest
+
+from planner.progress import quietly
+from planner.studies import registry
+from planner.studies.answer import StudyAnswer
+from planner.studies.conduct import conduct
+from planner.studies.papers import PAPERS
+
+
+def holds(answer: StudyAnswer, part: str) -> bool:
+    (found,) = [f.holds for f in answer.findings if part in f.paper]
+    return found
+
+
+MUST_HOLD = {
+    "busch2022": ("No kernel follows the damping ratios", "Residues are best modelled with RBF"),
+    "busch2020": ("The simulation alone, which lacks a mode",),
+    "seyedhosseini2025": ("Damping ratios are predicted less surely",),
+    "lei2023": ("parameters train in less time",),
+    "birk2025": ("24P reproduces FRFs far better than 12P", "Nobody reaches 100 %"),
+}
+
+
+@pytest.mark.parametrize("name", registry.NAMES)
+def test_a_small_study_runs_from_hits_to_claims(name, tmp_path):
+    answer = conduct(name, tmp_path, True, quietly)
+    assert answer.small
+    assert answer.data.startswith("SIMULATED")
+    page = (tmp_path / f"{name}.html").read_text()
+    assert PAPERS[name].citation.replace("&", "&amp;") in page
+    assert page.count("data:image/png;base64,") >= 2
+    for finding in answer.findings:
+        assert finding.here
+    assert all(holds(answer, part) for part in MUST_HOLD[name])
+    for table in answer.tables:
+        numbers = [v for row in table.rows for v in row if not isinstance(v, str)]
+        assert np.isfinite(numbers).any()

@@ -1,0 +1,53 @@
+"""Universal files of a matrix of FRFs, as analysers export them."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyuff
+
+from planner.frf.matrix import FrfMatrix
+
+KINDS = {"accelerance": (12, "m/s^2"), "mobility": (11, "m/s"), "receptance": (8, "m")}
+TIMES = {"accelerance": 0, "mobility": 1, "receptance": 2}
+
+
+def write_matrix(
+    path: Path,
+    matrix: FrfMatrix,
+    kind: str = "accelerance",
+    turned: Iterable[int] = (),
+    before: Iterable[dict[str, Any]] = (),
+    entries: Iterable[tuple[int, int]] | None = None,
+    **fields: Any,
+) -> Path:
+    """Write FRFs of `entries` (default: all measured) as UFF 58b after the sets of `before`.
+
+    Responses in `turned` (indices) are written along their negative direction.
+    """
+    number, unit = KINDS[kind]
+    w = 2j * np.pi * matrix.frequency_hz
+    sets = list(before)
+    pairs = zip(*np.nonzero(matrix.measured), strict=True) if entries is None else entries
+    for o, i in pairs:
+        felt, hit, sign = matrix.responses[o], matrix.references[i], -1 if o in turned else 1
+        sets.append(
+            {
+                "type": 58, "binary": 1, "func_type": 4, "id1": "simulated",
+                "rsp_node": int(felt.node), "rsp_dir": sign * felt.number,
+                "ref_node": int(hit.node), "ref_dir": hit.number,
+                "data": sign * matrix.accelerance[o, i] / w ** TIMES[kind],
+                "x": matrix.frequency_hz, "abscissa_spacing": 1, "abscissa_spec_data_type": 18,
+                "ordinate_spec_data_type": number, "ordinate_axis_units_lab": unit,
+                "orddenom_spec_data_type": 13, "orddenom_axis_units_lab": "N", **fields,
+            }
+        )  # fmt: skip
+    with open(path, "wb") as file:
+        piece = path.with_suffix(".piece.uff")
+        for one in sets:
+            piece.unlink(missing_ok=True)
+            pyuff.UFF(str(piece)).write_sets([one], "add")
+            file.write(piece.read_bytes())
+        piece.unlink()
+    return path

@@ -1,0 +1,214 @@
+"""Simulated structures whose modes, shapes and modal masses are known: plate, truss, aeroplane."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.linalg
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """M, C, K of n degrees of freedom at nodes (names), each along a direction ("x", "y", "z")."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    nodes: tuple[int, ...]
+    directions: tuple[str, ...]
+    position_m: dict[int, tuple[float, float, float]] = field(default_factory=dict)
+    lines: tuple[tuple[int, int], ...] = ()
+
+    def poles(self) -> tuple[np.ndarray, np.ndarray]:
+        """Poles (m,) with positive frequency, increasing, and shapes (n, m) with modal a = 1.
+
+        Receptance = Σ φφᵀ/(s − λ) + conjugate.
+        """
+        n = len(self.nodes)
+        zero = np.zeros((n, n))
+        a = np.block([[self.damping, self.mass], [self.mass, zero]])
+        b = np.block([[self.stiffness, zero], [zero, -self.mass]])
+        values, vectors = scipy.linalg.eig(-b, a)
+        kept = values.imag > 1e-6 * np.max(np.abs(values))
+        values, vectors = values[kept], vectors[:, kept]
+        order = np.argsort(np.abs(values))
+        values, vectors = values[order], vectors[:, order]
+        norm = np.einsum("im,ij,jm->m", vectors, a, vectors)
+        return values, vectors[:n] / np.sqrt(norm)
+
+    def accelerance(
+        self, frequency_hz: np.ndarray, responses: list[int], references: list[int]
+    ) -> np.ndarray:
+        """Exact FRFs (outputs, inputs, F) in m/s²/N between degrees of freedom by their index."""
+        poles, shapes = self.poles()
+        s = 2j * np.pi * np.asarray(frequency_hz)
+        residues = shapes[responses][:, None] * shapes[references][None]
+        up, down = 1 / (s - poles[:, None]), 1 / (s - poles.conj()[:, None])
+        return s**2 * (residues @ up + residues.conj() @ down)
+
+
+def damped(
+    mass: np.ndarray, stiffness: np.ndarray, ratio: tuple[float, float], hz: tuple[float, float]
+) -> np.ndarray:
+    """Rayleigh damping with given ratios at two frequencies."""
+    w = 2 * np.pi * np.array(hz)
+    a, b = np.linalg.solve(np.stack([0.5 / w, 0.5 * w], axis=1), ratio)
+    return a * mass + b * stiffness
+
+
+def _bending_element(dx: float, dy: float, rigidity: float, poisson: float) -> np.ndarray:
+    """Stiffness (12, 12) of a thin plate's rectangle, w, θx, θy per corner (Melosh 1963)."""
+    corners = np.array([(0.0, 0.0), (dx, 0.0), (dx, dy), (0.0, dy)])
+
+    def terms(x: float, y: float) -> np.ndarray:
+        powers = [1, x, y, x * x, x * y, y * y, x**3, x * x * y, x * y * y, y**3]
+        return np.array([*powers, x**3 * y, x * y**3])
+
+    def slopes(x: float, y: float) -> np.ndarray:
+        by_y = [0, 0, 1, 0, x, 2 * y, 0, x * x, 2 * x * y, 3 * y * y, x**3, 3 * x * y * y]
+        by_x = [0, 1, 0, 2 * x, y, 0, 3 * x * x, 2 * x * y, y * y, 0, 3 * x * x * y, y**3]
+        return np.array([by_y, [-v for v in by_x]])
+
+    rows = [np.vstack([terms(x, y), slopes(x, y)]) for x, y in corners]
+    turn = np.linalg.inv(np.vstack(rows))
+    law = rigidity * np.array([[1, poisson, 0], [poisson, 1, 0], [0, 0, (1 - poisson) / 2]])
+    points, weights = np.polynomial.legendre.leggauss(4)
+    inner = np.zeros((12, 12))
+    for px, wx in zip((points + 1) / 2 * dx, weights / 2 * dx, strict=True):
+        for py, wy in zip((points + 1) / 2 * dy, weights / 2 * dy, strict=True):
+            x, y = px, py
+            curve = np.array(
+                [
+                    [0, 0, 0, 2, 0, 0, 6 * x, 2 * y, 0, 0, 6 * x * y, 0],
+                    [0, 0, 0, 0, 0, 2, 0, 0, 2 * x, 6 * y, 0, 6 * x * y],
+                    [0, 0, 0, 0, 2, 0, 0, 4 * x, 4 * y, 0, 6 * x * x, 6 * y * y],
+                ]
+            )
+            inner += wx * wy * curve.T @ law @ curve
+    return turn.T @ inner @ turn
+
+
+def plate(
+    columns: int = 10, rows: int = 5, size_m: tuple[float, float] = (0.6, 0.28),
+    thickness_m: float = 0.004, ratio: tuple[float, float] = (0.004, 0.004),
+    dashpot: float = 0.0,
+) -> Structure:  # fmt: skip
+    """A free plate of aluminium on soft springs: columns × rows transverse degrees of freedom.
+
+    Rotations are condensed (they have no mass), so that the reduced structure is exact. `dashpot`
+    (N·s/m) at the last corner makes damping not proportional and shapes complex.
+    """
+    modulus, poisson, density = 70e9, 0.33, 2700.0
+    dx, dy = size_m[0] / (columns - 1), size_m[1] / (rows - 1)
+    rigidity = modulus * thickness_m**3 / 12 / (1 - poisson**2)
+    element = _bending_element(dx, dy, rigidity, poisson)
+    n = columns * rows
+    k, m = np.zeros((3 * n, 3 * n)), np.zeros(n)
+    for c in range(columns - 1):
+        for r in range(rows - 1):
+            corners = [
+                r * columns + c, r * columns + c + 1, (r + 1) * columns + c + 1,
+                (r + 1) * columns + c,
+            ]  # fmt: skip
+            at = np.ravel([[3 * i, 3 * i + 1, 3 * i + 2] for i in corners])
+            k[np.ix_(at, at)] += element
+            m[corners] += density * thickness_m * dx * dy / 4
+    w = np.arange(n) * 3
+    turns = np.setdiff1d(np.arange(3 * n), w)
+    kww, kwt, ktt = k[np.ix_(w, w)], k[np.ix_(w, turns)], k[np.ix_(turns, turns)]
+    stiffness = kww - kwt @ np.linalg.solve(ktt, kwt.T)
+    stiffness = (stiffness + stiffness.T) / 2
+    mass = np.diag(m)
+    stiffness += (2 * np.pi * 2.0) ** 2 * mass  # hung at 2 Hz
+    damping = damped(mass, stiffness, ratio, (100.0, 800.0))
+    damping[-1, -1] += dashpot
+    position = {i + 1: (dx * (i % columns), dy * (i // columns), 0.0) for i in range(n)}
+    lines = [(i + 1, i + 2) for i in range(n) if (i + 1) % columns]
+    lines += [(i + 1, i + 1 + columns) for i in range(n - columns)]
+    return Structure(
+        mass, damping, stiffness, tuple(range(1, n + 1)), ("z",) * n, position, tuple(lines)
+    )
+
+
+def aeroplane(ratio: tuple[float, float] = (0.01, 0.006)) -> tuple[Structure, list[int]]:
+    """A small model aeroplane of beams that bend (z) and twist, with 74 measured points.
+
+    Fuselage along x, wings and tail along y with points at both edges of each; springs hold it at
+    some 2 Hz. The structure's degrees of freedom are z of all points (rotations and the beams'
+    own nodes are condensed, they have hardly any mass). Returned beside it: three good places to
+    hit. Symmetric and antisymmetric modes of the wings lie close, as on real aeroplanes.
+    """
+    beams: list[tuple[int, int, float, float]] = []
+    place: list[tuple[float, float]] = []
+
+    def line(points: list[tuple[float, float]], bend: float, twist: float, start: int | None):
+        last = start
+        for x, y in points:
+            place.append((x, y))
+            if last is not None:
+                beams.append((last, len(place) - 1, bend, twist))
+            last = len(place) - 1
+
+    line([(0.1 * k, 0.0) for k in range(12)], 900.0, 500.0, None)  # fuselage: 0…11
+    for sign in (1, -1):
+        line([(0.45, sign * 0.075 * k) for k in range(1, 12)], 60.0, 32.0, 4)
+    for sign in (1, -1):
+        line([(1.1, sign * 0.07 * k) for k in range(1, 4)], 30.0, 14.0, 11)
+    n = len(place)
+    k = np.zeros((3 * n, 3 * n))
+    for a, b, bend, twist in beams:
+        delta = np.subtract(place[b], place[a])
+        length = float(np.hypot(*delta))
+        c, s = delta / length
+        # w, slope along the beam, twist about it; slopes by x and y turned into them.
+        turn = np.kron(np.eye(2), np.array([[1, 0, 0], [0, c, s], [0, -s, c]]))
+        local = np.zeros((6, 6))
+        i = bend / length**3
+        local[np.ix_([0, 1, 3, 4], [0, 1, 3, 4])] = i * np.array(
+            [
+                [12, 6 * length, -12, 6 * length],
+                [6 * length, 4 * length**2, -6 * length, 2 * length**2],
+                [-12, -6 * length, 12, -6 * length],
+                [6 * length, 2 * length**2, -6 * length, 4 * length**2],
+            ]
+        )
+        local[np.ix_([2, 5], [2, 5])] = twist / length * np.array([[1, -1], [-1, 1]])
+        at = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
+        k[np.ix_(at, at)] += turn.T @ local @ turn
+    points: list[tuple[float, float, int, float]] = []  # x, y, beam node, mass
+    for node, (x, y) in enumerate(place):
+        if node < 12:
+            points.append((x, y, node, 0.12))
+            if node in (4, 5, 6):
+                points.append((x, y + 0.02, node, 0.02))
+        else:
+            chord, mass = (0.06, 0.035) if node < 34 else (0.035, 0.015)
+            points += [(x - chord, y, node, mass), (x + chord, y, node, mass)]
+    points += [(-0.04, 0.0, 0, 0.05), (0.0, 0.02, 0, 0.05), (1.14, 0.0, 11, 0.03)]
+    m = len(points)
+    # Points hang on their node by stiff arms: w_point = w + dx·w,x + dy·w,y.
+    arms = np.zeros((m, 3 * n))
+    for row, (x, y, node, _) in enumerate(points):
+        arms[row, 3 * node : 3 * node + 3] = 1.0, x - place[node][0], y - place[node][1]
+    stiff = 3e6
+    full = np.block(
+        [[stiff * np.eye(m), -stiff * arms], [-stiff * arms.T, k + stiff * arms.T @ arms]]
+    )
+    kpp, kpr, krr = full[:m, :m], full[:m, m:], full[m:, m:]
+    stiffness = kpp - kpr @ np.linalg.solve(krr + 1e-6 * np.eye(3 * n), kpr.T)
+    stiffness = (stiffness + stiffness.T) / 2
+    mass = np.diag([p[3] for p in points])
+    stiffness += (2 * np.pi * 2.0) ** 2 * mass
+    damping = damped(mass, stiffness, ratio, (20.0, 150.0))
+    position = {i + 1: (x, y, 0.0) for i, (x, y, *_) in enumerate(points)}
+    names = [i + 1 for i in range(m)]
+    owners = [p[2] for p in points]
+    lines = []
+    for a, b, *_ in beams:
+        pa = [names[i] for i in range(m) if owners[i] == a]
+        pb = [names[i] for i in range(m) if owners[i] == b]
+        lines += [(pa[0], pb[0]), (pa[-1], pb[-1])]
+    made = Structure(mass, damping, stiffness, tuple(names), ("z",) * m, position, tuple(lines))
+    tips = [names.index(i) for i in range(1, m + 1)]
+    far = max(tips, key=lambda i: points[i][1] + 0.1 * points[i][0])
+    tail = min(tips, key=lambda i: points[i][1] - 10 * (points[i][0] > 1.0))
+    return made, [far, 0, tail]

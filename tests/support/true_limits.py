@@ -1,0 +1,45 @@
+"""Limits of a cut by a campaign's predicted FRFs beside those of the true ones."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.milling.cut import Cut
+from planner.milling.cutter_frf import of_accelerance
+from planner.milling.lobes import losses
+from planner.milling.structure import of_frf
+from planner.milling.uncertainty import sampled_limits
+
+
+@dataclass(frozen=True, eq=False)
+class LimitPair:
+    """At n speeds: limit by the mean FRFs, by the true ones, and the 90 % band (2, n), in m."""
+
+    predicted: np.ndarray
+    true: np.ndarray
+    band: np.ndarray
+
+    @property
+    def off(self) -> np.ndarray:
+        """(n,) relative error."""
+        return np.abs(self.predicted / self.true - 1)
+
+    @property
+    def inside(self) -> np.ndarray:
+        """(n,) whether the true limit is inside the band."""
+        return (self.band[0] <= self.true) & (self.true <= self.band[1])
+
+
+def limit_pair(
+    cut: Cut, lines: np.ndarray, mean: np.ndarray, sd: np.ndarray, true: np.ndarray, samples: int
+) -> LimitPair:
+    """Of accelerances (3, 3, F) in m/s²/N."""
+    told = of_frf(of_accelerance("predicted", lines, mean, sd), cut)
+    known = of_frf(of_accelerance("true", lines, true, None), cut)
+    found = losses(told.machine(cut))
+    drawn = sampled_limits(told.samples(cut, samples), found).depth_m
+    return LimitPair(
+        np.array([loss.depth_m for loss in found]),
+        np.array([loss.depth_m for loss in losses(known.machine(cut))]),
+        np.quantile(drawn, (0.05, 0.95), axis=0),
+    )
