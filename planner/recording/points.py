@@ -128,7 +128,7 @@ class StatedPoints:
 
         Raises InputError where the file names no point of the robot, or another than the table.
         """
-        own = self._named(source, node, "hit")
+        own = self._named(source, node, "hit", (self.hit_point,))
         if own and self.hit_point and self.names.hit(own) != self.names.hit(self.hit_point):
             raise InputError(
                 f"{source}{self.where} was hit at {_told(node, own)}, the table says "
@@ -138,7 +138,8 @@ class StatedPoints:
 
     def response_at(self, source: object, node: str) -> str:
         """The same of the point where a response was measured."""
-        own, stated = self._named(source, node, "response"), self.response_points
+        stated = self.response_points
+        own = self._named(source, node, "response", stated)
         if own is None and len(stated) > 1:
             raise InputError(
                 f"{source}{self.where} does not say which of {', '.join(stated)} a response is "
@@ -155,10 +156,17 @@ class StatedPoints:
     def _sensor(self, name: str) -> str:
         return self.names.sensor(name)
 
-    def _named(self, source: object, node: str, what: str) -> str | None:
+    def _named(self, source: object, node: str, what: str, stated: tuple[str, ...]) -> str | None:
+        """The point at a node; one that robot.toml does not list is that of a stated point.
+
+        If there is just one without a node of its own.
+        """
         try:
             return self.names.named(node)
         except KeyError:
+            free = [name for name in stated if name and name not in self.names.nodes.values()]
+            if len(free) == 1:
+                return free[0]
             nodes = ", ".join(f"{n} ({name})" for n, name in self.names.nodes.items())
             known = f"node {node}" if node.isdigit() else f'point "{node}"'
             raise InputError(

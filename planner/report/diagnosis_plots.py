@@ -14,6 +14,7 @@ from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.predict import ALL
 from planner.diagnosis.linear_diagnosis import Diagnosis
 from planner.diagnosis.residual_location import Where, where
+from planner.recording.points import TOOL
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
 from planner.report.plot_text import plain_text
@@ -28,14 +29,19 @@ SIDES = (
 
 
 def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") -> dict[str, Figure]:
-    """Residuals by band, pose and direction; FRF maps; direct FRFs of the worst poses."""
+    """Residuals by band, pose and direction; FRF maps; direct FRFs of the worst poses.
+
+    Of several sensors and hit points, FRFs are those of the first ones.
+    """
     before, after = where(found.problem, found.refitted), where(found.problem, found.best)
     figures = {"residuals": _residuals(before, after, names, mark)}
     misfit = found.problem.misfit(Effect(""), ALL)
     measured = np.where(misfit.measured.used, np.abs(misfit.measured.accelerance), np.nan)
     lines = misfit.measured.frequency_hz
     sides = [_simulated(found, f) for f in (None, found.refitted, found.best)]
-    number = np.arange(1.0, len(names) + 1)
+    number, layout = np.arange(1.0, len(names) + 1), found.problem.layout
+    if layout != TOOL:
+        mark = f"{mark}{layout.sensors[0]}, hit at {layout.hits[0]}: "
     for i, axis in enumerate(AXES):
         for (side, _, _), h in zip(SIDES, sides, strict=True):
             title = f"{mark}Map of H {axis}{axis}, simulation {side}"

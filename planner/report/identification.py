@@ -122,7 +122,9 @@ class IdentificationReport(Answer):
         for i, name in enumerate(dataset.poses):
             aside = i in judged.held_out
             shown = judged.trial if aside and judged.trial else judged.final
-            poses.append(ShownPose(name, dataset.q[i], dataset.frfs[i], shown.simulation, aside))
+            frf = dataset.frfs[i].of_tool
+            if frf is not None:  # pictures show the tool's FRFs
+                poses.append(ShownPose(name, dataset.q[i], frf, shown.simulation, aside))
         mark = SIMULATED_TITLE if self.simulated else ""
         nominal = self.basis.nominal
         figures = identification_figures(poses, nominal, self.band_hz, mark)

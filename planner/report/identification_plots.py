@@ -39,6 +39,8 @@ def identification_figures(
 
     Then the direct FRFs themselves at up to `most` poses, held-out ones first.
     """
+    if not poses:
+        return {}
     lines = _inside(poses[0].frf, band_hz)
     before = np.concatenate([nominal.accelerance(p.q, lines) for p in poses])
     after = np.concatenate([p.identified.accelerance(p.q, lines) for p in poses])

@@ -1,0 +1,153 @@
+"""Points that recordings name: by node, by column, by the table; and what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.errors import InputError
+from planner.recording.dof import Dof
+from planner.recording.folder import read_recordings
+from planner.recording.hits import hits_from, located
+from planner.recording.named_columns import Named, to_records
+from planner.recording.points import Layout, PointNames, StatedPoints, together
+from planner.recording.records import Channel, FrfRecord, TimeRecord
+
+NAMES = PointNames(
+    {"elbow": "xyz", "base": "x", "flange": "xyz"},
+    {"3": "elbow", "4": "base"},
+    ("tcp", "flange"),
+    ("sensor",),
+)
+
+
+def record(*responses: tuple[str, int], hit_node: str = "") -> TimeRecord:
+    """A force and accelerations at nodes along directions."""
+    samples = np.arange(1.0, 9.0)
+    channels = [Channel("hammer", "force", "N", 1, samples, hit_node)]
+    channels += [
+        Channel(f"{node} {direction}", "acceleration", "m/s^2", direction, k * samples, node)
+        for k, (node, direction) in enumerate(responses, 1)
+    ]
+    return TimeRecord(Path("a.uff"), 100.0, tuple(channels))
+
+
+def test_nodes_of_several_sensors_become_points_in_their_own_axes() -> None:
+    given = record(("4", -1), ("3", 2), ("3", 1), ("3", -3), hit_node="3")
+    hit = hits_from([given], "+x", StatedPoints(names=NAMES))[0]
+    assert hit.hit_point == "elbow"
+    assert hit.layout == Layout(("elbow",), ("base", "elbow"))
+    assert [str(d) for d in hit.responses] == ["base:x", "elbow:x", "elbow:y", "elbow:z"]
+    assert hit.acceleration_m_s2[:, 0].tolist() == [-1.0, 3.0, 2.0, -4.0]
+    assert hit.rows == [0, 3, 4, 5]
+    assert hit.heard_by("base") is None
+    alone = hit.heard_by("elbow")
+    assert alone is not None
+    assert alone.acceleration_m_s2[:, 0].tolist() == [3.0, 2.0, -4.0]
+
+
+def test_a_file_of_one_sensor_is_the_tools_whatever_its_node() -> None:
+    hit = hits_from([record(("7", 1), ("7", 2), ("7", 3), hit_node="9")])[0]
+    assert hit.hit_point == "tcp"
+    assert hit.responses == tuple(Dof("sensor", a) for a in "xyz")
+
+
+def test_a_point_where_the_tool_is_hit_is_the_tcp() -> None:
+    stated = StatedPoints("flange", ("elbow",), names=NAMES)
+    hit = hits_from([record(("", 1), ("", 2), ("", 3))], "-x", stated)[0]
+    assert (hit.hit_point, hit.layout.sensors, hit.axis) == ("tcp", ("elbow",), "-x")
+
+
+def test_a_node_that_nobody_listed_is_that_of_the_stated_point_without_one() -> None:
+    given = record(("8", 1), ("8", 2), ("8", 3), ("3", 1), hit_node="9")
+    hit = hits_from([given], "+x", StatedPoints("tcp", ("flange", "elbow"), 5, NAMES))[0]
+    assert (hit.hit_point, hit.layout.sensors) == ("tcp", ("flange", "elbow"))
+
+
+@pytest.mark.parametrize(
+    ("given", "stated", "told"),
+    [
+        (record(("8", 1)), StatedPoints(names=NAMES, row=5), "node 8, which is none of robot.toml"),
+        (
+            record(("3", 1)),
+            StatedPoints("", ("base",), 5, NAMES),
+            "node 3, which is elbow, the tab",
+        ),
+        (
+            record(("4", 2)),
+            StatedPoints(names=NAMES, row=5),
+            "along y at base, whose sensor has x ",
+        ),
+        (record(("", 1)), StatedPoints("", ("base", "elbow"), 5, NAMES), "which of base, elbow"),
+        (
+            record(("3", 1), hit_node="4"),
+            StatedPoints("elbow", (), 5, NAMES),
+            "was hit at node 4, which is base, the table says elbow",
+        ),
+    ],
+)
+def test_what_is_no_point_or_another_is_refused(
+    given: TimeRecord, stated: StatedPoints, told: str
+) -> None:
+    with pytest.raises(InputError, match=r"^a\.uff \(row 5 of recordings\.csv\)") as refused:
+        hits_from([given], "+x", stated)
+    assert told in str(refused.value)
+
+
+def test_columns_name_points() -> None:
+    time = np.arange(16) / 100
+    columns = {"time_s": time, "force_n": time, "acceleration_elbow_y_m_s2": time}
+    columns |= {"acceleration_fore_arm_z_m_s2": time}
+    found = to_records(Path("a.csv"), Named(columns, {}, {"hit_point": "base", "hit": "+z"}))[0]
+    assert isinstance(found, TimeRecord)
+    told = [(c.node, c.direction) for c in found.channels]
+    assert told == [("base", 3), ("elbow", 2), ("fore_arm", 3)]
+
+
+def test_columns_of_frfs_between_points() -> None:
+    lines = np.arange(1.0, 5.0)
+    columns = {"frequency_hz": lines, "accelerance_elbow_y_base_x_re": lines}
+    columns |= {"accelerance_elbow_y_base_x_im": 2 * lines}
+    found = to_records(Path("a.csv"), Named(columns))[0]
+    assert isinstance(found, FrfRecord)
+    assert np.array_equal(found.values, [lines + 2j * lines])
+    own = located(found, StatedPoints(names=NAMES))
+    assert (own.response_node, own.reference_node) == (("elbow",), ("base",))
+    assert (own.response_direction, own.reference_direction) == ((2,), (1,))
+
+
+def test_layouts_are_joined_and_found_again() -> None:
+    one, other = Layout(("tcp", "base"), ("sensor",)), Layout(("base", "base"), ("elbow",))
+    whole = together([one, other])
+    assert whole == Layout(("tcp", "base", "base"), ("sensor", "elbow"))
+    assert whole.rows(other) == [3, 4, 5]
+    assert whole.columns(other) == [3, 4, 5, 6, 7, 8]
+
+
+def table(folder: Path, *cells: str) -> Path:
+    """A recordings folder of one row, whose last cells are hit_point and response_points."""
+    folder.joinpath("a.uff").write_text("x")
+    header = "pose,j_deg,hit,file,hit_point,response_points\n"
+    folder.joinpath("recordings.csv").write_text(f"{header}P1,0,+x,a.uff,{','.join(cells)}\n")
+    return folder
+
+
+def test_the_table_names_points(tmp_path: Path) -> None:
+    row = read_recordings(table(tmp_path, "elbow", "base elbow"), ("j",), NAMES).rows[0]
+    assert row.stated == StatedPoints("elbow", ("base", "elbow"), 2, NAMES)
+
+
+@pytest.mark.parametrize(
+    ("cells", "told"),
+    [
+        (("elbo", "base"), 'row 2: hit_point names "elbo", which is none of robot.toml'),
+        (("elbow", "base rist"), 'row 2: response_points names "rist", which is none'),
+        (("elbow", "base base"), "row 2: response_points names base twice"),
+    ],
+)
+def test_a_table_that_names_no_point_is_refused(
+    tmp_path: Path, cells: tuple[str, str], told: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        read_recordings(table(tmp_path, *cells), ("j",), NAMES)
+    assert told in str(refused.value)
