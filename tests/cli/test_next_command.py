@@ -39,8 +39,24 @@ def robot(tmp_path) -> Path:
     return make_plain_arm(tmp_path / "robot")
 
 
-def begun(folder: Path, robot: Path, acquisition: str = "integrated_variance") -> Path:
+CUT = """teeth = 2
+diameter_m = 0.01
+milling = "slot"
+kt_n_m2 = 6.0e8
+kr_n_m2 = 2.0e8
+feed = [1.0, 0.0, 0.0]
+axis = [0.0, 0.0, 1.0]
+spindle_rpm = [600, 3000, 5]
+depth_m = [0.0, 0.001, 10]
+method = "zeroth_order"
+"""
+
+
+def begun(
+    folder: Path, robot: Path, acquisition: str = "integrated_variance", more: str = ""
+) -> Path:
     toml = plain_campaign(folder / "plan" / "campaign.toml", acquisition)
+    toml.write_text(toml.read_text() + more)
     call("new", folder / "cell", "--robot", robot, "--campaign", toml)
     return folder / "cell"
 
@@ -58,8 +74,12 @@ def proposed_again(cell: Path, *options: object) -> list[dict]:
 
 @pytest.mark.parametrize("name", [*ACQUISITIONS, *DESIGNS])
 def test_every_acquisition_is_logged_so_that_it_reads_back(name, robot, tmp_path):
-    asked = proposed_again(begun(tmp_path / "asked", robot), "--acquisition", name)
-    stated = proposed_again(begun(tmp_path / "stated", robot, name))
+    more = ""
+    if name == "stability":
+        (robot.parent / "cut.toml").write_text(CUT)
+        more = "[cut]\nspeed_rpm = 1200.0\ndepth_m = 1e-4\n"
+    asked = proposed_again(begun(tmp_path / "asked", robot, more=more), "--acquisition", name)
+    stated = proposed_again(begun(tmp_path / "stated", robot, name, more))
     assert asked == stated
     for proposal in asked:
         assert (proposal["score"] is None) == (name in DESIGNS)
