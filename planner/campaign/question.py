@@ -1,6 +1,6 @@
 """Whether hits can be from the pose they are said to be from: measured modes against expected.
 
-Calibrated on the shipped plane and on five true robots, from four measured poses on. Of 6992 times
+Calibrated on the shipped plane and on five true robots, from three measured poses on. Of 6992 times
 that a model judged a pose's own hits it asked never, and once when two modes were left out. Of
 hits under another pose's name, where a frequency differs by 2 %, it asks for 99 % on the plane and
 91 to 99 % in joint boxes, if the simulation learns and can have the physics; for a third on the

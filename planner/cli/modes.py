@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, refusals, respond
+from planner.errors import InputError
 
 
 def modes(
@@ -62,7 +63,14 @@ def modes(
     from planner.report.survey import several_poses, survey
 
     pictures = Pictures(plot, format_, rrd)
+    for_points = [
+        name
+        for name, given in (("--real", real), ("--export", export), ("--operating", operating))
+        if given
+    ]
     if several_poses(paths):
+        if for_points:
+            raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
         given = paths[0], band_hz, robot, estimator, quantity, window_rate_1_s
         with reporting("identifying", quiet=as_json) as progress:
             answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
@@ -72,6 +80,11 @@ def modes(
 
         return respond(operating_report(paths, band_hz, pictures), as_json)
     matrix = None if force else matrix_report(paths, band_hz, quantity, pictures, real, export)
+    if matrix is None and for_points:
+        raise InputError(
+            f"{paths[0]} holds hits of one pose, and {for_points[0]} is for FRFs of any points; "
+            f"leave it out."
+        )
     answer = matrix or modal_report(
         paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s
     )

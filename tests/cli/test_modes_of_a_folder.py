@@ -7,7 +7,7 @@ import pytest
 
 from planner.demo import shipped
 from tests.support.outside import answer as planner_json
-from tests.support.outside import planner
+from tests.support.outside import call, planner
 from tests.support.robots import make_arm
 
 
@@ -53,3 +53,14 @@ def test_a_robot_with_other_joints_is_refused(folder, tmp_path):
     assert run.returncode == 2
     assert "joint_a1" in run.stderr
     assert "Traceback" not in run.stderr
+
+
+@pytest.mark.parametrize("option", [("--real",), ("--export", "files"), ("--operating",)])
+def test_what_is_for_other_points_is_refused_for_hits_at_the_tool(folder, option):
+    code, _, told = call("modes", folder, *option)
+    assert code == 2
+    assert f"holds several poses; leave {option[0]} out." in told
+    if option[0] != "--operating":
+        code, _, told = call("modes", *sorted((folder / "data").glob("A21_p?_1.uff")), *option)
+        assert code == 2
+        assert "holds hits of one pose" in told
