@@ -6,7 +6,8 @@ from typing import Any, Literal
 import msgspec
 
 from planner.errors import InputError
-from planner.robot.config import DiagnoseTable, HitsTable, ReadbackTable, SensorTable, check_sds
+from planner.robot.config import DiagnoseTable, HitsTable, ReadbackTable, SensorTable
+from planner.robot.config_file import check_sds
 from planner.toml_file import load_toml
 
 

@@ -170,7 +170,7 @@ def _alive(process: int) -> bool:
 
 
 def _copy_robot(robot_toml: Path, target: Path) -> None:
-    from planner.robot.config import load_config
+    from planner.robot.config_file import load_config
 
     source = robot_toml.parent.resolve()
     urdf = (source / load_config(robot_toml).urdf).resolve()

@@ -159,7 +159,7 @@ def _agreeing(
     hits: list[tuple[Hit, ...]], verdicts: list[Verdict], band_hz: tuple[float, float]
 ) -> tuple[Hit, ...]:
     """Hits that do not disagree with the repeats of their axis; verdicts follow."""
-    from planner.recording.screening import screen_repeats
+    from planner.recording.repeats import screen_repeats
 
     every = [(number, hit) for number, found in enumerate(hits) for hit in found]
     kept = []

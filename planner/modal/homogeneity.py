@@ -19,7 +19,7 @@ from planner.modal.mac import mac
 from planner.modal.modes import ModalModel, Mode
 from planner.recording.force_levels import by_level, peak_n
 from planner.recording.records import Hit
-from planner.recording.screening import untilted
+from planner.recording.repeats import untilted
 
 # What is worth telling: FRFs that differ by this share, with such odds against chance.
 SHARE, CHANCE = 0.03, 1e-3

@@ -10,7 +10,8 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
-from planner.robot.config import PointTable, RobotConfig, load_config, with_effects
+from planner.robot.config import PointTable, RobotConfig
+from planner.robot.config_file import load_config, with_effects
 from planner.robot.points import PREFIX, check_points, names_of, with_points
 from planner.robot.urdf import build_model, joint_axes, parse_urdf, read_urdf
 

@@ -7,7 +7,7 @@ from planner.dataset.screened_files import Source, read_one
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import hit_count
 from planner.recording.records import Hit
-from planner.recording.screening import likeness_to, screen_repeats
+from planner.recording.repeats import likeness_to, screen_repeats
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from planner.recording.records import Hit
-from planner.recording.screening import ScreeningLimits, screen, screen_repeats
+from planner.recording.repeats import screen_repeats
+from planner.recording.screening import ScreeningLimits, screen
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support.faulty_hits import FAULTS, Scene

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.recording.screening import screen, screen_repeats
+from planner.recording.repeats import screen_repeats
+from planner.recording.screening import screen
 from tests.support.simulated_hits import POLES, RESIDUES, make_hit
 
 BAND = (4.0, 60.0)

@@ -1,0 +1,170 @@
+"""Hits of a pose beside each other: whether repeats along an axis agree, as they should."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.recording.force_levels import levels, peak_n
+from planner.recording.records import AXES, Fault, Hit
+from planner.recording.screening import NOTHING
+
+# Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
+# the last they are the same. Chosen.
+UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
+MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
+WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
+
+
+def screen_repeats(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[Fault, ...], ...]:
+    """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
+
+    Only hits at one point that the same sensors heard are compared, and where three or more were
+    made along an axis; a robust vote needs a majority. What a careful hand misses by is no
+    disagreement, and what only sets one force level apart from another may be the structure: that
+    is for the diagnosis to say.
+    """
+    faults: list[tuple[Fault, ...]] = [() for _ in hits]
+    for place in {(hit.hit_point, hit.responses) for hit in hits}:
+        own = [i for i, hit in enumerate(hits) if (hit.hit_point, hit.responses) == place]
+        found = _screen_alike(tuple(hits[i] for i in own), band_hz)
+        for i, one in zip(own, found, strict=True):
+            faults[i] = one
+    return tuple(faults)
+
+
+def _screen_alike(
+    hits: tuple[Hit, ...], band_hz: tuple[float, float]
+) -> tuple[tuple[Fault, ...], ...]:
+    """The same of hits at one point that the same sensors heard."""
+    faults: list[tuple[Fault, ...]] = [() for _ in hits]
+    shortest = min(len(hit.force_n) for hit in hits)
+    frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
+    axes = np.array([hit.axis_index for hit in hits])
+    level = _levels(hits)
+    centres = {axis: _centre(frfs[axes == axis]) for axis in set(axes.tolist())}
+    for axis, centre in centres.items():
+        group = np.flatnonzero(axes == axis)
+        if len(group) < 3:
+            continue
+        across = {other: c for other, c in centres.items() if other != axis}
+        own = _Agreement(centre, tuple(across.values()))
+        alike = np.array([own.of(frf) for frf in frfs[group]])
+        typical = float(np.median(alike))
+        for i, share in zip(group.tolist(), alike, strict=True):
+            usual = share > UNLIKE or share > typical - FAR_BELOW
+            if usual and not _struck(frfs[i], centre, across):
+                continue
+            same = [frfs[j] for j in group if j != i and level[j] == level[i]]
+            told = _disagreement(frfs[i], own, across, same)
+            if told:
+                kind, text = told
+                faults[i] = (
+                    Fault(
+                        kind,
+                        f"Its FRF {text} (likeness {share:.2f}, others {typical:.2f}); check axis "
+                        f"and hit point, and hit again.",
+                    ),
+                )
+    return tuple(faults)
+
+
+def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:
+    """How alike a hit's FRF and those of `others` along its axis are, in size too; 0: none such."""
+    same = [
+        other for other in others
+        if other.axis_index == hit.axis_index and other.sampling_rate_hz == hit.sampling_rate_hz
+        and (other.hit_point, other.responses) == (hit.hit_point, hit.responses)
+    ]  # fmt: skip
+    if not same:
+        return 0.0
+    shortest = min(len(one.force_n) for one in (hit, *same))
+    frf = _frf(hit, shortest, band_hz)
+    centre = _centre(np.array([_frf(other, shortest, band_hz) for other in same]))
+    sizes = np.linalg.norm(frf), np.linalg.norm(centre)
+    return _likeness(frf, centre) * float(min(sizes) / max(*sizes, NOTHING))
+
+
+@dataclass(frozen=True, eq=False)
+class _Agreement:
+    """How hits along an axis are answered, and in `across` those along the others."""
+
+    centre: np.ndarray
+    across: tuple[np.ndarray, ...]
+
+    def of(self, frf: np.ndarray) -> float:
+        """Likeness of an FRF, had it been tilted to the axis as far as hands tilt at most."""
+        if not self.across:
+            return _likeness(frf, self.centre)
+        off = untilted((frf - self.centre)[None], np.array(self.across))[0]
+        return _likeness(self.centre + off, self.centre)
+
+
+def untilted(off: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """By what FRFs (n, N) of hits along an axis differ, without what tilts of the hits explain.
+
+    A tilt adds a little of the FRFs `across` (k, N) of the other axes; MOST_TILT rad is the most.
+    """
+    normal = (across.conj() @ across.T).real
+    tilts = np.linalg.lstsq(normal, (off @ across.conj().T).real.T, rcond=None)[0]
+    return off - np.clip(tilts, -MOST_TILT, MOST_TILT).T @ across
+
+
+def _disagreement(
+    frf: np.ndarray, own: _Agreement, across: dict[int, np.ndarray], same: list[np.ndarray]
+) -> tuple[str, str] | None:
+    """Kind and text where an FRF that is unlike others of its axis is a mistake."""
+    if own.of(-frf) > UNLIKE:  # modes that move make FRFs unlike, never opposite
+        return "wrong_axis", "has the opposite sign of the others"
+    for axis, centre in across.items():
+        if abs(_likeness(frf, centre)) > LIKE:
+            return "wrong_axis", f"is that of hits along {AXES[axis]}"
+    # A structure that is not linear answers each level differently: only hits of the same force
+    # count, if they agree with each other or with all.
+    if any(_Agreement(one, own.across).of(frf) > LIKE for one in same):
+        return None
+    voters = [*same, own.centre]
+    agreed = any(_likeness(a, b) > LIKE for i, a in enumerate(voters) for b in voters[:i])
+    if not agreed:
+        return None
+    return "incoherent", "does not agree with the others of its axis"
+
+
+def _struck(frf: np.ndarray, own: np.ndarray, across: dict[int, np.ndarray]) -> bool:
+    """Whether an FRF is that of another axis in size too: no tilt brings in so much of it."""
+    plain = _likeness(frf, own)
+    return any(
+        abs(_likeness(frf, other)) > max(LIKE, plain + FAR_BELOW)
+        and abs(np.vdot(other, frf)) > WHOLE * np.linalg.norm(other) ** 2
+        for other in across.values()
+    )
+
+
+def _levels(hits: tuple[Hit, ...]) -> np.ndarray:
+    """Which force level each hit belongs to."""
+    groups = levels(np.sort([peak_n(hit) for hit in hits]))
+    weakest = [group[0] for group in groups[1:]]
+    return np.searchsorted(weakest, [peak_n(hit) for hit in hits], side="right")
+
+
+def _centre(frfs: np.ndarray) -> np.ndarray:
+    return np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
+
+
+def _frf(hit: Hit, samples: int, band_hz: tuple[float, float]) -> np.ndarray:
+    """FRF (3·F,) of a hit's first samples over the band's lines."""
+    frequency = np.fft.rfftfreq(samples, 1 / hit.sampling_rate_hz)
+    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
+    force = hit.sign * (hit.force_n - np.median(hit.force_n))
+    force = np.fft.rfft(force[:samples])[inside]
+    mean = np.median(hit.acceleration_m_s2, axis=1, keepdims=True)
+    response = np.fft.rfft((hit.acceleration_m_s2 - mean)[:, :samples], axis=1)[:, inside]
+    floor = 1e-3 * np.max(np.abs(force))
+    return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
+
+
+def _likeness(frf: np.ndarray, centre: np.ndarray) -> float:
+    """1 where two FRFs are the same in size, sign and phase; 0 or less where unrelated."""
+    scale = np.linalg.norm(frf) * np.linalg.norm(centre)
+    return float(np.real(np.vdot(centre, frf)) / scale) if scale > 0 else 0.0
