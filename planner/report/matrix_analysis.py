@@ -24,12 +24,11 @@ FEW = 3  # points of a shape that the table shows
 
 
 @dataclass(frozen=True)
-class MatrixShape:
-    """A mode of a matrix of FRFs; `shape` is [re, im] per degree of freedom, in their order.
+class ModeOverPoints:
+    """A mode over many points; `shape` is [re, im] per degree of freedom, in their order.
 
     In kg^-1/2 (unit modal mass) where `scaled`, else of unit length; `shape_sd` is of real and
-    imaginary part each. `modal_mass_kg` belongs to the shape with largest component 1,
-    `scatter_hz` is how the frequency differs from set to set (sd).
+    imaginary part each.
     """
 
     frequency_hz: float
@@ -42,6 +41,16 @@ class MatrixShape:
     probability: float
     mpc: float
     mpd_deg: float
+
+
+@dataclass(frozen=True)
+class MatrixShape(ModeOverPoints):
+    """A mode of a matrix of FRFs.
+
+    `modal_mass_kg` belongs to the shape with largest component 1, `scatter_hz` is how the frequency
+    differs from set to set (sd).
+    """
+
     modal_mass_kg: float
     scatter_hz: float
 

@@ -15,7 +15,7 @@ from planner.recording.dof import Dof
 from planner.recording.read import read
 from planner.recording.records import Channel, TimeRecord
 from planner.report.answer import Answer, RefusedFile
-from planner.report.matrix_analysis import named
+from planner.report.matrix_analysis import ModeOverPoints, named
 from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN, check_options, sources_of
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
@@ -28,19 +28,8 @@ UNSCALED = (
 
 
 @dataclass(frozen=True)
-class UnscaledMode:
+class UnscaledMode(ModeOverPoints):
     """A mode known from responses alone; `shape` is [re, im] per `dofs`, of unit length."""
-
-    frequency_hz: float
-    frequency_sd_hz: float
-    damping_ratio: float
-    damping_sd: float
-    shape: tuple[tuple[float, float], ...]
-    shape_sd: tuple[float, ...]
-    scaled: bool
-    probability: float
-    mpc: float
-    mpd_deg: float
 
     @classmethod
     def of(cls, mode: OperatingMode) -> "UnscaledMode":
