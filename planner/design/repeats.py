@@ -25,7 +25,7 @@ def repeat_gain(outputs: FrequencyOutputs, variance: np.ndarray) -> np.ndarray:
             continue
         low = target.poses.low[:, k]
         cross = post._prior(k, post.x[known], post.low[k][known], target.poses.x, low)
-        whiten = post.whiten[k][:, known[:, None], known[None, :]]
+        whiten = post.solved(k).whiten[:, known[:, None], known[None, :]]
         precision = np.swapaxes(whiten, 1, 2) @ whiten
         pulled = (precision @ cross) ** 2 @ target.importance[:, k]
         half = np.nan_to_num(variance[known, k]) / 2
