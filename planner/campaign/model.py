@@ -121,6 +121,8 @@ class Model:
     @cached_property
     def decision(self) -> "Decision | None":
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
+        if self.cell.cut is None:
+            return None
         from planner.campaign.decision import decided
 
         return decided(self)
