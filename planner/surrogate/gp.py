@@ -6,10 +6,13 @@ the measurement's own variance plus a nugget τ². The hyperparameters θ (see `
 averaged (see `importance`).
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dtrtri
+from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
@@ -88,12 +91,19 @@ class Posterior:
 
     _found: dict[int, Solved] = field(default_factory=dict, init=False, repr=False)
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Matrices of many points are worked out again as fast as they are read.
+        few = len(self.x) <= AT_ONCE
+        return vars(self) | {"_found": self._found if few else {}}
+
     def solved(self, j: int) -> Solved:
         """Of output j; InputError where no jitter makes its covariances regular."""
         if j not in self._found:
             for jitter in JITTERS[JITTERS.index(self.jitter) :]:
                 try:
-                    whiten = self._whitening(j, jitter)
+                    # The same digits wherever those of many points are worked out again.
+                    with threadpool_limits(1) if len(self.x) > AT_ONCE else nullcontext():
+                        whiten = self._whitening(j, jitter)
                 except np.linalg.LinAlgError:
                     continue
                 weights = np.swapaxes(whiten, 1, 2) @ (whiten @ self.y[j][:, None])
@@ -151,7 +161,8 @@ class Posterior:
     def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:
         """Output j, noise-free, at x (q, d) with centred low (q,), one Gaussian per sample."""
         cross, white = self._cross(j, x, low)
-        means = self.prior.mean[j] + (self.solved(j).weights[:, None, :] @ cross)[:, 0]
+        weights = self.solved(j).weights[:, None, self.known(j)]
+        means = self.prior.mean[j] + (weights @ cross)[:, 0]
         own = self._own(j, x, low) - np.sum(white**2, axis=1)
         return Predictive(np.full(len(means), 1 / len(means)), means, np.sqrt(np.maximum(own, 0.0)))
 
@@ -198,11 +209,22 @@ class Posterior:
 
         Padding is left out here: n counts the points that hold a value.
         """
-        known = np.flatnonzero(self.mask[j])
+        known = self.known(j)
         cross = self._prior(j, self.x[known], self.low[j][known], x, low)
-        full = np.zeros((len(cross), self.mask.shape[1], len(x)))
-        full[:, known] = cross
-        return full, self.solved(j).whiten[:, known[:, None], known[None, :]] @ cross
+        return cross, self.whitening(j) @ cross
+
+    def known(self, j: int) -> slice | np.ndarray:
+        """Which of the training points hold a value of output j."""
+        rows = np.flatnonzero(self.mask[j])
+        # A slice of large arrays is a view, which costs nothing.
+        return slice(0, len(rows)) if self.mask[j][: len(rows)].all() else rows
+
+    def whitening(self, j: int) -> np.ndarray:
+        """L⁻¹ (k, n, n) of output j between the points that hold a value."""
+        known, whole = self.known(j), self.solved(j).whiten
+        if isinstance(known, slice):
+            return whole[:, known, known]
+        return whole[:, known[:, None], known[None, :]]
 
 
 def fit(
