@@ -69,6 +69,17 @@ class Model:
         """
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
 
+    def frequencies(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies and their sds (n, count) in Hz, as of `predict`."""
+        f, sd = self.surrogate.frequencies(
+            self.cell.features(q), self.low.frequencies(q).frequency_hz
+        )
+        return f, self._with_parameters(q, f, sd)
+
+    def _with_parameters(self, q: np.ndarray, f: np.ndarray, sd: np.ndarray) -> np.ndarray:
+        """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
+        return np.hypot(sd, self.surrogate.frequency_trust * self.low.frequency_sd(q) * f)
+
     @cached_property
     def frfs(self) -> tuple[Frf, ...]:
         """Of the labelled poses; read when asked for."""
@@ -185,8 +196,7 @@ class Model:
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
         found = (surrogate or self.surrogate).predict(features, simulated, visit)
-        share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
-        sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
+        sd = self._with_parameters(q, found.frequency_hz, found.frequency_sd_hz)
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -246,11 +256,13 @@ class Model:
                 )
         return tuple(found)
 
-    @property
+    @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
-        p = self.workspace_prediction
-        return 100 * np.sqrt(np.mean((p.frequency_sd_hz / p.frequency_hz) ** 2, axis=0))
+        candidates, hertz = self.cell.candidates, self.simulated_candidates.frequency_hz
+        f, sd = self.surrogate.frequencies(candidates.features, hertz, visit=False)
+        sd = self._with_parameters(candidates.q, f, sd)
+        return 100 * np.sqrt(np.mean((sd / f) ** 2, axis=0))
 
 
 def build(

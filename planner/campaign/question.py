@@ -114,9 +114,8 @@ def _compared(
     model: Model, poses_deg: list[tuple[float, ...]], modes: tuple[MeasuredMode, ...]
 ) -> list[Comparison]:
     """What is expected at each of at least one pose against the same measured modes."""
-    expected = model.predict(np.deg2rad(poses_deg))
-    each = zip(expected.frequency_hz, expected.frequency_sd_hz, strict=True)
-    return [compare(hz, sd, modes) for hz, sd in each]
+    expected = zip(*model.frequencies(np.deg2rad(poses_deg)), strict=True)
+    return [compare(hz, sd, modes) for hz, sd in expected]
 
 
 def _asked(pose: str, here: Comparison, fits: str) -> Question:
