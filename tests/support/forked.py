@@ -3,8 +3,10 @@
 JAX must not have started in the parent: a child of a process whose backend runs hangs.
 """
 
+import importlib
 import json
 import os
+import pkgutil
 import resource
 import signal
 import sys
@@ -14,7 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from jax._src import xla_bridge
+
+import planner
+
 CPU_S, LARGEST_GIB = 10, 2  # no command of these small cases may take more
+HANGS_S = 120.0  # without work, on a machine that others load
 POLL_S = 0.002
 CHANGES = ("os.rename", "os.remove", "os.truncate", "os.mkdir", "os.rmdir")
 
@@ -28,11 +35,12 @@ class Outcome:
     err: str
     cpu_s: float
     peak_gib: float
+    hung: bool = False
 
     @property
     def killed(self) -> bool:
         """Whether it was killed as was meant."""
-        return self.code == -signal.SIGKILL
+        return self.code == -signal.SIGKILL and not self.hung
 
     @property
     def answer(self) -> Any:
@@ -46,7 +54,9 @@ class Outcome:
         """What no command may do, whatever befalls it."""
         said = self.out + self.err
         found = [text for text in ("Traceback", "failed inside") if text in said]
-        if self.code == -signal.SIGXCPU:
+        if self.hung:
+            found.append(f"no end within {HANGS_S} s")
+        elif self.code == -signal.SIGXCPU:
             found.append(f"more than {CPU_S} s")
         elif not self.killed and self.code not in codes:
             found.append(f"exit code {self.code}")
@@ -55,6 +65,14 @@ class Outcome:
         if found:
             found.append(self.err[-300:])
         return found
+
+
+def preload() -> None:
+    """Import all of the program, so that no child has to."""
+    for module in pkgutil.walk_packages(planner.__path__, "planner."):
+        if not module.name.endswith("__main__"):
+            importlib.import_module(module.name)
+    assert not xla_bridge._backends
 
 
 def forked(
@@ -81,17 +99,18 @@ def forked(
             sys.stderr.flush()
         finally:
             os._exit(code)
-    end = time.monotonic() + after_s
-    ended, status, used = os.wait4(child, os.WNOHANG if after_s else 0)
+    end = time.monotonic() + (after_s or HANGS_S)
+    ended, status, used = os.wait4(child, os.WNOHANG)
     while not ended and time.monotonic() < end:
         time.sleep(POLL_S)
         ended, status, used = os.wait4(child, os.WNOHANG)
+    hung = not ended and not after_s
     if not ended:
         os.kill(child, signal.SIGKILL)
         _, status, used = os.wait4(child, 0)
     out, err = (name.read_text("utf-8", "replace") for name in names)
     cpu = used.ru_utime + used.ru_stime
-    return Outcome(os.waitstatus_to_exitcode(status), out, err, cpu, used.ru_maxrss / 2**20)
+    return Outcome(os.waitstatus_to_exitcode(status), out, err, cpu, used.ru_maxrss / 2**20, hung)
 
 
 def _die_at(change: int) -> None:
