@@ -210,6 +210,7 @@ class Campaign(CampaignReads):
             lacking,
             measure_files,
             not_used,
+            remarked,
             taken_after_all,
         )
         from planner.campaign.log_conversion import from_homogeneity, from_modal
@@ -258,6 +259,7 @@ class Campaign(CampaignReads):
             refit_seconds=time.perf_counter() - started,
             remarks=(
                 *measured.remarks,
+                *remarked(measured, len(old)),
                 *taken_after_all(state, kept.fresh),
                 *displacement(state, delivery, stood),
                 *lacking(state, measurement),

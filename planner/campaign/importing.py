@@ -210,6 +210,12 @@ def displacement(
     )
 
 
+def remarked(measured: MeasuredPose, already: int) -> tuple[str, ...]:
+    """Remarks on the hits of new files, those after the first `already`, each once."""
+    told = (text for verdict in measured.verdicts[already:] for text in verdict.remarks)
+    return tuple(dict.fromkeys(told))
+
+
 def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
     """Remarks on axes that were not hit, or once only, of those that the pose is to be hit along.
 

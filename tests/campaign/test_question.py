@@ -229,7 +229,7 @@ def test_a_mode_that_was_not_found_is_none_that_is_off():
     turned = SimulatedModes(expected[None], np.full((1, 4), 0.03), -residues)
     other = compare(expected, sd, here, turned)
     assert not other.far[[0, 2, 3]].any()
-    assert other.answers_otherwise(True)
+    assert other.answers_otherwise
     assert other.contradicts(False)
     slight = compare(expected, sd, tuple(map(mode, (10.15, 12.2, 18.3, 28.4))))
     assert not slight.contradicts(True)

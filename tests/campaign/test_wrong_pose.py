@@ -13,7 +13,7 @@ from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
 from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
 
-ARMS = ((701, 4, 2), (702, 4, 3), (703, 5, 3), (704, 4, 2), (705, 5, 3))  # seed, joints, modes
+ARMS = ((911, 4, 2), (912, 4, 3), (913, 5, 3), (914, 4, 2), (915, 5, 3))  # seed, joints, modes
 POSES, PAIRS = 24, 40
 
 

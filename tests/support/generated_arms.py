@@ -97,9 +97,11 @@ def _urdf(rng: np.random.Generator, joints: int) -> str:
         x, z = (0.0, 0.25) if i == 1 else (rng.uniform(0, 0.12), rng.uniform(0.05, 0.2))
         if i > 2:
             x, z = rng.uniform(0.25, 0.5), rng.uniform(-0.03, 0.03)
-        mass, centre = masses[i - 1], (rng.uniform(0.08, 0.2), *rng.uniform(-0.03, 0.03, 2))
+        mass = masses[i - 1]
+        centre = np.round([rng.uniform(0.08, 0.2), *rng.uniform(-0.03, 0.03, 2)], 3)
+        at = " ".join(map(str, centre))
         text.append(
-            f'<link name="link_{i}"><inertial><origin xyz="{" ".join(f"{c:.3f}" for c in centre)}"/>'
+            f'<link name="link_{i}"><inertial><origin xyz="{at}"/>'
             f'<mass value="{mass:.3f}"/><inertia ixx="{0.008 * mass:.5f}" iyy="{0.02 * mass:.5f}" '
             f'izz="{0.02 * mass:.5f}" ixy="0" ixz="0" iyz="0"/></inertial></link>'
             f'<joint name="joint_{i}" type="revolute"><parent link="link_{i - 1}"/>'
