@@ -54,6 +54,7 @@ class ImportReport:
     remarks: tuple[str, ...] = ()
     left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
     question: Question | None = None
+    alerts: tuple[str, ...] = ()  # of the remarks, those to be acted upon while the robot stands
 
     def misses(self, model: Model | None = None) -> tuple[HitMiss, ...]:
         """How each accepted hit missed, by this import's model or a later one."""
@@ -208,12 +209,6 @@ def displacement(
         f"The readback of {delivery.pose} is up to {off:.2f}° from its setpoint; the readback "
         f"is used.",
     )
-
-
-def remarked(measured: MeasuredPose, already: int) -> tuple[str, ...]:
-    """Remarks on the hits of new files, those after the first `already`, each once."""
-    told = (text for verdict in measured.verdicts[already:] for text in verdict.remarks)
-    return tuple(dict.fromkeys(told))
 
 
 def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:

@@ -180,6 +180,13 @@ def question(
     return _asked(pose, here, fits)
 
 
+def compared(
+    model: Model, joints_deg: tuple[float, ...], modes: tuple[MeasuredMode, ...]
+) -> Comparison:
+    """Modes measured at a pose against what the model expects there."""
+    return _compared(model, [joints_deg], [modes])[0]
+
+
 def _limit(model: Model, state: CampaignState) -> float:
     """How far residues may be off, by how far they are at the measured poses."""
     used = [m for m in state.used if any(mode.likely for mode in m.modes)]

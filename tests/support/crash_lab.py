@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections import Counter
@@ -22,7 +23,7 @@ from planner.campaign.events import Imported
 from planner.campaign.journal import Journal
 from planner.campaign.state import CampaignState, fold
 from planner.campaign.store import read_kept, recording_path
-from planner.cli.run import run
+from planner.cli.run import STOPPED, run
 from planner.errors import PlannerError
 from planner.truth.deviation import Deviation
 from planner.truth.hits import Hammer, record_poses
@@ -179,6 +180,32 @@ def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
             "gib": outcome.peak_gib, "faults": faults}  # fmt: skip
 
 
+def interrupt(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
+    """One command, stopped as by Ctrl-C, then given again."""
+    if cell.log.exists() and len(cell.state().used) >= ENOUGH:
+        shutil.rmtree(cell.campaign)
+    command, before = cell.command(rng), entries(cell)
+    change = int(np.exp(rng.uniform(0, np.log(MOST_CHANGES))))
+    watching = command[0] == "watch"
+    outcome = forked(doing(command), log, change, 4.0 if watching else 0.0, signal.SIGINT)
+    faults = outcome.faults((0, 3, STOPPED)) + lost(cell, before, command, outcome)
+    said = outcome.err.strip().splitlines()
+    if outcome.code == STOPPED and (len(said) != 1 or not said[0].startswith("Stopped")):
+        faults.append(f"no one sentence: {outcome.err[:400]}")
+    if watching and outcome.code == 0 and "Session ended: quit" in outcome.err:
+        told, gained = outcome.err, entries(cell)[len(before) :]
+        faults += [] if "Stopped: " in told else [f"nothing is said of the stop: {told[-300:]}"]
+        new = [e.event.pose for e in gained if isinstance(e.event, Imported)]
+        faults += [f"the hits of {pose} are not named" for pose in new[-1:] if pose not in told]
+    if not watching:
+        before = entries(cell)
+        again = forked(doing(command), log)
+        codes = (0, 2, 3) if command[0] in ("new", "skip", "withdraw") else (0, 3)
+        faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
+    return {"command": command[:1], "code": outcome.code, "change": change,
+            "said": outcome.err.strip()[-200:], "faults": faults}  # fmt: skip
+
+
 def others(cell: Cell) -> list[Command]:
     """Commands that write elsewhere than into the log."""
     there, out = str(cell.campaign), cell.root / "out"
@@ -293,7 +320,7 @@ def _prefix(cell: Cell, before: tuple) -> bool:
     return now == before[: len(now)]
 
 
-TRIALS = {"kills": kill, "full": starve, "damaged": damage}
+TRIALS = {"kills": kill, "stopped": interrupt, "full": starve, "damaged": damage}
 
 
 def trials(root: Path, kind: str, count: int, seed: int) -> Iterator[dict]:

@@ -76,11 +76,16 @@ def preload() -> None:
 
 
 def forked(
-    act: Callable[[], int], folder: Path, at_change: int = 0, after_s: float = 0.0
+    act: Callable[[], int],
+    folder: Path,
+    at_change: int = 0,
+    after_s: float = 0.0,
+    signal_sent: int = signal.SIGKILL,
 ) -> Outcome:
     """Run `act` in a child whose words go to `folder`.
 
-    It is killed before its `at_change`-th change of the disk, or after so many seconds; 0: never.
+    It is sent a signal before its `at_change`-th change of the disk, and killed after so many
+    seconds; 0: never.
     """
     names = folder / "out", folder / "err"
     child = os.fork()
@@ -92,8 +97,9 @@ def forked(
             sys.stdout, sys.stderr = (os.fdopen(h, "w", closefd=False) for h in (1, 2))
             os.setsid()
             resource.setrlimit(resource.RLIMIT_CPU, (CPU_S, CPU_S))
+            signal.signal(signal.SIGINT, signal.default_int_handler)
             if at_change:
-                _die_at(at_change)
+                _die_at(at_change, signal_sent)
             code = act()
             sys.stdout.flush()
             sys.stderr.flush()
@@ -113,14 +119,14 @@ def forked(
     return Outcome(os.waitstatus_to_exitcode(status), out, err, cpu, used.ru_maxrss / 2**20, hung)
 
 
-def _die_at(change: int) -> None:
-    """SIGKILL before the `change`-th time that this process changes or syncs the disk."""
+def _die_at(change: int, signal_sent: int) -> None:
+    """A signal before the `change`-th time that this process changes or syncs the disk."""
     left = [change]
 
     def count() -> None:
         left[0] -= 1
         if not left[0]:
-            os.kill(os.getpid(), signal.SIGKILL)
+            os.kill(os.getpid(), signal_sent)
 
     def heard(event: str, arguments: tuple) -> None:
         writes = event == "open" and (arguments[2] or 0) & (os.O_WRONLY | os.O_RDWR)
