@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from planner.campaign.cell import Cell
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset, Progress
-    from planner.dataset.hit_columns import HitColumns
+    from planner.dataset.hit_columns import PoseHits
     from planner.frf.frf import Frf
     from planner.surrogate.frf_bands import ModalPrediction
 
@@ -82,6 +82,7 @@ class CampaignReads:
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
                 visit_scatter=configured.visit_scatter,
+                hits_err=configured.hits_err,
             )
         return self._cells[key]
 
@@ -123,7 +124,7 @@ class CampaignReads:
     def _fitted(self, state: CampaignState) -> "Model":
         from planner.campaign.model import build
 
-        model = build(self.cell, state, self.frf_of, self.columns_of)
+        model = build(self.cell, state, self.frf_of, self.hits_of)
         _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
 
@@ -137,12 +138,12 @@ class CampaignReads:
             self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
         return self._frfs[key]
 
-    def columns_of(self, measurement: Measurement, table: ModesTable) -> "HitColumns":
-        """What each accepted hit of a measured pose says by itself."""
-        from planner.dataset.hit_columns import columns_of
+    def hits_of(self, measurement: Measurement, table: ModesTable) -> "PoseHits":
+        """What the accepted hits of a measured pose say, each by itself and at all points."""
+        from planner.dataset.hit_columns import hits_of
 
         sources = tuple(self.source_of(hit) for hit in measurement.accepted)
-        return columns_of(sources, table.band_hz, table.window_rate_1_s)
+        return hits_of(sources, table.band_hz, table.window_rate_1_s)
 
     def dataset(
         self,
@@ -200,7 +201,7 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        kept = begun.geometric_stiffness, begun.visit_scatter
+        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err
         return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------
