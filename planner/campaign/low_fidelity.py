@@ -87,7 +87,8 @@ class LowFidelity:
     """What the simulation says at any pose; None: the campaign uses none.
 
     What `tolerances` leave open of hits, measuring chain and readback is integrated out where it is
-    identified; None: all are exact, as campaigns took them that began so. `left_out` (n, count) is what simulations that were identified without a pose say of its
+    identified; None: all are exact, as campaigns took them that began so.
+    `left_out` (n, count) is what simulations that were identified without a pose say of its
     natural frequencies (Hz), NaN where that was not asked.
     """
 
