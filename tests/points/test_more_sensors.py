@@ -10,13 +10,27 @@ SENSOR_PARTS what is asked of each ("1x2 4x2 1x4 4x4": sensors x poses).
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from planner.diagnosis.effects import library
+from planner.dynamics.simulation import Simulation
 from planner.prove.curves import Share, share
-from tests.support.sensor_cases import KINDS, Said, answers
+from planner.robot.robot import Robot
+from tests.support.arm_with_points import write_arm
+from tests.support.sensor_cases import KINDS, Said, answers, concealed
 
 FIRST = 7001
 MORE_OFTEN = 0.10  # by which four sensors name effect and place more often, or hits are halved
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_concealed_has_a_name(kind: str, tmp_path: Path) -> None:
+    simulation = Simulation(Robot.load(write_arm(tmp_path)))
+    named = {(effect.name, effect.at) for effect in library(simulation)}
+    places = {concealed(kind, np.random.default_rng(seed))[0] for seed in range(6)}
+    assert places <= named
+    assert len(places) > 1 or kind == "base"
 
 
 @pytest.mark.slow

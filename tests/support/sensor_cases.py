@@ -89,12 +89,12 @@ def concealed(kind: str, rng: np.random.Generator) -> tuple[Place, Secret]:
     if kind == "joint":
         k = STIFFNESS[number]
         own = _springs(joint, _across(number), _pair(rng, 0.4 * k, 8 * k))
-        place = "transverse_compliance", joint
+        place = "transverse_compliance", f"joint_{number + 1}"
         return place, Secret(replace(robot, extra=(*robot.extra, *own)))
     if kind == "link":
         k = STIFFNESS[number]
         beam = BentLink(f"l{number + 1}", _pair(rng, 0.3 * k, 5 * k), 3 * k, DAMPING_S)
-        return ("link_flexibility", beam.link), Secret(replace(robot, beams=(beam,)))
+        return ("link_flexibility", f"link_{number + 1}"), Secret(replace(robot, beams=(beam,)))
     moving = sum(mass for mass, *_ in MASSES)
     at = rng.uniform(0.3, 1.0) * np.array(STEPS[number + 1].split(), dtype=float)
     hose = AttachedResonator(
@@ -102,7 +102,7 @@ def concealed(kind: str, rng: np.random.Generator) -> tuple[Place, Secret]:
         moving * log_uniform(rng, 0.003, 0.05), log_uniform(rng, 10.0, 50.0),
         log_uniform(rng, 0.01, 0.05),
     )  # fmt: skip
-    return ("local_resonator", hose.link), Secret(replace(robot, resonators=(hose,)))
+    return ("local_resonator", f"link_{number + 1}"), Secret(replace(robot, resonators=(hose,)))
 
 
 def make(kind: str, seed: int, folder: Path) -> Place:
