@@ -134,8 +134,8 @@ def separation(
 ) -> np.ndarray:
     """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
 
-    q in rad; the sensors of `layout` listen. The odds are those of the true fit to each other one, averaged with the probabilities
-    of the fits; 0 where there are fewer than two.
+    q in rad; the sensors of `layout` listen. The odds are those of the true fit to each other one,
+    averaged with the probabilities of the fits; 0 where there are fewer than two.
     """
     q = np.atleast_2d(q)
     gain = np.zeros((len(q), AXES))

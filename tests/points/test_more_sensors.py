@@ -44,7 +44,7 @@ def test_four_sensors_name_more_or_take_half_the_hits(tmp_path: Path, capsys) ->
     found = list(answers(folder, each, FIRST, parts))
     with capsys.disabled():
         print("\n" + table(found))
-    named = {at: of(found, *at).share for at in {(s.sensors, s.hits) for s in found}}
+    named = {at: of(found, *at).share or 0.0 for at in {(s.sensors, s.hits) for s in found}}
     one, four = ({hits: p for (n, hits), p in named.items() if n == k} for k in (1, 4))
     better = all(four[h] >= one[h] + MORE_OFTEN for h in one if h in four)
     halved = any(2 * h <= most and four[h] >= one[most] for h in four for most in one)

@@ -71,9 +71,9 @@ def _across(joint: int) -> np.ndarray:
 def concealed(kind: str, rng: np.random.Generator) -> tuple[Place, Secret]:
     """One effect in a robot with imperfections; sizes from hardly to be told to large."""
     plain = REAL.scatter.of(int(rng.integers(2**31)))
+    sizes = RIPPLE * rng.standard_normal((4, 2))
     wave = tuple(
-        StiffnessRipple(f"a{n + 1}", 1, *map(float, RIPPLE * rng.standard_normal(2)))
-        for n in range(4)
+        StiffnessRipple(f"a{n}", 1, float(c), float(s)) for n, (c, s) in enumerate(sizes, 1)
     )
     number = int(rng.integers(3))
     joint = f"a{number + 1}"
