@@ -303,5 +303,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(as_logged(config), hashes, __version__, True, True)
+    event = Configured(as_logged(config), hashes, __version__, True, True, True)
     return encode_line("", Entry(1, now, event))[0]

@@ -15,7 +15,7 @@ from planner.campaign.labels import LabelledPose, frequencies, label, observatio
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import tell, visits_of
 from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.hit_columns import HitColumns
+from planner.dataset.hit_columns import PoseHits
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
 from planner.design.parameter_sensitivity import FrfNoise
@@ -182,7 +182,7 @@ class Model:
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
         found = (surrogate or self.surrogate).predict(features, simulated, visit)
-        share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
+        share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
         sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
         return replace(found, frequency_sd_hz=sd)
 
@@ -254,24 +254,25 @@ def build(
     cell: Cell,
     state: CampaignState,
     frf_of: FrfOf,
-    columns_of: Callable[[Measurement, ModesTable], HitColumns] | None = None,
+    hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself, which is
-    asked only where the simulation learns. Without it all hits count as exact.
+    `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
+    which is asked only where the simulation learns. Without it nothing is told of single hits.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     noise, misses, learns = None, (), cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
+        hits = tuple(hits_of(m, table) for m in used) if hits_of else None
+        whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        low = learn(low, frfs, q, table.band_hz)
+        low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(frfs, table.band_hz, misfit)
-        if columns_of is not None and low.learned is not None:
-            columns = [columns_of(m, table) for m in used]
-            told = tell(visits_of(used, columns, frfs), low.learned, cell.tolerances, table.band_hz)
+        if hits is not None and low.learned is not None:
+            told = tell(visits_of(used, hits, frfs), low.learned, cell.tolerances, table.band_hz)
             misses, used = told.poses, tuple(map(told.corrected, used))
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:
