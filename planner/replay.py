@@ -86,7 +86,7 @@ def replay(
         raise InputError(f"The log has entries 1 to {len(entries)}; {until} is not among them.")
     with ExitStack() as stack:
         cells = _Cells(campaign, stack)
-        model, model_key = None, None
+        model, model_key, kept = None, None, campaign.recordings
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
             check, detail, measured = _check(campaign, entry, before, model)
@@ -94,7 +94,7 @@ def replay(
             assert after.configured is not None
             key = (after.model_version, id(cells.of(after.configured)))
             if model is None or key != model_key:
-                of_hits = campaign.frf_of, campaign.hits_of
+                of_hits = kept.frf, kept.hits
                 model, model_key = build(cells.of(after.configured), after, *of_hits), key
             yield Step(entry, check, detail, after, model, measured, instead)
 
@@ -132,7 +132,7 @@ def _check_import(
 ) -> tuple[str, str, MeasuredPose]:
     known = before.measurements.get(event.pose)
     hits = (*(known.accepted if known else ()), *event.hits)
-    sources = tuple(campaign.source_of(hit) for hit in hits)
+    sources = tuple(map(campaign.recordings.source, hits))
     table = model.cell.config.modes
     # Nothing that was kept is taken: to compute it again is what is asked for.
     rate, anew = table.window_rate_1_s, Store(None)

@@ -16,7 +16,8 @@ from planner.campaign.low_fidelity import Learned
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.extra_compliance import across, triple
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear.fit import Fit, Problem, glance
+from planner.diagnosis.linear.fit import Fit, glance
+from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError

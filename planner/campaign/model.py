@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
 
+FrfOf = Callable[[Measurement, ModesTable], Frf]
+
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Scatter from visit to visit is told from so many poses on, where it is larger than usual.
@@ -56,7 +58,8 @@ class Model:
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
     misses: tuple[PoseMisses, ...] = ()  # of the hits of each pose, where a simulation tells them
-    frfs: tuple[Frf, ...] = ()  # of the labelled poses
+    used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
+    frf_of: FrfOf | None = None
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad, as a visit there would show them.
@@ -64,6 +67,14 @@ class Model:
         The modal analysis' own sd of what it will measure there is not part of the sds.
         """
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
+
+    @cached_property
+    def frfs(self) -> tuple[Frf, ...]:
+        """Of the labelled poses; read when asked for."""
+        if self.frf_of is None:
+            return ()
+        table = self.cell.config.modes
+        return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
     def with_residues(self) -> Surrogate:
@@ -242,7 +253,7 @@ class Model:
 def build(
     cell: Cell,
     state: CampaignState,
-    frf_of: Callable[[Measurement, ModesTable], Frf],
+    frf_of: FrfOf,
     hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
@@ -251,8 +262,9 @@ def build(
     which is asked only where the simulation learns. Without it nothing is told of single hits.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    frfs, noise, misses = tuple(frf_of(m, table) for m in used), None, ()
-    if cell.config.fidelity.simulation == "updated" and used:
+    noise, misses, learns = None, (), cell.config.fidelity.simulation == "updated"
+    if learns and used:
+        frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
         whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
@@ -278,8 +290,12 @@ def build(
         taught=best.low.taught,
         visits=cell.visit_scatter,
     )
-    kept = tuple(frf.within(table.band_hz) for frf in frfs)
-    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses, kept)
+    model = Model(
+        cell, best.labelled, best.low, best.seen, surrogate, noise, misses, state.used, frf_of
+    )
+    if learns:
+        _ = model.frfs  # which are at hand, and kept with the model
+    return model
 
 
 @dataclass(frozen=True, eq=False)
