@@ -76,11 +76,13 @@ def recorded(folder: Path, toml: Path, seed: int) -> Dataset:
     return Dataset.read(folder, robot.joint_names, robot.config.band_hz, points=robot.points)
 
 
-def told(robot: Robot, heard: Dataset, poses: int) -> Identification:
+def told(
+    robot: Robot, heard: Dataset, poses: int, warm: Identification | None = None
+) -> Identification:
     """By the first poses."""
     return identify(
         heard.one_hit_frfs[:poses], heard.q[:poses], Simulation(robot), CAD_INERTIAS,
-        starts=1, effort=QUICK, tolerances=Tolerances.of(robot.config),
+        starts=1, effort=QUICK, warm=warm, tolerances=Tolerances.of(robot.config),
     )  # fmt: skip
 
 
@@ -91,8 +93,10 @@ def test_four_sensors_leave_fewer_parameters_open(tmp_path: Path, capsys) -> Non
     robot, all_ = Robot.load(toml), recorded(tmp_path / "hits", toml, 41)
     open_: dict[tuple[int, int], int] = {}
     for poses in POSES:
-        for heard in (all_.heard_by("sensor"), all_):
-            found = told(robot, heard, poses)
+        found = None
+        for heard in (all_, all_.heard_by("sensor")):
+            # The tool's sensor starts where all led: what counts is what it tells, not the search.
+            found = told(robot, heard, poses, found)
             count = len(heard.sensors)
             open_[count, poses] = sum(not e.identifiable for e in found.estimates)
             with capsys.disabled():
