@@ -10,11 +10,8 @@ from planner.modal.mode_selection import MAX_DAMPING, excess, running_mean
 from planner.modal.refine import refine
 from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
-from planner.modal.split_modes import REACH, Places, around, drifted, explains, unsplit
+from planner.modal.split_modes import REACH, Places, around, drifted, explains, thinned, unsplit
 
-# Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
-# are fitted: one in so many is kept.
-NEAR, THINNED = 10.0, 3
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
 PRESENT, PRESENT_ADDED = 0.03, 0.2
@@ -86,19 +83,10 @@ def _fit(
     """Fit on thinned lines; poles that stray are left out."""
     while True:
         try:
-            lines = _thinned(data, poles)
+            lines = thinned(data, poles)
             return fit_sets(data, sets, variance, poles, rounds, known, lines)
         except StrayedError as error:
             poles, known = poles[~error.astray], None
-
-
-def _thinned(data: Data, poles: np.ndarray) -> np.ndarray:
-    """Lines near a resonance, and some of the others."""
-    f = data.frequency_hz
-    kept = np.arange(f.size) % THINNED == 0
-    for pole in poles:
-        kept |= np.abs(f - pole.imag / (2 * np.pi)) < NEAR * abs(pole.real) / (2 * np.pi)
-    return np.flatnonzero(kept)
 
 
 def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:

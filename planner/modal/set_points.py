@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.residues import Lines, Residues, basis, basis_slope, synthesize, unpack
+from planner.modal.residues import Lines, Residues, synthesize, unpack
 
 RIDGE = 1e-13  # of the residues' normal matrix: keeps poles that coincide apart from rounding
-AT_ONCE = 400_000  # values of one column for all poles and sets of a block
+AT_ONCE = 100_000  # values of one column for all poles and sets of a block
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +72,11 @@ def set_points(data: SetData, poles: np.ndarray) -> SetPoints:
 
 def _block(data: SetData, poles: np.ndarray, which: slice) -> tuple[np.ndarray, ...]:
     m, values, weight = poles.shape[1], data.values[which], data.weight[which]
-    linear, slope = basis(data.lines, poles), basis_slope(data.lines, poles)
-    p = linear.shape[1]
-    columns = np.concatenate([linear, slope], axis=1) * data.root
-    both = np.concatenate([columns.real, columns.imag], axis=-1)
-    norm = np.sqrt(np.einsum("kcf,kcf->kc", both, both))
-    both /= norm[..., None]
+    both, p = _columns(data, poles)
     gram = both @ both.transpose(0, 2, 1)
-    cross = values @ both.transpose(0, 2, 1)
+    norm = np.sqrt(np.maximum(np.einsum("kcc->kc", gram), 1e-300))
+    gram /= norm[:, :, None] * norm[:, None, :]
+    cross = values @ both.transpose(0, 2, 1) / norm[:, None]
     inverse = np.linalg.inv(gram[:, :p, :p] + RIDGE * p * np.eye(p))
     found = cross[..., :p] @ inverse
     turned = -inverse @ gram[:, :p, p:]
@@ -98,6 +95,33 @@ def _block(data: SetData, poles: np.ndarray, which: slice) -> tuple[np.ndarray, 
         inverse / norm[:, :p, None] / norm[:, None, :p],
         turned * norm[:, None, p:] / norm[:, :p, None],
     )
+
+
+def _columns(data: SetData, poles: np.ndarray) -> tuple[np.ndarray, int]:
+    """(k, columns, 2F) `basis`, then `basis_slope`, weighted; how many of them are the first.
+
+    Real parts, then imaginary ones; written where they belong, since this is where the time goes.
+    """
+    (k, m), lines = poles.shape, data.lines.x.size
+    rest = data.lines.rest * data.root
+    linear = 2 * m + 2 * len(rest)
+    both = np.empty((k, linear + 2 * m, 2 * lines))
+    both[:, 2 * m : linear, :lines] = np.concatenate([rest.real, -rest.imag])
+    both[:, 2 * m : linear, lines:] = np.concatenate([rest.imag, rest.real])
+    up, down = 1 / (data.lines.x - poles[..., None]), 1 / (data.lines.x - poles.conj()[..., None])
+    factor = data.lines.factor * data.root
+    for start, power in ((0, 1), (linear, 2)):
+        first, second = factor * up**power, factor * down**power
+        one, other = slice(start, start + m), slice(start + m, start + 2 * m)
+        both[:, one, :lines], both[:, one, lines:] = (
+            first.real + second.real,
+            first.imag + second.imag,
+        )
+        both[:, other, :lines], both[:, other, lines:] = (
+            second.imag - first.imag,
+            first.real - second.real,
+        )
+    return both, linear
 
 
 def _normal(
@@ -138,15 +162,15 @@ def significances(point: SetPoints, weight: np.ndarray, m: int) -> np.ndarray:
 
 
 def fitted(
-    data: SetData, point: SetPoints, poles: np.ndarray, shape: tuple[int, int]
+    data: SetData, point: SetPoints, poles: np.ndarray, lines: Lines
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Residues (entries, m) and responses `shape` (entries, F) that they make."""
-    m = poles.shape[1]
-    residue, response = np.zeros((shape[0], m), complex), np.zeros(shape, complex)
+    """Residues (entries, m) and the responses (entries, F) that they make at `lines`."""
+    m, entries = poles.shape[1], int(np.max(data.entries)) + 1
+    residue, response = np.zeros((entries, m), complex), np.zeros((entries, lines.x.size), complex)
     for k, own in enumerate(poles):
         there = data.entries[k] >= 0
         found = unpack(point.coefficients[k, there], m)
         residue[data.entries[k, there]] = found.residue
         made = Residues(found.residue[:, None], found.rest[:, None])
-        response[data.entries[k, there]] = synthesize(data.lines, own, made)[:, 0]
+        response[data.entries[k, there]] = synthesize(lines, own, made)[:, 0]
     return residue, response

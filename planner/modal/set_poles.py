@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.modal.fit_data import Data
+from planner.modal.residues import Lines
 from planner.modal.set_points import (
     SetData,
     SetPoints,
@@ -66,8 +67,8 @@ def fit_sets(
     """Fit from common poles `start` (m,) in rad/s.
 
     `sets` are the entries (indices) of each set; data.response (e, 1, F), variance (e, F). `known`
-    (k, m) are the sets' own poles to go on from; poles are fitted to some of the `lines`
-    (indices), where stated. Raises StrayedError where the data do not hold the poles.
+    (k, m) are the sets' own poles to go on from; only some `lines` (indices) are fitted, where
+    stated. Raises StrayedError where the data do not hold the poles.
     """
     m = start.size
     common = np.concatenate([start.real, start.imag])
@@ -93,8 +94,7 @@ def fit_sets(
         still = np.abs(own - before) < STILL * np.tile(np.abs(common[:m]), 2)
         if np.all(still) and np.all(np.abs(step) < SETTLED * np.sqrt(np.diag(covariance))):
             break
-    every = part if lines is None else SetData.of(data.lines, response, variance, sets)
-    return _finish(every, response.shape, own, common, spread, covariance)
+    return _finish(part, data.lines, own, common, spread, covariance)
 
 
 def _complex(parts: np.ndarray) -> np.ndarray:
@@ -160,12 +160,12 @@ def _own(point: SetPoints, x: np.ndarray, common: np.ndarray, spread: np.ndarray
 
 
 def _finish(
-    data: SetData, shape: tuple[int, int], own: np.ndarray, common: np.ndarray,
+    data: SetData, lines: Lines, own: np.ndarray, common: np.ndarray,
     spread: np.ndarray, covariance: np.ndarray,
 ) -> SetPoles:  # fmt: skip
     m = common.size // 2
     point = set_points(data, _complex(own))
-    residue, response = fitted(data, point, _complex(own), shape)
+    residue, response = fitted(data, point, _complex(own), lines)
     # Own poles are as sure as the set and the others make them.
     total = _held(point, spread) * spread + covariance
     change = point.turned[:, None, : 2 * m] @ turns(point.coefficients, m)
@@ -173,7 +173,7 @@ def _finish(
     alone = np.einsum("kcc->kc", point.inverse)[:, None, : 2 * m]
     parts = alone / np.maximum(data.weight, 1e-300)[..., None] + spent
     there = data.entries >= 0
-    residue_variance = np.zeros((shape[0], m))
+    residue_variance = np.zeros(residue.shape)
     residue_variance[data.entries[there]] = ((parts[..., :m] + parts[..., m:]) / 2)[there]
     return SetPoles(
         _complex(common), _complex(own), covariance, spread, residue, residue_variance, response,

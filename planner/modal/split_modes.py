@@ -18,6 +18,18 @@ MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
 # Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
 # it.
 REACH, LINES_AROUND = 12.0, 12
+# Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
+# are fitted: one in so many is kept.
+NEAR, THINNED = 10.0, 3
+
+
+def thinned(data: Data, poles: np.ndarray) -> np.ndarray:
+    """Lines near a resonance, and some of the others."""
+    f = data.frequency_hz
+    kept = np.arange(f.size) % THINNED == 0
+    for pole in poles:
+        kept |= np.abs(f - pole.imag / (2 * np.pi)) < NEAR * abs(pole.real) / (2 * np.pi)
+    return np.flatnonzero(kept)
 
 
 def drifted(
@@ -48,7 +60,8 @@ def around(
     """The lines around a pole less the modes far from it, their indices, which modes are near."""
     step, centre = data.frequency_hz[1] - data.frequency_hz[0], pole.imag / (2 * np.pi)
     reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
-    lines = np.flatnonzero(np.abs(data.frequency_hz - centre) < reach)
+    lines = thinned(data, np.append(fit.poles, pole))
+    lines = lines[np.abs(data.frequency_hz[lines] - centre) < reach]
     part = replace(data, frequency_hz=data.frequency_hz[lines], response=data.response[..., lines])
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
     far = _made(part, sets, fit, np.flatnonzero(~near))
