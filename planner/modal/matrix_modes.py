@@ -18,6 +18,7 @@ from planner.modal.shape_measures import (
     real_normal_modes,
 )
 from planner.recording.dof import Dof
+from planner.recording.geometry import Geometry
 
 # A band that the user does not state begins at this line: the first ones hold offsets and drift.
 FIRST_LINE = 3
@@ -67,9 +68,14 @@ class MatrixModes:
     checks: Consistency
 
 
-def modes_of_matrix(matrix: FrfMatrix, band_hz: tuple[float, float] | None = None) -> MatrixModes:
+def modes_of_matrix(
+    matrix: FrfMatrix,
+    band_hz: tuple[float, float] | None = None,
+    geometry: Geometry | None = None,
+) -> MatrixModes:
     """All modes that a matrix of FRFs holds in a band (Hz; default: all lines but the first few).
 
+    Where the points lie (`geometry`) shows which of them have a turned sign or another's name.
     Raises RefusedError where no mode can be found.
     """
     frequency = matrix.frequency_hz
@@ -84,7 +90,7 @@ def modes_of_matrix(matrix: FrfMatrix, band_hz: tuple[float, float] | None = Non
             f"No mode could be found between {band[0]:g} and {band[1]:g} Hz in {matrix.count} FRFs:"
             " check that the band holds a resonance."
         )
-    checks = check(matrix, found, np.array(inside))
+    checks = check(matrix, found, np.array(inside), geometry)
     found = _turned_back(matrix, found, checks)
     dofs, entries = _points(matrix, found, checks)
     gain = _row_gain(found, inside, entries)
@@ -94,10 +100,16 @@ def modes_of_matrix(matrix: FrfMatrix, band_hz: tuple[float, float] | None = Non
 
 
 def _turned_back(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
-    """With the residues of columns whose sign is turned as they should be."""
-    sign = np.array([-1.0 if dof in checks.turned else 1.0 for dof in matrix.references])
-    residue = found.fit.residue * sign[found.columns][:, None]
-    return replace(found, fit=replace(found.fit, residue=residue))
+    """With the residues of points whose sign is turned as they should be."""
+    felt, hit = matrix.responses, matrix.references
+    roved = (felt, hit) if len(felt) >= len(hit) else (hit, felt)
+    index = found.rows, found.columns
+    if len(felt) < len(hit):
+        index = index[::-1]
+    sign = np.ones(found.rows.size)
+    for dofs, where, wrong in zip(roved, index, (checks.turned_rows, checks.turned), strict=True):
+        sign *= np.array([-1.0 if dof in wrong else 1.0 for dof in dofs])[where]
+    return replace(found, fit=replace(found.fit, residue=found.fit.residue * sign[:, None]))
 
 
 def _within(frequency_hz: float, band_hz: tuple[float, float]) -> bool:
