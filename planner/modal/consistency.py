@@ -47,7 +47,7 @@ class DrivingPoint:
 
 @dataclass(frozen=True)
 class Reciprocity:
-    """H_ij beside H_ji: relative difference, and their ratio (least squares; −1: a turned sign)."""
+    """H_ij beside H_ji at the modes: difference and ratio (least squares; −1: a turned sign)."""
 
     first: Dof
     second: Dof
@@ -78,7 +78,7 @@ def check(
     """Check FRFs and residues of the modes (indices) that were established."""
     sides, lines = Sides.of(matrix, found, modes), _lines(matrix, found)
     driving = tuple(_driving(matrix, sides, lines, *pair) for pair in sides.driving)
-    reciprocity = tuple(_reciprocity(matrix, lines, *pair) for pair in _pairs(matrix))
+    reciprocity = tuple(_reciprocity(matrix, found, modes, *pair) for pair in _pairs(matrix))
     enough = modes.size >= LEAST_MODES
     wrong = tuple(point.dof for point in driving if point.modes < DOUBTED)
     rows = _turned_rows(sides, geometry) if enough else ()
@@ -145,9 +145,12 @@ def _pairs(matrix: FrfMatrix) -> list[tuple[int, int, int, int]]:
 
 
 def _reciprocity(
-    matrix: FrfMatrix, lines: np.ndarray, o: int, i: int, p: int, j: int
+    matrix: FrfMatrix, found: MatrixPoles, modes: np.ndarray, o: int, i: int, p: int, j: int
 ) -> Reciprocity:
-    one, other = matrix.accelerance[o, i, lines], matrix.accelerance[p, j, lines]
+    # The heights of the peaks; the lines themselves differ wherever frequencies drift.
+    height = found.fit.residue[:, modes] / np.abs(found.fit.poles[modes].real)
+    entry = {pair: k for k, pair in enumerate(zip(found.rows, found.columns, strict=True))}
+    one, other = height[entry[o, i]], height[entry[p, j]]
     size = np.linalg.norm(one) * np.linalg.norm(other)
     ratio = float(np.real(np.vdot(one, other)) / max(np.linalg.norm(one) ** 2, 1e-300))
     apart = float(np.linalg.norm(one - other) / max(np.sqrt(size), 1e-300))

@@ -20,6 +20,7 @@ ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets dif
 PASSES = 3  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
+SETTLING = 2  # rounds of a fit that has been fitted before, to fewer lines
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
@@ -174,11 +175,10 @@ def _tried(
     quick = refine(local.lines, local.response, together, start, local.allowed)
     if presences(local, quick.poles, quick.residues.residue[:, 0])[-1] < PRESENT_ADDED / 2:
         return None
+    known = fit.own[:, near]
+    own = np.column_stack([known, np.full(len(known), quick.poles[-1])])
+    start = np.append(fit.poles[near], quick.poles[-1])
     try:
-        own = fit.own[:, near]
-        before = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=own)
-        own = np.column_stack([own, np.full(len(own), quick.poles[-1])])
-        start = np.append(fit.poles[near], quick.poles[-1])
         after = fit_sets(local, sets, variance[:, lines], start, known=own)
     except StrayedError:
         return None
@@ -186,5 +186,10 @@ def _tried(
     inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
     present = presences(local, after.poles, after.residue)[-1]
     real = inside and present >= PRESENT_ADDED and -new.real < DAMPING_ADDED * abs(new)
-    better = explains(local, before, after, variance[:, lines])
-    return complex(new) if real and better else None
+    if not real:
+        return None
+    try:
+        before = fit_sets(local, sets, variance[:, lines], fit.poles[near], SETTLING, known)
+    except StrayedError:
+        return None
+    return complex(new) if explains(local, before, after, variance[:, lines]) else None

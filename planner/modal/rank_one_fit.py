@@ -14,6 +14,7 @@ RIDGE = 1e-11
 # Relative to all entries, an error that each is given at first: none rules alone.
 START_SHARE = 0.03
 REWEIGHED, SPREAD_ROUNDS = 4, 30  # times that weights follow what no shape explains; its steps
+SETTLED = 0.03  # relative change of the variance, below which it is settled
 LEAST_FREE = 1.0  # degrees of freedom, with fewer of which nothing is left over to tell
 
 
@@ -109,7 +110,9 @@ def fit_shape(
             break
         square = np.abs(left) ** 2 * residue.size / free
         size = np.abs(values - left) ** 2
-        spread = _spread(entries.columns, square, noise, size)
+        before, spread = spread, _spread(entries.columns, square, noise, size)
+        if np.all(np.abs(spread / before - 1) < SETTLED):
+            break
     found = _fitted(problem, 1 / spread, found)
     left, jacobian = problem.left(found), problem.jacobian(found)
     covariance = problem.covariance(jacobian, 1 / spread)

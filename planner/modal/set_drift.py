@@ -34,7 +34,10 @@ def sought(
     seen = rest[:, near] * root
     values = np.concatenate([seen.real, seen.imag], axis=1)
     lines, profile = data.lines.part(near), root[0] / root[0, 0]
-    gain = np.array([_explained(lines, profile, trial, values, sets) for trial in trials])
+    every = np.concatenate(sets)
+    which = np.repeat(np.arange(len(sets)), [len(chosen) for chosen in sets])
+    part = [_explained(lines, profile, trial, values)[every] for trial in trials]
+    gain = np.array([np.bincount(which, each, len(sets)) for each in part])
     nearest = np.argmin(np.abs(trials.imag[:, None] - own.imag), axis=0)
     best = np.argmax(gain, axis=0)
     index = np.arange(len(sets))
@@ -43,13 +46,11 @@ def sought(
 
 
 def _explained(
-    lines: Lines, profile: np.ndarray, trial: complex, values: np.ndarray,
-    sets: tuple[np.ndarray, ...],
-) -> np.ndarray:  # fmt: skip
-    """(k,) χ² of each set that a mode with this pole, and a straight line, explain."""
+    lines: Lines, profile: np.ndarray, trial: complex, values: np.ndarray
+) -> np.ndarray:
+    """(e,) χ² of each entry that a mode with this pole, and a straight line, explain."""
     up, down = unit(lines, np.array([trial])), unit(lines, np.array([trial.conjugate()]))
     far = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)])
     columns = np.concatenate([up + down, 1j * (up - down), far, 1j * far]) * profile
     both = np.concatenate([columns.real, columns.imag], axis=1)
-    part = np.sum((values @ np.linalg.qr(both.T)[0]) ** 2, axis=1)
-    return np.array([np.sum(part[chosen]) for chosen in sets])
+    return np.sum((values @ np.linalg.qr(both.T)[0]) ** 2, axis=1)

@@ -18,6 +18,7 @@ MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
 # Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
 # it.
 REACH, LINES_AROUND = 12.0, 12
+MOST_LINES = 240  # of which that needs no more: of a fine grid, one line in so many
 # Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
 # are fitted: one in so many is kept.
 NEAR, THINNED = 10.0, 3
@@ -62,6 +63,7 @@ def around(
     reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
     lines = thinned(data, np.append(fit.poles, pole))
     lines = lines[np.abs(data.frequency_hz[lines] - centre) < reach]
+    lines = lines[:: 1 + lines.size // MOST_LINES]
     part = replace(data, frequency_hz=data.frequency_hz[lines], response=data.response[..., lines])
     near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
     far = _made(part, sets, fit, np.flatnonzero(~near))
