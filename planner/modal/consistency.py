@@ -47,7 +47,7 @@ class DrivingPoint:
 
 @dataclass(frozen=True)
 class Reciprocity:
-    """H_ij beside H_ji at the modes: difference and ratio (least squares; −1: a turned sign)."""
+    """H_ij beside H_ji at the modes: difference beyond noise, ratio (least squares; −1: turned)."""
 
     first: Dof
     second: Dof
@@ -153,7 +153,10 @@ def _reciprocity(
     one, other = height[entry[o, i]], height[entry[p, j]]
     size = np.linalg.norm(one) * np.linalg.norm(other)
     ratio = float(np.real(np.vdot(one, other)) / max(np.linalg.norm(one) ** 2, 1e-300))
-    apart = float(np.linalg.norm(one - other) / max(np.sqrt(size), 1e-300))
+    variance = found.scale[modes] * found.fit.residue_variance[:, modes]
+    noise = 2 * (variance[entry[o, i]] + variance[entry[p, j]]) / found.fit.poles[modes].real ** 2
+    beyond = np.linalg.norm(one - other) ** 2 - np.sum(noise)
+    apart = float(np.sqrt(max(beyond, 0.0) / max(size, 1e-300)))
     return Reciprocity(matrix.responses[o], matrix.references[i], apart, ratio)
 
 

@@ -45,9 +45,7 @@ def sought(
     return np.where(moved, trials[best], own)
 
 
-def _explained(
-    lines: Lines, profile: np.ndarray, trial: complex, values: np.ndarray
-) -> np.ndarray:
+def _explained(lines: Lines, profile: np.ndarray, trial: complex, values: np.ndarray) -> np.ndarray:
     """(e,) χ² of each entry that a mode with this pole, and a straight line, explain."""
     up, down = unit(lines, np.array([trial])), unit(lines, np.array([trial.conjugate()]))
     far = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)])
