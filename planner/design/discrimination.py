@@ -18,8 +18,9 @@ from scipy.linalg import block_diag
 
 from planner.design.frequency_posterior import AXES
 from planner.design.parameter_sensitivity import FrfNoise
-from planner.diagnosis.linear.fit import Fit, Problem, carried_on, tolerances_of
+from planner.diagnosis.linear.fit import Fit, carried_on
 from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.frf.frf import Frf
 from planner.identification.measurement_model import OPEN, basis
 from planner.inference.parallel import side_by_side

@@ -10,7 +10,8 @@ from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
-from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle, tolerances_of
+from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.linear.search import Found, search
 from planner.diagnosis.linear.slightness import thinned, without_slight
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
@@ -76,7 +77,7 @@ def diagnose(
     """
     started = time.perf_counter()
     band = common_band(frfs, simulation.robot.config.band_hz)
-    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band)
+    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band, lossy=True)
     if not stands(simulation.elastic.matrices(problem.q), simulation.elasticity.stiffness):
         raise InputError(TOO_SOFT)
     tell("refitting the simulation", 0.0)

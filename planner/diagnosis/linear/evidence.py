@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, size_priors
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.thresholds import (
@@ -84,14 +84,15 @@ def shares_of(
     matter: the first fit will do.
     """
     before, left = np.log(prior), np.maximum(left, seen)
-    known = np.array([w.log_evidence for w in worth]) + before + left_alone(left, matters, seen)
-    strange = np.array([w.log_evidence_unknown for w in worth]) + before
-    strange += np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
-    scores = np.tile([w.score for w in worth], (2, 1))
-    both = np.concatenate([known, strange])
-    alone, beside, _ = np.split(
-        bootstrapped(scores, both, 1.0, -np.inf, BOOTSTRAPS, seed), [len(known), len(both)]
-    )
+    usual, unusual = size_priors()
+    each = np.array([w.by_size for w in worth]) + before[:, None]
+    known = each + usual + left_alone(left, matters, seen)[:, None]
+    strange = each + unusual + np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
+    # Sizes are told apart in each resample anew: poses differ in which of them they tell.
+    scores = np.tile(np.concatenate([w.scores for w in worth]), (2, 1))
+    both = np.concatenate([known.ravel(), strange.ravel()])
+    found = bootstrapped(scores, both, 1.0, -np.inf, BOOTSTRAPS, seed)[:-1]
+    alone, beside = found.reshape(2, *each.shape).sum(axis=2)
     counts = float(norm.cdf(np.log(left[0] / matters) / np.log(LEFT_FACTOR)))
     alone[0] += (1 - counts) * beside.sum()
     return np.append(alone, counts * beside.sum())

@@ -10,7 +10,8 @@ import numpy as np
 
 from planner.diagnosis.effects.combined import Both, together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import CLOSE, Fit, Problem, approached, fit, points, settle
+from planner.diagnosis.linear.fit import Fit, approached, fit, points, settle
+from planner.diagnosis.linear.problem import CLOSE, Problem
 from planner.diagnosis.thresholds import INERTIA_STRAYED
 from planner.inference.parallel import side_by_side
 

@@ -1,12 +1,13 @@
 """What a fit says: FRFs at any pose with uncertainty, and how well it agrees where one measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.diagnosis.linear.fit import Fit, Grade, Problem, fit, settle
+from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.diagnosis.linear.objective import Misfit
+from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.gradient import laplace
 from planner.identification.agreement import Similarity, similarity_of
 from planner.identification.held_out import set_aside
@@ -65,6 +66,8 @@ def misfit_at(
 
 def similarity(problem: Problem, found: Fit | None) -> Similarity:
     """Of a fit (None: the simulation as it stands) to the FRFs of a problem, artefacts included."""
+    if found is None:
+        problem = replace(problem, lossy=False)
     misfit = problem.misfit(Effect("") if found is None else found.effect, ALL)
     h = misfit.response(misfit.mean if found is None else found.x)[0]
     return similarity_of(misfit.measured, h)

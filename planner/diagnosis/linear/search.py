@@ -10,19 +10,9 @@ from planner.diagnosis.effects.combined import Both, Family, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
-from planner.diagnosis.linear.fit import (
-    CLOSE,
-    FINE,
-    Fit,
-    Grade,
-    Problem,
-    carried_on,
-    glance,
-    promise,
-    settle,
-    staged,
-)
+from planner.diagnosis.linear.fit import Fit, carried_on, glance, promise, settle, staged
 from planner.diagnosis.linear.other_places import burdened, elsewhere, rigid
+from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS, SPRING_STRAYED
 from planner.identification.held_out import farthest_first

@@ -18,7 +18,8 @@ from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.sensor_chain import SensorChain
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.fit import Problem, fit, tolerances_of
+from planner.diagnosis.linear.fit import fit
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens.exponential_window import screen_window
 from planner.diagnosis.thresholds import (
     ALIKE,

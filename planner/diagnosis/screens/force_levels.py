@@ -24,7 +24,8 @@ from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.starting_values import starts
 from planner.diagnosis.laws.torque_laws import behaviour
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import Fit, tolerances_of
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.screens import repeats, several_joints
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.diagnosis.screens.tone import screen_tone
