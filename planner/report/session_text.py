@@ -11,6 +11,7 @@ from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.report.pose_screen import PosePage
+from planner.report.text import with_sd
 
 HELP = """\
 a, Enter  import the hits that wait          r  set the waiting hits aside, do not import them
@@ -47,10 +48,10 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
             off = (mode.frequency_hz - expected) / np.hypot(sd, mode.frequency_sd_hz)
             table.add_row(
                 str(k + 1),
-                f"{mode.frequency_hz:.3f} ± {mode.frequency_sd_hz:.3f}",
+                with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
                 f"{expected:.2f} ± {sd:.2f}",
                 Text(f"{off:+.1f}", style="bold yellow" if abs(off) > 3 else ""),
-                f"{100 * mode.damping_ratio:.2f} ± {100 * mode.damping_sd:.2f}",
+                with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
                 sure,
             )
     parts: list[RenderableType] = [table, *_missed(report)]

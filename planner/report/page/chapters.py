@@ -9,6 +9,7 @@ from planner.campaign.config import CampaignConfig
 from planner.campaign.events import Configured, Entry, Imported, Proposed, Undone
 from planner.campaign.state import Measurement
 from planner.check.remark import CheckRemark
+from planner.recording.points import SENSOR, TCP
 from planner.report.page.facts import Facts
 from planner.report.page.html import (
     Markup,
@@ -34,6 +35,7 @@ def asked(facts: Facts) -> Markup:
         ("Robot", f"{robot.name}: {len(robot.joint_names)} joints, {mass:.4g} kg move"),
         ("Simulation", _simulation(config, len(robot.config.compliance))),
         ("Hit point and sensor", f"{robot.config.tcp_frame}, {robot.config.sensor_frame}"),
+        *_points(facts),
         *_workspace(config, robot.joint_names),
         ("Modes", f"the {config.modes.count} lowest in {_range(config.modes.band_hz)} Hz"),
         ("Poses chosen by", config.acquisition.name),
@@ -41,6 +43,16 @@ def asked(facts: Facts) -> Markup:
     ]
     words = tag("table", *(tag("tr", tag("th", a), tag("td", b)) for a, b in rows), class_="words")
     return section("What was asked", words, findings(cell.examined.remarks), id_="asked")
+
+
+def _points(facts: Facts) -> list[tuple[str, str]]:
+    """Sensors and hit points beside the tool's that recordings name."""
+    hits = [hit for m in facts.state.recorded for hit in m.hits]
+    named = dict.fromkeys(
+        name for hit in hits for name in (hit.hit_point, *hit.response_points)
+        if name and name not in (TCP, SENSOR)
+    )  # fmt: skip
+    return [("Other points", ", ".join(named))] if named else []
 
 
 def _range(values: Iterable[float]) -> str:
