@@ -124,7 +124,8 @@ def progress_line(
 ) -> Text:
     """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
-    `history` is the overall sd (%) after each measurement; it falls about geometrically.
+    Short, for it shares a line of 80 columns. `history` is the overall sd (%) after each
+    measurement; it falls about geometrically.
     """
     parts = []
     if seconds_per_pose is not None:
@@ -133,11 +134,12 @@ def progress_line(
     if left == (0, 0):
         parts.append("overall sd below the target")
     elif left is not None:
-        parts.append(f"{_span(left)} more pose{'s' if left != (1, 1) else ''} by the trend so far")
+        more = f"{_span(left)} more pose{'s' if left != (1, 1) else ''}"
         if seconds_per_pose is not None:
             minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
             rounded = [None if m is None else max(1, round(m)) for m in minutes]
-            parts.append(f"{_span((rounded[0] or 1, rounded[1]))} min to go")
+            more += f", {_span((rounded[0] or 1, rounded[1]))} min to go"
+        parts.append(more)
     elif len(history) > 1:
         parts.append("no trend yet that tells how many more it takes")
     return Text("; ".join(parts))

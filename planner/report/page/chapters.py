@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable
 
-import msgspec
 import numpy as np
 
 from planner.campaign.config import CampaignConfig
-from planner.campaign.events import Configured, Entry, Imported, Proposed, Undone
+from planner.campaign.events import Undone
 from planner.campaign.state import Measurement
 from planner.check.remark import CheckRemark
 from planner.recording.points import SENSOR, TCP
+from planner.report.log_words import act
 from planner.report.page.facts import Facts
 from planner.report.page.html import (
     Markup,
@@ -150,25 +150,6 @@ def decisions(facts: Facts) -> Markup:
     return section(
         "Log of decisions", words_table(("entry", "time (UTC)", "what"), rows), id_="log"
     )
-
-
-def act(entry: Entry) -> str:
-    """What an entry of the log says, in words."""
-    event = entry.event
-    if isinstance(event, Configured):
-        return f"configured, with planner {event.planner}"
-    if isinstance(event, Proposed):
-        poses = ", ".join(p.pose for p in event.proposals)
-        return f"proposed {poses} by {event.acquisition}"
-    if isinstance(event, Imported):
-        used = sum(hit.accepted for hit in event.hits)
-        held = "; held: a question was asked" if event.question else ""
-        return f"imported {used} of {len(event.hits)} hits at {event.pose}{held}"
-    if isinstance(event, Undone):
-        return f"took back entry {event.act}"
-    told = msgspec.to_builtins(event)
-    reason = f": {told['reason']}" if told.get("reason") else ""
-    return f"{told['kind']} {told['pose']}{reason}"
 
 
 def reproduce(facts: Facts) -> Markup:
