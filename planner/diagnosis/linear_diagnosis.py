@@ -52,9 +52,9 @@ class Diagnosis:
     refitted: Fit
     best: Fit  # of the likeliest candidate that is a fit, so not "unknown"
     temper: float
-    log_evidence: float  # of everything that was weighed, together
     seconds: float
     problem: Problem
+    log_evidence: float = 0.0  # of everything that was weighed, together
 
     @property
     def left(self) -> float:
@@ -118,7 +118,7 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
     seconds = time.perf_counter() - started
     return Diagnosis(
         _verdict(candidates), candidates, found.finalists[0], best,
-        weights.temper, weights.log_evidence, seconds, problem,
+        weights.temper, seconds, problem, weights.log_evidence,
     )  # fmt: skip
 
 

@@ -50,7 +50,7 @@ def explained(problem, effect):
     x = misfit.mean + 0.2 * misfit.sd * away
     fit = Fit(effect, misfit, x, misfit.by_pose(x))
     candidate = Candidate(effect.parts(), 0.9, fit)
-    return Diagnosis("explained", (candidate,), fit, fit, 1.0, 0.0, 0.0, problem), candidate
+    return Diagnosis("explained", (candidate,), fit, fit, 1.0, 0.0, problem), candidate
 
 
 @pytest.mark.parametrize("kind", KINDS)
