@@ -68,9 +68,8 @@ def compare(
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)
         found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
-    answer = comparison(bench, study, found, poses, (*remarks, *damaged)).with_pictures(
-        out, rrd, bench.key
-    )
+    answer = comparison(bench, study, found, poses, (*remarks, *damaged))
+    answer = answer.with_pictures(out, rrd, bench.key)
     answer = replace(answer, seconds=time.perf_counter() - started)
     if out is not None:
         answer.write(out)

@@ -53,9 +53,8 @@ def conduct(
     """
     kept = _folder(folder / RUNS)
     paths = {task: kept / f"{task.key(bench)}.json" for task in study.tasks}
-    found: dict[Task, Run | Failure] = {
-        t: r for t, p in paths.items() if (r := read_checked(p, Run))
-    }
+    read = {task: read_checked(path, Run) for task, path in paths.items()}
+    found: dict[Task, Run | Failure] = {task: run for task, run in read.items() if run}
     todo = [task for task in study.tasks if task not in found]
     damaged = [paths[task].name for task in todo if paths[task].exists()]
     progress("runs", len(found), len(paths))

@@ -11,6 +11,7 @@ from planner.campaign.importing import ImportReport
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
 from planner.report import session_text
+from planner.report.campaign_acts import UndoneAct
 from planner.session.course import Course, Visit
 from planner.session.page import page_with_hits, page_without_hits
 from planner.session.station import Station
@@ -133,7 +134,8 @@ def undo(station: Station, course: Course) -> Course:
     """Take back the last act of the engineer."""
     entry = station.campaign.undo(decisions_only=True)
     station.teller.note()
-    station.say(f"Took back entry {entry.seq} ({type(entry.event).__name__.lower()}).")
+    station.screen.forget()
+    station.say(UndoneAct.of(entry).text())
     return course.undone(station.campaign.state)
 
 

@@ -67,9 +67,12 @@ class Course:
         return {*self.aside, *state.refused, *hits}
 
     def undone(self, state: CampaignState) -> "Course":
-        """After an act was taken back: the pose before may be gone with it."""
+        """After an act was taken back: what was measured may be gone with it."""
         before = self.before if self.before.pose in state.measurements else PoseBefore()
-        return replace(self, before=before, progress="")
+        kept = [k for k, pose in enumerate(self.measured) if pose in state.measurements]
+        measured = tuple(self.measured[k] for k in kept)
+        history = tuple(self.history[k] for k in kept)
+        return replace(self, before=before, measured=measured, history=history, progress="")
 
     def after(
         self, pose: str, model: Model, state: CampaignState, seconds: float, auto: bool
@@ -79,9 +82,11 @@ class Course:
         measured = (*self.measured, pose)
         overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
         history = (*self.history, overall)
+        earlier = max(0, len(state.used) - len(history))  # by sessions before this one
         left = session_text.progress_line(
-            list(history), stop.frequency_sd_percent, seconds / len(measured), stop.measurements_min
-        )
+            list(history), stop.frequency_sd_percent, seconds / len(measured),
+            stop.measurements_min - earlier,
+        )  # fmt: skip
         ends = self.stop
         if model.done and not self.announced:
             ends = "target reached" if auto else ""
@@ -89,5 +94,5 @@ class Course:
             ends = "as many measurements as campaign.toml allows"
         return replace(
             self, measured=measured, history=history, announced=self.announced or model.done,
-            progress=f"sd over the workspace {overall:.2f} %; {left}", stop=ends,
+            progress=f"sd of all {overall:.2f} %; {left}", stop=ends,
         )  # fmt: skip

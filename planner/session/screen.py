@@ -39,13 +39,17 @@ class Screen:
     def ring(self, kinds: Mapping[tuple[str, int], str]) -> None:
         """Ring for hits, by file and number, that were not rung for: more often for bad ones.
 
-        Sentences under the page are dropped then: they spoke of what was before.
+        Sentences under the page are dropped then.
         """
         new = {kind for hit, kind in kinds.items() if hit not in self._rung}
         self._rung |= kinds.keys()
         if new:
-            self._notes.clear()
+            self.forget()
             self.bell(3 if new - {"good"} else 1)
+
+    def forget(self) -> None:
+        """Drop the sentences: they spoke of what was before."""
+        self._notes.clear()
 
     def bell(self, times: int = 1) -> None:
         """Ring: once for good, more often for what is to be done again."""
