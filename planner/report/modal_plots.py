@@ -208,7 +208,7 @@ def _legend(figure: Figure, grid: Any, handles: list) -> None:
         panel.set_xlabel("frequency (Hz)", fontsize=9)
     handles = [
         *handles,
-        Patch(color=USABLE, alpha=0.15, label="usable band"),
+        Patch(color=USABLE, alpha=0.15, label="coherent, in the usable band"),
         Line2D([], [], color=MODE, ls=":", label="mode"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)
