@@ -24,6 +24,7 @@ from planner.design.stopping import Forecast, forecast
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
+from planner.surrogate.gp import STAGES
 from planner.surrogate.hedged import HedgedAR1
 from planner.surrogate.modal_surrogate import (
     ModalObservations,
@@ -120,6 +121,8 @@ class Model:
     @cached_property
     def decision(self) -> "Decision | None":
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
+        if self.cell.cut is None:
+            return None
         from planner.campaign.decision import decided
 
         return decided(self)
@@ -324,7 +327,8 @@ class _Guided:
         """
         labels = self.primary.log_evidence[: self.low.count]
         missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
-        return float(np.sum(labels)) + missed * MISSED + self.stray * STRAY
+        share = min(1.0, STAGES[-1] / max(len(self.labelled), 1))  # of the poses it is about
+        return float(np.sum(labels)) + share * (missed * MISSED + self.stray * STRAY)
 
     @property
     def stray(self) -> int:

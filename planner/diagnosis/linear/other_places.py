@@ -16,6 +16,7 @@ from planner.diagnosis.thresholds import INERTIA_STRAYED
 from planner.inference.parallel import side_by_side
 
 MOVABLE = MASS, RESONATOR = "added_mass", "local_resonator"
+HEAVY = -0.8, 0.8  # prior sds of a mass that is begun with beside bent inertias
 KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
 
 
@@ -62,7 +63,16 @@ def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[F
 
 def _from_afar(problem: Problem, found: Fit, effect: Effect) -> Fit:
     # Valleys from inertias to a mass are long: a fit that stops early is still on its way.
-    return settle(problem, fit(problem, effect, [found]))
+    far, misfit = fit(problem, effect, [found]), problem.misfit(effect, CLOSE)
+    x, place = points(misfit, found)[0], misfit.names.index(f"mass of {MASS} at {_mass_at(effect)}")
+    starts = [np.where(np.arange(len(x)) == place, s * misfit.sd[place], x) for s in HEAVY]
+    # Either way has its own valley: the one that is steeper at first need not be the deeper one.
+    ends = [approached(misfit, [start]) for start in starts if misfit.possible(start)]
+    return min((settle(problem, one) for one in (far, *ends)), key=lambda f: f.misfit(f.x).value)
+
+
+def _mass_at(effect: Effect) -> str:
+    return next(p.at for p in effect.parts() if p.name == MASS)
 
 
 def rigid(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:

@@ -77,7 +77,7 @@ def search(
         found = _composed(problem, found, effects, tell)
     found = _lessened(problem, _rigid(problem, found, effects))
     found = _spared(problem, _accompanied(problem, found, effects, tell), effects)
-    return _distinct(_burdened(problem, found, effects))
+    return distinct(_burdened(problem, found, effects))
 
 
 def _best_of_few(found: Found) -> Fit:
@@ -197,6 +197,9 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds a mass at each place where the best moved inertias far to explain everything."""
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    if any(p.artefact for p in best.effect.parts()):  # what is beside one may be all there is
+        found = distinct(_lessened(problem, found))
     robots = [f for f in found.finalists if not any(p.artefact for p in f.effect.parts())]
     best = min(robots, key=lambda f: f.misfit(f.x).value)
     if best.per_value > AT_NOISE:
@@ -208,7 +211,7 @@ def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
     return carried_on(problem, *pair, LAST_STEPS)
 
 
-def _distinct(found: Found) -> Found:
+def distinct(found: Found) -> Found:
     """Each set of effects once, at its best, though it was come upon from several sides."""
     best: dict[frozenset[Effect], Fit] = {}
     for f in found.finalists:

@@ -55,7 +55,8 @@ def without_slight(
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
     """Fits without one effect of `whole`, then without a second, and so on: the slightest first.
 
-    Those that are among `fits` already are not made again.
+    Those among `fits` may have come from elsewhere and stopped in another minimum: each is followed
+    from `whole` too.
     """
     known = {frozenset(f.effect.parts()): f for f in fits}
     made: list[Fit] = []
@@ -64,12 +65,17 @@ def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
         sets = [[p for p in parts if p is not part] for part in parts if not part.absorbed]
         if not sets:
             break
-        wanted = [kept for kept in sets if frozenset(kept) not in known]
-        more = list(map(partial(_carried_on, problem, whole), wanted))
-        made += more
-        known |= {frozenset(f.effect.parts()): f for f in more}
+        for kept in sets:
+            again, key = _carried_on(problem, whole, kept), frozenset(kept)
+            if key not in known or _value(again) < _value(known[key]):
+                known[key] = again
+                made.append(again)
         whole = min((known[frozenset(kept)] for kept in sets), key=partial(change, whole=whole))
     return made
+
+
+def _value(fit: Fit) -> float:
+    return fit.misfit(fit.x).value
 
 
 def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:
