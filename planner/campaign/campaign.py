@@ -25,7 +25,8 @@ from planner.campaign.events import (
     Withdrawn,
 )
 from planner.campaign.journal import remove_parts
-from planner.campaign.reads import CampaignReads, as_logged, frf_key
+from planner.campaign.kept_recordings import frf_key
+from planner.campaign.reads import CampaignReads, as_logged
 from planner.campaign.state import last_act
 from planner.errors import InputError
 from planner.version import __version__
@@ -225,7 +226,7 @@ class Campaign(CampaignReads):
                 left_out=kept.left_out, question=held.question if held else None,
             )  # fmt: skip
         started = time.perf_counter()
-        old = tuple(self.source_of(hit) for hit in known.accepted) if known else ()
+        old = self.recordings.sources(known) if known else ()
         hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         modes = new_modes = from_modal(measured.modal)
@@ -244,7 +245,8 @@ class Campaign(CampaignReads):
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]
         if measured.frf is not None:
-            self._frfs[frf_key(measurement.accepted, self.cell.config.modes)] = measured.frf
+            key = frf_key(measurement.accepted, self.cell.config.modes)
+            self._remembered.frfs[key] = measured.frf
         model = self.model
         return ImportReport(
             pose=pose,
@@ -301,5 +303,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(as_logged(config), hashes, __version__, True, True)
+    event = Configured(as_logged(config), hashes, __version__, True, True, True)
     return encode_line("", Entry(1, now, event))[0]

@@ -129,9 +129,10 @@ def create_folder(
         partial.mkdir()
         _copy_robot(robot_toml, partial / ROBOT)
         robot = f"{ROBOT}/{robot_toml.name}"
+        if campaign_toml is not None:
+            load_campaign_config(campaign_toml)  # says what is wrong with it
         text = _taken_over(campaign_toml, robot) if campaign_toml else _default(partial, robot)
         (partial / CONFIG).write_text(text, encoding="utf-8")
-        load_campaign_config(campaign_toml or partial / CONFIG)
         write_synced(partial / LOG, first_line(partial))
         if directory.exists():
             directory.rmdir()

@@ -21,7 +21,6 @@ from planner.identification.staged_problem import Progress, StagedProblem
 from planner.inference.least_squares import Minimum, inverse
 
 STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-OPENINGS = 4  # rounds at most, in which what hits leave open follows the fit
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
@@ -47,12 +46,14 @@ class Effort:
     log_steps: int = 40
     steps: int = 80
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
+    openings: int = 4  # rounds at most, in which what hits leave open follows the fit
 
 
 THOROUGH = Effort()
 QUICK = Effort(
-    48, 80, 0, 1, 1e-4, False, stages=(0.28, 1.0), log_lines=40, log_steps=12, doubtful=False
-)
+    48, 80, 0, 1, 1e-4, False, stages=(0.28, 1.0), log_lines=40, log_steps=12, doubtful=False,
+    openings=1,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,7 +196,7 @@ def _plain(
     for _ in range(2 if near and problem.tolerances else 1):
         objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    rounds = max(completions if tail else 0, OPENINGS if problem.tolerances else 0)
+    rounds = max(completions if tail else 0, problem.effort.openings if problem.tolerances else 0)
     for _ in range(rounds):
         objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
