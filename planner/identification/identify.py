@@ -14,7 +14,7 @@ from planner.identification.agreement import MOST_LINES, fit_similarity
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, matrices_at
 from planner.identification.measurement_model import Tolerances
-from planner.identification.objective import Objective
+from planner.identification.objective import TOO_SOFT, Objective
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
 from planner.identification.staged_problem import Progress, StagedProblem
@@ -108,6 +108,10 @@ def identify(
     if best is None:
         x, misfits = _search(problem, _starting_points(p, starts, seed))
         best = _refine(*problem.carried(x))
+        if not np.isfinite(best.misfit):  # it can't be with the weight that these springs carry
+            best = _refine(problem, x)
+    if not np.isfinite(best.misfit):
+        raise InputError(TOO_SOFT)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
 

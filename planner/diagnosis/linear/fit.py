@@ -130,6 +130,18 @@ def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     return approached(close, points(close, warm), PROMISE_STEPS)
 
 
+def unbent(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """As `promise`, and a single effect of the robot from the prior's median, as `fit` begins.
+
+    From inertias that were bent to fit nothing leads to what they imitate.
+    """
+    near = promise(problem, effect, warm)
+    if len(effect.parts()) > 1 or effect.artefact:
+        return near
+    afresh = approached(near.misfit, [_approach(problem, effect)])
+    return min((near, afresh), key=lambda f: f.misfit(f.x).value)
+
+
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:
     rough = problem.misfit(effect, GLANCE)
     b = rough.split[1]

@@ -45,14 +45,19 @@ def _moved(problem: Problem, found: Fit, move: tuple[Effect, Effect, Effect]) ->
     return approached(misfit, list(np.unique(starts, axis=0)))
 
 
+def inertias_bent(found: Fit) -> bool:
+    """Whether a fit moved inertias far, so that they may hide what the simulation lacks."""
+    a, b = found.misfit.split
+    away = np.abs((found.x - found.misfit.mean) / found.misfit.sd)[a:b]
+    return float(away.max(initial=0.0)) > INERTIA_STRAYED
+
+
 def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Fits with one mass at each place, where inertias were moved far to imitate one.
 
     From a fit that has bent them nothing leads to the mass: each is fitted from afar too.
     """
-    a, b = found.misfit.split
-    away = np.abs((found.x - found.misfit.mean) / found.misfit.sd)[a:b]
-    if away.max(initial=0.0) < INERTIA_STRAYED:
+    if not inertias_bent(found):
         return ()
     masses = [e for e in effects if e.name == MASS]
     rest = [p for p in found.effect.parts() if p.at and p.name != MASS]
