@@ -11,7 +11,8 @@ from planner.dynamics.gradient import laplace, response, response_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.identify import QUICK, identify
+from planner.identification.effort import QUICK
+from planner.identification.identify import identify
 from planner.identification.measured_frfs import matrices_at
 from planner.identification.measurement_model import (
     Part,
