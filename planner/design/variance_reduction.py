@@ -106,9 +106,7 @@ def _features(
     """
     post = outputs.posterior
     low = poses.low[:, k]
-    known = np.flatnonzero(post.mask[k])
-    cross = post._prior(k, post.x[known], post.low[k][known], poses.x, low)
-    white = post.whiten[k][:, known[:, None], known[None, :]] @ cross
+    _, white = post._cross(k, poses.x, low)
     if len(outputs.planned):
         white = np.concatenate([white, outputs.whitened_planned(k, poses)], axis=1)
     own = post._own(k, poses.x, low) - np.sum(white**2, axis=1)

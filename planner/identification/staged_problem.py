@@ -76,9 +76,9 @@ class StagedProblem:
         p = self.parametrisation
         stiffer = STIFFER * np.array([x.kind == "stiffness" for x in p.parameters])
         for steps in range(STIFFEST + 1):
-            tried = p.near(theta + steps * stiffer)
+            tried = p.near(theta + steps * stiffer) if steps else theta
             if stands(self.matrices, p.elasticity(tried).stiffness):
-                return theta if steps == 0 else tried
+                return tried
         raise InputError(TOO_SOFT)
 
     def objective(

@@ -36,13 +36,14 @@ def log_likelihoods(
     """(m, s) of y (m, c) at θ (m, s, p), without the constant; −∞ where there is none."""
     outputs = y, data.low, data.mask, data.variance, bias_sd, slope_sd
     m, samples, _ = theta.shape
-    if m * samples * len(data.x) ** 2 > NUMPY_ELEMENTS:
+    x = np.broadcast_to(data.x, (m, *data.x.shape[-2:]))
+    if m * samples * x.shape[1] ** 2 > NUMPY_ELEMENTS:
         from planner.surrogate.compiled_likelihood import compiled_log_likelihoods
 
-        return compiled_log_likelihoods(kernel, data.x, *outputs, jitter, theta)
+        return compiled_log_likelihoods(kernel, x, *outputs, jitter, theta)
     return np.array(
         [
-            _of_an_output(kernel, data.x, jitter, theta[j], *(values[j] for values in outputs))
+            _of_an_output(kernel, x[j], jitter, theta[j], *(values[j] for values in outputs))
             for j in range(m)
         ]
     )

@@ -154,6 +154,20 @@ def test_hits_elsewhere_and_sensors_that_rove(toml: Path, tmp_path: Path) -> Non
     assert "modes of the tool are not told" in (other.measured.remarks[-1])
 
 
+def test_a_dead_channel_leaves_the_other_sensors_of_its_hits(toml: Path, tmp_path: Path) -> None:
+    robot, sensors = Robot.load(toml), ("sensor", "elbow")
+    stays = [(f"P{i}", q, "tcp", sensors) for i, q in enumerate(poses(2))]
+    record(tmp_path / "hits", toml, stays, Secret(Deviation(3)), dead={"P1": 4})
+    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    assert not found.refused
+    assert [frf.layout.sensors for frf in found.frfs] == [sensors, ("sensor",)]
+    whole, lacking = found.measured
+    assert whole.measured.modal is not None
+    assert lacking.measured.modal is not None
+    assert all("elbow y" in " ".join(v.remarks) for v in lacking.measured.verdicts)
+    assert not any(v.remarks for v in whole.measured.verdicts)
+
+
 def test_springs_are_identified_from_hits_away_from_the_tool(toml: Path, tmp_path: Path) -> None:
     stays = [
         (f"P{i}", q, "elbow" if i % 2 else "tcp", ("elbow", "shoulder", "sensor")[: 3 - i % 2])
