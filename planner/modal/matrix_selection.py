@@ -20,7 +20,7 @@ ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets dif
 PASSES = 4  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
-SETTLING = 2  # rounds of a fit that has been fitted before, to fewer lines
+SETTLING = 2  # rounds of a fit that has been fitted before, to other lines
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
@@ -29,7 +29,9 @@ def common(data: Data, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = np.broadcast_to(power, data.response.shape)
     for _ in range(2):
-        found = refine(data.lines, data.response, variance, poles, data.allowed)
+        some = thinned(data, poles)
+        part = data.lines.part(some), data.response[..., some], variance[..., some]
+        found = refine(*part, poles, data.allowed)
         poles = found.poles
         shown = found.residues.residue @ unit(data.lines, poles)
         shown += found.residues.residue.conj() @ unit(data.lines, poles.conj())
@@ -73,17 +75,19 @@ def established(
         if not poles.size:
             return replace(left, poles=poles), variance
         fit = _fit(data, sets, variance, poles, own)
+    variance = _variance(data, fit.fitted, fit.poles.size)
+    fit = _fit(data, sets, variance, fit.poles, fit.own, SETTLING, every=True)
     return fit, _variance(data, fit.fitted, fit.poles.size)
 
 
 def _fit(
     data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
-    known: np.ndarray | None = None, rounds: int = ROUNDS,
+    known: np.ndarray | None = None, rounds: int = ROUNDS, every: bool = False,
 ) -> SetPoles:  # fmt: skip
-    """Fit on thinned lines; poles that stray are left out."""
+    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
     while True:
         try:
-            lines = thinned(data, poles)
+            lines = thinned(data, poles, every)
             return fit_sets(data, sets, variance, poles, rounds, known, lines)
         except StrayedError as error:
             poles, known = poles[~error.astray], None
