@@ -163,6 +163,8 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
         return found
     tell("looking for a small second effect", 0.98)
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
+    if not pairs:
+        return found
     more = _round(problem, best, pairs, quietly)
     return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
 
