@@ -56,8 +56,8 @@ class _Cells:
         self._cells: dict[bytes, Cell] = {}
 
     def of(self, configured: Configured) -> Cell:
-        stiffened, scatters = configured.geometric_stiffness, configured.visit_scatter
-        key = msgspec.json.encode((configured.config, configured.robot, stiffened, scatters))
+        frozen = configured.geometric_stiffness, configured.visit_scatter, configured.hits_err
+        key = msgspec.json.encode((configured.config, configured.robot, frozen))
         if key not in self._cells:
             config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
@@ -65,8 +65,9 @@ class _Cells:
             self._cells[key] = Cell.load(
                 root / config.robot,
                 config,
-                geometric_stiffness=stiffened,
-                visit_scatter=scatters,
+                geometric_stiffness=configured.geometric_stiffness,
+                visit_scatter=configured.visit_scatter,
+                hits_err=configured.hits_err,
             )
         return self._cells[key]
 
@@ -93,7 +94,7 @@ def replay(
             assert after.configured is not None
             key = (after.model_version, id(cells.of(after.configured)))
             if model is None or key != model_key:
-                of_hits = kept.frf, kept.columns
+                of_hits = kept.frf, kept.hits
                 model, model_key = build(cells.of(after.configured), after, *of_hits), key
             yield Step(entry, check, detail, after, model, measured, instead)
 

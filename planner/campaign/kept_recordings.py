@@ -12,7 +12,7 @@ from planner.dataset.screened_files import Source
 from planner.recording.points import PointNames, StatedPoints
 
 if TYPE_CHECKING:
-    from planner.dataset.hit_columns import HitColumns
+    from planner.dataset.hit_columns import PoseHits
     from planner.frf.frf import Frf
 
 
@@ -71,11 +71,11 @@ class KeptRecordings:
         self.remembered.frfs[frf_key(measurement.accepted, table)] = frf
         keep_frf(frf, self.sources(measurement), table.band_hz, table.window_rate_1_s)
 
-    def columns(self, measurement: Measurement, table: ModesTable) -> "HitColumns":
-        """What each accepted hit of a measured pose says by itself."""
-        from planner.dataset.hit_columns import columns_of
+    def hits(self, measurement: Measurement, table: ModesTable) -> "PoseHits":
+        """What the accepted hits of a measured pose say, each by itself and at all points."""
+        from planner.dataset.hit_columns import hits_of
 
-        return columns_of(self.sources(measurement), table.band_hz, table.window_rate_1_s)
+        return hits_of(self.sources(measurement), table.band_hz, table.window_rate_1_s)
 
 
 def frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:

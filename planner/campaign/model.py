@@ -15,7 +15,7 @@ from planner.campaign.labels import LabelledPose, frequencies, label, observatio
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import tell, visits_of
 from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.hit_columns import HitColumns
+from planner.dataset.hit_columns import PoseHits
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
 from planner.design.parameter_sensitivity import FrfNoise
@@ -71,14 +71,16 @@ class Model:
 
     def frequencies(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies and their sds (n, count) in Hz, as of `predict`."""
-        f, sd = self.surrogate.frequencies(
-            self.cell.features(q), self.low.frequencies(q).frequency_hz
-        )
-        return f, self._with_parameters(q, f, sd)
+        said = self.low.frequencies(q)
+        f, sd = self.surrogate.frequencies(self.cell.features(q), said.frequency_hz)
+        return f, self._with_parameters(q, said, f, sd)
 
-    def _with_parameters(self, q: np.ndarray, f: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    def _with_parameters(
+        self, q: np.ndarray, simulated: SimulatedModes, f: np.ndarray, sd: np.ndarray
+    ) -> np.ndarray:
         """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
-        return np.hypot(sd, self.surrogate.frequency_trust * self.low.frequency_sd(q) * f)
+        share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
+        return np.hypot(sd, share * f)
 
     @cached_property
     def frfs(self) -> tuple[Frf, ...]:
@@ -140,11 +142,11 @@ class Model:
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
-        """As `informed`, the goal being the poses and modes on which the decision hangs."""
-        from planner.campaign.decision import decision_target
+        """As `informed`, asked for the margins of the decision about the cut."""
+        from planner.campaign.decision import deciding_outputs
 
         outputs, poses = self.informed
-        return replace(outputs, goal=decision_target(self)), poses
+        return deciding_outputs(self, outputs), poses
 
     @cached_property
     def forecast(self) -> Forecast:
@@ -196,7 +198,7 @@ class Model:
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
         found = (surrogate or self.surrogate).predict(features, simulated, visit)
-        sd = self._with_parameters(q, found.frequency_hz, found.frequency_sd_hz)
+        sd = self._with_parameters(q, simulated, found.frequency_hz, found.frequency_sd_hz)
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -259,9 +261,9 @@ class Model:
     @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
-        candidates, hertz = self.cell.candidates, self.simulated_candidates.frequency_hz
-        f, sd = self.surrogate.frequencies(candidates.features, hertz, visit=False)
-        sd = self._with_parameters(candidates.q, f, sd)
+        candidates, said = self.cell.candidates, self.simulated_candidates
+        f, sd = self.surrogate.frequencies(candidates.features, said.frequency_hz, visit=False)
+        sd = self._with_parameters(candidates.q, said, f, sd)
         return 100 * np.sqrt(np.mean((sd / f) ** 2, axis=0))
 
 
@@ -269,24 +271,25 @@ def build(
     cell: Cell,
     state: CampaignState,
     frf_of: FrfOf,
-    columns_of: Callable[[Measurement, ModesTable], HitColumns] | None = None,
+    hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself, which is
-    asked only where the simulation learns. Without it all hits count as exact.
+    `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
+    which is asked only where the simulation learns. Without it nothing is told of single hits.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
     noise, misses, learns = None, (), cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
+        hits = tuple(hits_of(m, table) for m in used) if hits_of else None
+        whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        low = learn(low, frfs, q, table.band_hz)
+        low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(frfs, table.band_hz, misfit)
-        if columns_of is not None and low.learned is not None:
-            columns = [columns_of(m, table) for m in used]
-            told = tell(visits_of(used, columns, frfs), low.learned, cell.tolerances, table.band_hz)
+        if hits is not None and low.learned is not None:
+            told = tell(visits_of(used, hits, frfs), low.learned, cell.tolerances, table.band_hz)
             misses, used = told.poses, tuple(map(told.corrected, used))
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:

@@ -84,6 +84,7 @@ class CampaignReads:
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
                 visit_scatter=configured.visit_scatter,
+                hits_err=configured.hits_err,
             )
         return self._cells[key]
 
@@ -128,7 +129,7 @@ class CampaignReads:
         kept = self.recordings
         for measurement in state.used:  # a damaged one is told now, whoever reads it later
             kept.sources(measurement)
-        model = build(self.cell, state, kept.frf, kept.columns)
+        model = build(self.cell, state, kept.frf, kept.hits)
         _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
 
@@ -190,7 +191,7 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        kept = begun.geometric_stiffness, begun.visit_scatter
+        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err
         return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------

@@ -109,11 +109,16 @@ class MeasuredPose:
 
     @cached_property
     def one_hit_frf(self) -> Frf | None:
-        """The FRF of one hit in the middle of all, for a model of how hits miss; as `ended_frf`."""
+        """The FRF of one hit in the middle of all, with the variance of the noise alone.
+
+        For fits that integrate over how hits miss. As `ended_frf`; what the records still cut off
+        is too small to matter.
+        """
         plain = self.whole
         if plain is None or not self.hits:
             return plain
-        return self.kept("one hit frf", Frf, lambda: self._ended(plain, "one_hit"))
+        found = self.kept("one hit frf", Frf, lambda: self._ended(plain, "one_hit"))
+        return replace(found, tail_s=np.inf) if found.exponential_rate_1_s > 0 else found
 
     @cached_property
     def decomposed(self) -> Decomposed:
@@ -271,6 +276,17 @@ def _accepted(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
 ) -> MeasuredPose:
     return MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+
+
+def one_hit_frf(
+    hits: tuple[Hit, ...],
+    records: tuple[FrfRecord, ...],
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
+) -> Frf:
+    """`MeasuredPose.one_hit_frf` of accepted hits, or exported FRFs as they are."""
+    found = MeasuredPose((), band_hz, "h1", window_rate_1_s, hits).one_hit_frf if hits else None
+    return found or _frf(hits, records, band_hz, "h1", window_rate_1_s)
 
 
 def _nothing(frf: Frf) -> Frf:

@@ -18,7 +18,8 @@ from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.sensor_chain import SensorChain
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.fit import Problem, fit, tolerances_of
+from planner.diagnosis.linear.fit import fit
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens.exponential_window import screen_window
 from planner.diagnosis.thresholds import (
     ALIKE,
@@ -95,16 +96,16 @@ class Chain:
     gain: float
 
 
-def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
-    """All artefacts that are clear; none where the recordings are in order."""
+def screen(recorded: Dataset, nominal: Simulation, *, chain: bool = True) -> tuple[Finding, ...]:
+    """All artefacts that are clear, without `chain` windows alone; none where all is in order."""
     window = screen_window(recorded)
     told = window is not None and window.log_evidence > CLEAR
     found = [window] if window is not None and told else []
     clean = correct(recorded, found)
     told = [*found]
-    for sensor in _triaxial(clean):
-        chain, t = measure_chain(clean, nominal, sensor), tolerances_of(nominal)
-        told += [f for f in (_delay(chain, t), _matrix(chain, t)) if f]
+    for sensor in _triaxial(clean) if chain else ():
+        measured, t = measure_chain(clean, nominal, sensor), tolerances_of(nominal)
+        told += [f for f in (_delay(measured, t), _matrix(measured, t)) if f]
     return tuple(f for f in told if f.log_evidence > CLEAR)
 
 
