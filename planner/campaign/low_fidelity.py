@@ -10,9 +10,10 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.frf import synthesis
 from planner.frf.frf import Frf
+from planner.identification.effort import QUICK, Effort
 from planner.identification.extended_structure import FLOOR, Structure, extended
 from planner.identification.frequency_uncertainty import frequency_sd
-from planner.identification.identify import QUICK, Effort, identify
+from planner.identification.identify import identify
 from planner.identification.measured_frfs import layout_of
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS, Priors

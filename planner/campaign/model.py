@@ -129,11 +129,11 @@ class Model:
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
-        """As `informed`, the goal being the poses and modes on which the decision hangs."""
-        from planner.campaign.decision import decision_target
+        """As `informed`, asked for the margins of the decision about the cut."""
+        from planner.campaign.decision import deciding_outputs
 
         outputs, poses = self.informed
-        return replace(outputs, goal=decision_target(self)), poses
+        return deciding_outputs(self, outputs), poses
 
     @cached_property
     def forecast(self) -> Forecast:

@@ -7,6 +7,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
+from planner.diagnosis.hidden_inertias import hidden_inertias
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import Diagnosis, beside_another, diagnose
 from planner.diagnosis.misses_again import abstained, asked_again
@@ -61,6 +62,9 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
             recorded = replace(recorded, remarks=(*recorded.remarks, said))
         findings, judged = kept, replace(judged, diagnosis=found)
     whole = together(findings, judged.diagnosis, counts)
+    if whole.verdict == "consistent":
+        said = hidden_inertias(judged.diagnosis)
+        recorded = replace(recorded, remarks=(*recorded.remarks, *said))
     return Explained(recorded, judged, whole)
 
 

@@ -93,8 +93,11 @@ def modes_of_matrix(
     checks = check(matrix, found, np.array(inside), geometry)
     found = _turned_back(matrix, found, checks)
     dofs, entries = _points(matrix, found, checks)
-    gain = _row_gain(found, inside, entries)
-    modes = tuple(_mode(found, int(k), entries, len(dofs), matrix.scaled, gain) for k in inside)
+    shapes = _shapes(found, inside, entries)
+    modes = tuple(
+        _mode(found, int(k), shape, entries, len(dofs), matrix.scaled)
+        for k, shape in zip(inside, shapes, strict=True)
+    )
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
     return MatrixModes(dofs, modes, band, remarks, found, checks)
 
@@ -138,28 +141,32 @@ def _points(
     return dofs, Entries(*roved, len(dofs) + len(apart))
 
 
-def _shape(found: MatrixPoles, k: int, entries: Entries, gain: float) -> FittedShape:
-    fit = found.fit
-    variance = found.scale[k] * fit.residue_variance[:, k]
-    return fit_shape(entries, fit.residue[:, k], variance, fit.poles[k].imag, gain)
+def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[FittedShape]:
+    """Shapes of modes (indices); rows err as a whole by what those of the references show.
 
+    Points that are rows and columns tell it, at first fitted with their gains left free.
+    """
 
-def _row_gain(found: MatrixPoles, modes: list[int], entries: Entries) -> float:
-    """Relative sd by which rows err as a whole, from those of points that are columns too."""
+    def fitted(k: int, gain: float, near: np.ndarray | None) -> FittedShape:
+        residue = found.fit.residue[:, k]
+        variance = found.scale[k] * found.fit.residue_variance[:, k]
+        return fit_shape(entries, residue, variance, found.fit.poles[k].imag, gain, near)
+
     if np.intersect1d(entries.rows, entries.columns).size < 2:
-        return 0.0
-    return row_gain([_shape(found, k, entries, FREE_GAIN) for k in modes])
+        return [fitted(k, 0.0, None) for k in modes]
+    free = [fitted(k, FREE_GAIN, None) for k in modes]
+    gain = row_gain(free)
+    return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
 
 
 def _mode(
-    found: MatrixPoles, k: int, entries: Entries, points: int, scaled: bool, gain: float
+    found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, points: int, scaled: bool
 ) -> MatrixMode:
     fit, m = found.fit, found.fit.poles.size
     pole = complex(fit.poles[k])
     index = [k, m + k]
     covariance = found.scale[k] * fit.covariance[np.ix_(index, index)]
     frequency, damping, sd = natural(pole, covariance)
-    fitted = _shape(found, k, entries, gain)
     group, odd = entries.groups
     scaled = scaled and bool(np.all(odd[group[:points]]))
     shape, shape_sd = _shrunk(fitted.shape[:points], fitted.sd[:points])

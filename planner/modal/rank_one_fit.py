@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDS, STILL = 60, 1e-6  # of alternating and of Gauss-Newton steps, relative to the shape
+ROUNDS = 60  # of alternating and of Gauss-Newton steps
+ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
 RIDGE = 1e-11
 # Relative to all entries, an error that each is given at first: none rules alone.
 START_SHARE = 0.03
@@ -83,24 +84,27 @@ def fit_shape(
     variance: np.ndarray,
     damped_1_s: float,
     gain: float = 0.0,
+    near: np.ndarray | None = None,
 ) -> FittedShape:
     """Shape φ with residue ≈ φ_row φ_column / (2iω_d).
 
     residue (e,) in m/(N·s), variance (e,) of real and imaginary part each; damped_1_s: ω_d;
     `gain`: relative sd by which whole rows err, which only rows of points that are columns too can
-    show. The shape has unit modal mass (kg^−½) in groups whose scale is known; in others rows and
-    columns share the residue evenly. What no shape explains widens the variance: that of each
-    column by a factor, that of all entries in proportion to their size.
+    show; `near` (points,): a shape to start from. The shape has unit modal mass (kg^−½) in groups
+    whose scale is known; in others rows and columns share the residue evenly. What no shape
+    explains widens the variance: that of each column by a factor, that of all entries in
+    proportion to their size.
     """
     values = residue * 2j * damped_1_s
     noise = 2 * variance * (2 * damped_1_s) ** 2
     even = noise + START_SHARE**2 * np.mean(np.abs(values) ** 2)
     tied = np.intersect1d(entries.rows, entries.columns) if gain else np.zeros(0, int)
     problem = _Problem(entries, values, tied, max(gain, 1e-12))
-    found = np.append(_start(entries, values, 1 / even), np.zeros(tied.size))
+    near = _start(entries, values, 1 / even) if near is None else near
+    found = np.append(near, np.zeros(tied.size))
     spread = even
     for _ in range(REWEIGHED):
-        found = _fitted(problem, 1 / spread, found)
+        found = _fitted(problem, 1 / spread, found, ROUGH)
         left, jacobian = problem.left(found), problem.jacobian(found)
         covariance = problem.covariance(jacobian, 1 / spread)
         taken = np.einsum("ea,ab,eb->e", jacobian.conj(), covariance, jacobian).real / spread
@@ -200,7 +204,9 @@ class _Problem:
         return float(np.sum(weight * left) + np.sum(gains) / (2 * self.gain**2))
 
 
-def _fitted(problem: _Problem, weight: np.ndarray, found: np.ndarray) -> np.ndarray:
+def _fitted(
+    problem: _Problem, weight: np.ndarray, found: np.ndarray, still: float = STILL
+) -> np.ndarray:
     """The unknowns that fit best, from first ones (Gauss-Newton)."""
     n = problem.entries.points
     for _ in range(ROUNDS):
@@ -212,7 +218,7 @@ def _fitted(problem: _Problem, weight: np.ndarray, found: np.ndarray) -> np.ndar
         normal[np.arange(n), np.arange(n)] += RIDGE * np.trace(normal[:n, :n]).real / n
         step = np.linalg.solve(normal, slope)
         found = _shortened(problem, weight, found, step)
-        if np.linalg.norm(step) < STILL * np.linalg.norm(found):
+        if np.linalg.norm(step) < still * np.linalg.norm(found):
             break
     return found
 

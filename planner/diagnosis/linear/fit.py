@@ -9,7 +9,8 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, own_names
 from planner.diagnosis.linear.problem import CLOSE, COARSE, FINE, GLANCE, Grade, Problem
-from planner.identification.identify import QUICK, STAGES, Effort, identify
+from planner.identification.effort import QUICK, STAGES, Effort
+from planner.identification.identify import identify
 from planner.identification.parameters import UNITS
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
@@ -128,6 +129,18 @@ def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     """A few steps with all that is free, from an earlier fit."""
     close = problem.misfit(effect, CLOSE)
     return approached(close, points(close, warm), PROMISE_STEPS)
+
+
+def unbent(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """As `promise`, and a single effect of the robot from the prior's median, as `fit` begins.
+
+    From inertias that were bent to fit nothing leads to what they imitate.
+    """
+    near = promise(problem, effect, warm)
+    if len(effect.parts()) > 1 or effect.artefact:
+        return near
+    afresh = approached(near.misfit, [_approach(problem, effect)])
+    return min((near, afresh), key=lambda f: f.misfit(f.x).value)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:

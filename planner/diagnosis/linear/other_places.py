@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.diagnosis.effects.combined import Both, together
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.places import links
 from planner.diagnosis.linear.fit import Fit, approached, fit, points, settle
 from planner.diagnosis.linear.problem import CLOSE, Problem
 from planner.diagnosis.thresholds import INERTIA_STRAYED
@@ -45,14 +46,29 @@ def _moved(problem: Problem, found: Fit, move: tuple[Effect, Effect, Effect]) ->
     return approached(misfit, list(np.unique(starts, axis=0)))
 
 
+def inertias_bent(found: Fit) -> bool:
+    """Whether a fit moved inertias far, so that they may hide what the simulation lacks."""
+    return farthest_bent(found)[1] > INERTIA_STRAYED
+
+
+def farthest_bent(fit: Fit) -> tuple[str, float]:
+    """The link whose mass, centre or moments a fit moved farthest, and by how many prior sds."""
+    a, b = fit.misfit.split
+    if a == b:
+        return "", 0.0
+    away = np.abs((fit.x - fit.misfit.mean) / fit.misfit.sd)[a:b]
+    most = int(np.argmax(away))
+    body = fit.misfit.names[a + most].split(" of ", 1)[1]
+    named = {joint: link.replace("_", " ") for link, joint in links(fit.misfit.setting.simulation)}
+    return named.get(body, body), float(away[most])
+
+
 def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Fits with one mass at each place, where inertias were moved far to imitate one.
 
     From a fit that has bent them nothing leads to the mass: each is fitted from afar too.
     """
-    a, b = found.misfit.split
-    away = np.abs((found.x - found.misfit.mean) / found.misfit.sd)[a:b]
-    if away.max(initial=0.0) < INERTIA_STRAYED:
+    if not inertias_bent(found):
         return ()
     masses = [e for e in effects if e.name == MASS]
     rest = [p for p in found.effect.parts() if p.at and p.name != MASS]

@@ -10,8 +10,8 @@ from planner.diagnosis.effects.combined import Both, Family, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
-from planner.diagnosis.linear.fit import Fit, carried_on, glance, promise, settle, staged
-from planner.diagnosis.linear.other_places import burdened, elsewhere, rigid
+from planner.diagnosis.linear.fit import Fit, carried_on, glance, promise, settle, staged, unbent
+from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_bent, rigid
 from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS, SPRING_STRAYED
@@ -163,6 +163,8 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
         return found
     tell("looking for a small second effect", 0.98)
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
+    if not pairs:
+        return found
     more = _round(problem, best, pairs, quietly)
     return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
 
@@ -270,7 +272,8 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     none = settle(problem, warm, CLOSE, STEPS)
     clearly = none.per_value > CLEARLY_WRONG
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
-    looked = partial(glance if clearly else promise, few, warm=none)
+    look = glance if clearly else unbent if inertias_bent(none) else promise
+    looked = partial(look, few, warm=none)
     share = 0.6 / max(len(effects), 1)
     fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
     if clearly:
