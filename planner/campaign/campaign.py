@@ -25,7 +25,6 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.kept_recordings import frf_key
 from planner.campaign.reads import CampaignReads, as_logged
 from planner.campaign.state import last_act
 from planner.errors import InputError
@@ -246,9 +245,10 @@ class Campaign(CampaignReads):
         told = alerts(before, state, event, measured, new_modes)
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]
-        if measured.frf is not None:
-            key = frf_key(measurement.accepted, self.cell.config.modes)
-            self._remembered.frfs[key] = measured.frf
+        # Beside new hits earlier ones may look wrong; they stay accepted all the same.
+        agreed = all(verdict.accepted for verdict in measured.verdicts[: len(old)])
+        if measured.frf is not None and agreed:
+            self.recordings.keep_frf(measured.frf, measurement, self.cell.config.modes)
         model = self.model
         return ImportReport(
             pose=pose,

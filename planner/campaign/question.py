@@ -203,12 +203,12 @@ def _compared(
 ) -> list[Comparison]:
     """What is expected at each of at least one pose, against the modes that are said to be its."""
     q = np.deg2rad(poses_deg)
-    expected, simulated = model.predict(q), model.low.simulate(q, ABOVE)
+    (hz, sd), simulated = model.frequencies(q), model.low.simulate(q, ABOVE)
     known = model.low.simulation is not None
     found = []
     for i, own in enumerate(modes):
         theirs = simulated[i : i + 1] if known else None
-        one = compare(expected.frequency_hz[i], expected.frequency_sd_hz[i], own, theirs)
+        one = compare(hz[i], sd[i], own, theirs)
         found.append(replace(one, limit=limit))
     return found
 
