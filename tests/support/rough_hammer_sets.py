@@ -36,6 +36,7 @@ class RoughSet:
     poles: np.ndarray
     shapes: np.ndarray
     seen: np.ndarray  # (m,) bool: modes that at least one reference takes part in
+    drift: float
 
 
 def rough_set(seed: int, kind: str | None = None, **changes: float) -> RoughSet:
@@ -64,7 +65,15 @@ def rough_set(seed: int, kind: str | None = None, **changes: float) -> RoughSet:
     true = shapes[:, inside]
     part = np.max(np.abs(true[references]), axis=0) / np.max(np.abs(true), axis=0)
     return RoughSet(
-        kind, structure, references, matrix, (low, high), poles[inside], true, part > 0.1
+        kind,
+        structure,
+        references,
+        matrix,
+        (low, high),
+        poles[inside],
+        true,
+        part > 0.1,
+        drawn["drift"],
     )
 
 
