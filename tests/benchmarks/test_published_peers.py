@@ -146,7 +146,7 @@ def test_nargp_is_as_good_as_emukits(tmp_path):
         assert np.median(np.abs(same / peer - 1)) < 0.01, name
         assert np.all(np.abs(same / peer - 1) < 0.02), (
             name
-        )  # where RMSE is 0.3 %: the same near-singularity
+        )  # what 2,000 draws of the cheap level leave
         assert np.all(gain > -SAME_PEAK), name
-        assert np.median(own) < 1.01 * np.median(peer), name
+        assert abs(np.median(own / peer - 1)) < 0.01, name
         assert np.median(np.abs(own / peer - 1)[np.abs(gain) < SAME_PEAK]) < 0.01, name
