@@ -35,6 +35,8 @@ class Cell:
     workspace: Workspace
     # Whether the scatter of frequencies from visit to visit is learned.
     visit_scatter: bool = field(default=True, kw_only=True)
+    # Whether the simulation is identified from all points, by hits that err; see `Configured`.
+    hits_err: bool = field(default=True, kw_only=True)
     # The cut whose stability is to be decided, where campaign.toml names one.
     cut: Cut | None = field(default=None, kw_only=True)
 
@@ -47,11 +49,13 @@ class Cell:
         *,
         geometric_stiffness: bool = True,
         visit_scatter: bool = True,
+        hits_err: bool = True,
     ) -> "Cell":
         """Load the robot and hold the workspace against it; InputError where they disagree.
 
         `robot` is the one of robot_toml, where it was loaded already. `geometric_stiffness` holds
-        where robot.toml does not say. `visit_scatter` is off for campaigns that began without.
+        where robot.toml does not say. `visit_scatter` and `hits_err` are off for campaigns that
+        began without.
         """
         check_name(config.acquisition.name)
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
@@ -60,7 +64,10 @@ class Cell:
         _check_angles(robot, config)
         table = config.cut
         cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
-        return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
+        return cls(
+            config, robot, simulation, workspace,
+            visit_scatter=visit_scatter, hits_err=hits_err, cut=cut,
+        )  # fmt: skip
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -81,9 +88,9 @@ class Cell:
     @cached_property
     def candidates(self) -> Candidates:
         """Reachable poses of the workspace, the same for the same configuration; then own ones."""
-        own = self.config.acquisition.own_poses_deg
+        own = self._own
         spread = self._spread
-        if own is None:
+        if not own:
             return spread
         q = np.array([self.check_pose(tuple(p), "[acquisition] own_poses_deg") for p in own])
         collisions = Collisions(self.robot)
@@ -104,8 +111,15 @@ class Cell:
     @property
     def spread(self) -> int:
         """How many of the candidates, the first ones, are spread evenly over the workspace."""
-        own = self.config.acquisition.own_poses_deg
-        return len(self.candidates.q) if own is None else len(self._spread.q)
+        return len(self._spread.q) if self._own else len(self.candidates.q)
+
+    @property
+    def _own(self) -> list[list[float]]:
+        """Poses in degrees that are offered besides: the engineer's, and those of a cut's path."""
+        own = list(self.config.acquisition.own_poses_deg or ())
+        if self.config.acquisition.name == "stability" and self.config.cut is not msgspec.UNSET:
+            own += [p for p in self.config.cut.joints_deg or () if p not in own]
+        return own
 
     @cached_property
     def allowed(self) -> np.ndarray:
@@ -132,7 +146,8 @@ class Cell:
     @cached_property
     def frozen(self) -> LowFidelity:
         """The simulation as robot.toml states it."""
-        return LowFidelity(self.config.modes.count, self.simulation)
+        tolerances = self.tolerances if self.hits_err else None
+        return LowFidelity(self.config.modes.count, self.simulation, tolerances)
 
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """What the simulation of robot.toml says at q (n, dof) in rad; see `LowFidelity`."""

@@ -15,7 +15,7 @@ from planner.campaign.labels import LabelledPose, frequencies, label, observatio
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import tell, visits_of
 from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.hit_columns import HitColumns
+from planner.dataset.hit_columns import PoseHits
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
 from planner.design.parameter_sensitivity import FrfNoise
@@ -24,6 +24,7 @@ from planner.design.stopping import Forecast, forecast
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
+from planner.surrogate.gp import STAGES
 from planner.surrogate.hedged import HedgedAR1
 from planner.surrogate.modal_surrogate import (
     ModalObservations,
@@ -35,6 +36,8 @@ from planner.surrogate.modal_surrogate import (
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
+
+FrfOf = Callable[[Measurement, ModesTable], Frf]
 
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
@@ -56,7 +59,8 @@ class Model:
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
     misses: tuple[PoseMisses, ...] = ()  # of the hits of each pose, where a simulation tells them
-    frfs: tuple[Frf, ...] = ()  # of the labelled poses
+    used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
+    frf_of: FrfOf | None = None
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad, as a visit there would show them.
@@ -64,6 +68,27 @@ class Model:
         The modal analysis' own sd of what it will measure there is not part of the sds.
         """
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
+
+    def frequencies(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies and their sds (n, count) in Hz, as of `predict`."""
+        said = self.low.frequencies(q)
+        f, sd = self.surrogate.frequencies(self.cell.features(q), said.frequency_hz)
+        return f, self._with_parameters(q, said, f, sd)
+
+    def _with_parameters(
+        self, q: np.ndarray, simulated: SimulatedModes, f: np.ndarray, sd: np.ndarray
+    ) -> np.ndarray:
+        """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
+        share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
+        return np.hypot(sd, share * f)
+
+    @cached_property
+    def frfs(self) -> tuple[Frf, ...]:
+        """Of the labelled poses; read when asked for."""
+        if self.frf_of is None:
+            return ()
+        table = self.cell.config.modes
+        return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
     def with_residues(self) -> Surrogate:
@@ -109,17 +134,19 @@ class Model:
     @cached_property
     def decision(self) -> "Decision | None":
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
+        if self.cell.cut is None:
+            return None
         from planner.campaign.decision import decided
 
         return decided(self)
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
-        """As `informed`, the goal being the poses and modes on which the decision hangs."""
-        from planner.campaign.decision import decision_target
+        """As `informed`, asked for the margins of the decision about the cut."""
+        from planner.campaign.decision import deciding_outputs
 
         outputs, poses = self.informed
-        return replace(outputs, goal=decision_target(self)), poses
+        return deciding_outputs(self, outputs), poses
 
     @cached_property
     def forecast(self) -> Forecast:
@@ -171,8 +198,7 @@ class Model:
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
         found = (surrogate or self.surrogate).predict(features, simulated, visit)
-        share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
-        sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
+        sd = self._with_parameters(q, simulated, found.frequency_hz, found.frequency_sd_hz)
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -232,34 +258,38 @@ class Model:
                 )
         return tuple(found)
 
-    @property
+    @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
-        p = self.workspace_prediction
-        return 100 * np.sqrt(np.mean((p.frequency_sd_hz / p.frequency_hz) ** 2, axis=0))
+        candidates, said = self.cell.candidates, self.simulated_candidates
+        f, sd = self.surrogate.frequencies(candidates.features, said.frequency_hz, visit=False)
+        sd = self._with_parameters(candidates.q, said, f, sd)
+        return 100 * np.sqrt(np.mean((sd / f) ** 2, axis=0))
 
 
 def build(
     cell: Cell,
     state: CampaignState,
-    frf_of: Callable[[Measurement, ModesTable], Frf],
-    columns_of: Callable[[Measurement, ModesTable], HitColumns] | None = None,
+    frf_of: FrfOf,
+    hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
 ) -> Model:
     """Label and fit everything that the state's measurements hold.
 
-    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself, which is
-    asked only where the simulation learns. Without it all hits count as exact.
+    `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
+    which is asked only where the simulation learns. Without it nothing is told of single hits.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    frfs, noise, misses = tuple(frf_of(m, table) for m in used), None, ()
-    if cell.config.fidelity.simulation == "updated" and used:
+    noise, misses, learns = None, (), cell.config.fidelity.simulation == "updated"
+    if learns and used:
+        frfs = tuple(frf_of(m, table) for m in used)
+        hits = tuple(hits_of(m, table) for m in used) if hits_of else None
+        whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        low = learn(low, frfs, q, table.band_hz)
+        low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(frfs, table.band_hz, misfit)
-        if columns_of is not None and low.learned is not None:
-            columns = [columns_of(m, table) for m in used]
-            told = tell(visits_of(used, columns, frfs), low.learned, cell.tolerances, table.band_hz)
+        if hits is not None and low.learned is not None:
+            told = tell(visits_of(used, hits, frfs), low.learned, cell.tolerances, table.band_hz)
             misses, used = told.poses, tuple(map(told.corrected, used))
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:
@@ -277,8 +307,12 @@ def build(
         taught=best.low.taught,
         visits=cell.visit_scatter,
     )
-    kept = tuple(frf.within(table.band_hz) for frf in frfs)
-    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses, kept)
+    model = Model(
+        cell, best.labelled, best.low, best.seen, surrogate, noise, misses, state.used, frf_of
+    )
+    if learns:
+        _ = model.frfs  # which are at hand, and kept with the model
+    return model
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +341,8 @@ class _Guided:
         """
         labels = self.primary.log_evidence[: self.low.count]
         missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
-        return float(np.sum(labels)) + missed * MISSED + self.stray * STRAY
+        share = min(1.0, STAGES[-1] / max(len(self.labelled), 1))  # of the poses it is about
+        return float(np.sum(labels)) + share * (missed * MISSED + self.stray * STRAY)
 
     @property
     def stray(self) -> int:

@@ -15,7 +15,8 @@ from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf import metrics
 from planner.frf.metrics import Agreement
-from planner.identification.identify import QUICK, THOROUGH, identify
+from planner.identification.effort import QUICK, THOROUGH
+from planner.identification.identify import identify
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS
 from planner.progress import Tell, within
