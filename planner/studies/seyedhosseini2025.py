@@ -133,7 +133,10 @@ def _steps_table(data: PostureData) -> Table:
 
 def _models_table(data: PostureData, mean: np.ndarray, alone: np.ndarray) -> Table:
     rows = []
-    for name, told in (("multi-task by kind", mean), ("one GP an output (published)", alone)):
+    for name, told in (
+        ("multi-task by kind (ours)", mean),
+        ("one GP an output (published)", alone),
+    ):
         off = told[:, : 2 * MODES] - data.clean[-HELD_OUT:, : 2 * MODES]
         percent = 100 * np.abs(np.expm1(off))
         rows.append((name, float(percent[:, FREQUENCY].mean()), float(percent[:, DAMPING].mean())))

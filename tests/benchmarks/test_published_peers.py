@@ -35,6 +35,7 @@ LOW_STARTS, STARTS = 5, 30  # of the levels' climbs; of 30 each is rough at firs
 SAME_PEAK = 0.15  # difference of log-likelihoods of two climbs that say the same
 # Of some hundred: 25 points on a line with next to no noise leave a nearly singular matrix.
 LIKELIHOODS = 0.03
+DRAWN = 0.02  # what emukit's 2,000 draws of the cheap level leave of an RMSE of 0.3 %
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 
 pytestmark = [
@@ -144,9 +145,7 @@ def test_nargp_is_as_good_as_emukits(tmp_path):
         peer, same, own, differs, gain = np.transpose(each)
         assert np.all(np.abs(differs) < LIKELIHOODS), name
         assert np.median(np.abs(same / peer - 1)) < 0.01, name
-        assert np.all(np.abs(same / peer - 1) < 0.02), (
-            name
-        )  # where RMSE is 0.3 %: the same near-singularity
+        assert np.all(np.abs(same / peer - 1) < DRAWN), name
         assert np.all(gain > -SAME_PEAK), name
-        assert np.median(own) < 1.01 * np.median(peer), name
+        assert abs(np.median(own / peer - 1)) < 0.01, name
         assert np.median(np.abs(own / peer - 1)[np.abs(gain) < SAME_PEAK]) < 0.01, name
