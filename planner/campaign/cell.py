@@ -88,9 +88,9 @@ class Cell:
     @cached_property
     def candidates(self) -> Candidates:
         """Reachable poses of the workspace, the same for the same configuration; then own ones."""
-        own = self.config.acquisition.own_poses_deg
+        own = self._own
         spread = self._spread
-        if own is None:
+        if not own:
             return spread
         q = np.array([self.check_pose(tuple(p), "[acquisition] own_poses_deg") for p in own])
         collisions = Collisions(self.robot)
@@ -111,8 +111,15 @@ class Cell:
     @property
     def spread(self) -> int:
         """How many of the candidates, the first ones, are spread evenly over the workspace."""
-        own = self.config.acquisition.own_poses_deg
-        return len(self.candidates.q) if own is None else len(self._spread.q)
+        return len(self._spread.q) if self._own else len(self.candidates.q)
+
+    @property
+    def _own(self) -> list[list[float]]:
+        """Poses in degrees that are offered besides: the engineer's, and those of a cut's path."""
+        own = list(self.config.acquisition.own_poses_deg or ())
+        if self.config.acquisition.name == "stability" and self.config.cut is not msgspec.UNSET:
+            own += [p for p in self.config.cut.joints_deg or () if p not in own]
+        return own
 
     @cached_property
     def allowed(self) -> np.ndarray:

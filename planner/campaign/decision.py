@@ -8,8 +8,8 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.campaign.acquisition_inputs import open_parameters, poses_at
-from planner.design.frequency_posterior import Target
-from planner.design.stability import stability
+from planner.design.frequency_posterior import FrequencyOutputs, Margins
+from planner.design.stability import share_left, stability, with_margins
 from planner.errors import InputError
 from planner.frf.frequency_lines import frequency_lines
 from planner.milling.cut import Cut
@@ -48,9 +48,9 @@ class Decision:
         """Whether each pose's answer is right with at least this probability."""
         return bool(np.all(self.certainty >= probability))
 
-    def shrunk(self, share: float, probability: float) -> bool:
-        """Whether it were sure if the variance of every margin were this share of what it is."""
-        size = [abs(pose.margin) / (pose.sd * np.sqrt(max(share, 1e-12))) for pose in self.poses]
+    def shrunk(self, share: np.ndarray, probability: float) -> bool:
+        """Whether it were sure if of the margins' variances these shares (u,) were left."""
+        size = [abs(pose.margin) / pose.sd for pose in self.poses] / np.sqrt(share)
         return bool(np.min(norm.cdf(size)) >= probability)
 
 
@@ -81,8 +81,8 @@ def _at(
     return decide(structure, cut, table.speed_rpm, table.depth_m)
 
 
-def decision_target(model: "Model") -> Target:
-    """Poses at which the decision is unsure, and modes on which it hangs, as a target."""
+def deciding_outputs(model: "Model", outputs: FrequencyOutputs) -> FrequencyOutputs:
+    """The posterior, asked for the margins of the decision and the modes on which they hang."""
     decision = model.decision
     if decision is None:
         raise InputError(
@@ -91,32 +91,34 @@ def decision_target(model: "Model") -> Target:
     open_ = open_parameters(model.cell, model.low, model.frf_noise)
     poses, _ = poses_at(model.cell, model.low, model.surrogate, open_, decision.q)
     expected = model.predict(decision.q).frequency_hz
-    importance = np.array([
-        _importance(pose, hertz) for pose, hertz in zip(decision.poses, expected, strict=True)
-    ])  # fmt: skip
-    total = importance.sum()
-    if not total > 0:
-        return Target.evenly(poses)
-    return Target(poses, importance / total)
+    found = decision.poses
+    margins = Margins(
+        poses,
+        np.array([pose.margin for pose in found]),
+        np.array([pose.sd for pose in found]),
+        np.array([_slope(pose, hertz) for pose, hertz in zip(found, expected, strict=True)]),
+        np.zeros(len(found)),
+    )
+    return with_margins(outputs, margins)
 
 
-def _importance(pose: PoseDecision, expected_hz: np.ndarray) -> np.ndarray:
-    """(k,) of each label: square of the slope, weighed by how near the limit the pose may be."""
-    weight = float(norm.pdf(pose.margin / pose.sd)) / pose.sd
+def _slope(pose: PoseDecision, expected_hz: np.ndarray) -> np.ndarray:
+    """(k,) of each label: the margin's change per relative change of its frequency."""
     found = np.zeros(len(expected_hz))
     for k, hertz in enumerate(expected_hz):
         off = np.abs(pose.frequency_hz / hertz - 1)
         nearest = int(np.argmin(off))
         if off[nearest] < NEAR:
-            found[k] = weight * pose.slope[nearest] ** 2
-    return found
+            found[k] = pose.slope[nearest]
+    # Where no label is known to matter, all do.
+    return found if found.any() else np.ones_like(found)
 
 
 def measurements_left(model: "Model") -> int | None:
     """How many more poses to measure until the decision is sure; None: more than looked ahead.
 
-    By the acquisition's own choice of them, if every margin's variance falls as that of the
-    frequencies on which the decision hangs.
+    By the acquisition's own choice of them, if each margin's variance falls as that of the
+    frequencies on which it hangs.
     """
     decision = model.decision
     probability = model.cell.config.stop.probability
@@ -125,15 +127,9 @@ def measurements_left(model: "Model") -> int | None:
     if decision.sure(probability):
         return 0
     outputs, poses = model.deciding
-    target = outputs.goal
-    expected = model.predict(decision.q)
-    relative = np.nan_to_num(expected.frequency_sd_hz / expected.frequency_hz)
-    total = left = float(np.sum(target.importance * relative**2))
     for count in range(1, AHEAD + 1):
-        gain = stability(outputs, poses)
-        best = int(np.argmax(gain))
-        left -= float(gain[best])
-        if decision.shrunk(left / total, probability):
-            return count
+        best = int(np.argmax(stability(outputs, poses)))
         outputs = outputs.planning(poses.one(best))
+        if decision.shrunk(share_left(outputs), probability):
+            return count
     return None

@@ -22,6 +22,7 @@ from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
+from planner.identification.effort import QUICK, STAGES
 from planner.identification.extended_structure import (
     DAMPING_S,
     FLOOR,
@@ -29,7 +30,7 @@ from planner.identification.extended_structure import (
     Structure,
     extended,
 )
-from planner.identification.identify import QUICK, STAGES, identify
+from planner.identification.identify import identify
 from planner.identification.measured_frfs import common_band
 from planner.identification.parameters import place_name
 from planner.identification.truncated_decay import cut_off

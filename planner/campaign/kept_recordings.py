@@ -64,6 +64,13 @@ class KeptRecordings:
             self.remembered.frfs[key] = found
         return self.remembered.frfs[key]
 
+    def keep_frf(self, frf: "Frf", measurement: Measurement, table: ModesTable) -> None:
+        """Keep the FRF matrix of a pose that was measured just now, for this process and others."""
+        from planner.dataset.measure import keep_frf
+
+        self.remembered.frfs[frf_key(measurement.accepted, table)] = frf
+        keep_frf(frf, self.sources(measurement), table.band_hz, table.window_rate_1_s)
+
     def hits(self, measurement: Measurement, table: ModesTable) -> "PoseHits":
         """What the accepted hits of a measured pose say, each by itself and at all points."""
         from planner.dataset.hit_columns import hits_of

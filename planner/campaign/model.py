@@ -69,6 +69,19 @@ class Model:
         """
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
 
+    def frequencies(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies and their sds (n, count) in Hz, as of `predict`."""
+        said = self.low.frequencies(q)
+        f, sd = self.surrogate.frequencies(self.cell.features(q), said.frequency_hz)
+        return f, self._with_parameters(q, said, f, sd)
+
+    def _with_parameters(
+        self, q: np.ndarray, simulated: SimulatedModes, f: np.ndarray, sd: np.ndarray
+    ) -> np.ndarray:
+        """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
+        share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
+        return np.hypot(sd, share * f)
+
     @cached_property
     def frfs(self) -> tuple[Frf, ...]:
         """Of the labelled poses; read when asked for."""
@@ -129,11 +142,11 @@ class Model:
 
     @cached_property
     def deciding(self) -> tuple[FrequencyOutputs, Poses]:
-        """As `informed`, the goal being the poses and modes on which the decision hangs."""
-        from planner.campaign.decision import decision_target
+        """As `informed`, asked for the margins of the decision about the cut."""
+        from planner.campaign.decision import deciding_outputs
 
         outputs, poses = self.informed
-        return replace(outputs, goal=decision_target(self)), poses
+        return deciding_outputs(self, outputs), poses
 
     @cached_property
     def forecast(self) -> Forecast:
@@ -185,8 +198,7 @@ class Model:
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
         found = (surrogate or self.surrogate).predict(features, simulated, visit)
-        share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
-        sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
+        sd = self._with_parameters(q, simulated, found.frequency_hz, found.frequency_sd_hz)
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -246,11 +258,13 @@ class Model:
                 )
         return tuple(found)
 
-    @property
+    @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
-        p = self.workspace_prediction
-        return 100 * np.sqrt(np.mean((p.frequency_sd_hz / p.frequency_hz) ** 2, axis=0))
+        candidates, said = self.cell.candidates, self.simulated_candidates
+        f, sd = self.surrogate.frequencies(candidates.features, said.frequency_hz, visit=False)
+        sd = self._with_parameters(candidates.q, said, f, sd)
+        return 100 * np.sqrt(np.mean((sd / f) ** 2, axis=0))
 
 
 def build(

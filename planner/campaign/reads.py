@@ -45,6 +45,7 @@ class CampaignReads:
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
         self._remembered = Remembered()
+        self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -59,7 +60,10 @@ class CampaignReads:
     @property
     def state(self) -> CampaignState:
         """The fold over the log, with changes made by hand to the configuration."""
-        state = fold(self.entries)
+        entries = self.entries
+        if entries is not self._folded[0]:
+            self._folded = entries, fold(entries)
+        state = self._folded[1]
         if state.configured is None:
             raise InputError(
                 f"{self.directory} holds an empty log; start the campaign again with planner new."

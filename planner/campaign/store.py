@@ -146,10 +146,18 @@ def create_folder(
         raise InputError(text) from None
     except OSError as error:
         raise InputError(
-            f"{directory} cannot be made ({error.strerror}); choose another folder."
+            f"{directory} cannot be made ({_why(error)}); choose another folder."
         ) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def _why(error: OSError) -> str:
+    """In words; of a folder whose files cannot be copied, those of the first one."""
+    if isinstance(error, shutil.Error):
+        _, copy, reason = error.args[0][0]
+        return f"{Path(copy).name}: {reason}"
+    return error.strerror or type(error).__name__
 
 
 def _remove_left(directory: Path) -> None:

@@ -6,6 +6,9 @@ from typing import Annotated
 import typer
 
 from planner.cli.answer import AsJson, respond
+from planner.errors import InputError
+
+MAP_POSES, WAY_POSES = 40, 12
 
 
 def stability(
@@ -19,7 +22,20 @@ def stability(
     ] = None,
     path: Annotated[
         Path | None,
-        typer.Option(metavar="POSES_CSV", help="Of a campaign: all these poses, as in predict."),
+        typer.Option(metavar="CSV|PROGRAM", help="Of a campaign: poses, or G-code or APT."),
+    ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Of a program: its zero in the robot's base, m."),
+    ] = None,
+    turns: Annotated[
+        bool, typer.Option("--turns", help="Along --path: turn the robot about the tool's axis.")
+    ] = False,
+    map_: Annotated[
+        bool, typer.Option("--map", help="Of a campaign: all over the workspace.")
+    ] = False,
+    poses: Annotated[
+        int | None, typer.Option(min=2, max=200, help="Of a program (12), or of --map (40).")
     ] = None,
     tool: Annotated[
         Path | None, typer.Option(metavar="TOOL_TOML", help="Put this tool on, as couple does.")
@@ -30,6 +46,9 @@ def stability(
     robot: Annotated[
         Path | None, typer.Option(metavar="ROBOT_TOML", help="Tells how the tip turns; see couple.")
     ] = None,
+    noise: Annotated[
+        float, typer.Option(metavar="PERCENT", min=0.0, help="With --tool: of FRFs without sd.")
+    ] = 0.0,
     point: Annotated[
         str | None, typer.Option(metavar="RPM,DEPTH_M", help="How stable is this very point?")
     ] = None,
@@ -46,20 +65,41 @@ def stability(
     Example: planner stability cell7 --pose P001 --cut cut.toml --plot pictures
     """
     from planner.cli.progress import counting
+    from planner.milling.cut import load_cut
     from planner.report.plot_files import Pictures
-    from planner.report.stability_of import Asked, stability_of
+    from planner.report.stability_source import Asked
 
-    if path is not None or pose == "all":
-        from planner.milling.cut import load_cut
-        from planner.report.stability_path import path_report
-
-        with counting(quiet=as_json) as tell:
-            found = path_report(
-                source, path, load_cut(cut), samples, Pictures(plot, format_, rrd), tell
-            )
-        return respond(found, as_json)
-    asked = Asked(source, cut, pose, point, samples, tool, reference, robot)
+    asked = Asked(source, cut, pose, point, samples, tool, reference, robot, noise / 100)
     pictures = Pictures(plot, format_, rrd)
+    check(path, origin, turns, poses, map_, pose)
     with counting(quiet=as_json) as tell:
-        answer = stability_of(asked, pictures, tell)
-    return respond(answer, as_json)
+        if map_:
+            from planner.report.stability_map import map_report
+
+            return respond(
+                map_report(asked, poses or MAP_POSES, load_cut(cut), pictures, tell), as_json
+            )
+        if path is not None or pose == "all":
+            from planner.report.stability_path import path_report
+            from planner.report.stability_way import Way
+
+            way = Way(path, origin, poses or WAY_POSES, turns)
+            return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)
+        from planner.report.stability_of import stability_of
+
+        return respond(stability_of(asked, pictures, tell), as_json)
+
+
+def check(
+    path: Path | None, origin: str | None, turns: bool, poses: int | None, map_: bool,
+    pose: str | None,
+) -> None:  # fmt: skip
+    """InputError where options contradict each other."""
+    if map_ and (path is not None or pose is not None):
+        raise InputError("--map looks all over the workspace; leave --path and --pose out.")
+    if path is not None and pose is not None:
+        raise InputError("--path names the poses; leave --pose out.")
+    if path is None and (origin is not None or turns):
+        raise InputError("--origin and --turns go with --path; name the path.")
+    if poses is not None and not map_ and path is None:
+        raise InputError("--poses goes with --map or a program as --path; add one of them.")

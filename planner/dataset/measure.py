@@ -20,6 +20,7 @@ from planner.recording.records import FrfRecord, Hit
 OVER = 5.5  # e^−OVER of the slowest decay is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
 
+ACCEPTED = "accepted frf"  # what the store calls the FRF of a pose's accepted files
 NOT_OF_TOOL = (
     "No hit at the tcp was heard by all axes of the sensor there: modes of the tool are not told, "
     "what was measured at other points serves identification and diagnosis."
@@ -253,7 +254,6 @@ def frf_of(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
 ) -> Frf:
     """The tool's FRF of files that were accepted before: the one that `measure` gave then."""
-    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
     def make() -> Frf:
         read = [source.read() for source in sources]
@@ -262,7 +262,20 @@ def frf_of(
         whole = _frf(hits, frfs, band_hz, "h1", window_rate_1_s)
         return whole.of_tool or _nothing(whole)
 
-    return pose.kept("accepted frf", Frf, make)
+    return _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
+
+
+def keep_frf(
+    frf: Frf, sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
+) -> None:
+    """Keep what `frf_of` will be asked for, now that it is at hand."""
+    _ = _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, lambda: frf)
+
+
+def _accepted(
+    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
+) -> MeasuredPose:
+    return MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
 
 def one_hit_frf(

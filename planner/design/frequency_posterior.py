@@ -71,6 +71,21 @@ class Target:
 
 
 @dataclass(frozen=True, eq=False)
+class Margins:
+    """u answers that hang on frequencies: yes where a margin (u,), known to `sd` (u,), is above 0.
+
+    `slope` (u, k) is how each margin changes per relative change of each label's frequency at
+    `poses`; `variance` (u,) what the frequencies' own uncertainty makes of that at first.
+    """
+
+    poses: Poses
+    margin: np.ndarray
+    sd: np.ndarray
+    slope: np.ndarray
+    variance: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class FrequencyOutputs:
     """Log-frequencies of k labels, and the workspace (and goal) to be good at.
 
@@ -85,6 +100,7 @@ class FrequencyOutputs:
     planned: Poses
     trust: np.ndarray  # (k,) weight of the simulation in each label
     covariance_root: np.ndarray  # (p, p): root rootᵀ is that of the simulation's parameters
+    margins: Margins | None = None  # where a decision is asked for
 
     @classmethod
     def of(

@@ -10,7 +10,8 @@ from scipy.linalg import block_diag
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import MOST_LINES, fit_similarity
+from planner.identification.agreement import fit_similarity
+from planner.identification.effort import THOROUGH, Effort
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, matrices_at
 from planner.identification.measurement_model import Tolerances
@@ -20,40 +21,10 @@ from planner.identification.result import Identification, estimates, undetermine
 from planner.identification.staged_problem import Progress, StagedProblem
 from planner.inference.least_squares import Minimum, inverse
 
-STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How exact an identification is: lines a pose and completions of cut-off records.
-
-    Each for a start and for the last fit, which is judged on as many lines; iterations end where a
-    step gains less than `tolerance`.
-    """
-
-    lines: int = 160
-    last_lines: int = MOST_LINES
-    completions: int = 2  # after the first: exact to second order
-    last_completions: int = 6
-    tolerance: float = 1e-6
-    sloped: bool = True  # a completion holds to first order, not at one point only
-    stages: tuple[float, ...] = STAGES
-    log_lines: int = 64  # a pose, in the logarithmic stages
-    log_steps: int = 40
-    steps: int = 80
-    doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
-    openings: int = 4  # rounds at most, in which what hits leave open follows the fit
-
-
-THOROUGH = Effort()
-QUICK = Effort(
-    48, 80, 0, 1, 1e-4, False, stages=(0.28, 1.0), log_lines=40, log_steps=12, doubtful=False,
-    openings=1,
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,10 @@ SLOT = 1.0  # radial immersion of a slot
 class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A cutter, its immersion, the cutting coefficients, and which speeds and depths are asked for.
 
-    `feed` is the tool's direction over the workpiece, `axis` that of the tool from its tip to the
-    spindle, both in the frame of the FRFs; the spindle turns clockwise seen from behind it.
+    `axis` is the tool's direction from its tip to the spindle in the frame of the FRFs, as
+    `to_spindle` in tool.toml; the spindle turns clockwise seen from behind it. `feed` is the tool's
+    direction over the workpiece, in the same frame, or with `feed_in = "base"` in that of the
+    robot's base; with "path" it follows the path's own positions.
     `kt_n_m2` and `kr_n_m2` are the tangential and radial force per area of the chip's section,
     `kr_n_m2` positive where it pushes the cutter away. `pitch_deg` are the angles from each tooth
     to the one ahead of it (none: all alike), `helix_deg` how far the teeth are wound.
@@ -35,6 +37,7 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     depth_m: tuple[float, float, int]
     radial_immersion: float = SLOT
     feed: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    feed_in: Literal["frf", "base", "path"] = "frf"
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     method: Literal["full_discretisation", "semi_discretisation", "zeroth_order"] = (
         "full_discretisation"
@@ -152,5 +155,5 @@ def _check_directions(cut: Cut, path: Path) -> None:
     for name, given in (("feed", cut.feed), ("axis", cut.axis)):
         if not abs(np.linalg.norm(given) - 1) < UNIT:
             raise InputError(f"{path}: {name} is not of length 1; give a unit vector.")
-    if abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
+    if cut.feed_in == "frf" and abs(float(np.dot(cut.feed, cut.axis))) > UNIT:
         raise InputError(f"{path}: feed is not at right angles to the axis; correct one of them.")

@@ -146,12 +146,9 @@ def of_accelerance(
     return CutterFrf(name, hertz, h, spread)
 
 
-def read_all(path: Path) -> list[CutterFrf]:
-    """Every pose of an npz of `predict`, in its order."""
-    if path.suffix.lower() != ".npz":
-        return [read_frf(path, None)]
-    names = _held(path)[0]
-    return [read_frf(path, name) for name in names]
+def names_in(path: Path) -> list[str | None]:
+    """Every pose of an npz of `predict`, in its order; of other files None, the one they hold."""
+    return list(_held(path)[0]) if path.suffix.lower() == ".npz" else [None]
 
 
 def _npz(path: Path, pose: str | None) -> CutterFrf:

@@ -7,8 +7,6 @@ import msgspec
 import numpy as np
 
 from planner.milling.cut import Cut
-from planner.milling.cutter_modes import CutterModes
-from planner.milling.directional import Coefficients
 from planner.milling.lobes import Loss, losses
 from planner.milling.machine import Machine
 from planner.milling.structure import Structure
@@ -63,6 +61,28 @@ def along(
     return PathLimits(tuple(name for name, _ in poses), tuple(found), np.array(robust))
 
 
+def best_speed_of(
+    poses: Sequence[tuple[str, Structure]], cut: Cut, most: int, tell: Tell = quietly
+) -> float:
+    """Of at most so many of the cut's speeds that in rpm at which the tightest pose allows most."""
+    low, high, count = cut.spindle_rpm
+    fewer = msgspec.structs.replace(cut, spindle_rpm=(low, high, min(count, most)))
+    least = np.full(len(fewer.speeds_rpm), np.inf)
+    for i, (_, structure) in enumerate(poses):
+        depth = np.array([loss.depth_m for loss in losses(structure.machine(fewer))])
+        least = np.fmin(least, depth)
+        tell("poses", (i + 1) / len(poses))
+    return float(fewer.speeds_rpm[int(np.argmax(least))])
+
+
+def at_speed(
+    poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float, samples: int, tell: Tell = quietly
+) -> tuple[np.ndarray, np.ndarray]:
+    """(p,) first losses in m at a speed, and depths that are stable with 95 %; inf: none lost."""
+    limits = along(poses, _at_one_speed(cut, rpm), samples, tell)
+    return limits.depth_m[:, 0], limits.robust_m[:, 0]
+
+
 def by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.ndarray:
     """(TURNS_DEG,) depth in m that all poses allow at a speed if the feed is turned.
 
@@ -71,9 +91,14 @@ def by_feed(poses: Sequence[tuple[str, Structure]], cut: Cut, rpm: float) -> np.
     one = _at_one_speed(cut, rpm)
     limit = []
     for turn in np.deg2rad(TURNS_DEG):
-        each = [_limit(_turned(structure.modes, turn), one) for _, structure in poses]
+        each = [_limit(_turned(structure.machine(one), turn)) for _, structure in poses]
         limit.append(min(each))
     return np.array(limit)
+
+
+def limit_at(structure: Structure, cut: Cut, rpm: float) -> float:
+    """Depth in m that is stable at a speed in rpm, inf where nothing is lost."""
+    return _limit(structure.machine(_at_one_speed(cut, rpm)))
 
 
 def _at_one_speed(cut: Cut, rpm: float) -> Cut:
@@ -81,15 +106,18 @@ def _at_one_speed(cut: Cut, rpm: float) -> Cut:
     return msgspec.structs.replace(cut, spindle_rpm=(rpm, rpm, 1))
 
 
-def _limit(modes: CutterModes, cut: Cut) -> float:
-    (loss,) = losses(Machine(modes, cut, Coefficients.of(cut)))
+def _limit(machine: Machine) -> float:
+    (loss,) = losses(machine)
     return float(np.inf if np.isnan(loss.depth_m) else loss.depth_m)
 
 
-def _turned(modes: CutterModes, turn: float) -> CutterModes:
+def _turned(machine: Machine, turn: float) -> Machine:
     c, s = np.cos(turn), np.sin(turn)
-    plane = np.array([[c, s], [-s, c]])
-    return replace(
+    plane, modes, frf = np.array([[c, s], [-s, c]]), machine.modes, machine.frf
+    turned = replace(
         modes, shapes=modes.shapes @ plane.T, drives=modes.drives @ plane.T,
         residual=plane @ modes.residual @ plane.T,
     )  # fmt: skip
+    if frf is not None:
+        frf = replace(frf, receptance=np.einsum("ia,abf,jb->ijf", plane, frf.receptance, plane))
+    return replace(machine, modes=turned, frf=frf)

@@ -20,6 +20,8 @@ STEP = 1e-4  # relative, of derivatives
 MOST_LINES = 300  # of an FRF, that its sd is explained at
 LEAST_COEFFICIENT = 0.05  # of the stated one: a sample of K_t is not below
 MOST_DAMPING = 0.95
+LEAST_SHARE = 1e-3  # of the median variance over the lines: none counts as if it were known better
+MOST_SD = 0.5  # of ln frequency, damping or size: nothing is known of a mode that is less sure
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +84,17 @@ def explaining(modes: CutterModes, frf: PlaneFrf) -> tuple[ModeSpread, float]:
         by[i] = STEP
         columns.append(np.abs((moved(modes, by).receptance(hertz) - here) / STEP) ** 2)
     scale = np.sum(np.abs(here) ** 2, axis=(1, 2))[:, None, None]
-    a = np.stack([(column / scale).ravel() for column in columns], axis=1)
-    wanted = (sd**2 / scale).ravel()
+    wanted = sd**2 / scale
+    # Line by line alike: few lines of which hardly anything is known say nothing of the others.
+    size = np.sum(wanted, axis=(1, 2))[:, None, None]
+    size = np.maximum(size, LEAST_SHARE * np.median(size))
+    a = np.stack([(column / scale / size).ravel() for column in columns], axis=1)
+    wanted = (wanted / size).ravel()
     unit = np.linalg.norm(a, axis=0)
     unit[unit == 0] = np.inf
     square = nnls(a / unit, wanted)[0] / unit
     given = float(np.sum(a @ square) / np.sum(wanted))
-    return ModeSpread.of(np.sqrt(square)), given
+    return ModeSpread.of(np.minimum(np.sqrt(square), MOST_SD)), given
 
 
 def sampled(

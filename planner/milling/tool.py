@@ -1,102 +1,13 @@
-"""A tool as a TOML file states it: segments from the holder to the tip, materials, contacts.
+"""A tool: segments from the holder to the tip, what holds each, and where it was measured."""
 
-    name = "end mill, 12 mm"
-    axis = [0.0, 0.0, 1.0]          # from the holder to the tip, in the axes of the FRFs
-
-    [material.carbide]
-    youngs_modulus_pa = 5.4e11
-    density_kg_m3 = 14500.0
-    poisson_ratio = 0.25
-    loss_factor = 0.001             # structural damping
-
-    [[segment]]                     # the shank
-    material = "carbide"
-    length_m = 0.030
-    diameter_m = 0.012
-    [segment.contact]               # what holds it at its lower end; none: held rigidly
-    stiffness_n_m = 4.5e7
-    stiffness_nm_rad = 4.2e6
-    damping_ns_m = 210.0
-    damping_nms_rad = 1.5
-
-    [[segment]]                     # the flutes, bending like a rod of 80 % of their diameter
-    material = "carbide"
-    length_m = 0.026
-    diameter_m = 0.012
-    flutes = 4
-
-Further keys of a segment: `end_diameter_m` (towards the tip), `bore_m`, `equivalent_diameter_m`
-of flutes, `mass_kg` at its end towards the tip. `[[point]]` says where a tested tool was hit and
-measured: `node` in the FRFs' file, `from_tip_m`, `place_sd_m`, `sensor_mass_kg`.
-"""
-
-import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-import msgspec
 import numpy as np
 
-from planner.errors import InputError
-from planner.milling.beam import Segment, ToolMaterial, transfer
-from planner.milling.interface import NUMBERS, ToolContact
-from planner.toml_file import load_toml
+from planner.milling.beam import Segment, transfer
+from planner.milling.interface import ToolContact
 
-# Of the cutting diameter, as which flutes bend (Kops and Vo, CIRP Annals 39, 1990).
-FLUTED = 0.8
 SAME_PLACE = 1e-9  # m
-
-
-class ContactTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[segment.contact]."""
-
-    stiffness_n_m: float
-    stiffness_nm_rad: float
-    damping_ns_m: float = 0.0
-    damping_nms_rad: float = 0.0
-    sd_percent: float = 0.0
-
-
-class MaterialTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[material.NAME]."""
-
-    youngs_modulus_pa: float
-    density_kg_m3: float
-    poisson_ratio: float
-    loss_factor: float = 0.0
-
-
-class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[[segment]]."""
-
-    length_m: float
-    diameter_m: float
-    material: str
-    end_diameter_m: float | None = None
-    bore_m: float = 0.0
-    flutes: int = 0
-    equivalent_diameter_m: float | None = None
-    mass_kg: float = 0.0
-    contact: ContactTable | None = None
-
-
-class ToolPointTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[[point]]: where a tested tool was hit and measured."""
-
-    node: int | str
-    from_tip_m: float
-    place_sd_m: float = 0.0
-    sensor_mass_kg: float = 0.0
-
-
-class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
-    """A whole tool.toml."""
-
-    segment: tuple[SegmentTable, ...]
-    material: dict[str, MaterialTable]
-    name: str = ""
-    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    point: tuple[ToolPointTable, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -119,12 +30,17 @@ class Point:
 
 @dataclass(frozen=True)
 class Tool:
-    """Parts from the holder to the tip, the unit axis (3,) from holder to tip, measured points."""
+    """Parts from the holder to the tip, the unit axis (3,) from holder to tip, measured points.
+
+    The axis is that along which parts follow each other; files say where the spindle is, the other
+    way.
+    """
 
     name: str
     axis: tuple[float, float, float]
     parts: tuple[ToolPart, ...]
     points: tuple[Point, ...] = ()
+    says_spindle: bool = False  # whether its file has to_spindle, which older ones have not
 
     @property
     def length(self) -> float:
@@ -194,7 +110,7 @@ def _split(parts: tuple[ToolPart, ...], from_tip: float) -> tuple[ToolPart, ...]
     return tuple(out)
 
 
-def _loaded(parts: tuple[ToolPart, ...], from_tip: float, mass: float) -> tuple[ToolPart, ...]:
+def loaded(parts: tuple[ToolPart, ...], from_tip: float, mass: float) -> tuple[ToolPart, ...]:
     """Parts with a mass (kg) so many m from the tip."""
     parts, length = _split(parts, from_tip), 0.0
     for k in range(len(parts) - 1, -1, -1):
@@ -203,124 +119,3 @@ def _loaded(parts: tuple[ToolPart, ...], from_tip: float, mass: float) -> tuple[
             return (*parts[:k], replace(parts[k], segment=segment), *parts[k + 1 :])
         length += parts[k].segment.length
     return parts  # at the very lowest end: the holder's, not the tool's
-
-
-def load_tool(path: Path) -> Tool:
-    """A tool from its TOML file; InputError naming the file, the fault and the remedy."""
-    try:
-        table = load_toml(path, ToolTable, "tool.toml")
-    except InputError as error:
-        raise InputError(_with_unit(path, str(error))) from None
-    _check(path, table)
-    materials = {
-        name: ToolMaterial(m.youngs_modulus_pa, m.density_kg_m3, m.poisson_ratio, m.loss_factor)
-        for name, m in table.material.items()
-    }
-    parts = tuple(_part(s, materials[s.material]) for s in table.segment)
-    points = tuple(
-        Point(str(p.node), p.from_tip_m, p.place_sd_m, p.sensor_mass_kg) for p in table.point
-    )
-    x, y, z = (float(a) for a in np.array(table.axis) / np.linalg.norm(table.axis))
-    tool = Tool(table.name or path.stem, (x, y, z), parts, points)
-    for point in points:
-        if point.from_tip > tool.length:
-            raise InputError(
-                f"{path}: node {point.node} is {point.from_tip} m from the tip of a tool that is "
-                f"{tool.length:g} m long; correct from_tip_m."
-            )
-        if point.sensor_mass > 0:
-            loaded = _loaded(tool.parts, point.from_tip, point.sensor_mass)
-            tool = replace(tool, parts=loaded)
-    return tool
-
-
-def _part(s: SegmentTable, material: ToolMaterial) -> ToolPart:
-    end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
-    start = s.diameter_m
-    if s.flutes:
-        start, end = FLUTED * start, FLUTED * end
-    if s.equivalent_diameter_m is not None:
-        start = end = s.equivalent_diameter_m
-    contact = None
-    if s.contact is not None:
-        contact = ToolContact(
-            **{name: getattr(s.contact, name) for name in (*NUMBERS, "sd_percent")}
-        )
-    return ToolPart(Segment(s.length_m, start, end, material, s.bore_m, s.mass_kg), contact)
-
-
-UNITS = {
-    "length": "length_m", "diameter": "diameter_m", "end_diameter": "end_diameter_m",
-    "bore": "bore_m", "mass": "mass_kg", "density": "density_kg_m3", "from_tip": "from_tip_m",
-    "youngs_modulus": "youngs_modulus_pa", "stiffness": "stiffness_n_m and stiffness_nm_rad",
-    "damping": "damping_ns_m and damping_nms_rad", "place_sd": "place_sd_m",
-    "equivalent_diameter": "equivalent_diameter_m", "sensor_mass": "sensor_mass_kg",
-}  # fmt: skip
-
-
-def _with_unit(path: Path, sentence: str) -> str:
-    """The fault in words where a key only lacks its unit, or has another one."""
-    found = re.search(r"unknown field `(\w+)`(?:.*at `([^`]+)`)?", sentence)
-    if found is None:
-        return sentence
-    key, place = found.group(1), (found.group(2) or "").removeprefix("$.")
-    stem = max((s for s in UNITS if key == s or key.startswith(f"{s}_")), key=len, default=None)
-    if stem is None:
-        return sentence
-    where = f"{path}, {place}" if place else str(path)
-    return f"{where}: {key} does not state the unit that is read here; write {UNITS[stem]}."
-
-
-def _check(path: Path, table: ToolTable) -> None:
-    if not table.segment:
-        raise InputError(f"{path} has no [[segment]]; list them from the holder to the tip.")
-    if not np.all(np.isfinite(table.axis)) or np.linalg.norm(table.axis) == 0:
-        raise InputError(f"{path}: axis has no direction; give it from the holder to the tip.")
-    for name, m in table.material.items():
-        where = f"{path}, material {name}"
-        _positive(where, youngs_modulus_pa=m.youngs_modulus_pa, density_kg_m3=m.density_kg_m3)
-        _not_negative(where, loss_factor=m.loss_factor)
-        if not -1 < m.poisson_ratio < 0.5:
-            raise InputError(f"{where}: poisson_ratio is {m.poisson_ratio:g}; correct it.")
-    for number, s in enumerate(table.segment, 1):
-        _check_segment(f"{path}, segment {number}", s, table.material)
-    for number, p in enumerate(table.point, 1):
-        _not_negative(
-            f"{path}, point {number}",
-            from_tip_m=p.from_tip_m, place_sd_m=p.place_sd_m, sensor_mass_kg=p.sensor_mass_kg,
-        )  # fmt: skip
-    if len({str(p.node) for p in table.point}) < len(table.point):
-        raise InputError(f"{path} lists a [[point]] with the same node twice; correct node.")
-
-
-def _check_segment(where: str, s: SegmentTable, materials: dict[str, MaterialTable]) -> None:
-    if s.material not in materials:
-        raise InputError(
-            f"{where} is of {s.material!r}, which has no [material.{s.material}]; add that."
-        )
-    end = s.diameter_m if s.end_diameter_m is None else s.end_diameter_m
-    _positive(where, length_m=s.length_m, diameter_m=s.diameter_m, end_diameter_m=end)
-    _not_negative(where, bore_m=s.bore_m, mass_kg=s.mass_kg, flutes=s.flutes)
-    if s.equivalent_diameter_m is not None:
-        _positive(where, equivalent_diameter_m=s.equivalent_diameter_m)
-    narrow = min(s.diameter_m, end, s.equivalent_diameter_m or np.inf)
-    if s.bore_m >= narrow * (FLUTED if s.flutes and s.equivalent_diameter_m is None else 1.0):
-        raise InputError(f"{where}: a bore of {s.bore_m} m leaves nothing of it; correct bore_m.")
-    if s.contact is not None:
-        c = s.contact
-        _positive(f"{where}, contact", stiffness_n_m=c.stiffness_n_m,
-                  stiffness_nm_rad=c.stiffness_nm_rad)  # fmt: skip
-        _not_negative(f"{where}, contact", damping_ns_m=c.damping_ns_m,
-                      damping_nms_rad=c.damping_nms_rad, sd_percent=c.sd_percent)  # fmt: skip
-
-
-def _positive(where: str, **values: float) -> None:
-    for name, value in values.items():
-        if not (np.isfinite(value) and value > 0):
-            raise InputError(f"{where}: {name} is {value:g}; it has to be above zero, correct it.")
-
-
-def _not_negative(where: str, **values: float) -> None:
-    for name, value in values.items():
-        if not (np.isfinite(value) and value >= 0):
-            raise InputError(f"{where}: {name} is {value:g}; it cannot be negative, correct it.")

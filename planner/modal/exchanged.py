@@ -106,13 +106,8 @@ def _misfit(shape: np.ndarray, columns: np.ndarray, rows: list[int]) -> float:
     felt = shape[rows]
     if not np.all(np.isfinite(felt)):
         return 1.0
-    wrong = total = 0.0
-    for k in range(felt.shape[1]):
-        a, b = columns[:, k], felt[:, k]
-        size = np.linalg.norm(a) * np.linalg.norm(b)
-        # residue = row·column = φφ: column/row is a positive number where both are φ.
-        along = np.real(np.vdot(b, a)) if size else 0.0
-        power = np.linalg.norm(a) ** 2
-        wrong += power - max(along, 0.0) ** 2 / max(np.linalg.norm(b) ** 2, 1e-300)
-        total += power
-    return float(np.sqrt(max(wrong, 0.0) / max(total, 1e-300)))
+    # residue = row·column = φφ: column/row is a positive number where both are φ.
+    along = np.maximum(np.sum(felt.conj() * columns, axis=0).real, 0.0)
+    power = np.sum(np.abs(columns) ** 2, axis=0)
+    wrong = power - along**2 / np.maximum(np.sum(np.abs(felt) ** 2, axis=0), 1e-300)
+    return float(np.sqrt(max(np.sum(wrong), 0.0) / max(np.sum(power), 1e-300)))

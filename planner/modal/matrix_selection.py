@@ -17,10 +17,10 @@ from planner.modal.split_modes import REACH, Places, around, drifted, explains, 
 PRESENT, PRESENT_ADDED = 0.03, 0.2
 MOST_ADDED = 6
 ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
-PASSES = 3  # of leaving out and adding
+PASSES = 4  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
-SETTLING = 2  # rounds of a fit that has been fitted before, to fewer lines
+SETTLING = 2  # rounds of a fit that has been fitted before, to other lines
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
@@ -29,7 +29,9 @@ def common(data: Data, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = np.broadcast_to(power, data.response.shape)
     for _ in range(2):
-        found = refine(data.lines, data.response, variance, poles, data.allowed)
+        some = thinned(data, poles)
+        part = data.lines.part(some), data.response[..., some], variance[..., some]
+        found = refine(*part, poles, data.allowed)
         poles = found.poles
         shown = found.residues.residue @ unit(data.lines, poles)
         shown += found.residues.residue.conj() @ unit(data.lines, poles.conj())
@@ -56,44 +58,46 @@ def established(
     """Fit with every set's own poles, weak modes left out and missing ones added."""
     fit = _fit(data, sets, variance, poles, rounds=0)
     fit = _fit(data, sets, variance, fit.poles, drifted(data, sets, fit, variance), ROUGH_ROUNDS)
-    for number in range(PASSES):
+    searched = False
+    for _ in range(PASSES):
         variance = _variance(data, fit.fitted, fit.poles.size)
-        stands = _standing(data, fit, variance)
-        left = _part_of(fit, stands)
+        left = _part_of(fit, _standing(data, fit, variance))
         poles, own = unsplit(data, sets, left, variance, places)
-        changed = poles.size < fit.poles.size
-        if number == 0:
-            added = _missing(data, sets, left, variance)
+        # What a fit lacks is looked for where it has no mode too many.
+        if poles.size == fit.poles.size:
+            if searched:
+                break
+            added, searched = _missing(data, sets, fit, variance), True
             poles = np.append(poles, added)
             own = np.column_stack([own, np.tile(added, (len(own), 1))])
-            changed |= added.size > 0
+            if not added.size:
+                break
         if not poles.size:
             return replace(left, poles=poles), variance
-        if number and not changed:
-            break
         fit = _fit(data, sets, variance, poles, own)
-        if not changed:
-            break
+    variance = _variance(data, fit.fitted, fit.poles.size)
+    fit = _fit(data, sets, variance, fit.poles, fit.own, SETTLING, every=True)
     return fit, _variance(data, fit.fitted, fit.poles.size)
 
 
 def _fit(
     data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
-    known: np.ndarray | None = None, rounds: int = ROUNDS,
+    known: np.ndarray | None = None, rounds: int = ROUNDS, every: bool = False,
 ) -> SetPoles:  # fmt: skip
-    """Fit on thinned lines; poles that stray are left out."""
+    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
     while True:
         try:
-            lines = thinned(data, poles)
+            lines = thinned(data, poles, every)
             return fit_sets(data, sets, variance, poles, rounds, known, lines)
         except StrayedError as error:
             poles, known = poles[~error.astray], None
 
 
 def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """(m,) bool: which poles are modes."""
+    """(m,) bool: which poles are modes, or stand for those above the last line."""
     _, weak, presence = judged(data, fit, variance)
-    return (weak <= 1) & (presence >= PRESENT)
+    above = fit.poles.imag > 2 * np.pi * data.frequency_hz[-1]
+    return above | (weak <= 1) & (presence >= PRESENT)
 
 
 def _part_of(fit: SetPoles, kept: np.ndarray) -> SetPoles:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDS, STILL = 60, 1e-6  # of alternating and of Gauss-Newton steps, relative to the shape
+ROUNDS = 60  # of alternating and of Gauss-Newton steps
+ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
 RIDGE = 1e-11
 # Relative to all entries, an error that each is given at first: none rules alone.
 START_SHARE = 0.03
@@ -83,39 +84,45 @@ def fit_shape(
     variance: np.ndarray,
     damped_1_s: float,
     gain: float = 0.0,
+    near: np.ndarray | None = None,
 ) -> FittedShape:
     """Shape φ with residue ≈ φ_row φ_column / (2iω_d).
 
     residue (e,) in m/(N·s), variance (e,) of real and imaginary part each; damped_1_s: ω_d;
     `gain`: relative sd by which whole rows err, which only rows of points that are columns too can
-    show. The shape has unit modal mass (kg^−½) in groups whose scale is known; in others rows and
-    columns share the residue evenly. What no shape explains widens the variance: that of each
-    column by a factor, that of all entries in proportion to their size.
+    show; `near` (points,): a shape to start from. The shape has unit modal mass (kg^−½) in groups
+    whose scale is known; in others rows and columns share the residue evenly. What no shape
+    explains widens the variance: that of each column by a factor, that of all entries in
+    proportion to their size.
     """
     values = residue * 2j * damped_1_s
     noise = 2 * variance * (2 * damped_1_s) ** 2
     even = noise + START_SHARE**2 * np.mean(np.abs(values) ** 2)
     tied = np.intersect1d(entries.rows, entries.columns) if gain else np.zeros(0, int)
     problem = _Problem(entries, values, tied, max(gain, 1e-12))
-    found = np.append(_start(entries, values, 1 / even), np.zeros(tied.size))
-    spread = even
+    near = _start(entries, values, 1 / even) if near is None else near
+    found = np.append(near, np.zeros(tied.size))
+    spread, proportional = even, np.zeros(even.size)
     for _ in range(REWEIGHED):
-        found = _fitted(problem, 1 / spread, found)
+        found = _fitted(problem, 1 / spread, found, ROUGH)
         left, jacobian = problem.left(found), problem.jacobian(found)
         covariance = problem.covariance(jacobian, 1 / spread)
         taken = np.einsum("ea,ab,eb->e", jacobian.conj(), covariance, jacobian).real / spread
         free = residue.size - float(np.sum(taken))
         if free < LEAST_FREE:
-            spread = noise
+            spread, proportional = noise, np.zeros(noise.size)
             break
         square = np.abs(left) ** 2 * residue.size / free
         size = np.abs(values - left) ** 2
-        before, spread = spread, _spread(entries.columns, square, noise, size)
+        before = spread
+        constant, proportional = _spread(entries.columns, square, noise, size)
+        spread = constant + proportional
         if np.all(np.abs(spread / before - 1) < SETTLED):
             break
     found = _fitted(problem, 1 / spread, found)
     left, jacobian = problem.left(found), problem.jacobian(found)
-    covariance = problem.covariance(jacobian, 1 / spread)
+    # What errs in proportion errs in phase: all of it is in the real part, not half.
+    covariance = problem.covariance(jacobian, 1 / (spread + proportional))
     free = residue.size - int(np.linalg.matrix_rank(covariance, hermitian=True)) + tied.size
     misfit = float(np.sum(np.abs(left) ** 2 / noise) / free) if free > 0 else float("nan")
     n = entries.points
@@ -127,8 +134,8 @@ def fit_shape(
 
 def _spread(
     columns: np.ndarray, square: np.ndarray, noise: np.ndarray, size: np.ndarray
-) -> np.ndarray:
-    """(e,) variance: κ_column · noise + share · size, most likely for squared errors (e,).
+) -> tuple[np.ndarray, np.ndarray]:
+    """(e,) variances κ_column · noise and share · size, most likely for squared errors (e,).
 
     κ ≥ 1 and share ≥ 0 by multiplicative steps, as for the factors of spectra (Févotte, Bertin
     and Durrieu 2009).
@@ -142,7 +149,7 @@ def _spread(
         step = (table @ (square / total**2)) / np.maximum(table @ (1 / total), 1e-300)
         factor *= np.sqrt(step)
         factor[:-1] = np.maximum(factor[:-1], 1.0)
-    return factor @ table
+    return factor[:-1] @ table[:-1], factor[-1] * table[-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +207,9 @@ class _Problem:
         return float(np.sum(weight * left) + np.sum(gains) / (2 * self.gain**2))
 
 
-def _fitted(problem: _Problem, weight: np.ndarray, found: np.ndarray) -> np.ndarray:
+def _fitted(
+    problem: _Problem, weight: np.ndarray, found: np.ndarray, still: float = STILL
+) -> np.ndarray:
     """The unknowns that fit best, from first ones (Gauss-Newton)."""
     n = problem.entries.points
     for _ in range(ROUNDS):
@@ -212,7 +221,7 @@ def _fitted(problem: _Problem, weight: np.ndarray, found: np.ndarray) -> np.ndar
         normal[np.arange(n), np.arange(n)] += RIDGE * np.trace(normal[:n, :n]).real / n
         step = np.linalg.solve(normal, slope)
         found = _shortened(problem, weight, found, step)
-        if np.linalg.norm(step) < STILL * np.linalg.norm(found):
+        if np.linalg.norm(step) < still * np.linalg.norm(found):
             break
     return found
 

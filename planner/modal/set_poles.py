@@ -166,8 +166,10 @@ def _finish(
     m = common.size // 2
     point = set_points(data, _complex(own))
     residue, response = fitted(data, point, _complex(own), lines)
-    # Own poles are as sure as the set and the others make them.
-    total = _held(point, spread) * spread + covariance
+    # Own poles are as sure as the set and the others make them: a set that tells its own poles
+    # hardly depends on what is common.
+    held = _held(point, spread)
+    total = held * spread + held @ covariance @ held.transpose(0, 2, 1)
     change = point.turned[:, None, : 2 * m] @ turns(point.coefficients, m)
     spent = np.sum((change @ total[:, None]) * change, axis=-1)
     alone = np.einsum("kcc->kc", point.inverse)[:, None, : 2 * m]

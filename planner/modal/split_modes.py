@@ -14,6 +14,9 @@ Places = tuple[np.ndarray, np.ndarray]
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
 # this share of the frequency, or within a bandwidth.
 ALIKE, TOGETHER = 0.8, 0.02
+# Two of them stay apart where they explain more than one by this many times what chance does: the
+# second also has a pole for every set. Real pairs explain tens of times as much.
+APART = 3.0
 MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
 # Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
 # it.
@@ -22,14 +25,19 @@ MOST_LINES = 240  # of which that needs no more: of a fine grid, one line in so 
 # Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
 # are fitted: one in so many is kept.
 NEAR, THINNED = 10.0, 3
+ENOUGH = 3.0  # lines in a half bandwidth are enough until the last fit
 
 
-def thinned(data: Data, poles: np.ndarray) -> np.ndarray:
-    """Lines near a resonance, and some of the others."""
-    f = data.frequency_hz
-    kept = np.arange(f.size) % THINNED == 0
+def thinned(data: Data, poles: np.ndarray, every: bool = False) -> np.ndarray:
+    """Lines near a resonance (some of them, where they are many; or `every` one), and others."""
+    f, step = data.frequency_hz, data.frequency_hz[1] - data.frequency_hz[0]
+    index = np.arange(f.size)
+    kept = index % THINNED == 0
     for pole in poles:
-        kept |= np.abs(f - pole.imag / (2 * np.pi)) < NEAR * abs(pole.real) / (2 * np.pi)
+        half = abs(pole.real) / (2 * np.pi)
+        one_in = 1 if every else max(1, int(half / step / ENOUGH))
+        near = np.abs(f - pole.imag / (2 * np.pi)) < NEAR * half
+        kept |= near & (index % one_in == 0)
     return np.flatnonzero(kept)
 
 
@@ -70,14 +78,16 @@ def around(
     return replace(part, response=part.response - far[:, None]), lines, near
 
 
-def explains(local: Data, less: SetPoles, more: SetPoles, variance: np.ndarray) -> bool:
-    """Whether a fit with one mode more is better than chance makes it."""
+def explains(
+    local: Data, less: SetPoles, more: SetPoles, variance: np.ndarray, margin: float = 1.0
+) -> bool:
+    """Whether a fit with more modes is better than chance makes it, `margin` times over."""
     chi = [
         float(np.sum(2 / variance * np.abs(local.response[:, 0] - fit.fitted) ** 2))
         for fit in (less, more)
     ]
     scale = max(1.0, chi[1] / (2 * local.response.size))
-    return chi[0] - chi[1] > local.threshold * scale
+    return chi[0] - chi[1] > margin * local.threshold * scale
 
 
 def unsplit(
@@ -92,12 +102,14 @@ def unsplit(
     order = np.argsort(fit.poles.imag)
     poles, own = list(fit.poles), list(fit.own.T)
     for group in _groups(fit, places, order):
-        one = _as_one(data, sets, fit, variance, group)
-        if one is None:
-            continue
-        poles[group[0]], own[group[0]] = one
-        for k in group[1:]:
-            poles[k], own[k] = np.nan, np.full(len(sets), np.nan)
+        pairs = [group[k : k + 2] for k in range(len(group) - 1)] if len(group) > 2 else []
+        for tried in (group, *pairs):
+            one = _as_one(data, sets, fit, variance, tried)
+            if one is not None:
+                poles[tried[0]], own[tried[0]] = one
+                for k in tried[1:]:
+                    poles[k], own[k] = np.nan, np.full(len(sets), np.nan)
+                break
     kept = [k for k in order if np.isfinite(poles[k])]
     return np.array([poles[k] for k in kept]), np.array([own[k] for k in kept]).T.reshape(
         len(sets), len(kept)
@@ -152,6 +164,6 @@ def _as_one(
         more = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
     except StrayedError:
         return None
-    if explains(local, one, more, variance[:, lines]):
+    if explains(local, one, more, variance[:, lines], APART):
         return None
     return complex(one.poles[-1]), one.own[:, -1]

@@ -58,15 +58,22 @@ def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
             f"write its FRFs with predict --out and couple that file with --robot."
         )
     q = np.deg2rad(np.array(stands[pose], float))
-    simulation = campaign.model.low.simulation
-    if simulation is None:
-        raise InputError(f"{directory} has no simulation to tell rotations by; {MEASURE}.")
     lines = campaign.frequency_lines
     mean, sd = campaign.frf(q[None], lines)
-    s2 = (2j * np.pi * lines) ** 2
-    motion = TipMotion(pose, lines, mean[0] / s2, sd[0] / np.abs(s2), q)
     simulated = any(m.simulated for m in state.recorded)
-    return replace(completed(motion, simulation, q), simulated=simulated), pose
+    return replace(tip_at(campaign, pose, q, lines, mean[0], sd[0]), simulated=simulated), pose
+
+
+def tip_at(
+    campaign: Campaign, pose: str, q: np.ndarray, lines: np.ndarray, mean: np.ndarray,
+    sd: np.ndarray,
+) -> TipReceptance:  # fmt: skip
+    """Of a campaign's accelerance (3, 3, F) and its sd at q (dof,), with its simulation's turns."""
+    simulation = campaign.model.low.simulation
+    if simulation is None:
+        raise InputError(f"{campaign.directory} has no simulation to tell rotations by; {MEASURE}.")
+    s2 = (2j * np.pi * lines) ** 2
+    return completed(TipMotion(pose, lines, mean / s2, sd / np.abs(s2), q), simulation, q)
 
 
 def within(tip: TipReceptance, band_hz: tuple[float, float] | None, source: Path) -> TipReceptance:

@@ -30,7 +30,9 @@ class JudgedHit:
         """One line, in colour."""
         axis = self.axis or "axis not stated"
         if self.kind == "good":
-            return Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
+            style = COLOURS["late"] if self.text else COLOURS["good"]
+            but = f", but – {self.text}" if self.text else ""
+            return Text(f"hit {self.number} ({axis}): good{but}", style=style)
         said = "late?" if self.kind == "late" else f"REPEAT HIT {self.number}"
         return Text(f"hit {self.number} ({axis}): {said} – {self.text}", style=COLOURS[self.kind])
 

@@ -13,7 +13,8 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.recording.points import Layout
-from planner.report.rerun_chart import BRIGHT, GREY, write
+from planner.report.rerun_chart import BRIGHT
+from planner.report.rerun_modal import draw_mac, mac_view
 from planner.report.robot_motion import (
     PointShapes,
     agreement,
@@ -38,11 +39,7 @@ def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
         rrb.Spatial3DView(origin=f"/modes/mode_{k + 1}", name=f"mode {k + 1}", eye_controls=eye)
         for k in range(count)
     ]
-    bounds = rrb.VisualBounds2D(x_range=[-0.9, count + 0.2], y_range=[-0.6, count + 0.4])
-    mac = rrb.Spatial2DView(
-        origin="/modes/mac", name="MAC: measured (rows) and simulated (columns)",
-        visual_bounds=bounds,
-    )  # fmt: skip
+    mac = mac_view("modes/mac", "MAC: measured (rows) and simulated (columns)", count)
     return rrb.Grid(*views, mac, name="Modes")
 
 
@@ -113,27 +110,14 @@ class ModeDrawing:
             self._stream.send_columns(path, [_times()], columns)
 
     def _mac(self, pose: LabelledPose, mac: np.ndarray, points: int) -> None:
-        """A cell for each pair of modes; dark where there is nothing to compare."""
-        cells = (255 * colormaps["viridis"](np.nan_to_num(mac))[..., :3]).astype(np.uint8)
-        cells[~np.isfinite(mac)] = 0
-        self._stream.log("modes/mac/cells", rr.Image(cells))
-        count = len(mac)
-        words = [
-            (f"{mac[k, j]:.2f}", (j + 0.5, k + 0.42))
-            for k, j in np.ndindex(count, count) if np.isfinite(mac[k, j])
-        ]  # fmt: skip
-        rows = [m.frequency_hz if m else np.nan for m in pose.modes]
-        words += [
-            (f"{k + 1}: {hz:.1f} Hz" if np.isfinite(hz) else f"{k + 1}: none", (-0.45, k + 0.42))
-            for k, hz in enumerate(rows)
+        rows = [
+            f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
+            for k, mode in enumerate(pose.modes)
         ]
-        words += [
-            (f"{j + 1}: {hz:.1f} Hz", (j + 0.5, -0.3)) for j, hz in enumerate(pose.simulated_hz)
-        ]
+        columns = [f"{j + 1}: {hz:.1f} Hz" for j, hz in enumerate(pose.simulated_hz)]
         note = f"{pose.pose}, shapes at {3 * points} coordinates"
         few = "; different modes can look alike in so few" if points == 1 else ""
-        words.append((note + few, (count / 2, count + 0.1)))
-        write(self._stream, "modes/mac/words", words, [BRIGHT] * (len(words) - 1) + [GREY])
+        draw_mac(self._stream, "modes/mac", mac, rows, columns, note + few)
 
 
 def _title(pose: LabelledPose, k: int) -> str:

@@ -1,21 +1,21 @@
 """Answer of `stability` along a path: the tightest pose, the best speed, the better feed."""
 
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Group
 from rich.text import Text
 
-from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.cutter_frf import CutterFrf, of_accelerance, read_all
 from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
-from planner.milling.structure import Structure, beyond, of_frf
-from planner.progress import Tell, quietly
+from planner.milling.structure import Structure, beyond
+from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.plot_files import Pictures
+from planner.report.stability_source import Asked, structures_of_file
+from planner.report.stability_turns import TurnAdvice, turn_advice, turns_figure
+from planner.report.stability_way import Travelled, Way
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:
@@ -30,10 +30,12 @@ class FeedAdvice:
     """What turning the feed about the tool's axis would allow at the best speed.
 
     Angles in degrees from the feed as it is towards axis × feed, depths in m that all poses allow.
+    `direction_base` is the best feed in the robot's base frame, where that is one for all poses.
     """
 
     turn_deg: tuple[float, ...]
     depth_m: tuple[float, ...]
+    direction_base: tuple[float, float, float] | None = None
 
     @property
     def best(self) -> int:
@@ -50,8 +52,13 @@ class FeedAdvice:
             return "Another feed direction gains less than 5 % of depth."
         if not np.isfinite(gain):
             return f"Turned by {self.turn_deg[self.best]:g}° the feed allows every depth asked for."
+        base = ""
+        if self.direction_base is not None:
+            base = (
+                " (along [" + ", ".join(f"{v:.2f}" for v in self.direction_base) + "] of the base)"
+            )
         return (
-            f"Turned by {self.turn_deg[self.best]:g}° about the tool's axis, the feed allows "
+            f"Turned by {self.turn_deg[self.best]:g}° about the tool's axis{base}, the feed allows "
             f"{gain:.0f} % more depth."
         )
 
@@ -75,6 +82,7 @@ class PathReport(Answer):
     best_depth_m_at_95: float
     feed: FeedAdvice
     method: str
+    turn: TurnAdvice | None = None
     remarks: tuple[str, ...] = ()
     simulated: bool = False
     plots: tuple[str, ...] = ()
@@ -100,6 +108,8 @@ class PathReport(Answer):
             f"Best speed for the whole path: {self.best_spindle_rpm:.0f} rpm allows {best} with "
             f"95 % probability. {self.feed.text}"
         )
+        if self.turn is not None:
+            said += " " + self.turn.text(self.poses)
         parts = [made, Text(said), *remarks(self.remarks), *drawn(self.plots)]
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
@@ -109,52 +119,36 @@ def _or_none(value: float) -> float | None:
 
 
 def path_report(
-    source: Path, poses_csv: Path | None, cut: Cut, samples: int,
-    pictures: Pictures, tell: Tell = quietly,
-) -> PathReport:  # fmt: skip
-    """Of every pose of an npz, or of a campaign at the poses of a CSV."""
-    frfs = _of_campaign(source, poses_csv) if source.is_dir() else read_all(source)
-    poses = [(_short(frf.name), of_frf(frf, cut)) for frf in frfs]
-    limits = along(poses, cut, samples, tell)
-    answer = _answer(poses, limits, cut, any(frf.simulated for frf in frfs))
+    asked: Asked, way: Way, cut: Cut, pictures: Pictures, tell: Tell = quietly
+) -> PathReport:
+    """Of every pose of an npz, or of a campaign along a way."""
+    spent = (0.0, 0.5) if way.turns else (0.0, 1.0)
+    if not asked.source.is_dir():
+        way.check_none(asked.source)
+        poses = structures_of_file(asked, cut)
+        limits = along(poses, cut, asked.samples, tell)
+        answer = _answer(poses, limits, cut)
+    else:
+        travelled = Travelled.of(asked, way, cut)
+        poses = travelled.structures(cut)
+        limits = along(poses, cut, asked.samples, within(tell, *spent))
+        answer = _answer(poses, limits, cut)
+        if way.turns:
+            turned = turn_advice(travelled, cut, answer.best_spindle_rpm, within(tell, 0.5, 1.0))
+            answer = replace(answer, turn=turned)
+        feed = travelled.feed_in_base(answer.feed.turn_deg[answer.feed.best])
+        answer = replace(answer, feed=replace(answer.feed, direction_base=feed))
     if not pictures.wanted:
         return answer
-    from dataclasses import replace
-
     mark = SIMULATED_TITLE if answer.simulated else ""
-    written = pictures.write({"path": _figure(limits, answer, cut, mark)}, source.name)
+    figures = {"path": _figure(limits, answer, cut, mark)}
+    if answer.turn is not None:
+        figures["turns"] = turns_figure(answer.turn, answer.poses, answer.best_spindle_rpm, mark)
+    written = pictures.write(figures, asked.source.name)
     return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
 
 
-def _short(name: str) -> str:
-    return name.rsplit("pose ", 1)[-1]
-
-
-def _of_campaign(directory: Path, poses_csv: Path | None) -> list[CutterFrf]:
-    from dataclasses import replace
-
-    from planner.campaign.campaign import Campaign
-    from planner.recording.folder import read_poses
-
-    if poses_csv is None:
-        raise InputError(f"{directory} is a campaign: name the path's poses with --path POSES_CSV.")
-    campaign = Campaign(directory)
-    cell, rows = campaign.cell, read_poses(poses_csv, campaign.cell.robot.joint_names)
-    q = [cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}") for row in rows]
-    mean, sd = campaign.frf(np.array(q))
-    simulated = any(m.simulated for m in campaign.state.recorded)
-    return [
-        replace(
-            of_accelerance(f"pose {row.pose}", campaign.frequency_lines, mean[i], sd[i]),
-            simulated=simulated,
-        )
-        for i, row in enumerate(rows)
-    ]
-
-
-def _answer(
-    poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut, simulated: bool
-) -> PathReport:
+def _answer(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) -> PathReport:
     first, depth = np.argmin(limits.depth_m, axis=0), np.min(limits.depth_m, axis=0)
     tightest = [limits.found[p][i] for i, p in enumerate(first)]
     robust, best = np.min(limits.robust_m, axis=0), limits.best_speed
@@ -177,7 +171,7 @@ def _answer(
         feed=FeedAdvice(tuple(map(float, TURNS_DEG)), tuple(map(float, turned))),
         method=cut.method,
         remarks=tuple(said),
-        simulated=simulated,
+        simulated=any(one.frf is not None and one.frf.simulated for _, one in poses),
     )
 
 

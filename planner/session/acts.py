@@ -1,10 +1,12 @@
 """What the engineer's keys do. Each act changes the campaign and gives the session's next value."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
 from planner.campaign.importing import ImportReport
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
@@ -17,6 +19,14 @@ from planner.session.verdicts import PoseBefore
 
 ENTER = ("a", "\n", "\r")
 IMPORTING = "importing and refitting"
+ACTS: dict[type, Callable[[Any], str]] = {  # in words, where an interruption has to say them
+    Imported: lambda event: f"the hits of {event.pose}",
+    Confirmed: lambda event: f"the answer about {event.pose}",
+    Refused: lambda event: f"the refusal of hits at {event.pose}",
+    Skipped: lambda event: f"the skip of {event.pose}",
+    Starred: lambda event: f"the star of {event.pose}",
+    Undone: lambda event: f"that entry {event.act} is taken back",
+}
 
 
 def arrive(station: Station, course: Course) -> Course:
@@ -104,8 +114,6 @@ def import_waiting(station: Station, course: Course, visit: Visit, files: Sequen
             reports = station.campaign.import_paths(
                 (folder,) if table else tuple(files), None if table else visit.proposal.pose
             )
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(_interrupted(station)) from None
     except PlannerError as error:
         station.say(str(error), "red")
         bad = {station.inbox.digest(path) for path in files} if station.auto else set()
@@ -185,15 +193,13 @@ def _to_before(station: Station, course: Course, late: Sequence[Path]) -> Course
     return course
 
 
-def _interrupted(station: Station) -> str:
-    """What of an import that was stopped is in the log."""
-    poses = station.teller.gained()
-    if not poses:
-        return "Stopped while importing: nothing of it is in the log, the hits wait."
-    return (
-        f"Stopped while importing: the hits of {', '.join(poses)} are in the log; planner undo "
-        f"takes them back."
-    )
+def interrupted(station: Station) -> str:
+    """Which acts of the engineer an interruption left in the log, in a sentence."""
+    said = [ACTS[type(event)](event) for event in station.teller.gained() if type(event) in ACTS]
+    if not said:
+        return "Stopped: nothing that was begun is in the log; hits that were not imported wait."
+    there = ", ".join(dict.fromkeys(said))
+    return f"Stopped: {there}: that is in the log; planner undo takes the last act back."
 
 
 def _imported(station: Station, course: Course, report: ImportReport) -> Course:
@@ -212,4 +218,6 @@ def _after(station: Station, course: Course, report: ImportReport) -> Course:
     station.screen.show(session_text.import_panel(report, simulated))
     if station.screen.console.is_terminal:  # the page goes with the next pose
         station.say(session_text.result_line(report), "bold")
+        for alert in report.alerts:
+            station.say(alert, "yellow")
     return measured(station, course, report.pose)

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Entry, Imported
+from planner.campaign.events import AnyEvent, Entry, Imported
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
@@ -35,7 +35,6 @@ class Teller:
             self._story.tell(*self._untold[0])
             self._untold.popleft()
 
-    def gained(self) -> list[str]:
-        """Poses imported, by the log on disk, since it was noted last."""
-        entries = Campaign(self._campaign.directory).entries[self._noted :]
-        return [entry.event.pose for entry in entries if isinstance(entry.event, Imported)]
+    def gained(self) -> list[AnyEvent]:
+        """What the log on disk holds since it was noted last."""
+        return [entry.event for entry in Campaign(self._campaign.directory).entries[self._noted :]]

@@ -14,7 +14,7 @@ from planner.replay import replay
 from planner.report import session_text
 from planner.report.answer import Answer
 from planner.report.rerun_story import Story
-from planner.session.acts import answer, arrive, import_waiting, on_key, undoable
+from planner.session.acts import answer, arrive, import_waiting, interrupted, on_key, undoable
 from planner.session.course import Course, Visit
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.inbox import Inbox
@@ -92,8 +92,8 @@ def _run(station: Station) -> SessionSummary:
         if course.stop != "quit":
             with console.status("finding what the simulation lacks"):
                 station.say_diagnosis(wait=True)
-    except KeyboardInterrupt as stopped:
-        course = replace(course, stop="quit", ended=str(stopped))
+    except KeyboardInterrupt:
+        course = replace(course, stop="quit", ended=interrupted(station))
     finally:
         with suppress(KeyboardInterrupt):
             station.teller.tell()

@@ -6,7 +6,7 @@ from jax import Array
 from jax.scipy.linalg import solve_triangular
 
 from planner import jax_setup
-from planner.surrogate.likelihood import data_covariance
+from planner.surrogate.data_covariance import data_covariance
 
 
 @jax_setup.compiled("quick", static_argnums=0)

@@ -15,9 +15,10 @@ from scipy.linalg.lapack import dtrtri
 from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
+from planner.surrogate.data_covariance import data_covariance
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.likelihood import data_covariance, log_likelihoods
+from planner.surrogate.likelihood import log_likelihoods
 from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import Padded, thinned
 

@@ -268,7 +268,7 @@ def test_left_out_residuals_are_those_of_refits(surrogate):
             for s in range(len(post.theta[k])):
                 whiten = post.whiten[k][s][np.ix_(known, known)]
                 noisy = np.linalg.inv(whiten.T @ whiten)
-                y = noisy @ post.weights[k][s][known]
+                y = noisy @ post.solved(k).weights[s][known]
                 rest = np.arange(len(known)) != i
                 pull = np.linalg.solve(noisy[np.ix_(rest, rest)], noisy[rest, i])
                 means.append(y[i] - pull @ y[rest])

@@ -9,7 +9,8 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.identification.identify import QUICK, identify
+from planner.identification.effort import QUICK
+from planner.identification.identify import identify
 from planner.identification.measured_frfs import stack
 from planner.identification.objective import Objective, stands
 from planner.identification.parameters import Priors, parametrise

@@ -16,7 +16,8 @@ import pytest
 from planner.dataset.dataset import Dataset
 from planner.demo import shipped
 from planner.dynamics.simulation import Simulation
-from planner.identification.identify import QUICK, identify
+from planner.identification.effort import QUICK
+from planner.identification.identify import identify
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS
 from planner.identification.result import Identification

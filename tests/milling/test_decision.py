@@ -56,8 +56,8 @@ def test_a_decision_is_as_sure_as_its_least_sure_pose():
     decision = Decision(np.zeros((2, 6)), poses)
     assert not decision.sure(0.95)
     assert decision.sure(0.75)
-    assert decision.shrunk(0.2, 0.95)
-    assert not decision.shrunk(0.9, 0.95)
+    assert decision.shrunk(np.full(2, 0.2), 0.95)
+    assert not decision.shrunk(np.full(2, 0.9), 0.95)
 
 
 def test_path_takes_the_tightest_pose_and_the_speed_that_suits_all():

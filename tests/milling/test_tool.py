@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
-from planner.milling.tool import load_tool
+from planner.milling.tool_file import load_tool
 
 GOOD = """
-axis = [0.0, 0.0, 2.0]
+to_spindle = [0.0, 0.0, -2.0]
 [material.steel]
 youngs_modulus_pa = 2.1e11
 density_kg_m3 = 7850.0
@@ -43,6 +43,15 @@ def test_a_tool_as_stated(tmp_path):
     assert shank.weight == pytest.approx(7850 * np.pi / 4 * (0.02**2 - 0.004**2) * 0.04)
     assert tool.parts[0].contact is not None
     assert tool.parts[1].contact is None
+
+
+def test_the_axis_of_older_files_means_what_it_meant(tmp_path):
+    """From the holder to the tip; and so where a file says nothing."""
+    for old in ("axis = [0.0, 0.0, 2.0]", ""):
+        text = GOOD.replace("to_spindle = [0.0, 0.0, -2.0]", old)
+        assert load_tool(written(tmp_path, text)).axis == (0.0, 0.0, 1.0)
+    turned = load_tool(written(tmp_path, GOOD.replace("-2.0", "2.0")))
+    assert turned.axis == (0.0, 0.0, -1.0)
 
 
 def test_a_sensors_mass_sits_where_it_was_measured(tmp_path):
@@ -82,7 +91,8 @@ def test_a_section_within_a_tool(tmp_path):
             'material = "tin"\nlength_m = 0.04',
             "material.tin",
         ),
-        ("axis = [0.0, 0.0, 2.0]", "axis = [0.0, 0.0, 0.0]", "no direction"),
+        ("[0.0, 0.0, -2.0]", "[0.0, 0.0, 0.0]", "no direction"),
+        ("to_spindle", "axis = [0.0, 0.0, 2.0]\nto_spindle", "leave axis out"),
         ("flutes = 4", "flutes = 4\nflute_length_m = 0.02", "flute_length_m"),
         ("flutes = 4", "flutes = 4\n[[point]]\nnode=1\nfrom_tip_m=0.2", "0.2 m from the tip"),
         (GOOD, "", "tool.toml"),

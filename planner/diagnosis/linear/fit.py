@@ -9,7 +9,8 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, own_names
 from planner.diagnosis.linear.problem import CLOSE, COARSE, FINE, GLANCE, Grade, Problem
-from planner.identification.identify import QUICK, STAGES, Effort, identify
+from planner.identification.effort import QUICK, STAGES, Effort
+from planner.identification.identify import identify
 from planner.identification.parameters import UNITS
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise

@@ -1,0 +1,206 @@
+"""What `stability` is asked of: files or a campaign, one pose or many, this tool or another."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.milling.cut import Cut
+from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
+from planner.milling.feed import cuts_at, no_pose, turned_to
+from planner.milling.mode_file import load_mode_file
+from planner.milling.structure import SAMPLES, Structure, of_frf, of_modes
+
+if TYPE_CHECKING:
+    from planner.campaign.campaign import Campaign
+    from planner.milling.coupling import TipReceptance
+    from planner.milling.tool import Tool
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What `stability` is asked: a source, its pose, and one point of interest.
+
+    With `tool` the FRFs are coupled to it first, as `couple` does: `reference` is the tested one,
+    `robot` whose simulation tells how the tip turns, `noise` the relative sd of FRFs whose file
+    states none.
+    """
+
+    source: Path
+    cut: Path
+    pose: str | None = None
+    point: str | None = None
+    samples: int = SAMPLES
+    tool: Path | None = None
+    reference: Path | None = None
+    robot: Path | None = None
+    noise: float = 0.0
+
+    @property
+    def wanted(self) -> tuple[float, float] | None:
+        """Speed in rpm and depth in m of the point; InputError where they are none."""
+        if self.point is None:
+            return None
+        try:
+            rpm, depth = (float(part) for part in self.point.split(","))
+        except ValueError:
+            raise InputError(
+                f"--point {self.point} is not RPM,DEPTH_M; give e.g. 5000,0.001."
+            ) from None
+        if not (1 <= rpm <= 1e6 and 0 <= depth < 1):
+            raise InputError(
+                f"--point {self.point}: the speed must be 1 rpm or more, the depth 0 to 1 m."
+            )
+        return rpm, depth
+
+    def check(self) -> None:
+        """InputError where options of a tool are given without one."""
+        if self.tool is None and (self.reference or self.robot or self.noise):
+            raise InputError(
+                "--reference, --robot and --noise go with --tool; name the tool that is put on."
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class ToolChange:
+    """The tool that is put on, and the tested one that is taken off, if any."""
+
+    target: "Tool"
+    tested: "Tool | None"
+    remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, asked: Asked, cut: Cut) -> "ToolChange | None":
+        """None where no tool is named; InputError where its file and the cut's disagree."""
+        from planner.milling.tool_file import load_tool
+
+        asked.check()
+        if asked.tool is None:
+            return None
+        target = load_tool(asked.tool)
+        tested = None if asked.reference is None else load_tool(asked.reference)
+        told = [_directions(cut, tool, file) for tool, file in
+                ((target, asked.tool), (tested, asked.reference)) if tool is not None]  # fmt: skip
+        return cls(target, tested, tuple(text for text in told if text))
+
+    def coupled(self, tip: "TipReceptance", name: str) -> tuple[CutterFrf, tuple[str, ...]]:
+        """FRFs of the target's tip, and remarks."""
+        from planner.milling.coupling import couple
+
+        found = couple(tip, self.target, self.tested)
+        h, sd = found.accelerance[:3, :3].copy(), found.accelerance_sd[:3, :3]
+        unknown = [k for k in range(3) if k not in found.kept]
+        h[unknown] = h[:, unknown] = np.nan
+        frf = of_accelerance(f"{name}, {self.target.name}", found.frequency_hz, h, sd)
+        return replace(frf, simulated=found.simulated), (*self.remarks, *found.remarks)
+
+
+TOWARDS = 0.99  # cosine of the angle between directions that are the same
+
+
+def _directions(cut: Cut, tool: "Tool", file: Path | None) -> str:
+    """What disagrees between the cut's axis and where a tool's file has the spindle, if anything.
+
+    InputError where that file says to_spindle; older ones are taken as they are.
+    """
+    axis = np.array(cut.axis) / np.linalg.norm(cut.axis)
+    if axis @ -np.array(tool.axis) >= TOWARDS:
+        return ""
+    spindle = [round(-v, 4) + 0.0 for v in tool.axis]
+    text = (
+        f"Seen from the tip the cut's axis has the spindle at {list(cut.axis)}, {file} at "
+        f"{spindle}; correct the one that is wrong."
+    )
+    if tool.says_spindle:
+        raise InputError(text)
+    return text
+
+
+def structure_of(asked: Asked, cut: Cut) -> Structure:
+    """From modes, FRFs, or a campaign at a pose."""
+    source, change = asked.source, ToolChange.of(asked, cut)
+    if source.is_dir():
+        campaign, q = _stands(source, asked.pose)
+        (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
+        return found
+    no_pose(cut, source)
+    if change is not None:
+        return _coupled(asked, change, asked.pose, cut)
+    if source.suffix.lower() == ".toml":
+        if asked.pose is not None:
+            raise InputError(f"{source} states modes of one pose; leave --pose out.")
+        return of_modes(load_mode_file(source), cut)
+    return of_frf(read_frf(source, asked.pose), cut)
+
+
+def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
+    """Every pose of an npz."""
+    change = ToolChange.of(asked, cut)
+    no_pose(cut, asked.source)
+    names = names_in(asked.source)
+    if change is not None:
+        return [(name or asked.source.stem, _coupled(asked, change, name, cut)) for name in names]
+    return [
+        (name or asked.source.stem, of_frf(read_frf(asked.source, name), cut)) for name in names
+    ]
+
+
+def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
+    from planner.report.coupling_source import tip_of
+
+    tip, name = tip_of(asked.source, change.tested, pose, asked.robot, asked.noise)
+    frf, remarks = change.coupled(tip, f"{asked.source}, pose {name}")
+    return _with(of_frf(frf, cut), remarks)
+
+
+def _stands(directory: Path, pose: str | None) -> "tuple[Campaign, np.ndarray]":
+    from planner.campaign.campaign import Campaign
+
+    campaign = Campaign(directory)
+    state = campaign.state
+    known = {m.pose: m.joints_deg for m in state.measurements.values()}
+    known |= {name: p.joints_deg for name, p in state.proposals.items() if name not in known}
+    if pose is None or pose not in known:
+        given = f"has no pose {pose}; choose" if pose else "is a campaign: say at which pose,"
+        raise InputError(
+            f"{directory} {given} one of {', '.join(known) or 'none yet'} with --pose."
+        )
+    return campaign, np.deg2rad(np.array(known[pose], float))
+
+
+def at_poses(
+    campaign: "Campaign", names: Sequence[str], q: np.ndarray, cut: Cut,
+    change: ToolChange | None, feeds: np.ndarray | None = None,
+) -> list[Structure]:  # fmt: skip
+    """What a campaign predicts at poses q (p, dof) in rad, in the plane of the cut there.
+
+    `feeds` (p, 3) in the base frame, where a program gives them; else as the cut says.
+    """
+    lines = campaign.frequency_lines
+    rotation, position = campaign.cell.robot.forward_batch(q)
+    if feeds is not None and cut.feed_in == "path":
+        cuts = [turned_to(cut, *row) for row in zip(rotation, feeds, names, strict=True)]
+    else:
+        cuts = cuts_at(cut, rotation, position, names)
+    simulated = any(m.simulated for m in campaign.state.recorded)
+    mean, sd = campaign.frf(q, lines)
+    found = []
+    for i, name in enumerate(names):
+        where = f"{campaign.directory}, pose {name}"
+        remarks: tuple[str, ...] = ()
+        if change is None:
+            frf = of_accelerance(where, lines, mean[i], sd[i])
+        else:
+            from planner.report.coupling_source import tip_at
+
+            tip = tip_at(campaign, name, q[i], lines, mean[i], sd[i])
+            frf, remarks = change.coupled(tip, where)
+        found.append(_with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks))
+    return found
+
+
+def _with(structure: Structure, remarks: tuple[str, ...]) -> Structure:
+    return replace(structure, remarks=(*remarks, *structure.remarks))

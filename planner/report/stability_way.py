@@ -1,0 +1,217 @@
+"""The poses of a milling path on a robot: a table of joint angles, or a program's positions."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from planner.campaign.campaign import Campaign
+from planner.errors import InputError
+from planner.milling.cut import Cut
+from planner.milling.structure import Structure
+from planner.milling.toolpath import is_toolpath, read_toolpath
+from planner.recording.folder import read_poses
+from planner.report.stability_source import Asked, ToolChange, at_poses
+from planner.robot.collision import Collisions
+from planner.robot.inverse_kinematics import solve
+from planner.robot.robot import Robot
+
+TURN_DEG = 30.0  # between angles about the tool's axis that are tried
+TURNS_DEG = np.arange(0.0, 360.0, TURN_DEG)
+MOST_POSES = 200
+STARTS = 4  # from which the first pose of a program is looked for, for each turn
+
+
+@dataclass(frozen=True)
+class Way:
+    """--path, with --origin and --poses of a program, and whether turns are looked at."""
+
+    path: Path | None
+    origin: str | None = None
+    poses: int = 12
+    turns: bool = False
+
+    def check_none(self, source: Path) -> None:
+        """InputError where options ask for a robot that a file does not have."""
+        if self.path is not None or self.origin is not None or self.turns:
+            raise InputError(
+                f"{source} holds FRFs of certain poses; --path, --origin, --turns need a campaign."
+            )
+
+    @property
+    def origin_m(self) -> np.ndarray:
+        """(3,) of the program's zero in the robot's base frame."""
+        try:
+            found = np.array([float(part) for part in (self.origin or "").split(",")])
+        except ValueError:
+            found = np.zeros(0)
+        if len(found) != 3 or not np.all(np.abs(found) < 1e3):
+            raise InputError(
+                f"{self.path} is a program: say where its zero lies in the robot's base frame by "
+                f"--origin X,Y,Z in m, as 1.5,0,0.8."
+            )
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Travelled:
+    """p named poses q (p, dof) of a campaign in rad, with feeds (p, 3) in the base if known."""
+
+    campaign: Campaign
+    change: ToolChange | None
+    cut: Cut
+    names: tuple[str, ...]
+    q: np.ndarray
+    feeds: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, asked: Asked, way: Way, cut: Cut) -> "Travelled":
+        """InputError where a pose cannot be reached, or the path is missing."""
+        if way.path is None:
+            raise InputError(
+                f"{asked.source} is a campaign: name the path with --path, as a CSV of poses or a "
+                f"program (G-code, APT)."
+            )
+        change = ToolChange.of(asked, cut)
+        campaign = Campaign(asked.source)
+        if is_toolpath(way.path):
+            names, q, feeds = _program(campaign.cell.robot, way, cut)
+            return cls(campaign, change, cut, names, q, feeds)
+        if way.origin is not None:
+            raise InputError(f"{way.path} holds joint angles; --origin goes with a program.")
+        cell = campaign.cell
+        rows = read_poses(way.path, cell.robot.joint_names)
+        q = [cell.check_pose(row.joints_deg, f"{way.path}, row {row.row}") for row in rows]
+        if not q:
+            raise InputError(f"{way.path} holds no pose; give one a row.")
+        return cls(campaign, change, cut, tuple(row.pose for row in rows), np.array(q))
+
+    def structures(self, cut: Cut) -> list[tuple[str, Structure]]:
+        """By name, in the order of the path."""
+        found = at_poses(self.campaign, self.names, self.q, cut, self.change, self.feeds)
+        return list(zip(self.names, found, strict=True))
+
+    def structures_with_feed(self, cut: Cut) -> list[tuple[str, Structure]]:
+        """The same with the feeds as they are in the base frame, whatever the cut says."""
+        own = msgspec.structs.replace(cut, feed_in="path")
+        found = at_poses(self.campaign, self.names, self.q, own, self.change, self.feeds)
+        return list(zip(self.names, found, strict=True))
+
+    def turned(self, pose: int) -> list[tuple[float, np.ndarray]]:
+        """Angles in degrees, and q (dof,) turned by them about the tool, where the robot can stand.
+
+        From angle to angle it stays on its branch.
+        """
+        robot = self.campaign.cell.robot
+        collisions, here = Collisions(robot), self.q[pose]
+        found = {0.0: here}
+        for sense in (1.0, -1.0):
+            near = here
+            for turn in TURNS_DEG[1:]:
+                angle = float(sense * turn) % 360
+                if angle in found:
+                    break
+                q = _turned(robot, here, np.array(self.cut.axis), angle, near, collisions)
+                if q is None:
+                    break
+                near = found[angle] = q
+        return list(found.items())
+
+    def standing(self, found: list[tuple[int, float, np.ndarray]]) -> "Travelled":
+        """Other angles q at some of the poses, with the feeds there."""
+        names = tuple(f"{self.names[i]}, turned {turn:g}°" for i, turn, _ in found)
+        feeds = np.array([self._feed(i) for i, _, _ in found])
+        return replace(self, names=names, q=np.array([q for _, _, q in found]), feeds=feeds)
+
+    def _feed(self, pose: int) -> np.ndarray:
+        """(3,) in the base frame, as the cut or the path has it."""
+        rotation, position = self.campaign.cell.robot.forward_batch(self.q)
+        feed = np.array(self.cut.feed)
+        if self.cut.feed_in != "path":
+            return feed if self.cut.feed_in == "base" else rotation[pose] @ feed
+        return np.gradient(position, axis=0)[pose] if self.feeds is None else self.feeds[pose]
+
+    def feed_in_base(self, turn_deg: float) -> tuple[float, float, float] | None:
+        """The feed turned about the tool's axis, in the base frame; None if poses differ in it."""
+        rotation, _ = self.campaign.cell.robot.forward_batch(self.q)
+        axis = rotation @ (np.array(self.cut.axis) / np.linalg.norm(self.cut.axis))
+        feed = np.array([self._feed(i) for i in range(len(self.q))])
+        feed = feed - axis * np.sum(feed * axis, axis=1, keepdims=True)
+        feed /= np.linalg.norm(feed, axis=1, keepdims=True)
+        turn = np.deg2rad(turn_deg)
+        turned = np.cos(turn) * feed + np.sin(turn) * np.cross(axis, feed)
+        if np.max(np.linalg.norm(turned - turned[0], axis=1)) > SAME:
+            return None
+        x, y, z = (float(v) for v in turned[0])
+        return x, y, z
+
+
+SAME = 0.02  # by which unit vectors that are the same may differ
+
+
+def _turned(
+    robot: Robot, q: np.ndarray, axis: np.ndarray, turn_deg: float, near: np.ndarray,
+    collisions: Collisions,
+) -> np.ndarray | None:  # fmt: skip
+    """q (dof,) turned about the tool's axis through the tcp, near `near`; None: it cannot be."""
+    rotation, position = robot.forward(q)
+    return solve(robot, rotation @ about(axis, turn_deg), position, near, collisions, 0).q
+
+
+def about(axis: np.ndarray, turn_deg: float) -> np.ndarray:
+    """(3, 3) rotation about an axis (3,) by Rodrigues' formula."""
+    x, y, z = axis / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    turn = np.deg2rad(turn_deg)
+    return np.eye(3) + np.sin(turn) * cross + (1 - np.cos(turn)) * cross @ cross
+
+
+def _program(robot: Robot, way: Way, cut: Cut) -> tuple[tuple[str, ...], np.ndarray, np.ndarray]:
+    """Names, angles (p, dof) and feeds (p, 3): the first turn at which all can be reached."""
+    assert way.path is not None
+    path = read_toolpath(way.path)
+    if not 2 <= way.poses <= MOST_POSES:
+        raise InputError(f"--poses {way.poses}: give 2 to {MOST_POSES}.")
+    position, feeds, names = path.points(way.poses)
+    position = position + way.origin_m
+    collisions, reasons = Collisions(robot), []
+    for turn in TURNS_DEG:
+        rotation = _upright(np.array(cut.axis), path.spindle, float(turn))
+        for seed in range(STARTS):
+            q, reason = _followed(robot, rotation, position, collisions, seed)
+            if q is not None:
+                return names, q, feeds
+            reasons.append(reason)
+    at, reason = max(reasons, key=lambda one: one[0])
+    raise InputError(
+        f"{way.path}: {names[at]} cannot be reached at any turn about the tool's axis ({reason}); "
+        f"check --origin and the axis in the cut's file."
+    )
+
+
+def _upright(axis: np.ndarray, spindle: np.ndarray, turn_deg: float) -> np.ndarray:
+    """Rotation (3, 3) of a tcp whose own axis (3,) is to point along `spindle` of the base."""
+    frames = []
+    for z in (axis / np.linalg.norm(axis), spindle):
+        first = np.eye(3)[0] if abs(z[0]) < 0.9 else np.eye(3)[1]
+        x = first - z * (z @ first)
+        x /= np.linalg.norm(x)
+        frames.append(np.column_stack([x, np.cross(z, x), z]))
+    return about(spindle, turn_deg) @ frames[1] @ frames[0].T
+
+
+def _followed(
+    robot: Robot, rotation: np.ndarray, position: np.ndarray, collisions: Collisions, seed: int
+) -> tuple[np.ndarray | None, tuple[int, str]]:
+    """Angles (p, dof) on one branch, or the first pose that fails and why."""
+    rng = np.random.default_rng(seed)
+    near = rng.uniform(robot.lower_rad, robot.upper_rad)
+    found = []
+    for i, place in enumerate(position):
+        result = solve(robot, rotation, place, near, collisions, 0 if found else 4, seed)
+        if result.q is None:
+            return None, (i, result.reason)
+        near = result.q
+        found.append(result.q)
+    return np.array(found), (len(position), "")

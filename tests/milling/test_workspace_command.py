@@ -1,0 +1,123 @@
+"""`planner stability` of a campaign: over its workspace, along a program, with another tool."""
+
+import json
+
+import numpy as np
+import pytest
+
+from planner.cli.run import run
+from planner.truth.arms import KR10
+
+CUT = """
+teeth = 2
+diameter_m = 0.016
+milling = "down"
+radial_immersion = 0.5
+kt_n_m2 = 8.0e8
+kr_n_m2 = 2.5e8
+feed = [0.0, 1.0, 0.0]
+feed_in = "base"
+axis = [0.0, 0.0, -1.0]
+spindle_rpm = [5000, 8000, 2]
+depth_m = [0.0, 0.02, 100]
+method = "zeroth_order"
+"""
+PROGRAM = "G21 G90 G0 X0 Y0 Z5\nG1 Z-1\nX80\nG3 X120 Y40 J40\n"
+TOOL = """
+name = "long mill"
+to_spindle = [0.0, 0.0, -1.0]
+[material.carbide]
+youngs_modulus_pa = 5.4e11
+density_kg_m3 = 14500.0
+poisson_ratio = 0.25
+[[segment]]
+material = "carbide"
+length_m = 0.12
+diameter_m = 0.02
+"""
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    """A campaign in which nothing is measured yet: its simulation predicts."""
+    root = tmp_path_factory.mktemp("cell")
+    robot = KR10.write(root / "robot", 2)
+    campaign = KR10.campaign(str(robot)).replace("[5.0, 150.0]", "[5.0, 80.0]")
+    (root / "campaign.toml").write_text(campaign + "candidates = 20\n")
+    for name, text in (("cut.toml", CUT), ("part.nc", PROGRAM), ("tool.toml", TOOL)):
+        (root / name).write_text(text)
+    folder = str(root / "cell")
+    told = ["new", folder, "--robot", str(robot), "--campaign", str(root / "campaign.toml")]
+    assert run(told) == 0
+    return root
+
+
+def asked(cell, capsys, *more, code=0):
+    capsys.readouterr()
+    told = ["stability", str(cell / "cell"), "--cut", str(cell / "cut.toml"), "--samples", "20"]
+    assert run([*told, "--json", *map(str, more)]) == code
+    out = capsys.readouterr()
+    if code:
+        assert len(out.err.strip().splitlines()) == 1
+        return out.err
+    return json.loads(out.out)
+
+
+def test_map_of_the_workspace(cell, tmp_path, capsys):
+    said = asked(cell, capsys, "--map", "--poses", 4, "--point", "6000,0.0002", "--plot", tmp_path)
+    assert said["spindle_rpm"] == 6000
+    found, robust = (np.array(said[n], float) for n in ("depth_limit_m", "depth_limit_m_at_95"))
+    assert found.shape == (4,)
+    assert np.all(robust <= found * 1.05)
+    assert said["tightest_pose"] == said["poses"][int(np.argmin(robust))]
+    assert said["wanted_share"] == np.mean(robust > 2e-4)
+    assert np.array(said["position_m"]).shape == (4, 3)
+    assert (tmp_path / "stability_map.png").stat().st_size > 10_000
+
+
+def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
+    way = ("--path", cell / "part.nc", "--origin", "0.6,-0.1,0.4", "--poses", 2)
+    said = asked(cell, capsys, *way, "--turns", "--plot", tmp_path)
+    turn = said["turn"]
+    depth = np.array(turn["depth_m"], float)
+    assert depth.shape == (2, 12)
+    assert turn["reached"][0][0] is True
+    assert depth[:, 0].min() == pytest.approx(_at(said, said["best_spindle_rpm"]), rel=1e-6)
+    for row, best in zip(depth, turn["best_deg"], strict=True):
+        assert turn["turn_deg"][int(np.nanargmax(row))] == best
+    assert (tmp_path / "turns.png").exists()
+    assert said["feed"]["direction_base"] is not None
+    longer = asked(cell, capsys, *way, "--tool", cell / "tool.toml")
+    assert longer["depth_limit_m"] != said["depth_limit_m"]
+
+
+def _at(said, rpm):
+    return said["depth_limit_m"][said["spindle_rpm"].index(rpm)]
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (("--path", "part.nc"), "--origin"),
+        (("--path", "part.nc", "--origin", "a,b"), "--origin"),
+        (("--path", "part.nc", "--origin", "60,0,0"), "cannot be reached"),
+        (("--path", "part.nc", "--origin", "0.6,0,0.4", "--pose", "all"), "leave --pose out"),
+        (("--turns",), "name the path"),
+        (("--map", "--pose", "P001"), "--map"),
+        (("--pose", "all"), "--path"),
+        (("--pose", "P9"), "has no pose"),
+        (("--noise", "2", "--map"), "go with --tool"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(cell, capsys, more, told):
+    more = [cell / part if part == "part.nc" else part for part in more]
+    assert told in asked(cell, capsys, *more, code=2)
+
+
+def test_a_tool_that_points_the_other_way_is_refused(cell, tmp_path, capsys):
+    tool = tmp_path / "tool.toml"
+    tool.write_text(TOOL.replace("-1.0]", "1.0]"))
+    way = ("--path", cell / "part.nc", "--origin", "0.6,-0.1,0.4", "--poses", 2)
+    assert "to_spindle" not in asked(cell, capsys, *way, "--tool", tool, code=2).split(";")[-1]
+    tool.write_text(TOOL.replace("to_spindle = [0.0, 0.0, -1.0]", "axis = [0.0, 0.0, 1.0]"))
+    assert asked(cell, capsys, *way, "--tool", tool)["poses"]
