@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from planner.campaign import store
+from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
@@ -22,7 +23,7 @@ from planner.campaign.events import (
     Proposed,
 )
 from planner.campaign.log_conversion import from_modal
-from planner.campaign.model import Model, build
+from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, fold
 from planner.dataset.measure import MeasuredPose, measure

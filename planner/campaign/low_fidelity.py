@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
+from planner.errors import InputError
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK, Effort
@@ -283,7 +284,10 @@ def _wider(stated: Learned, lesson: _Lesson) -> Learned:
     penalty = 2 * structure.added * np.log(first.values)
     if first.values * (first.misfit - BEST) < penalty:
         return stated
-    wider = lesson.identified(structure, first if stated.fits else None)
+    try:
+        wider = lesson.identified(structure, first if stated.fits else None)
+    except InputError:  # a search that ended where the robot would not stand
+        return stated
     gain = first.values * (first.misfit - wider.identified.misfit)
     return wider if gain > penalty else stated
 

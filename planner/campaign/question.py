@@ -166,9 +166,12 @@ def question(
     answered = known is not None and known.question is not None
     if answered or len(model.labelled) < LEAST or not any(m.likely for m in modes):
         return None
-    limit = _limit(model, state)
-    (here,) = _compared(model, [joints_deg], [modes], limit)
-    if not here.contradicts(model.low.taught):
+    here, sure = compared(model, joints_deg, modes), model.low.taught
+    if not here.contradicts(sure):
+        return None
+    limit = _limit(model, state)  # no less than the one before
+    here = replace(here, limit=limit)
+    if not here.contradicts(sure):
         return None
     others = {m.pose: m.joints_deg for m in state.used}
     others |= {name: state.proposals[name].joints_deg for name in state.open}

@@ -124,7 +124,7 @@ class CampaignReads:
         return self._kept.result(name, kind, lambda: make(self.model))
 
     def _fitted(self, state: CampaignState) -> "Model":
-        from planner.campaign.model import build
+        from planner.campaign.build import build
 
         kept = self.recordings
         for measurement in state.used:  # a damaged one is told now, whoever reads it later

@@ -60,7 +60,8 @@ class Consistency:
     """What the checks say; `faults` are the sentences about what is wrong, `remarks` the rest.
 
     `turned` are points of the side that stayed whose FRFs all have the wrong sign, `turned_rows`
-    those of the side that roved, `untied` points whose column does not go with the row.
+    those of the side that roved, `untied` points whose column does not go with the row, `odd`
+    (roved, stayed) single FRFs that do not fit the others.
     """
 
     driving: tuple[DrivingPoint, ...]
@@ -70,6 +71,7 @@ class Consistency:
     turned: tuple[Dof, ...] = ()
     turned_rows: tuple[Dof, ...] = ()
     untied: tuple[Dof, ...] = ()
+    odd: tuple[tuple[Dof, Dof], ...] = ()
 
 
 def check(
@@ -93,12 +95,14 @@ def check(
     faults = [exchange.text for exchange in swapped]
     faults += _turned(turned, len(driving), reciprocity)
     faults += [_turned_row(dof, sides.hit) for dof in rows]
-    faults += odd_entries(sides) if enough else []
+    single, entries = odd_entries(sides) if enough else ([], [])
+    faults += single
+    odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
     untied = tuple(dof for e in swapped for dof in (e.first, e.second))
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")
-    return Consistency(driving, reciprocity, tuple(faults), told, turned, rows, untied)
+    return Consistency(driving, reciprocity, tuple(faults), told, turned, rows, untied, odd)
 
 
 def _turned_rows(sides: Sides, geometry: Geometry | None) -> tuple[Dof, ...]:

@@ -22,6 +22,7 @@ from planner.recording.geometry import Geometry
 
 # A band that the user does not state begins at this line: the first ones hold offsets and drift.
 FIRST_LINE = 3
+LEFT_OUT = 1e8  # times its variance: of a residue that does not fit the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,7 @@ def modes_of_matrix(
             " check that the band holds a resonance."
         )
     checks = check(matrix, found, np.array(inside), geometry)
-    found = _turned_back(matrix, found, checks)
+    found = _put_right(matrix, found, checks)
     dofs, entries = _points(matrix, found, checks)
     shapes = _shapes(found, inside, entries)
     modes = tuple(
@@ -102,17 +103,18 @@ def modes_of_matrix(
     return MatrixModes(dofs, modes, band, remarks, found, checks)
 
 
-def _turned_back(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
-    """With the residues of points whose sign is turned as they should be."""
+def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
+    """With residues of turned points as they should be; odd ones count for nothing."""
     felt, hit = matrix.responses, matrix.references
-    roved = (felt, hit) if len(felt) >= len(hit) else (hit, felt)
-    index = found.rows, found.columns
+    named = [(felt[o], hit[i]) for o, i in zip(found.rows, found.columns, strict=True)]
     if len(felt) < len(hit):
-        index = index[::-1]
-    sign = np.ones(found.rows.size)
-    for dofs, where, wrong in zip(roved, index, (checks.turned_rows, checks.turned), strict=True):
-        sign *= np.array([-1.0 if dof in wrong else 1.0 for dof in dofs])[where]
-    return replace(found, fit=replace(found.fit, residue=found.fit.residue * sign[:, None]))
+        named = [(roved, stayed) for stayed, roved in named]
+    turned = [(r in checks.turned_rows) != (s in checks.turned) for r, s in named]
+    sign = np.where(turned, -1.0, 1.0)[:, None]
+    doubt = np.where([pair in checks.odd for pair in named], LEFT_OUT, 1.0)[:, None]
+    fit = found.fit
+    residue, variance = fit.residue * sign, fit.residue_variance * doubt
+    return replace(found, fit=replace(fit, residue=residue, residue_variance=variance))
 
 
 def _within(frequency_hz: float, band_hz: tuple[float, float]) -> bool:
@@ -187,12 +189,13 @@ def _mode(
 def _shrunk(shape: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A shape whose hardly determined points are drawn towards zero, and its sds.
 
-    No point moves much farther than the farthest of the well determined half (normal prior): where
-    poles of a set nearly coincide, its residues alone would be anything.
+    Points move about as far as those of the well determined half (normal prior): where poles of a
+    set nearly coincide, or only a reference near a mode's node felt a point, its residues alone
+    would be anything.
     """
     relative = sd / np.maximum(np.abs(shape), 1e-300)
     known = relative <= np.median(relative)
-    power = float(np.max(np.abs(shape[known]) ** 2))
+    power = float(np.mean(np.abs(shape[known]) ** 2))
     share = power / np.maximum(power + 2 * sd**2, 1e-300)
     return shape * share, sd * np.sqrt(share)
 

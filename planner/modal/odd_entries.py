@@ -13,30 +13,33 @@ FITS, ODD = 0.3, 1.0
 MOST = 0.2  # share of entries that can be odd: beyond, what they are compared with is
 
 
-def odd_entries(sides: Sides) -> list[str]:
-    """Sentences about FRFs with a turned sign, and about two of a column that are exchanged."""
+def odd_entries(sides: Sides) -> tuple[list[str], list[tuple[int, int]]]:
+    """FRFs with a turned sign, and two of a column that are exchanged: sentences and entries."""
     expected = _expected(sides)
     if expected is None:
-        return []
+        return [], []
     seen = sides.table
     size = np.maximum(np.linalg.norm(expected, axis=-1), 1e-300)
     stated = np.linalg.norm(seen - expected, axis=-1) / size
     turned = np.linalg.norm(seen + expected, axis=-1) / size
+    wrong = [(a, b) for a, b in np.argwhere((turned < FITS) & (stated > ODD)).tolist()]
     sentences = [
-        f"The FRF {_named(sides, row, column)} has a turned sign beside the others of its row; "
-        "check its polarity."
-        for row, column in np.argwhere((turned < FITS) & (stated > ODD)).tolist()
+        f"The FRF {_named(sides, row, column)} has a turned sign beside the others of its row and "
+        "was left out; check its polarity."
+        for row, column in wrong
     ]
     for column in range(len(sides.columns)):
         odd = np.flatnonzero((stated[:, column] > ODD / 2) & (turned[:, column] > FITS))
         for a, b in combinations(odd.tolist(), 2):
             off = np.linalg.norm(seen[[a, b], column] - expected[[b, a], column], axis=-1)
             if np.all(off < FITS * size[[b, a], column]):
+                wrong += [(a, column), (b, column)]
                 sentences.append(
                     f"The FRFs {_named(sides, a, column)} and {_named(sides, b, column)} fit each "
-                    "other's places; were the two exchanged?"
+                    "other's places and were left out; were the two exchanged?"
                 )
-    return sentences if len(sentences) <= MOST * np.count_nonzero(np.isfinite(stated)) else []
+    few = len(sentences) <= MOST * np.count_nonzero(np.isfinite(stated))
+    return (sentences, wrong) if few else ([], [])
 
 
 def _expected(sides: Sides) -> np.ndarray | None:

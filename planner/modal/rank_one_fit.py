@@ -102,7 +102,7 @@ def fit_shape(
     problem = _Problem(entries, values, tied, max(gain, 1e-12))
     near = _start(entries, values, 1 / even) if near is None else near
     found = np.append(near, np.zeros(tied.size))
-    spread = even
+    spread, proportional = even, np.zeros(even.size)
     for _ in range(REWEIGHED):
         found = _fitted(problem, 1 / spread, found, ROUGH)
         left, jacobian = problem.left(found), problem.jacobian(found)
@@ -110,16 +110,19 @@ def fit_shape(
         taken = np.einsum("ea,ab,eb->e", jacobian.conj(), covariance, jacobian).real / spread
         free = residue.size - float(np.sum(taken))
         if free < LEAST_FREE:
-            spread = noise
+            spread, proportional = noise, np.zeros(noise.size)
             break
         square = np.abs(left) ** 2 * residue.size / free
         size = np.abs(values - left) ** 2
-        before, spread = spread, _spread(entries.columns, square, noise, size)
+        before = spread
+        constant, proportional = _spread(entries.columns, square, noise, size)
+        spread = constant + proportional
         if np.all(np.abs(spread / before - 1) < SETTLED):
             break
     found = _fitted(problem, 1 / spread, found)
     left, jacobian = problem.left(found), problem.jacobian(found)
-    covariance = problem.covariance(jacobian, 1 / spread)
+    # What errs in proportion errs in phase: all of it is in the real part, not half.
+    covariance = problem.covariance(jacobian, 1 / (spread + proportional))
     free = residue.size - int(np.linalg.matrix_rank(covariance, hermitian=True)) + tied.size
     misfit = float(np.sum(np.abs(left) ** 2 / noise) / free) if free > 0 else float("nan")
     n = entries.points
@@ -131,8 +134,8 @@ def fit_shape(
 
 def _spread(
     columns: np.ndarray, square: np.ndarray, noise: np.ndarray, size: np.ndarray
-) -> np.ndarray:
-    """(e,) variance: κ_column · noise + share · size, most likely for squared errors (e,).
+) -> tuple[np.ndarray, np.ndarray]:
+    """(e,) variances κ_column · noise and share · size, most likely for squared errors (e,).
 
     κ ≥ 1 and share ≥ 0 by multiplicative steps, as for the factors of spectra (Févotte, Bertin
     and Durrieu 2009).
@@ -146,7 +149,7 @@ def _spread(
         step = (table @ (square / total**2)) / np.maximum(table @ (1 / total), 1e-300)
         factor *= np.sqrt(step)
         factor[:-1] = np.maximum(factor[:-1], 1.0)
-    return factor @ table
+    return factor[:-1] @ table[:-1], factor[-1] * table[-1]
 
 
 @dataclass(frozen=True, eq=False)

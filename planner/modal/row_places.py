@@ -46,6 +46,12 @@ class Foretold:
         """(n, m) difference to what the others foretell, squared, over its variance."""
         return (self.precision @ self.values) ** 2 / np.diag(self.precision)[:, None]
 
+    @property
+    def gain(self) -> np.ndarray:
+        """(n,) fall of −2 log likelihood where a row is turned."""
+        slope = np.sum(self.values * (self.precision @ self.values), axis=1)
+        return 4 * (slope - np.sum(self.values**2, axis=1) * np.diag(self.precision))
+
     def turning(self) -> tuple[np.ndarray, np.ndarray]:
         """(n,) relative squared difference to what is foretold: as stated, and turned."""
         off = (self.precision @ self.values) / np.diag(self.precision)[:, None]
@@ -148,14 +154,17 @@ def turned_rows(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> 
 
 def _clearest(group: Foretold, moves: np.ndarray) -> int | None:
     """The row (index) that is clearly turned, None where none is or another might be instead."""
-    slope = np.sum(group.values * (group.precision @ group.values), axis=1)
-    power = np.sum(group.values**2, axis=1) * np.diag(group.precision)
-    gain = 4 * (slope - power)  # fall of −2 log likelihood where the row is turned
-    order = np.argsort(-gain)
-    k = int(order[0])
+    gain = group.gain
+    k = int(np.argmax(gain))
     stated, turned = group.turning()
-    clear = turned[k] < TURNED and stated[k] > STATED and bool(moves[group.index[k]])
-    return int(group.index[k]) if clear and gain[order[1]] < RIVAL * gain[k] else None
+    if turned[k] > TURNED or stated[k] < STATED or not moves[group.index[k]]:
+        return None
+    values = group.values.copy()
+    values[k] *= -1
+    after = Foretold(group.index, values, group.precision).gain
+    # Another row might be turned instead if little is left for it once this one is turned.
+    rival = (gain > RIVAL * gain[k]) & (after < gain / 2)
+    return int(group.index[k]) if np.count_nonzero(rival) <= 1 else None
 
 
 def exchanged_nodes(

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.campaign.model import build
+from planner.campaign.build import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from planner.cli.run import run as call

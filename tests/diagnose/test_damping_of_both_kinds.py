@@ -12,6 +12,7 @@ from planner.diagnosis.laws.one_joint_response import modal
 from planner.diagnosis.linear_diagnosis import Diagnosis, diagnose
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
+from planner.identification.truncated_decay import cut_off
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR10
 
@@ -77,3 +78,13 @@ def test_the_poles_of_a_law_s_joint_know_loss_factors(stated):
     exact = exact[exact.imag > 0]
     order, other = np.argsort(np.abs(poles.imag)), np.argsort(exact.imag)
     np.testing.assert_allclose(poles[order].real, exact[other].real, rtol=0.05)
+
+
+@pytest.mark.parametrize(("share", "tail_s", "within"), [(1e-3, 0.2, 0.02), (0.9, 1.0, 5.0)])
+def test_what_a_record_cuts_off_is_that_of_decays_alone(stated, share, tail_s, within):
+    """A little of the damping as a loss factor: nearly what dashpots leave; much: nothing grows."""
+    plain, lossy = stated.poles(Q), partly_lossy(stated, (share,) * 6).poles(Q)
+    s, tails = np.tile(2j * np.pi * LINES, (len(Q), 1)), np.full(len(Q), tail_s)
+    expected, found = cut_off(plain, s, tails), cut_off(lossy, s, tails)
+    assert np.abs(expected).max() > 0
+    assert np.abs(found - expected).max() < within * np.abs(expected).max()

@@ -20,7 +20,7 @@ from planner.robot.robot import Robot
 from tests.support.arm_with_points import write_arm
 from tests.support.sensor_cases import KINDS, Said, answers, concealed
 
-FIRST = 7001
+FIRST = 8001
 MORE_OFTEN = 0.10  # by which four sensors name effect and place more often, or hits are halved
 
 
