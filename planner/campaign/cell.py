@@ -60,6 +60,11 @@ class Cell:
         _check_angles(robot, config)
         table = config.cut
         cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
+        if cut is not None and table and table.joints_deg is None and cut.feed_in == "path":
+            raise InputError(
+                f'{table.file}: feed_in = "path" needs the path\'s poses; give [cut] joints_deg in '
+                f"campaign.toml, or state the feed."
+            )
         return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
 
     @cached_property
