@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import measure
+from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import explain
 from planner.dynamics.simulation import Simulation
@@ -170,7 +171,8 @@ def diagnose(
 
     Returns:
         The verdict, findings with probabilities and parameters, the agreement at poses held out,
-        and the next hit that would tell apart what is tied; `predict` gives FRFs.
+        and the next hit, or the place of one more sensor, that would tell apart what is tied;
+        `predict` gives FRFs.
 
     Raises:
         InputError: Nothing of the FRFs lies in robot.toml's band.
@@ -179,9 +181,9 @@ def diagnose(
     started = time.perf_counter()
     with threadpool_limits(1):
         explained = explain(dataset, Simulation(robot), progress)
-        hit = next_hit(explained, offered or {})
+        hit, sensor = next_hit(explained, offered or {}), extra_sensor(explained, offered or {})
         made = diagnosis_report(explained)
-    return replace(made, next=hit, seconds=time.perf_counter() - started)
+    return replace(made, next=hit, next_sensor=sensor, seconds=time.perf_counter() - started)
 
 
 def diagnose_material(

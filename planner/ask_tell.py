@@ -13,12 +13,13 @@ import msgspec
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.check import refuse_errors
 from planner.campaign.config import CampaignConfig, check_config, load_campaign_config
 from planner.campaign.events import MeasuredMode, Proposal
 from planner.campaign.log_conversion import from_modal, from_mode
-from planner.campaign.model import Model, build
+from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.records import measured_records, predicted_records
 from planner.campaign.state import CampaignState, Measurement

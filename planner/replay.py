@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from planner.campaign import store
+from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
@@ -22,7 +23,7 @@ from planner.campaign.events import (
     Proposed,
 )
 from planner.campaign.log_conversion import from_modal
-from planner.campaign.model import Model, build
+from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, fold
 from planner.dataset.measure import MeasuredPose, measure
@@ -56,8 +57,8 @@ class _Cells:
         self._cells: dict[bytes, Cell] = {}
 
     def of(self, configured: Configured) -> Cell:
-        stiffened, scatters = configured.geometric_stiffness, configured.visit_scatter
-        key = msgspec.json.encode((configured.config, configured.robot, stiffened, scatters))
+        frozen = configured.geometric_stiffness, configured.visit_scatter, configured.hits_err
+        key = msgspec.json.encode((configured.config, configured.robot, frozen))
         if key not in self._cells:
             config = config_from_builtins(configured.config)
             root = Path(self._stack.enter_context(tempfile.TemporaryDirectory()))
@@ -65,8 +66,9 @@ class _Cells:
             self._cells[key] = Cell.load(
                 root / config.robot,
                 config,
-                geometric_stiffness=stiffened,
-                visit_scatter=scatters,
+                geometric_stiffness=configured.geometric_stiffness,
+                visit_scatter=configured.visit_scatter,
+                hits_err=configured.hits_err,
             )
         return self._cells[key]
 
@@ -85,7 +87,7 @@ def replay(
         raise InputError(f"The log has entries 1 to {len(entries)}; {until} is not among them.")
     with ExitStack() as stack:
         cells = _Cells(campaign, stack)
-        model, model_key = None, None
+        model, model_key, kept = None, None, campaign.recordings
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
             check, detail, measured = _check(campaign, entry, before, model)
@@ -93,7 +95,7 @@ def replay(
             assert after.configured is not None
             key = (after.model_version, id(cells.of(after.configured)))
             if model is None or key != model_key:
-                of_hits = campaign.frf_of, campaign.columns_of
+                of_hits = kept.frf, kept.hits
                 model, model_key = build(cells.of(after.configured), after, *of_hits), key
             yield Step(entry, check, detail, after, model, measured, instead)
 
@@ -131,7 +133,7 @@ def _check_import(
 ) -> tuple[str, str, MeasuredPose]:
     known = before.measurements.get(event.pose)
     hits = (*(known.accepted if known else ()), *event.hits)
-    sources = tuple(campaign.source_of(hit) for hit in hits)
+    sources = tuple(map(campaign.recordings.source, hits))
     table = model.cell.config.modes
     # Nothing that was kept is taken: to compute it again is what is asked for.
     rate, anew = table.window_rate_1_s, Store(None)

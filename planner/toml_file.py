@@ -33,6 +33,10 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
         found = msgspec.toml.decode(text, type=kind)
     except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(f"{path} is not a valid {name} ({error}); correct it.") from None
+    except ValueError:  # of more digits than Python turns into an integer
+        raise InputError(
+            f"{path} is not a valid {name} (a number has thousands of digits); correct it."
+        ) from None
     entry, value = _not_finite(msgspec.to_builtins(found), "")
     if entry:
         raise InputError(f"{path}: {entry} is {value}; it must be a finite number.")

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from planner.campaign.cell import Cell
-from planner.campaign.low_fidelity import PRIORS, LowFidelity
+from planner.campaign.low_fidelity import LowFidelity
 from planner.design.cost import Cost
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
 from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
@@ -26,7 +26,7 @@ def open_parameters(cell: Cell, low: LowFidelity, noise: FrfNoise | None) -> Ope
     band = cell.config.modes.band_hz
     noise = noise or FrfNoise.of((), band, 1.0)
     if learned is None:
-        p = parametrise(nominal, PRIORS)
+        p = parametrise(nominal, low.priors)
         known = np.asarray(block_diag(p.covariance, np.eye(len(p.nuisances))))
         return OpenParameters(nominal, p, known, noise, band)
     p, found = parametrise(learned.structure.simulation, learned.priors), learned.identified
@@ -61,7 +61,11 @@ def outlook(
         poses, covariance = Poses.plain(candidates.features[asked], inputs[asked]), None
     else:
         poses = open_.poses(
-            candidates.features[asked], inputs[asked], candidates.q[asked], informed
+            candidates.features[asked],
+            inputs[asked],
+            candidates.q[asked],
+            simulated[asked],
+            informed,
         )
         covariance = open_.covariance
     workspace = poses[: min(WORKSPACE_POSES, MOST_INFORMED, cell.spread)]
@@ -99,7 +103,7 @@ def poses_at(
     """Poses q (n, dof) in rad as targets, and their simulated frequencies (n, k) in Hz."""
     said, x = low.simulate(q), cell.features(q)
     inputs = surrogate.frequency_inputs(said)
-    poses = open_.poses(x, inputs, q, False) if open_ else Poses.plain(x, inputs)
+    poses = open_.poses(x, inputs, q, said, False) if open_ else Poses.plain(x, inputs)
     return poses, said.frequency_hz
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from planner.campaign import store
+from planner.campaign.acting import Acting
 from planner.campaign.config import load_campaign_config
 from planner.campaign.events import (
     REFUSED,
@@ -24,8 +25,7 @@ from planner.campaign.events import (
     Undone,
     Withdrawn,
 )
-from planner.campaign.journal import remove_parts
-from planner.campaign.reads import CampaignReads, as_logged, frf_key
+from planner.campaign.reads import CampaignReads, as_logged
 from planner.campaign.state import last_act
 from planner.errors import InputError
 from planner.version import __version__
@@ -173,7 +173,7 @@ class Campaign(CampaignReads):
     # -- inside --------------------------------------------------------------------------------
 
     def _acting(self):
-        return _Acting(self)
+        return Acting(self)
 
     def _append(self, event: AnyEvent) -> Entry:
         return self._journal.append(event)
@@ -203,6 +203,7 @@ class Campaign(CampaignReads):
     def _import_pose(
         self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
     ) -> "ImportReport":
+        from planner.campaign.alerts import alerts
         from planner.campaign.importing import (
             ImportReport,
             displacement,
@@ -225,7 +226,7 @@ class Campaign(CampaignReads):
                 left_out=kept.left_out, question=held.question if held else None,
             )  # fmt: skip
         started = time.perf_counter()
-        old = tuple(self.source_of(hit) for hit in known.accepted) if known else ()
+        old = self.recordings.sources(known) if known else ()
         hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         modes = new_modes = from_modal(measured.modal)
@@ -241,10 +242,13 @@ class Campaign(CampaignReads):
             amplitude=from_homogeneity(measured.homogeneity),
             question=question(before, state, pose, joints_deg, new_modes),
         )
+        told = alerts(before, state, event, measured, new_modes)
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]
-        if measured.frf is not None:
-            self._frfs[frf_key(measurement.accepted, self.cell.config.modes)] = measured.frf
+        # Beside new hits earlier ones may look wrong; they stay accepted all the same.
+        agreed = all(verdict.accepted for verdict in measured.verdicts[: len(old)])
+        if measured.frf is not None and agreed:
+            self.recordings.keep_frf(measured.frf, measurement, self.cell.config.modes)
         model = self.model
         return ImportReport(
             pose=pose,
@@ -258,6 +262,7 @@ class Campaign(CampaignReads):
             refit_seconds=time.perf_counter() - started,
             remarks=(
                 *measured.remarks,
+                *told,
                 *taken_after_all(state, kept.fresh),
                 *displacement(state, delivery, stood),
                 *lacking(state, measurement),
@@ -265,27 +270,8 @@ class Campaign(CampaignReads):
             ),
             left_out=kept.left_out,
             question=event.question,
+            alerts=told,
         )
-
-
-class _Acting:
-    """The campaign's lock, its log read afresh and its configuration followed."""
-
-    def __init__(self, campaign: Campaign):
-        self._campaign = campaign
-        self._lock = campaign._journal.writing()
-
-    def __enter__(self) -> None:
-        self._lock.__enter__()
-        remove_parts(self._campaign.directory / store.RECORDINGS)
-        try:
-            self._campaign._log_configuration()
-        except BaseException:
-            self._lock.__exit__(None, None, None)
-            raise
-
-    def __exit__(self, *error: object) -> None:
-        self._lock.__exit__(None, None, None)
 
 
 def _first_entry(directory: Path) -> bytes:
@@ -301,5 +287,5 @@ def _first_entry(directory: Path) -> bytes:
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(as_logged(config), hashes, __version__, True, True)
+    event = Configured(as_logged(config), hashes, __version__, True, True, True)
     return encode_line("", Entry(1, now, event))[0]

@@ -35,6 +35,8 @@ class Cell:
     workspace: Workspace
     # Whether the scatter of frequencies from visit to visit is learned.
     visit_scatter: bool = field(default=True, kw_only=True)
+    # Whether the simulation is identified from all points, by hits that err; see `Configured`.
+    hits_err: bool = field(default=True, kw_only=True)
     # The cut whose stability is to be decided, where campaign.toml names one.
     cut: Cut | None = field(default=None, kw_only=True)
 
@@ -47,25 +49,24 @@ class Cell:
         *,
         geometric_stiffness: bool = True,
         visit_scatter: bool = True,
+        hits_err: bool = True,
     ) -> "Cell":
         """Load the robot and hold the workspace against it; InputError where they disagree.
 
         `robot` is the one of robot_toml, where it was loaded already. `geometric_stiffness` holds
-        where robot.toml does not say. `visit_scatter` is off for campaigns that began without.
+        where robot.toml does not say. `visit_scatter` and `hits_err` are off for campaigns that
+        began without.
         """
         check_name(config.acquisition.name)
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
         _check_angles(robot, config)
-        table = config.cut
-        cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
-        if cut is not None and table and table.joints_deg is None and cut.feed_in == "path":
-            raise InputError(
-                f'{table.file}: feed_in = "path" needs the path\'s poses; give [cut] joints_deg in '
-                f"campaign.toml, or state the feed."
-            )
-        return cls(config, robot, simulation, workspace, visit_scatter=visit_scatter, cut=cut)
+        cut = _cut_of(robot_toml, config)
+        return cls(
+            config, robot, simulation, workspace,
+            visit_scatter=visit_scatter, hits_err=hits_err, cut=cut,
+        )  # fmt: skip
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
@@ -144,7 +145,8 @@ class Cell:
     @cached_property
     def frozen(self) -> LowFidelity:
         """The simulation as robot.toml states it."""
-        return LowFidelity(self.config.modes.count, self.simulation)
+        tolerances = self.tolerances if self.hits_err else None
+        return LowFidelity(self.config.modes.count, self.simulation, tolerances)
 
     def simulate(self, q: np.ndarray, more: int = 0) -> SimulatedModes:
         """What the simulation of robot.toml says at q (n, dof) in rad; see `LowFidelity`."""
@@ -190,6 +192,19 @@ def _check_angles(robot: Robot, config: CampaignConfig) -> None:
                 f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the "
                 f"robot {len(robot.joint_names)} joints; give one range a joint."
             )
+
+
+def _cut_of(robot_toml: Path, config: CampaignConfig) -> Cut | None:
+    table = config.cut
+    if table is msgspec.UNSET:
+        return None
+    cut = load_cut(robot_toml.parent / table.file)
+    if table.joints_deg is None and cut.feed_in == "path":
+        raise InputError(
+            f'{table.file}: feed_in = "path" needs the path\'s poses; give [cut] joints_deg in '
+            f"campaign.toml, or state the feed."
+        )
+    return cut
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:

@@ -17,7 +17,9 @@ class Configured(Event, frozen=True, tag="configured"):
     `config` is campaign.toml; `robot` maps each file of the robot folder to its sha256.
     `geometric_stiffness` is what holds where robot.toml does not say: campaigns whose log does
     not say either began when gravity's own stiffness was left out, and go on like that. So it is
-    with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned.
+    with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned; and
+    with `hits_err`: whether the simulation is identified from hits at all points that err, as
+    hits and measuring chains do, or from the tool's sensor as if they did not.
     """
 
     config: dict
@@ -25,6 +27,7 @@ class Configured(Event, frozen=True, tag="configured"):
     planner: str
     geometric_stiffness: bool = False
     visit_scatter: bool = False
+    hits_err: bool = False
 
 
 class Proposal(msgspec.Struct, frozen=True):

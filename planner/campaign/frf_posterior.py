@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import Grade, Problem, tolerances_of
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear.problem import Grade, Problem, tolerances_of
 from planner.dynamics.gradient import Turned
 from planner.identification.measurement_model import (
     CHAIN_NUMBERS,

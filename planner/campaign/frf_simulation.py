@@ -12,15 +12,17 @@ import msgspec
 import numpy as np
 
 from planner.campaign.frf_posterior import CHAIN, FrfPosterior, fitted
-from planner.campaign.low_fidelity import PRIORS, Learned
+from planner.campaign.low_fidelity import Learned
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.extra_compliance import across, triple
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear.fit import Fit, Problem, glance
+from planner.diagnosis.linear.fit import Fit, glance
+from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
+from planner.identification.effort import QUICK, STAGES
 from planner.identification.extended_structure import (
     DAMPING_S,
     FLOOR,
@@ -28,7 +30,7 @@ from planner.identification.extended_structure import (
     Structure,
     extended,
 )
-from planner.identification.identify import QUICK, STAGES, identify
+from planner.identification.identify import identify
 from planner.identification.measured_frfs import common_band
 from planner.identification.parameters import place_name
 from planner.identification.truncated_decay import cut_off
@@ -109,7 +111,7 @@ def _wider(
 def widened(structure: Structure) -> Structure:
     """Beside tilts of joints and floor the base's turn and shifts, and links that bend."""
     if not structure.added:
-        structure = extended(structure.simulation, PRIORS)
+        structure = extended(structure.simulation, structure.priors)
     robot = structure.simulation.robot
     stated = robot.config.compliance[: len(robot.config.compliance) - structure.added]
     stiffest = max(block.stiffness for block in stated if not block.slide)

@@ -54,6 +54,7 @@ class ImportReport:
     remarks: tuple[str, ...] = ()
     left_out: tuple[HitRecord, ...] = ()  # not imported: the engineer refused them, or must answer
     question: Question | None = None
+    alerts: tuple[str, ...] = ()  # of the remarks, those to be acted upon while the robot stands
 
     def misses(self, model: Model | None = None) -> tuple[HitMiss, ...]:
         """How each accepted hit missed, by this import's model or a later one."""

@@ -10,7 +10,7 @@ from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
 from planner.campaign.log_conversion import from_mode, to_mode
 from planner.campaign.low_fidelity import Learned, LowFidelity, learn
 from planner.campaign.state import Measurement
-from planner.dataset.hit_columns import HitColumns
+from planner.dataset.hit_columns import HitColumns, PoseHits
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.hit_misses import (
@@ -43,13 +43,21 @@ UNIT = Tolerances(angle_rad=1.0, offset_m=1.0)
 
 @dataclass(frozen=True, eq=False)
 class Visited:
-    """A pose with hits: its name, accepted files, joint angles (dof,) in rad, columns, and FRF."""
+    """A pose with hits: its name, accepted files, joint angles (dof,) in rad, hits, the tool's FRF.
+
+    The FRF is the average of all hits.
+    """
 
     pose: str
     files: tuple[str, ...]
     q: np.ndarray
-    columns: HitColumns
+    hits: PoseHits
     frf: Frf
+
+    @property
+    def columns(self) -> HitColumns:
+        """What each hit says by itself."""
+        return self.hits.columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,19 +148,20 @@ def told_by(
 ) -> CampaignMisses:
     """As `tell`, by a simulation that is identified from the same FRFs first."""
     q = np.array([one.q for one in visited])
-    learned = learn(LowFidelity(1, nominal), [one.frf for one in visited], q, band_hz).learned
+    before, whole = LowFidelity(1, nominal, t), [one.hits.whole for one in visited]
+    learned = learn(before, whole, q, band_hz).learned
     return tell(visited, learned, t, band_hz)
 
 
 def visits_of(
-    used: Sequence[Measurement], columns: Sequence[HitColumns], frfs: Sequence[Frf]
+    used: Sequence[Measurement], hits: Sequence[PoseHits], frfs: Sequence[Frf]
 ) -> tuple[Visited, ...]:
-    """Measurements as visits, with the columns of their hits and their FRFs."""
+    """Measurements as visits, with their hits and the tool's FRFs."""
     return tuple(
         Visited(
-            m.pose, tuple(hit.file for hit in m.accepted), np.deg2rad(np.array(m.joints_deg)), c, f
+            m.pose, tuple(hit.file for hit in m.accepted), np.deg2rad(np.array(m.joints_deg)), h, f
         )
-        for m, c, f in zip(used, columns, frfs, strict=True)
+        for m, h, f in zip(used, hits, frfs, strict=True)
     )
 
 

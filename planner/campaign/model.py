@@ -11,11 +11,9 @@ from planner.campaign.acquisition_inputs import outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_habits import PoseMisses
-from planner.campaign.labels import LabelledPose, frequencies, label, observations
-from planner.campaign.low_fidelity import LowFidelity, learn
-from planner.campaign.misses import tell, visits_of
-from planner.campaign.state import CampaignState, Measurement
-from planner.dataset.hit_columns import HitColumns
+from planner.campaign.labels import LabelledPose
+from planner.campaign.low_fidelity import LowFidelity
+from planner.campaign.state import Measurement
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
 from planner.design.parameter_sensitivity import FrfNoise
@@ -24,25 +22,21 @@ from planner.design.stopping import Forecast, forecast
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.surrogate.frf_bands import ModalPrediction, frf_moments
-from planner.surrogate.hedged import HedgedAR1
 from planner.surrogate.modal_surrogate import (
     ModalObservations,
     Surrogate,
-    fit_primary,
-    fit_surrogate,
 )
 
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
     from planner.campaign.frf_model import FrfModel
 
+FrfOf = Callable[[Measurement, ModesTable], Frf]
+
 CONSIDERED = 500  # candidates, the first ones, when asking what one more measurement would gain
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Scatter from visit to visit is told from so many poses on, where it is larger than usual.
 SCATTER_POSES, TOLD_SCATTER_PERCENT = 5, 0.3
-# Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
-# that are none.
-MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +50,8 @@ class Model:
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
     misses: tuple[PoseMisses, ...] = ()  # of the hits of each pose, where a simulation tells them
-    frfs: tuple[Frf, ...] = ()  # of the labelled poses
+    used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
+    frf_of: FrfOf | None = None
 
     def predict(self, q: np.ndarray) -> ModalPrediction:
         """Frequencies and damping at poses q (n, dof) in rad, as a visit there would show them.
@@ -64,6 +59,27 @@ class Model:
         The modal analysis' own sd of what it will measure there is not part of the sds.
         """
         return self._predict(q, self.cell.features(q), self.low.simulate(q))
+
+    def frequencies(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies and their sds (n, count) in Hz, as of `predict`."""
+        said = self.low.frequencies(q)
+        f, sd = self.surrogate.frequencies(self.cell.features(q), said.frequency_hz)
+        return f, self._with_parameters(q, said, f, sd)
+
+    def _with_parameters(
+        self, q: np.ndarray, simulated: SimulatedModes, f: np.ndarray, sd: np.ndarray
+    ) -> np.ndarray:
+        """Sds (n, count) with what the simulation's own parameters leave open, all in Hz."""
+        share = self.surrogate.frequency_trust * self.low.frequency_sd(q, simulated)
+        return np.hypot(sd, share * f)
+
+    @cached_property
+    def frfs(self) -> tuple[Frf, ...]:
+        """Of the labelled poses; read when asked for."""
+        if self.frf_of is None:
+            return ()
+        table = self.cell.config.modes
+        return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
     def with_residues(self) -> Surrogate:
@@ -109,6 +125,8 @@ class Model:
     @cached_property
     def decision(self) -> "Decision | None":
         """Whether the cut of campaign.toml is stable, pose by pose; None where none is named."""
+        if self.cell.cut is None:
+            return None
         from planner.campaign.decision import decided
 
         return decided(self)
@@ -171,8 +189,7 @@ class Model:
     ) -> ModalPrediction:
         """The surrogate's prediction, with what the simulation's own parameters leave open."""
         found = (surrogate or self.surrogate).predict(features, simulated, visit)
-        share = self.surrogate.frequency_trust * self.low.frequency_sd(q)
-        sd = np.hypot(found.frequency_sd_hz, share * found.frequency_hz)
+        sd = self._with_parameters(q, simulated, found.frequency_hz, found.frequency_sd_hz)
         return replace(found, frequency_sd_hz=sd)
 
     def frf(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -232,89 +249,10 @@ class Model:
                 )
         return tuple(found)
 
-    @property
+    @cached_property
     def frequency_sd_percent(self) -> np.ndarray:
         """Predicted sd of each natural frequency, root mean square over the workspace, in %."""
-        p = self.workspace_prediction
-        return 100 * np.sqrt(np.mean((p.frequency_sd_hz / p.frequency_hz) ** 2, axis=0))
-
-
-def build(
-    cell: Cell,
-    state: CampaignState,
-    frf_of: Callable[[Measurement, ModesTable], Frf],
-    columns_of: Callable[[Measurement, ModesTable], HitColumns] | None = None,
-) -> Model:
-    """Label and fit everything that the state's measurements hold.
-
-    `frf_of` gives the FRFs of a measurement, `columns_of` what each hit says by itself, which is
-    asked only where the simulation learns. Without it all hits count as exact.
-    """
-    low, used, table = cell.frozen, state.used, cell.config.modes
-    frfs, noise, misses = tuple(frf_of(m, table) for m in used), None, ()
-    if cell.config.fidelity.simulation == "updated" and used:
-        q = np.deg2rad(np.array([m.joints_deg for m in used]))
-        low = learn(low, frfs, q, table.band_hz)
-        misfit = low.identified.misfit if low.identified else 1.0
-        noise = FrfNoise.of(frfs, table.band_hz, misfit)
-        if columns_of is not None and low.learned is not None:
-            columns = [columns_of(m, table) for m in used]
-            told = tell(visits_of(used, columns, frfs), low.learned, cell.tolerances, table.band_hz)
-            misses, used = told.poses, tuple(map(told.corrected, used))
-    candidates = [_Guided.by(cell, used, low)]
-    if low.learned is not None and not low.learned.fits:
-        # What lacks physics is bent by fitting it: as it stands it may be a better
-        # guide, or none.
-        stated = replace(cell.frozen, suspect=low.learned)
-        candidates += [
-            _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
-        ]
-    best = max(candidates, key=lambda guided: guided.log_evidence)
-    surrogate = fit_surrogate(
-        best.seen,
-        primary=best.primary,
-        residues=False,
-        taught=best.low.taught,
-        visits=cell.visit_scatter,
-    )
-    kept = tuple(frf.within(table.band_hz) for frf in frfs)
-    return Model(cell, best.labelled, best.low, best.seen, surrogate, noise, misses, kept)
-
-
-@dataclass(frozen=True, eq=False)
-class _Guided:
-    """Labels and frequencies as one low fidelity makes them."""
-
-    low: LowFidelity
-    used: tuple[Measurement, ...]
-    labelled: tuple[LabelledPose, ...]
-    seen: ModalObservations
-    primary: HedgedAR1
-
-    @classmethod
-    def by(cls, cell: Cell, used: tuple[Measurement, ...], low: LowFidelity) -> "_Guided":
-        labelled = label(cell, used, low)
-        seen = observations(cell, labelled, low)
-        known = low.discrepancy(frequencies(labelled)) if labelled else None
-        primary = fit_primary(seen, known, low.left_out, low.belief, cell.visit_scatter)
-        return cls(low, used, labelled, seen, primary)
-
-    @property
-    def log_evidence(self) -> float:
-        """How probable the measured modes were, all labels together.
-
-        A label without a mode, and a mode below the last label that got none, are rare too.
-        """
-        labels = self.primary.log_evidence[: self.low.count]
-        missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
-        return float(np.sum(labels)) + missed * MISSED + self.stray * STRAY
-
-    @property
-    def stray(self) -> int:
-        """Measured modes that are no label's though labels lie above them."""
-        count = 0
-        for pose, measurement in zip(self.labelled, self.used, strict=True):
-            given = {mode.frequency_hz for mode in pose.modes if mode is not None}
-            free = [m.frequency_hz for m in measurement.modes if m.likely]
-            count += sum(f not in given and f < max(given, default=0.0) for f in free)
-        return count
+        candidates, said = self.cell.candidates, self.simulated_candidates
+        f, sd = self.surrogate.frequencies(candidates.features, said.frequency_hz, visit=False)
+        sd = self._with_parameters(candidates.q, said, f, sd)
+        return 100 * np.sqrt(np.mean((sd / f) ** 2, axis=0))

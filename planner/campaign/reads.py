@@ -16,11 +16,11 @@ from planner.campaign.config import (
 )
 from planner.campaign.events import Configured, Entry, HitRecord, Imported, Refused
 from planner.campaign.journal import Journal
+from planner.campaign.kept_recordings import KeptRecordings, Remembered
 from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.errors import InputError
-from planner.recording.points import PointNames, StatedPoints
 from planner.version import __version__
 
 # Imported where they are needed: with what is kept of a model, `status` needs none of them.
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from planner.campaign.cell import Cell
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset, Progress
-    from planner.dataset.hit_columns import HitColumns
     from planner.frf.frf import Frf
     from planner.surrogate.frf_bands import ModalPrediction
 
@@ -45,8 +44,8 @@ class CampaignReads:
         self._journal = Journal(self.directory / store.LOG)
         self._cells: dict[str, Cell] = {}
         self._models: dict[tuple[str, int], Model] = {}
-        self._frfs: dict[tuple, Frf] = {}
-        self._verified: set[Path] = set()  # kept recordings whose content was held against its hash
+        self._remembered = Remembered()
+        self._folded: tuple[tuple[Entry, ...], CampaignState] = (), fold(())
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -61,7 +60,10 @@ class CampaignReads:
     @property
     def state(self) -> CampaignState:
         """The fold over the log, with changes made by hand to the configuration."""
-        state = fold(self.entries)
+        entries = self.entries
+        if entries is not self._folded[0]:
+            self._folded = entries, fold(entries)
+        state = self._folded[1]
         if state.configured is None:
             raise InputError(
                 f"{self.directory} holds an empty log; start the campaign again with planner new."
@@ -82,6 +84,7 @@ class CampaignReads:
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
                 visit_scatter=configured.visit_scatter,
+                hits_err=configured.hits_err,
             )
         return self._cells[key]
 
@@ -121,28 +124,23 @@ class CampaignReads:
         return self._kept.result(name, kind, lambda: make(self.model))
 
     def _fitted(self, state: CampaignState) -> "Model":
-        from planner.campaign.model import build
+        from planner.campaign.build import build
 
-        model = build(self.cell, state, self.frf_of, self.columns_of)
+        kept = self.recordings
+        for measurement in state.used:  # a damaged one is told now, whoever reads it later
+            kept.sources(measurement)
+        model = build(self.cell, state, kept.frf, kept.hits)
         _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
 
+    @property
+    def recordings(self) -> KeptRecordings:
+        """The recordings that were imported, by the points of the robot as configured now."""
+        return KeptRecordings(self.directory, self.cell.robot.points, self._remembered)
+
     def frf_of(self, measurement: Measurement, table: ModesTable) -> "Frf":
         """The FRF matrix of a measured pose, estimated again from its recordings if need be."""
-        from planner.dataset.measure import frf_of
-
-        key = frf_key(measurement.accepted, table)
-        if key not in self._frfs:
-            sources = tuple(self.source_of(hit) for hit in measurement.accepted)
-            self._frfs[key] = frf_of(sources, table.band_hz, table.window_rate_1_s)
-        return self._frfs[key]
-
-    def columns_of(self, measurement: Measurement, table: ModesTable) -> "HitColumns":
-        """What each accepted hit of a measured pose says by itself."""
-        from planner.dataset.hit_columns import columns_of
-
-        sources = tuple(self.source_of(hit) for hit in measurement.accepted)
-        return columns_of(sources, table.band_hz, table.window_rate_1_s)
+        return self.recordings.frf(measurement, table)
 
     def dataset(
         self,
@@ -157,10 +155,11 @@ class CampaignReads:
         """
         from planner.dataset.dataset import Dataset, Recording
 
+        kept = self.recordings
         found = [
-            Recording(measurement.pose, np.deg2rad(measurement.joints_deg), self.source_of(hit))
+            Recording(measurement.pose, np.deg2rad(measurement.joints_deg), source)
             for measurement in self.state.used
-            for hit in measurement.accepted
+            for source in kept.sources(measurement)
         ]
         if not found:
             raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
@@ -174,15 +173,7 @@ class CampaignReads:
 
     def source_of(self, hit: HitRecord) -> Source:
         """The kept copy of a recording; InputError where it is not what was imported."""
-        path = store.recording_path(self.directory, hit.sha256, hit.suffix)
-        if path not in self._verified:
-            store.read_kept(path, hit.sha256, hit.file)
-            self._verified.add(path)
-        names = self.cell.robot.points
-        said = hit.hit_point or hit.response_points or names != PointNames()
-        stated = StatedPoints(hit.hit_point, hit.response_points, names=names)
-        points = stated if said else StatedPoints()
-        return Source(path, hit.file, hit.hit, hit.repeat, points, hit.part)
+        return self.recordings.source(hit)
 
     def orphans(self) -> list[str]:
         """Recordings stored without an import: the program was stopped in between."""
@@ -200,7 +191,7 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        kept = begun.geometric_stiffness, begun.visit_scatter
+        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err
         return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------
@@ -249,11 +240,6 @@ class CampaignReads:
         from planner.frf.frequency_lines import frequency_lines
 
         return frequency_lines(self.cell.config.modes.band_hz)
-
-
-def frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:
-    """What an FRF depends on."""
-    return (*(hit.sha256 for hit in hits), table.band_hz, table.window_rate_1_s)
 
 
 def _text(configured: Configured) -> str:

@@ -129,9 +129,10 @@ def create_folder(
         partial.mkdir()
         _copy_robot(robot_toml, partial / ROBOT)
         robot = f"{ROBOT}/{robot_toml.name}"
+        if campaign_toml is not None:
+            load_campaign_config(campaign_toml)  # says what is wrong with it
         text = _taken_over(campaign_toml, robot) if campaign_toml else _default(partial, robot)
         (partial / CONFIG).write_text(text, encoding="utf-8")
-        load_campaign_config(campaign_toml or partial / CONFIG)
         write_synced(partial / LOG, first_line(partial))
         if directory.exists():
             directory.rmdir()
@@ -145,10 +146,18 @@ def create_folder(
         raise InputError(text) from None
     except OSError as error:
         raise InputError(
-            f"{directory} cannot be made ({error.strerror}); choose another folder."
+            f"{directory} cannot be made ({_why(error)}); choose another folder."
         ) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)
+
+
+def _why(error: OSError) -> str:
+    """In words; of a folder whose files cannot be copied, those of the first one."""
+    if isinstance(error, shutil.Error):
+        _, copy, reason = error.args[0][0]
+        return f"{Path(copy).name}: {reason}"
+    return error.strerror or type(error).__name__
 
 
 def _remove_left(directory: Path) -> None:

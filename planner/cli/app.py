@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from planner.cli.acts import Directory, confirm, skip, undo, withdraw
 from planner.cli.answer import AsJson, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
@@ -28,8 +29,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Campaign folder.")]
-PoseArgument = Annotated[str, typer.Argument(metavar="POSE", help="Name of the pose.")]
 Rrd = Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")]
 Viewer = Annotated[bool, typer.Option("--viewer", help="Show progress in a live Rerun viewer.")]
 
@@ -117,31 +116,6 @@ def import_(
     return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
 
-@app.command()
-def confirm(
-    directory: Directory,
-    pose: PoseArgument,
-    at: Annotated[
-        str | None, typer.Option("--at", metavar="POSE", help="Where they are from instead.")
-    ] = None,
-    as_json: AsJson = False,
-) -> int:
-    """Use the held hits of a pose: they are from there indeed, or from another pose.
-
-    Example: planner confirm cell7 P014 --at P009
-    """
-    from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import ConfirmedPose
-    from planner.report.imports import ImportedPoses
-
-    campaign = Campaign(directory)
-    if at is None:
-        campaign.confirm(pose)
-        return respond(ConfirmedPose(pose, campaign.model.frequency_sd_percent), as_json)
-    answer = ImportedPoses.of((campaign.move(pose, at),))
-    return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
-
-
 @app.command(name="status")
 def status_(
     directory: Directory,
@@ -165,57 +139,6 @@ def status_(
     campaign, pictures = Campaign(directory), Pictures(plot, format_)
     answer = status(campaign).with_pictures(pictures, campaign.directory.name)
     return respond(answer, as_json)
-
-
-@app.command()
-def undo(directory: Directory, as_json: AsJson = False) -> int:
-    """Take back the last act.
-
-    Example: planner undo cell7
-    """
-    from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import UndoneAct
-
-    return respond(UndoneAct.of(Campaign(directory).undo()), as_json)
-
-
-@app.command()
-def withdraw(
-    directory: Directory,
-    pose: PoseArgument,
-    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
-    as_json: AsJson = False,
-) -> int:
-    """Set a measured pose aside; its recordings stay.
-
-    Example: planner withdraw cell7 P003 --reason "loose sensor"
-    """
-    from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import WithdrawnPose
-
-    Campaign(directory).withdraw(pose, reason)
-    return respond(WithdrawnPose(pose, reason), as_json)
-
-
-@app.command()
-def skip(
-    directory: Directory,
-    pose: PoseArgument,
-    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
-    as_json: AsJson = False,
-) -> int:
-    """Say that a proposed pose cannot be measured; it is not offered again.
-
-    With a reason its neighbours are not offered either: what stands in the way there does so
-    around it too.
-
-    Example: planner skip cell7 P007 --reason "hose in the way"
-    """
-    from planner.campaign.campaign import Campaign
-    from planner.report.campaign_acts import SkippedPose
-
-    Campaign(directory).skip(pose, reason, neighbours=bool(reason))
-    return respond(SkippedPose(pose, reason), as_json)
 
 
 @app.command()
@@ -302,19 +225,11 @@ def replay(
     return respond(answer, as_json, 0 if answer.reproduced else 1)
 
 
-app.command()(check)
-app.command()(report)
-app.command()(export)
-app.command()(modes)
-app.command()(identify)
-app.command()(diagnose)
-app.command()(prove)
-app.command()(compare)
-app.command()(study)
-app.command()(schema)
-app.command()(manual)
-app.command()(couple)
-app.command()(stability)
+for _command in (
+    undo, confirm, skip, withdraw, check, report, export, modes, identify, diagnose, prove, compare,
+    study, schema, manual, couple, stability,
+):  # fmt: skip
+    app.command()(_command)
 
 
 @app.command()

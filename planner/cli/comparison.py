@@ -67,8 +67,9 @@ def compare(
         poses = recorded(recordings, loaded, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)
-        found = conduct(bench, study, folder, scheduler, workers, progress)
-    answer = comparison(bench, study, found, poses, remarks).with_pictures(out, rrd, bench.key)
+        found, damaged = conduct(bench, study, folder, scheduler, workers, progress)
+    answer = comparison(bench, study, found, poses, (*remarks, *damaged))
+    answer = answer.with_pictures(out, rrd, bench.key)
     answer = replace(answer, seconds=time.perf_counter() - started)
     if out is not None:
         answer.write(out)

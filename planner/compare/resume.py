@@ -4,10 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
+from planner.campaign.checked_file import read_checked, write_checked
 from planner.campaign.config import ModesTable
-from planner.campaign.journal import write_synced
 from planner.compare import cluster, pool, processes
 from planner.compare.bench import Bench
 from planner.compare.pool import PoolPose
@@ -48,20 +46,25 @@ def conduct(
     scheduler: str | None,
     workers: int,
     progress: Progress,
-) -> dict[Task, Run | Failure]:
-    """Every run of a study. Runs are kept in `folder` as they end, under what they hang on."""
+) -> tuple[dict[Task, Run | Failure], tuple[str, ...]]:
+    """Every run of a study, and remarks on kept ones that were damaged and are done again.
+
+    Runs are kept in `folder` as they end, under what they hang on.
+    """
     kept = _folder(folder / RUNS)
     paths = {task: kept / f"{task.key(bench)}.json" for task in study.tasks}
-    found: dict[Task, Run | Failure] = {t: r for t, p in paths.items() if (r := _read(p))}
+    read = {task: read_checked(path, Run) for task, path in paths.items()}
+    found: dict[Task, Run | Failure] = {task: run for task, run in read.items() if run}
     todo = [task for task in study.tasks if task not in found]
+    damaged = [paths[task].name for task in todo if paths[task].exists()]
     progress("runs", len(found), len(paths))
     if todo:
         for k, answer in _spread(bench, todo, scheduler, workers):
             if isinstance(answer, Run):
-                write_synced(paths[todo[k]], msgspec.json.encode(answer))
+                write_checked(paths[todo[k]], answer)
             found[todo[k]] = answer
             progress("runs", len(found), len(paths))
-    return {task: found[task] for task in study.tasks}
+    return {task: found[task] for task in study.tasks}, _told(damaged, kept)
 
 
 def _spread(bench: Bench, tasks: list[Task], scheduler: str | None, workers: int) -> Any:
@@ -70,12 +73,12 @@ def _spread(bench: Bench, tasks: list[Task], scheduler: str | None, workers: int
     return processes.each(run, bench, tasks, workers)
 
 
-def _read(path: Path) -> Run | None:
-    """A run that was kept; None where there is none, or none that can be read: it is run again."""
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=Run)
-    except (OSError, UnicodeDecodeError, msgspec.DecodeError):
-        return None
+def _told(damaged: list[str], folder: Path) -> tuple[str, ...]:
+    if not damaged:
+        return ()
+    what = f"{len(damaged)} kept runs in {folder} were" if damaged[1:] else "1 kept run was"
+    where = ", ".join(damaged) if damaged[1:] else str(folder / damaged[0])
+    return (f"{what} damaged ({where}) and done again.",)
 
 
 def _folder(path: Path) -> Path:

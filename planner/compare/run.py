@@ -8,7 +8,8 @@ from threadpoolctl import threadpool_limits
 
 from planner import content_hash
 from planner.campaign.acquisition_inputs import cost_of
-from planner.campaign.model import Model, build
+from planner.campaign.build import build
+from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from planner.compare.bench import Bench, PoolCell, cell_of

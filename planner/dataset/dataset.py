@@ -195,15 +195,8 @@ class Dataset:
 
     @property
     def one_hit_frfs(self) -> tuple[Frf, ...]:
-        """The same, each of one hit in the middle of all, with the variance of the noise alone.
-
-        For fits that integrate over how hits miss. The decays that the records still cut off are
-        too small to matter.
-        """
-        found = _known(entry.measured.one_hit_frf for entry in self.measured)
-        return tuple(
-            replace(frf, tail_s=np.inf) if frf.exponential_rate_1_s > 0 else frf for frf in found
-        )
+        """The same, each of one hit in the middle of all (`MeasuredPose.one_hit_frf`)."""
+        return _known(entry.measured.one_hit_frf for entry in self.measured)
 
     @property
     def modes(self) -> tuple[ModalModel | None, ...]:

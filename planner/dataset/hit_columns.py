@@ -1,13 +1,14 @@
-"""What each hit of a pose says by itself: its own column of the FRF matrix, on a few lines."""
+"""What each hit of a pose says by itself, on a few lines, and what one of them all would say."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from planner.dataset.dataset import LAID
-from planner.dataset.measure import MeasuredPose, of_tool
+from planner.dataset.measure import MeasuredPose, of_tool, one_hit_frf
 from planner.dataset.screened_files import Source
 from planner.dataset.store import user_store
+from planner.frf.frf import Frf
 from planner.frf.spectra import Windows, transform
 from planner.recording.records import Hit
 
@@ -41,6 +42,17 @@ class HitColumns:
     def shared_at(self, frequency_hz: np.ndarray) -> np.ndarray:
         """`share` (n, F) at other lines (Hz)."""
         return np.array([np.interp(frequency_hz, self.frequency_hz, row) for row in self.share])
+
+
+@dataclass(frozen=True, eq=False)
+class PoseHits:
+    """The accepted hits of a pose one by one, and `whole`, their FRFs at all points.
+
+    These are of one hit in the middle of all, see `MeasuredPose.one_hit_frf`.
+    """
+
+    columns: HitColumns
+    whole: Frf
 
 
 def hit_columns(
@@ -84,23 +96,25 @@ def hit_columns(
     )
 
 
-def columns_of(
+def hits_of(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
-) -> HitColumns:
+) -> PoseHits:
     """Those of files that were accepted before, kept like FRFs."""
     pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
-    def make() -> HitColumns:
-        hits, file = [], []
-        for number, source in enumerate(sources):
-            found = of_tool(source.read()[0])
-            hits += found
-            file += [number] * len(found)
-        if not hits:
-            return _none()
-        return hit_columns(tuple(hits), tuple(file), band_hz, window_rate_1_s)
+    def make() -> PoseHits:
+        read = [source.read() for source in sources]
+        records = tuple(record for _, found in read for record in found)
+        every = tuple(hit for found, _ in read for hit in found)
+        at_tool = [of_tool(found) for found, _ in read]
+        file = tuple(number for number, found in enumerate(at_tool) for _ in found)
+        columns = _none()
+        if file:
+            hits = tuple(hit for found in at_tool for hit in found)
+            columns = hit_columns(hits, file, band_hz, window_rate_1_s)
+        return PoseHits(columns, one_hit_frf(every, records, band_hz, window_rate_1_s))
 
-    return pose.kept("hit columns", HitColumns, make)
+    return pose.kept("hits", PoseHits, make)
 
 
 def _none() -> HitColumns:

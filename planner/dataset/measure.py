@@ -20,6 +20,7 @@ from planner.recording.records import FrfRecord, Hit
 OVER = 5.5  # e^−OVER of the slowest decay is left where the record ends
 PACKAGES = "recording", "frf", "modal", "dataset", "inference"  # that results here depend on
 
+ACCEPTED = "accepted frf"  # what the store calls the FRF of a pose's accepted files
 NOT_OF_TOOL = (
     "No hit at the tcp was heard by all axes of the sensor there: modes of the tool are not told, "
     "what was measured at other points serves identification and diagnosis."
@@ -108,11 +109,16 @@ class MeasuredPose:
 
     @cached_property
     def one_hit_frf(self) -> Frf | None:
-        """The FRF of one hit in the middle of all, for a model of how hits miss; as `ended_frf`."""
+        """The FRF of one hit in the middle of all, with the variance of the noise alone.
+
+        For fits that integrate over how hits miss. As `ended_frf`; what the records still cut off
+        is too small to matter.
+        """
         plain = self.whole
         if plain is None or not self.hits:
             return plain
-        return self.kept("one hit frf", Frf, lambda: self._ended(plain, "one_hit"))
+        found = self.kept("one hit frf", Frf, lambda: self._ended(plain, "one_hit"))
+        return replace(found, tail_s=np.inf) if found.exponential_rate_1_s > 0 else found
 
     @cached_property
     def decomposed(self) -> Decomposed:
@@ -248,7 +254,6 @@ def frf_of(
     sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float = 0.0
 ) -> Frf:
     """The tool's FRF of files that were accepted before: the one that `measure` gave then."""
-    pose = MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
 
     def make() -> Frf:
         read = [source.read() for source in sources]
@@ -257,7 +262,31 @@ def frf_of(
         whole = _frf(hits, frfs, band_hz, "h1", window_rate_1_s)
         return whole.of_tool or _nothing(whole)
 
-    return pose.kept("accepted frf", Frf, make)
+    return _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, make)
+
+
+def keep_frf(
+    frf: Frf, sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
+) -> None:
+    """Keep what `frf_of` will be asked for, now that it is at hand."""
+    _ = _accepted(sources, band_hz, window_rate_1_s).kept(ACCEPTED, Frf, lambda: frf)
+
+
+def _accepted(
+    sources: tuple[Source, ...], band_hz: tuple[float, float], window_rate_1_s: float
+) -> MeasuredPose:
+    return MeasuredPose(sources, band_hz, "h1", window_rate_1_s, store=user_store())
+
+
+def one_hit_frf(
+    hits: tuple[Hit, ...],
+    records: tuple[FrfRecord, ...],
+    band_hz: tuple[float, float],
+    window_rate_1_s: float = 0.0,
+) -> Frf:
+    """`MeasuredPose.one_hit_frf` of accepted hits, or exported FRFs as they are."""
+    found = MeasuredPose((), band_hz, "h1", window_rate_1_s, hits).one_hit_frf if hits else None
+    return found or _frf(hits, records, band_hz, "h1", window_rate_1_s)
 
 
 def _nothing(frf: Frf) -> Frf:

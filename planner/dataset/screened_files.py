@@ -121,6 +121,8 @@ def read_one(
     source: Source, band_hz: tuple[float, float]
 ) -> tuple[Verdict, tuple[Hit, ...], list[FrfRecord]]:
     """One file, judged by itself: the verdict, its usable hits, its FRFs."""
+    from planner.recording.channel_faults import by_good_sensors
+    from planner.recording.driving_point import driving_point
     from planner.recording.screening import ScreeningLimits, screen
 
     try:
@@ -131,7 +133,10 @@ def read_one(
     except PlannerError as error:
         return Verdict(source, False, renamed(str(error), (source,))), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)
-    judged = [(hit, screen(hit, limits)) for hit in found]
+    heard = [by_good_sensors(hit) for hit in found]
+    judged = [
+        (hit, (*told, *screen(hit, limits), *driving_point(hit, band_hz))) for hit, told in heard
+    ]
     remarks = [f.text for _, faults in judged for f in faults if not f.refuse]
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
     refused = [

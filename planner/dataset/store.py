@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -101,26 +102,33 @@ class Store:
         """Remove entries that nobody used for long, and the oldest where there are too many."""
         assert self.folder is not None
         entries = []
-        for path in self.folder.iterdir():
-            with suppress(OSError):
-                status = path.stat()
-                entries.append((now - status.st_mtime, status.st_size, path))
+        with os.scandir(self.folder) as found:  # thousands of entries: faster than by Path
+            for entry in found:
+                with suppress(OSError):
+                    status = entry.stat()
+                    entries.append((now - status.st_mtime, status.st_size, entry.path))
         total = sum(size for _, size, _ in entries)
         most = self.most_bytes if total <= self.most_bytes else LEFT_SHARE * self.most_bytes
-        for age, size, path in sorted(entries, key=lambda entry: -entry[0]):
-            part = path.suffix == ".part"
+        for age, size, path in sorted(entries, reverse=True):
+            part = path.endswith(".part")
             if age > (WRITING_S if part else LONGEST_UNUSED_S) or (total > most and not part):
                 with suppress(OSError):
-                    path.unlink()
+                    os.unlink(path)
                 total -= size
 
 
 def user_store() -> Store:
     """The store of this user; one that keeps nothing where there is no home."""
     try:
-        return Store(cache_folder.folder("poses"))
+        return _store_in(cache_folder.folder("poses"))
     except RuntimeError:
         return Store(None)
+
+
+@cache
+def _store_in(folder: Path) -> Store:
+    """One for all of the process: each new one looks through all entries at its first."""
+    return Store(folder)
 
 
 def _checksum(key: str, body: bytes) -> bytes:

@@ -18,11 +18,13 @@ from scipy.linalg import block_diag
 
 from planner.design.frequency_posterior import AXES
 from planner.design.parameter_sensitivity import FrfNoise
-from planner.diagnosis.linear.fit import Fit, Problem, carried_on, tolerances_of
+from planner.diagnosis.linear.fit import Fit, carried_on
 from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import OPEN, basis
+from planner.identification.measurement_model import OpenNumbers, basis
 from planner.inference.parallel import side_by_side
+from planner.recording.points import TOOL, Layout
 
 FRF_LINES = 96  # lines over the band at which FRFs are compared, evenly spaced
 TRIED_POSES = 8  # poses at which candidates are fitted, the most promising in closed form
@@ -129,11 +131,12 @@ def separation(
     probability: Sequence[float],
     q: np.ndarray,
     temper: float,
+    layout: Layout = TOOL,
 ) -> np.ndarray:
     """Expected logarithm of the odds (n, 3) that a hit along each tcp axis gives at q (n, dof).
 
-    q in rad. The odds are those of the true fit to each other one, averaged with the probabilities
-    of the fits; 0 where there are fewer than two.
+    q in rad; the sensors of `layout` listen. The odds are those of the true fit to each other one,
+    averaged with the probabilities of the fits; 0 where there are fewer than two.
     """
     q = np.atleast_2d(q)
     gain = np.zeros((len(q), AXES))
@@ -144,25 +147,31 @@ def separation(
     lines = np.linspace(*problem.band_hz, FRF_LINES)
     # Lines closer than those of a record are not measured apart; farther ones stand for several.
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
-    open_ = 0 if problem.exact else OPEN + problem.q.shape[1]
+    numbers = OpenNumbers.of(np.empty((*layout.shape, 0)))
+    open_ = 0 if problem.exact else numbers.known + problem.q.shape[1]
     known = [np.asarray(block_diag(fit.precision(temper), np.eye(open_))) for fit in fits]
     rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):
-        predicted = [_predicted(problem, f, row, lines, rate) for f in fits]
+        predicted = [_predicted(problem, f, row, lines, rate, layout) for f in fits]
         scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in predicted]
         gain[place] = expected_log_odds(predicted, scales, known, share)
     return gain
 
 
 def _predicted(
-    problem: Problem, found: Fit, q: np.ndarray, lines: np.ndarray, rate_1_s: float
+    problem: Problem,
+    found: Fit,
+    q: np.ndarray,
+    lines: np.ndarray,
+    rate_1_s: float,
+    layout: Layout,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """FRF (3, 3, F) of a fit at q (dof,), and its derivatives (D, 3, 3, F).
+    """FRF (r, 3, F) of a fit at q (dof,), and its derivatives (D, r, 3, F).
 
     By what hit and measuring chain leave open, too, in sds: a hit is never told as well as its
     noise allows.
     """
-    misfit = misfit_at(problem, found.effect, q[None], lines, rate_1_s)
+    misfit = misfit_at(problem, found.effect, q[None], lines, rate_1_s, layout)
     h, slope, turned = misfit.parts(found.x)
     if problem.exact:
         return h[0], slope[0]

@@ -11,6 +11,7 @@ import numpy as np
 from planner.design.frequency_posterior import AXES, Poses
 from planner.dynamics.gradient import laplace, response_gradient
 from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import SimulatedModes
 from planner.frf.frf import Frf
 from planner.identification.agreement import MODEL_ERROR
 from planner.identification.frequency_uncertainty import log_frequency_slope
@@ -61,12 +62,21 @@ class OpenParameters:
     noise: FrfNoise
     band_hz: tuple[float, float]
 
-    def poses(self, x: np.ndarray, low: np.ndarray, q: np.ndarray, informed: bool) -> Poses:
-        """Poses q (n, dof) in rad with their slopes and, where `informed`, their information."""
-        count = low.shape[1]
-        slope = np.zeros((0, count, len(self.covariance)))
+    def poses(
+        self,
+        x: np.ndarray,
+        low: np.ndarray,
+        q: np.ndarray,
+        simulated: SimulatedModes,
+        informed: bool,
+    ) -> Poses:
+        """Poses q (n, dof) in rad with their slopes and, where `informed`, their information.
+
+        `simulated` are the simulation's modes there.
+        """
+        slope = np.zeros((0, low.shape[1], len(self.covariance)))
         if len(q):
-            slope = log_frequency_slope(self.simulation, self.parametrisation, q, count)
+            slope = log_frequency_slope(self.simulation, self.parametrisation, q, simulated)
         information = self.information(q) if informed else np.zeros((len(q), AXES, 0, 0))
         return Poses(x, low, np.nan_to_num(slope), information)
 

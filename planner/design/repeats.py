@@ -20,15 +20,12 @@ def repeat_gain(outputs: FrequencyOutputs, variance: np.ndarray) -> np.ndarray:
     gain = np.zeros(len(variance))
     for k in range(outputs.count):
         known = np.flatnonzero(post.mask[k])
-        known = known[known < len(variance)]
         if not len(known):
             continue
-        low = target.poses.low[:, k]
-        cross = post._prior(k, post.x[known], post.low[k][known], target.poses.x, low)
-        whiten = post.whiten[k][:, known[:, None], known[None, :]]
-        precision = np.swapaxes(whiten, 1, 2) @ whiten
-        pulled = (precision @ cross) ** 2 @ target.importance[:, k]
+        _, white = post._cross(k, target.poses.x, target.poses.low[:, k])
+        whiten = post.whitening(k)
+        pulled = (np.swapaxes(whiten, 1, 2) @ white) ** 2 @ target.importance[:, k]
         half = np.nan_to_num(variance[known, k]) / 2
-        left = 1 - half * np.diagonal(precision, axis1=1, axis2=2)
+        left = 1 - half * np.sum(whiten**2, axis=1)
         gain[known] += np.mean(half * pulled / np.maximum(left, 1e-9), axis=0)
     return gain

@@ -1,27 +1,21 @@
-"""Squared posterior covariances of candidates with a target, summed up and compiled."""
+"""Squared posterior covariances of candidates with a target, summed up."""
 
-import jax
-import jax.numpy as jnp
-from jax import Array
+import numpy as np
 
-from planner import jax_setup
-from planner.design.variance_reduction import BLOCK_CANDIDATES
 from planner.surrogate.kernels import parse
 
+BLOCK_CANDIDATES = 128  # at a time: their covariances with the target stay in the cache
 
-@jax_setup.compiled("wide", static_argnums=0)
+
 def squared_covariances(
-    kernel: str, theta: Array, x: Array, a: Array, xu: Array, b: Array, weight: Array
-) -> Array:
-    """Σ_u weight_u cov(c, u)² of candidates c, block by block."""
+    kernel: str,
+    theta: np.ndarray,
+    x: np.ndarray,
+    a: np.ndarray,
+    xu: np.ndarray,
+    b: np.ndarray,
+    weight: np.ndarray,
+) -> np.ndarray:
+    """Σ_u weight_u cov(c, u)² (n,) of one block of candidates c, by NumPy, as is quick for few."""
     delta = parse(kernel, x.shape[1])
-
-    def block(one: tuple[Array, Array]) -> Array:
-        xc, ac = one
-        return (delta.covariance(jnp, theta, xc, xu) + ac @ b.T) ** 2 @ weight
-
-    blocks = (
-        x.reshape(-1, BLOCK_CANDIDATES, x.shape[1]),
-        a.reshape(-1, BLOCK_CANDIDATES, a.shape[1]),
-    )
-    return jax.lax.map(block, blocks).reshape(-1)
+    return (delta.covariance(np, theta, x, xu) + a @ b.T) ** 2 @ weight

@@ -116,10 +116,8 @@ def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
         poses = max(poses, len(known))
         if len(known) < 2:
             continue
-        whiten = posterior.whiten[k][:, known[:, None], known[None, :]]
-        precision = np.swapaxes(whiten, 1, 2) @ whiten
-        variance = 1 / np.diagonal(precision, axis1=1, axis2=2)
-        residual = posterior.weights[k][:, known] * variance
+        variance = 1 / np.sum(posterior.whitening(k) ** 2, axis=1)
+        residual = posterior.solved(k).weights[:, known] * variance
         mixed = np.mean(variance, axis=0) + np.var(residual, axis=0)
         squares.append(np.mean(residual, axis=0) ** 2 / mixed)
     if not squares:
@@ -130,7 +128,7 @@ def left_out(posterior: "Posterior", count: int) -> tuple[int, float]:
 def _means_apart(posterior: "Posterior", k: int, poses: "Poses") -> np.ndarray:
     """How far the mean of each hyperparameter sample (s, u) is from that of all."""
     cross, _ = posterior._cross(k, poses.x, poses.low[:, k])
-    means = (posterior.weights[k][:, None, :] @ cross)[:, 0]
+    means = (posterior.solved(k).weights[:, None, posterior.known(k)] @ cross)[:, 0]
     return means - means.mean(axis=0)
 
 

@@ -13,10 +13,9 @@ from functools import partial
 import numpy as np
 
 from planner.design.frequency_posterior import FrequencyOutputs, Poses, Target
+from planner.design.squared_covariances import BLOCK_CANDIDATES, squared_covariances
 from planner.inference.parallel import side_by_side
-from planner.surrogate.kernels import parse
 
-BLOCK_CANDIDATES = 128  # at a time: their covariances with the target stay in the cache
 BLOCKS_PER_CALL = 64  # where there are many; calls of equal shape are compiled once
 # Up to so many NumPy takes as long as what is compiled, and JAX half a second to import.
 PLAIN_CANDIDATES = 1_000
@@ -66,9 +65,11 @@ def _label(
     b, _ = _features(outputs, k, target.poses, sign=1.0)
     scale = va + outputs.noise[k]
     n, kernel = len(poses), outputs.posterior.kernel
-    squared, step = plain_squared_covariances, BLOCK_CANDIDATES
+    squared, step = squared_covariances, BLOCK_CANDIDATES
     if n > PLAIN_CANDIDATES:
-        from planner.design.squared_covariances import squared_covariances as squared
+        from planner.design.compiled_squared_covariances import compiled_squared_covariances
+
+        squared = compiled_squared_covariances
 
         step *= BLOCKS_PER_CALL if n > 4 * BLOCK_CANDIDATES * BLOCKS_PER_CALL else 1
     rows = (_filled(poses.x, step), np.stack([_filled(one, step) for one in a]))
@@ -83,20 +84,6 @@ def _label(
     return np.mean(done[:, :n] / scale, axis=0), np.mean(scale, axis=0)
 
 
-def plain_squared_covariances(
-    kernel: str,
-    theta: np.ndarray,
-    x: np.ndarray,
-    a: np.ndarray,
-    xu: np.ndarray,
-    b: np.ndarray,
-    weight: np.ndarray,
-) -> np.ndarray:
-    """Σ_u weight_u cov(c, u)² (n,) of one block of candidates c, by NumPy."""
-    delta = parse(kernel, x.shape[1])
-    return (delta.covariance(np, theta, x, xu) + a @ b.T) ** 2 @ weight
-
-
 def _features(
     outputs: FrequencyOutputs, k: int, poses: Poses, sign: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -106,9 +93,7 @@ def _features(
     """
     post = outputs.posterior
     low = poses.low[:, k]
-    known = np.flatnonzero(post.mask[k])
-    cross = post._prior(k, post.x[known], post.low[k][known], poses.x, low)
-    white = post.whiten[k][:, known[:, None], known[None, :]] @ cross
+    _, white = post._cross(k, poses.x, low)
     if len(outputs.planned):
         white = np.concatenate([white, outputs.whitened_planned(k, poses)], axis=1)
     own = post._own(k, poses.x, low) - np.sum(white**2, axis=1)

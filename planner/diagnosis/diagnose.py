@@ -2,16 +2,19 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
+from planner.diagnosis.hidden_inertias import hidden_inertias
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
-from planner.diagnosis.linear_diagnosis import beside_another, diagnose
+from planner.diagnosis.linear_diagnosis import Diagnosis, beside_another, diagnose
 from planner.diagnosis.misses_again import abstained, asked_again
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.thresholds import ARTEFACTS
+from planner.diagnosis.thresholds import ARTEFACTS, NOTHING, SECOND_EFFECT
 from planner.diagnosis.verdict import Together, linear_effects_apply, together
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, within
@@ -30,20 +33,12 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
     """What `simulation` lacks; hits are screened unless a window is stated that they carry."""
     tell("looking at the measuring chain, the order in time and the force levels", 0.02)
     screened = bool(recorded.visits) and not recorded.window_rate_1_s
-    findings, missed = (), recorded
-    if screened:
-        recorded, missed, findings = _screened(recorded, simulation, within(tell, 0.02, 0.2))
+    looked = _looked_at(recorded, simulation, within(tell, 0.02, 0.6), screened)
+    if looked.doubtful:
+        other = _looked_at(recorded, simulation, within(tell, 0.6, 0.85), screened, chain=False)
+        looked = other if other.better_than(looked) else looked
+    recorded, missed, findings, found = looked.clean, looked.missed, looked.findings, looked.found
     linear = linear_effects_apply(findings)
-    found = diagnose(
-        recorded.ended_frfs,
-        recorded.q,
-        simulation,
-        effects=None if linear or leaves_room(findings) else (),
-        bent=bool(of_levels(findings)),
-        tell=within(tell, 0.2, 0.85),
-    )
-    if any(f.effect in ARTEFACTS for f in findings):
-        found = beside_another(found)
     tell("looking for a nonlinear joint beside it", 0.85)
     closer = within(tell, 0.85, 0.95)
     again = asked_again(missed, findings, found, closer) if screened else None
@@ -67,14 +62,73 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
             recorded = replace(recorded, remarks=(*recorded.remarks, said))
         findings, judged = kept, replace(judged, diagnosis=found)
     whole = together(findings, judged.diagnosis, counts)
+    if whole.verdict == "consistent":
+        said = hidden_inertias(judged.diagnosis)
+        recorded = replace(recorded, remarks=(*recorded.remarks, *said))
     return Explained(recorded, judged, whole)
 
 
+@dataclass(frozen=True, eq=False)
+class _Looked:
+    """Recordings without artefacts and misses, and with the misses; what hits and FRFs say."""
+
+    clean: Dataset
+    missed: Dataset
+    findings: tuple[Finding, ...]
+    found: Diagnosis
+
+    @property
+    def of_chain(self) -> tuple[Finding, ...]:
+        """Artefacts that only a simulation tells, not the force's own noise."""
+        return tuple(
+            f for f in self.findings if f.effect in ARTEFACTS and f.effect != "exponential_window"
+        )
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether an artefact was told by a simulation that even then lacks what matters."""
+        matters = self.found.problem.simulation.robot.config.diagnose.matters_percent / 100
+        return (
+            bool(self.of_chain)
+            and linear_effects_apply(self.findings)
+            and self.found.left > matters
+        )
+
+    def better_than(self, corrected: "_Looked") -> bool:
+        """Whether recordings as they are say more than `corrected` ones, artefacts being rare."""
+        rare = len(corrected.of_chain) * np.log(SECOND_EFFECT / NOTHING)
+        return linear_effects_apply(self.findings) and (
+            self.found.log_evidence > corrected.found.log_evidence + rare
+        )
+
+
+def _looked_at(
+    recorded: Dataset, simulation: Simulation, tell: Tell, screened: bool, *, chain: bool = True
+) -> _Looked:
+    """What screens and FRFs say; without `chain` its artefacts are left to the effects."""
+    findings, missed = (), recorded
+    if screened:
+        early = within(tell, 0.0, 0.2)
+        recorded, missed, findings = _screened(recorded, simulation, early, chain)
+    linear = linear_effects_apply(findings)
+    found = diagnose(
+        recorded.ended_frfs,
+        recorded.q,
+        simulation,
+        effects=None if linear or leaves_room(findings) else (),
+        bent=bool(of_levels(findings)),
+        tell=within(tell, 0.2, 1.0),
+    )
+    if any(f.effect in ARTEFACTS for f in findings):
+        found = beside_another(found)
+    return _Looked(recorded, missed, findings, found)
+
+
 def _screened(
-    recorded: Dataset, simulation: Simulation, tell: Tell
+    recorded: Dataset, simulation: Simulation, tell: Tell, chain: bool
 ) -> tuple[Dataset, Dataset, tuple[Finding, ...]]:
     """Recordings corrected for artefacts and misses, for artefacts alone, and what hits say."""
-    found = screen(recorded, simulation, tell)
+    found = screen(recorded, simulation, tell, chain=chain)
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
     said = [f"The recordings were corrected for: {', '.join(artefacts)}."] if artefacts else []
     if found.hit_errors:

@@ -10,8 +10,10 @@ from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
-from planner.diagnosis.linear.fit import Fit, Problem, carried_on, fit, settle, tolerances_of
-from planner.diagnosis.linear.search import Found, search
+from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
+from planner.diagnosis.linear.mismatch import Mismatch
+from planner.diagnosis.linear.problem import Problem, tolerances_of
+from planner.diagnosis.linear.search import Found, distinct, search
 from planner.diagnosis.linear.slightness import thinned, without_slight
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
 from planner.dynamics.simulation import Simulation
@@ -52,6 +54,12 @@ class Diagnosis:
     temper: float
     seconds: float
     problem: Problem
+    log_evidence: float = 0.0  # of everything that was weighed, together
+
+    @property
+    def left(self) -> float:
+        """What refitting alone leaves of the recordings, relative, once misses are out."""
+        return Mismatch.of(self.refitted.misfit, self.refitted.x).unexplained
 
     @property
     def undecided(self) -> tuple[Candidate, ...]:
@@ -76,7 +84,7 @@ def diagnose(
     """
     started = time.perf_counter()
     band = common_band(frfs, simulation.robot.config.band_hz)
-    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band)
+    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band, lossy=True)
     if not stands(simulation.elastic.matrices(problem.q), simulation.elasticity.stiffness):
         raise InputError(TOO_SOFT)
     tell("refitting the simulation", 0.0)
@@ -109,8 +117,9 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
     best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
     return Diagnosis(
-        _verdict(candidates), candidates, found.finalists[0], best, weights.temper, seconds, problem
-    )
+        _verdict(candidates), candidates, found.finalists[0], best,
+        weights.temper, seconds, problem, weights.log_evidence,
+    )  # fmt: skip
 
 
 def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Found, Weights]:
@@ -124,7 +133,7 @@ def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Fo
     more = thinned(problem, likeliest, found.finalists)
     if not more:
         return found, first
-    found = replace(found, finalists=(*found.finalists, *more))
+    found = distinct(replace(found, finalists=(*found.finalists, *more)))
     return found, weights(found.finalists)
 
 

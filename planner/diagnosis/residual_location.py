@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.diagnosis.linear.fit import FINE, Fit, Problem
+from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.mismatch import residuals
+from planner.diagnosis.linear.problem import FINE, Problem
 from planner.diagnosis.thresholds import RESIDUAL_CLEARLY, RESIDUAL_SHARE
 
 BANDS = 12

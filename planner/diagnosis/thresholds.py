@@ -22,6 +22,9 @@ SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; c
 # anything being wrong: as factors, relative, and in m. That of the generated robots.
 STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 1.6
 MASS_SD, INERTIA_SD, COM_SD_M = 0.05, 0.05, 0.01
+# Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as
+# gears and bearings are both and no data sheet says in which share.
+STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
 # Of each kind of effect: ranges are those of log-uniform priors; chosen, wider than what the
 # literature's robots show and what the generated cases have.
 FAR_SPRING_FACTOR = 8.0  # either way, of a joint's stiffness that is far off

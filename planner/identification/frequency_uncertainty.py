@@ -2,70 +2,90 @@
 
 import numpy as np
 
-from planner.dynamics.mode_families import undamped_modes
 from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import SimulatedModes
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification
 
+# A pole is told by inverse iteration from so far beside it, relative to itself, in so many rounds.
+BESIDE, ROUNDS = 1e-7, 2
+
 
 def frequency_sensitivity(
-    identified: Identification, nominal: Simulation, priors: Priors, q: np.ndarray, count: int
+    identified: Identification,
+    nominal: Simulation,
+    priors: Priors,
+    q: np.ndarray,
+    modes: SimulatedModes,
 ) -> np.ndarray:
-    """∂ ln f of the `count` lowest oscillatory modes (n, count, P + R) at q (n, dof) in rad.
+    """∂ ln f of `modes` (n, count) at q (n, dof) in rad, (n, count, P + R).
 
-    As if they were undamped, by the parameters in the order of `identified.mean`: with
-    mass-normalised shapes φ, ∂ω²/∂k = φ² and ∂ω²/∂M = −ω² φφᵀ (Fox & Kapoor 1968). The sag under
-    gravity is held where the identified springs carry the weight, as it is while they are
-    identified.
+    By the parameters in the order of `identified.mean`; `modes` are the identified simulation's.
     """
     p = parametrise(nominal, priors if identified.nuisances else Priors())
-    return log_frequency_slope(identified.simulation, p, q, count)
+    return log_frequency_slope(identified.simulation, p, q, modes)
 
 
 def log_frequency_slope(
-    simulation: Simulation, parametrisation: Parametrisation, q: np.ndarray, count: int
+    simulation: Simulation, parametrisation: Parametrisation, q: np.ndarray, modes: SimulatedModes
 ) -> np.ndarray:
-    """The same (n, count, P + R) of a simulation, by any parameters."""
-    m = simulation.elastic.matrices(q)
-    stiffness = simulation.stiffness.real
-    hertz, shapes, _ = undamped_modes(m.mass, stiffness + m.geometric)
-    chosen = _oscillatory(simulation, hertz, shapes, count)
-    square = (2 * np.pi * np.take_along_axis(hertz, chosen, axis=1)) ** 2
-    phi = np.take_along_axis(shapes, chosen[:, None, :], axis=2)
-    springs = np.diagonal(stiffness)[None, :, None] * phi**2 / (2 * square[:, None, :])
-    own = len(parametrisation.parameters)
-    out = np.zeros((len(q), count, own + len(parametrisation.nuisances)))
-    for p, parameter in enumerate(parametrisation.parameters):
-        if parameter.kind == "stiffness":
-            out[:, :, p] = springs[:, list(parameter.blocks)].sum(axis=1)
-    if parametrisation.nuisances:
-        basis = parametrisation.basis
-        moved = np.einsum(
-            "nbie,nek->nbik", simulation.elastic.body_jacobians(q), phi, optimize=True
-        )
-        half = np.einsum("bpij,nbjk->nbpik", basis, moved, optimize=True)
-        inertial = -0.5 * np.einsum("nbik,nbpik->nkbp", moved, half, optimize=True)
-        out[:, :, own:] = inertial.reshape(len(q), count, -1)
-    return out
+    """The same of a simulation, by any parameters; 0 where there is no mode.
 
-
-def _oscillatory(
-    simulation: Simulation, hertz: np.ndarray, shapes: np.ndarray, count: int
-) -> np.ndarray:
-    """Columns (n, count) of the lowest undamped modes that their damping lets swing.
-
-    Overdamped ones come last: `Simulation.modes` does not count them, and what they leave open is
-    no frequency's.
+    With Z(λ) = λ²M + λC + K symmetric and Z(λ) x = 0, dλ = −xᵀ dZ x / xᵀ(2λM + C)x: modes are the
+    damped ones, whatever the dampers. The sag under gravity is held where the springs carry the
+    weight, as it is while they are identified.
     """
-    damping, omega = np.diagonal(simulation.damping), np.maximum(2 * np.pi * hertz, 1e-9)
-    ratio = np.einsum("e,nek->nk", damping, shapes**2) / (2 * omega)
-    return np.argsort(ratio >= 1, axis=1, kind="stable")[:, :count]
+    m, (hertz, ratio) = simulation.elastic.matrices(q), (modes.frequency_hz, modes.damping_ratio)
+    known = np.isfinite(hertz)
+    omega, ratio = 2 * np.pi * np.where(known, hertz, 1.0), np.where(known, ratio, 0.0)
+    pole = omega * (1j * np.sqrt(np.maximum(1 - ratio**2, 0.0)) - ratio)
+    stiffness = simulation.stiffness + m.geometric
+    x = _shapes(m.mass, simulation.damping, stiffness, pole)
+    momentum = 2 * pole[..., None] * np.einsum("nef,nkf->nke", m.mass, x) + x @ simulation.damping
+    # Of ln λ, whose real part is that of ln |λ| = ln 2πf.
+    scale = -1 / (pole * np.einsum("nke,nke->nk", x, momentum))
+    springs, own = simulation.elasticity, len(parametrisation.parameters)
+    by_kind = {
+        "stiffness": np.diagonal(simulation.stiffness)[None, None],
+        "damping": pole[..., None] * springs.damping,
+        "loss_factor": 1j * (springs.stiffness * springs.loss_factor)[None, None],
+    }
+    slope = {kind: scale[..., None] * values * x**2 for kind, values in by_kind.items()}
+    out = np.zeros((*hertz.shape, own + len(parametrisation.nuisances)))
+    for number, parameter in enumerate(parametrisation.parameters):
+        some = slope[parameter.kind][..., list(parameter.blocks)]
+        out[..., number] = some.sum(axis=-1).real
+    if parametrisation.nuisances:
+        jacobians = simulation.elastic.body_jacobians(q)
+        moved = np.einsum("nbie,nke->nkbi", jacobians, x, optimize=True)
+        change = np.einsum("nkbi,bpij,nkbj->nkbp", moved, parametrisation.basis, moved,
+                           optimize=True)  # fmt: skip
+        inertial = (scale * pole**2)[..., None, None] * change
+        out[..., own:] = inertial.real.reshape(*hertz.shape, -1)
+    return np.where(known[..., None], out, 0.0)
+
+
+def _shapes(
+    mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, pole: np.ndarray
+) -> np.ndarray:
+    """Shapes (n, count, e) of poles (n, count), Z(λ) x = 0, by inverse iteration."""
+    beside = (pole * (1 + BESIDE))[..., None, None]
+    z = beside**2 * mass[:, None] + beside * damping + stiffness[:, None]
+    x = np.ones((*pole.shape, mass.shape[1], 1), dtype=complex)
+    for _ in range(ROUNDS):
+        x = np.linalg.solve(z, x)
+        x = x / np.max(np.abs(x), axis=-2, keepdims=True)
+    return x[..., 0]
 
 
 def frequency_sd(
-    identified: Identification, nominal: Simulation, priors: Priors, q: np.ndarray, count: int
+    identified: Identification,
+    nominal: Simulation,
+    priors: Priors,
+    q: np.ndarray,
+    modes: SimulatedModes,
 ) -> np.ndarray:
     """Standard deviation of ln f (n, count) that the parameters' covariance leaves, linearised."""
-    slope = frequency_sensitivity(identified, nominal, priors, q, count)
+    slope = frequency_sensitivity(identified, nominal, priors, q, modes)
     root = np.linalg.cholesky(identified.covariance + 1e-12 * np.eye(len(identified.mean)))
     return np.sqrt(np.sum((slope @ root) ** 2, axis=-1))

@@ -10,49 +10,21 @@ from scipy.linalg import block_diag
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import MOST_LINES, fit_similarity
+from planner.identification.agreement import fit_similarity
+from planner.identification.effort import THOROUGH, Effort
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, matrices_at
 from planner.identification.measurement_model import Tolerances
-from planner.identification.objective import Objective
+from planner.identification.objective import TOO_SOFT, Objective
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
 from planner.identification.staged_problem import Progress, StagedProblem
 from planner.inference.least_squares import Minimum, inverse
 
-STAGES = (0.1, 0.28, 0.59, 1.0)  # of the band: 25, 60, 120, 200 Hz of 5 to 200
-OPENINGS = 4  # rounds at most, in which what hits leave open follows the fit
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How exact an identification is: lines a pose and completions of cut-off records.
-
-    Each for a start and for the last fit, which is judged on as many lines; iterations end where a
-    step gains less than `tolerance`.
-    """
-
-    lines: int = 160
-    last_lines: int = MOST_LINES
-    completions: int = 2  # after the first: exact to second order
-    last_completions: int = 6
-    tolerance: float = 1e-6
-    sloped: bool = True  # a completion holds to first order, not at one point only
-    stages: tuple[float, ...] = STAGES
-    log_lines: int = 64  # a pose, in the logarithmic stages
-    log_steps: int = 40
-    steps: int = 80
-    doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
-
-
-THOROUGH = Effort()
-QUICK = Effort(
-    48, 80, 0, 1, 1e-4, False, stages=(0.28, 1.0), log_lines=40, log_steps=12, doubtful=False
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +79,10 @@ def identify(
     if best is None:
         x, misfits = _search(problem, _starting_points(p, starts, seed))
         best = _refine(*problem.carried(x))
+        if not np.isfinite(best.misfit):  # it can't be with the weight that these springs carry
+            best = _refine(problem, x)
+    if not np.isfinite(best.misfit):
+        raise InputError(TOO_SOFT)
     seconds = time.perf_counter() - started
     return _result(problem, simulation, q, best, misfits, seconds)
 
@@ -191,7 +167,7 @@ def _plain(
     for _ in range(2 if near and problem.tolerances else 1):
         objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    rounds = max(completions if tail else 0, OPENINGS if problem.tolerances else 0)
+    rounds = max(completions if tail else 0, problem.effort.openings if problem.tolerances else 0)
     for _ in range(rounds):
         objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)

@@ -42,15 +42,11 @@ class Told:
 class LeftOpen:
     """B of n poses, weighted, as it is somewhere and held there.
 
-    `own` (l, m) of each pose is whitened (by `factor`), so that integrating out subtracts the
-    square of what is projected on it; `common` (k, m) is of numbers that all poses share: the
-    chain of a campaign. `crossed` (n, r, c, F), weighted, is what goes beyond first order. Were B
-    to follow the parameters, larger FRFs would seem to fit better, having larger B.
+    `crossed` (n, r, c, F), weighted, is what goes beyond first order. Were B to follow the
+    parameters, larger FRFs would seem to fit better, having larger B.
     """
 
-    own: tuple[np.ndarray, ...]
-    factor: tuple[np.ndarray, ...]
-    common: tuple[np.ndarray, ...]
+    poses: tuple["_Pose", ...]
     crossed: np.ndarray
 
     @classmethod
@@ -71,30 +67,28 @@ class LeftOpen:
         made = basis(h, turned, s, tolerances)
         crossed = np.zeros_like(h) if told is None else _crossed(made, turned, s, tolerances, told)
         made *= weight[:, None]
-        numbers = OpenNumbers.of(h)
-        own, factors, common = [], [], []
-        for pose in made:
-            mine = real_rows(numbers.own(pose))
-            factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
-            own.append(np.linalg.solve(factor, mine))
-            factors.append(factor)
-            common.append(real_rows(numbers.shared(pose)))
-        return cls(tuple(own), tuple(factors), tuple(common), weight * crossed)
+        numbers, used = OpenNumbers.of(h), np.repeat(weight > 0, 2, axis=-1)
+        poses = (
+            _Pose.of(real_rows(numbers.own(pose)), real_rows(numbers.shared(pose)), there.ravel())
+            for pose, there in zip(made, used, strict=True)
+        )
+        return cls(tuple(poses), weight * crossed)
 
     def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
         """Of residuals (n, r, c, F) and their derivatives (n, d, r, c, F), both weighted."""
         residual = residual + self.crossed
-        d, k = slope.shape[1], len(self.common[0])
+        d, k = slope.shape[1], len(self.poses[0].common)
         chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
-        whole, shared = np.zeros((d + k, d + k)), np.empty((len(residual), k, k))
-        for i, (own, common) in enumerate(zip(self.own, self.common, strict=True)):
-            r, j = real_rows(residual[i, None])[0], np.concatenate([real_rows(slope[i]), common])
-            onto, moved = own @ r, own @ j.T
+        whole, shared = np.zeros((d + k, d + k)), np.array([pose.normal for pose in self.poses])
+        for i, pose in enumerate(self.poses):
+            r, j = pose.values(residual[i, None])[0], pose.values(slope[i])
+            onto, moved = pose.own @ r, pose.own @ j.T
             chi2[i] = r @ r - onto @ onto
-            gradients[i] = j @ r - moved.T @ onto
-            normal = j @ j.T - moved.T @ moved
-            shared[i] = normal[d:, d:]
-            whole += normal
+            gradients[i, :d] = j @ r - moved.T @ onto
+            gradients[i, d:] = pose.common @ r
+            whole[:d, :d] += j @ j.T - moved.T @ moved
+            whole[:d, d:] += j @ pose.common.T
+        whole[d:, :d], whole[d:, d:] = whole[:d, d:].T, shared.sum(axis=0)
         pull = gradients.sum(axis=0)
         # The common numbers at their best, and what that takes from all else.
         right = np.column_stack([pull[d:], whole[d:, :d]])
@@ -110,18 +104,50 @@ class LeftOpen:
 
     def told(self, residual: np.ndarray) -> Told:
         """What weighted residuals (n, r, c, F) tell of the numbers."""
-        flat, k = real_rows(residual + self.crossed), len(self.common[0])
-        whole, pull = np.eye(k), np.zeros(k)
-        for own, common, r in zip(self.own, self.common, flat, strict=True):
-            moved = own @ common.T
-            whole += common @ common.T - moved.T @ moved
-            pull += common @ r - moved.T @ (own @ r)
+        off = residual + self.crossed
+        flat = [pose.values(one[None])[0] for pose, one in zip(self.poses, off, strict=True)]
+        whole, pull = np.eye(len(self.poses[0].common)), np.zeros(len(self.poses[0].common))
+        for pose, r in zip(self.poses, flat, strict=True):
+            whole += pose.normal
+            pull += pose.common @ r
         chain = -np.linalg.solve(whole, pull)
         left = [
-            -np.linalg.solve(factor.T, own @ (r + chain @ common))
-            for own, factor, common, r in zip(self.own, self.factor, self.common, flat, strict=True)
+            -np.linalg.solve(pose.factor.T, pose.own @ r + pose.across @ chain)
+            for pose, r in zip(self.poses, flat, strict=True)
         ]
         return Told(np.array(left), chain)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pose:
+    """B of one pose on the m real values that were measured there, which `used` marks.
+
+    `own` (l, m) is whitened (by `factor`), so that integrating out subtracts the square of what is
+    projected on it. Of the chain's numbers, which all poses share, `common` (k, m) is what is left
+    where the pose's own take their part, `across` (l, k) that part, and `normal` (k, k).
+    """
+
+    used: np.ndarray
+    own: np.ndarray
+    factor: np.ndarray
+    common: np.ndarray
+    across: np.ndarray
+    normal: np.ndarray
+
+    @classmethod
+    def of(cls, mine: np.ndarray, shared: np.ndarray, used: np.ndarray) -> "_Pose":
+        if not used.all():
+            mine, shared = mine[:, used], shared[:, used]
+        factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)
+        own = np.linalg.solve(factor, mine)
+        across = own @ shared.T
+        normal = shared @ shared.T - across.T @ across
+        return cls(used, own, factor, shared - across.T @ own, across, normal)
+
+    def values(self, some: np.ndarray) -> np.ndarray:
+        """Of values (d, r, c, F) those that were measured, as real rows (d, m)."""
+        rows = real_rows(some)
+        return rows if self.used.all() else rows[:, self.used]
 
 
 def _crossed(

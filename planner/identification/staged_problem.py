@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +9,7 @@ from planner.dynamics.gradient import Inertias
 from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.agreement import MODEL_ERROR
+from planner.identification.effort import Effort
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import matrices_at, stack
 from planner.identification.measurement_model import Tolerances
@@ -17,9 +17,6 @@ from planner.identification.objective import TOO_SOFT, Objective, stands
 from planner.identification.parameters import Parametrisation
 from planner.inference.least_squares import Minimum, minimise
 from planner.robot.elastic_model import ElasticModel, Matrices
-
-if TYPE_CHECKING:
-    from planner.identification.identify import Effort
 
 LOG_TOLERANCE = 1e-4
 STIFFER = float(np.log(1.5))  # by which the springs of a start grow until they carry the weight
@@ -52,7 +49,7 @@ class StagedProblem:
     inertias: Inertias
     parametrisation: Parametrisation
     progress: Callable[[Progress], None] | None
-    effort: "Effort"
+    effort: Effort
     barrier: Barrier | None
     tolerances: Tolerances | None
 
@@ -76,9 +73,9 @@ class StagedProblem:
         p = self.parametrisation
         stiffer = STIFFER * np.array([x.kind == "stiffness" for x in p.parameters])
         for steps in range(STIFFEST + 1):
-            tried = p.near(theta + steps * stiffer)
+            tried = p.near(theta + steps * stiffer) if steps else theta
             if stands(self.matrices, p.elasticity(tried).stiffness):
-                return theta if steps == 0 else tried
+                return tried
         raise InputError(TOO_SOFT)
 
     def objective(

@@ -31,15 +31,23 @@ class Completion:
 
 
 def cut_off(solved: Poles, s: np.ndarray, tail_s: np.ndarray) -> np.ndarray:
-    """(n, 3, 3, F) in m/s²/N at s (n, F) for records that end tail_s (n,) after the pulse."""
+    """(n, 3, 3, F) in m/s²/N at s (n, F) for records that end tail_s (n,) after the pulse.
+
+    With loss factors, of the poles of K(1 + iη) those with a negative imaginary part grow: what is
+    recorded has the conjugates of the others in their place.
+    """
     out = np.zeros((*solved.residues.shape[:1], *solved.residues.shape[2:], s.shape[1]), complex)
     for i in np.flatnonzero(np.isfinite(tail_s)):
         alive = solved.poles[i].real * tail_s[i] > OVER
+        if solved.structural:
+            alive &= (solved.poles[i].imag > 0) & (solved.poles[i].real < 0)
         if not alive.any():
             continue
         pole = solved.poles[i, alive][:, None]
-        lost = pole**2 * np.exp((pole - s[i]) * tail_s[i]) / (s[i] - pole)
         flat = solved.residues[i, alive].reshape(len(pole), -1)
+        if solved.structural:
+            pole, flat = np.concatenate([pole, pole.conj()]), np.concatenate([flat, flat.conj()])
+        lost = pole**2 * np.exp((pole - s[i]) * tail_s[i]) / (s[i] - pole)
         out[i] = (flat.T @ lost).reshape(out[i].shape)
     return out
 

@@ -9,20 +9,20 @@ from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
 from planner.modal.pole_identification import natural, probability, support
-from planner.modal.rank_one_fit import Entries, fit_halves, fit_shape
+from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.residues import realign
+from planner.modal.row_gains import FREE_GAIN, row_gain
 from planner.modal.shape_measures import (
     phase_collinearity,
     phase_deviation_deg,
     real_normal_modes,
 )
 from planner.recording.dof import Dof
+from planner.recording.geometry import Geometry
 
 # A band that the user does not state begins at this line: the first ones hold offsets and drift.
 FIRST_LINE = 3
-# Rows and columns are fitted apart where together they leave χ² this many times too large, and
-# apart this many times less.
-ASYMMETRIC = 2.0
+LEFT_OUT = 1e8  # times its variance: of a residue that does not fit the others
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,14 @@ class MatrixModes:
     checks: Consistency
 
 
-def modes_of_matrix(matrix: FrfMatrix, band_hz: tuple[float, float] | None = None) -> MatrixModes:
+def modes_of_matrix(
+    matrix: FrfMatrix,
+    band_hz: tuple[float, float] | None = None,
+    geometry: Geometry | None = None,
+) -> MatrixModes:
     """All modes that a matrix of FRFs holds in a band (Hz; default: all lines but the first few).
 
+    Where the points lie (`geometry`) shows which of them have a turned sign or another's name.
     Raises RefusedError where no mode can be found.
     """
     frequency = matrix.frequency_hz
@@ -86,19 +91,30 @@ def modes_of_matrix(matrix: FrfMatrix, band_hz: tuple[float, float] | None = Non
             f"No mode could be found between {band[0]:g} and {band[1]:g} Hz in {matrix.count} FRFs:"
             " check that the band holds a resonance."
         )
-    checks = check(matrix, found, np.array(inside))
-    found = _turned_back(matrix, found, checks)
+    checks = check(matrix, found, np.array(inside), geometry)
+    found = _put_right(matrix, found, checks)
     dofs, entries = _points(matrix, found, checks)
-    modes = tuple(_mode(found, int(k), entries, len(dofs), matrix.scaled) for k in inside)
+    shapes = _shapes(found, inside, entries)
+    modes = tuple(
+        _mode(found, int(k), shape, entries, len(dofs), matrix.scaled)
+        for k, shape in zip(inside, shapes, strict=True)
+    )
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
     return MatrixModes(dofs, modes, band, remarks, found, checks)
 
 
-def _turned_back(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
-    """With the residues of columns whose sign is turned as they should be."""
-    sign = np.array([-1.0 if dof in checks.turned else 1.0 for dof in matrix.references])
-    residue = found.fit.residue * sign[found.columns][:, None]
-    return replace(found, fit=replace(found.fit, residue=residue))
+def _put_right(matrix: FrfMatrix, found: MatrixPoles, checks: Consistency) -> MatrixPoles:
+    """With residues of turned points as they should be; odd ones count for nothing."""
+    felt, hit = matrix.responses, matrix.references
+    named = [(felt[o], hit[i]) for o, i in zip(found.rows, found.columns, strict=True)]
+    if len(felt) < len(hit):
+        named = [(roved, stayed) for stayed, roved in named]
+    turned = [(r in checks.turned_rows) != (s in checks.turned) for r, s in named]
+    sign = np.where(turned, -1.0, 1.0)[:, None]
+    doubt = np.where([pair in checks.odd for pair in named], LEFT_OUT, 1.0)[:, None]
+    fit = found.fit
+    residue, variance = fit.residue * sign, fit.residue_variance * doubt
+    return replace(found, fit=replace(fit, residue=residue, residue_variance=variance))
 
 
 def _within(frequency_hz: float, band_hz: tuple[float, float]) -> bool:
@@ -121,21 +137,38 @@ def _points(
     hit_at = place | {dof: len(dofs) + k for k, dof in enumerate(apart)}
     felt = np.array([place[matrix.responses[o]] for o in found.rows])
     hit = np.array([hit_at[matrix.references[i]] for i in found.columns])
-    return dofs, Entries(felt, hit, len(dofs) + len(apart))
+    roved = felt, hit
+    if len(matrix.responses) < len(matrix.references):
+        roved = hit, felt
+    return dofs, Entries(*roved, len(dofs) + len(apart))
 
 
-def _mode(found: MatrixPoles, k: int, entries: Entries, points: int, scaled: bool) -> MatrixMode:
+def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[FittedShape]:
+    """Shapes of modes (indices); rows err as a whole by what those of the references show.
+
+    Points that are rows and columns tell it, at first fitted with their gains left free.
+    """
+
+    def fitted(k: int, gain: float, near: np.ndarray | None) -> FittedShape:
+        residue = found.fit.residue[:, k]
+        variance = found.scale[k] * found.fit.residue_variance[:, k]
+        return fit_shape(entries, residue, variance, found.fit.poles[k].imag, gain, near)
+
+    if np.intersect1d(entries.rows, entries.columns).size < 2:
+        return [fitted(k, 0.0, None) for k in modes]
+    free = [fitted(k, FREE_GAIN, None) for k in modes]
+    gain = row_gain(free)
+    return [fitted(k, gain, one.shape) for k, one in zip(modes, free, strict=True)]
+
+
+def _mode(
+    found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, points: int, scaled: bool
+) -> MatrixMode:
     fit, m = found.fit, found.fit.poles.size
     pole = complex(fit.poles[k])
     index = [k, m + k]
     covariance = found.scale[k] * fit.covariance[np.ix_(index, index)]
     frequency, damping, sd = natural(pole, covariance)
-    variance = found.scale[k] * fit.residue_variance[:, k]
-    given = entries, fit.residue[:, k], variance, pole.imag
-    fitted = fit_shape(*given)
-    if fitted.misfit > ASYMMETRIC:
-        halves = fit_halves(*given)
-        fitted = halves if halves.misfit < fitted.misfit / ASYMMETRIC else fitted
     group, odd = entries.groups
     scaled = scaled and bool(np.all(odd[group[:points]]))
     shape, shape_sd = _shrunk(fitted.shape[:points], fitted.sd[:points])
@@ -156,11 +189,13 @@ def _mode(found: MatrixPoles, k: int, entries: Entries, points: int, scaled: boo
 def _shrunk(shape: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A shape whose hardly determined points are drawn towards zero, and its sds.
 
-    No point moves much farther than the farthest of the well determined half (normal prior): where
-    poles of a set nearly coincide, its residues alone would be anything.
+    Points move about as far as those of the well determined half (normal prior): where poles of a
+    set nearly coincide, or only a reference near a mode's node felt a point, its residues alone
+    would be anything.
     """
-    known = sd <= np.median(sd)
-    power = float(np.max(np.abs(shape[known]) ** 2))
+    relative = sd / np.maximum(np.abs(shape), 1e-300)
+    known = relative <= np.median(relative)
+    power = float(np.mean(np.abs(shape[known]) ** 2))
     share = power / np.maximum(power + 2 * sd**2, 1e-300)
     return shape * share, sd * np.sqrt(share)
 

@@ -10,27 +10,18 @@ from planner.modal.mode_selection import MAX_DAMPING, excess, running_mean
 from planner.modal.refine import refine
 from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
+from planner.modal.split_modes import REACH, Places, around, drifted, explains, thinned, unsplit
 
-# Row and column of each entry, columns being those of the few references.
-Places = tuple[np.ndarray, np.ndarray]
-# Lines farther from every resonance than this many half bandwidths are thinned when poles of sets
-# are fitted: one in so many is kept.
-NEAR, THINNED = 10.0, 3
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
 PRESENT, PRESENT_ADDED = 0.03, 0.2
 MOST_ADDED = 6
 ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
-PASSES = 2  # of leaving out and adding
+PASSES = 4  # of leaving out and adding
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
+SETTLING = 2  # rounds of a fit that has been fitted before, to other lines
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
-# Poles of one mode take part at the references alike (MAC of the participation).
-ALIKE = 0.8
-MERGED_ROUNDS = 8  # of a fit whose sets have to part from where two poles were
-# Around a pole so many half bandwidths, and at least so many lines either way, are fitted to judge
-# it.
-REACH, LINES_AROUND = 12.0, 12
 
 
 def common(data: Data, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -38,7 +29,9 @@ def common(data: Data, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
     variance = np.broadcast_to(power, data.response.shape)
     for _ in range(2):
-        found = refine(data.lines, data.response, variance, poles, data.allowed)
+        some = thinned(data, poles)
+        part = data.lines.part(some), data.response[..., some], variance[..., some]
+        found = refine(*part, poles, data.allowed)
         poles = found.poles
         shown = found.residues.residue @ unit(data.lines, poles)
         shown += found.residues.residue.conj() @ unit(data.lines, poles.conj())
@@ -63,58 +56,58 @@ def established(
     places: Places,
 ) -> tuple[SetPoles, np.ndarray]:  # fmt: skip
     """Fit with every set's own poles, weak modes left out and missing ones added."""
-    fit = _fit(data, sets, variance, poles, rounds=ROUGH_ROUNDS)
-    tested: set[tuple[int, int]] = set()
-    for number in range(PASSES):
+    fit = _fit(data, sets, variance, poles, rounds=0)
+    fit = _fit(data, sets, variance, fit.poles, drifted(data, sets, fit, variance), ROUGH_ROUNDS)
+    searched = False
+    for _ in range(PASSES):
         variance = _variance(data, fit.fitted, fit.poles.size)
-        poles = _pruned(data, fit, variance)
+        left = _part_of(fit, _standing(data, fit, variance))
+        poles, own = unsplit(data, sets, left, variance, places)
+        # What a fit lacks is looked for where it has no mode too many.
         if poles.size == fit.poles.size:
-            poles = _unsplit(data, sets, fit, variance, places, tested)
-        split = poles.size < fit.poles.size
-        if number == 0:
-            poles = np.append(poles, _missing(data, sets, fit, variance))
+            if searched:
+                break
+            added, searched = _missing(data, sets, fit, variance), True
+            poles = np.append(poles, added)
+            own = np.column_stack([own, np.tile(added, (len(own), 1))])
+            if not added.size:
+                break
         if not poles.size:
-            return replace(fit, poles=poles), variance
-        same = not split and poles.size == fit.poles.size
-        if same and number:
-            break
-        known = fit.own if same else None
-        fit = _fit(data, sets, variance, fit.poles if same else poles, known)
-        if same:
-            break
+            return replace(left, poles=poles), variance
+        fit = _fit(data, sets, variance, poles, own)
+    variance = _variance(data, fit.fitted, fit.poles.size)
+    fit = _fit(data, sets, variance, fit.poles, fit.own, SETTLING, every=True)
     return fit, _variance(data, fit.fitted, fit.poles.size)
 
 
 def _fit(
     data: Data, sets: tuple[np.ndarray, ...], variance: np.ndarray, poles: np.ndarray,
-    known: np.ndarray | None = None, rounds: int = ROUNDS,
+    known: np.ndarray | None = None, rounds: int = ROUNDS, every: bool = False,
 ) -> SetPoles:  # fmt: skip
-    """Fit on thinned lines; poles that stray are left out."""
+    """Fit on thinned lines (or `every` one near a mode); poles that stray are left out."""
     while True:
         try:
-            lines = _thinned(data, poles)
+            lines = thinned(data, poles, every)
             return fit_sets(data, sets, variance, poles, rounds, known, lines)
         except StrayedError as error:
             poles, known = poles[~error.astray], None
 
 
-def _thinned(data: Data, poles: np.ndarray) -> np.ndarray:
-    """Lines near a resonance, and some of the others."""
-    f = data.frequency_hz
-    kept = np.arange(f.size) % THINNED == 0
-    for pole in poles:
-        kept |= np.abs(f - pole.imag / (2 * np.pi)) < NEAR * abs(pole.real) / (2 * np.pi)
-    return np.flatnonzero(kept)
-
-
-def _part(data: Data, lines: np.ndarray) -> Data:
-    return replace(data, frequency_hz=data.frequency_hz[lines], response=data.response[..., lines])
-
-
-def _pruned(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
-    """The poles that stand."""
+def _standing(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
+    """(m,) bool: which poles are modes, or stand for those above the last line."""
     _, weak, presence = judged(data, fit, variance)
-    return fit.poles[(weak <= 1) & (presence >= PRESENT)]
+    above = fit.poles.imag > 2 * np.pi * data.frequency_hz[-1]
+    return above | (weak <= 1) & (presence >= PRESENT)
+
+
+def _part_of(fit: SetPoles, kept: np.ndarray) -> SetPoles:
+    """Some of the modes (bool); what was fitted stays."""
+    both = np.tile(kept, 2)
+    return replace(
+        fit, poles=fit.poles[kept], own=fit.own[:, kept], spread=fit.spread[both],
+        covariance=fit.covariance[np.ix_(both, both)], residue=fit.residue[:, kept],
+        residue_variance=fit.residue_variance[:, kept], significance=fit.significance[kept],
+    )  # fmt: skip
 
 
 def judged(
@@ -124,7 +117,8 @@ def judged(
     poles, m = fit.poles, fit.poles.size
     frequency = np.abs(poles) / (2 * np.pi)
     scale = np.interp(frequency, data.frequency_hz, _excess(data, fit, variance))
-    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    # How the sets differ does not blur a mode: each has a pole of its own.
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance) - fit.spread / len(fit.own), 0.0))
     decay = np.maximum(-poles.real, 1e-12 * np.abs(poles))
     weak = [
         data.threshold * scale / np.maximum(fit.significance, 1e-300),
@@ -179,17 +173,16 @@ def _tried(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray, pole: complex
 ) -> complex | None:
     """The pole after a fit of the lines around it, where it is a mode; None where it is not."""
-    local, lines, near = _around(data, fit, pole)
+    local, lines, near = around(data, sets, fit, pole)
     start = np.append(fit.poles[near], pole)
     together = np.broadcast_to(variance[:, None, lines], local.response.shape)
     quick = refine(local.lines, local.response, together, start, local.allowed)
     if presences(local, quick.poles, quick.residues.residue[:, 0])[-1] < PRESENT_ADDED / 2:
         return None
+    known = fit.own[:, near]
+    own = np.column_stack([known, np.full(len(known), quick.poles[-1])])
+    start = np.append(fit.poles[near], quick.poles[-1])
     try:
-        own = fit.own[:, near]
-        before = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=own)
-        own = np.column_stack([own, np.full(len(own), quick.poles[-1])])
-        start = np.append(fit.poles[near], quick.poles[-1])
         after = fit_sets(local, sets, variance[:, lines], start, known=own)
     except StrayedError:
         return None
@@ -197,88 +190,10 @@ def _tried(
     inside = local.frequency_hz[0] < new.imag / (2 * np.pi) < local.frequency_hz[-1]
     present = presences(local, after.poles, after.residue)[-1]
     real = inside and present >= PRESENT_ADDED and -new.real < DAMPING_ADDED * abs(new)
-    better = _explains(local, before, after, variance[:, lines])
-    return complex(new) if real and better else None
-
-
-def _around(data: Data, fit: SetPoles, pole: complex) -> tuple[Data, np.ndarray, np.ndarray]:
-    """The lines around a pole less the modes far from it, their indices, which modes are near."""
-    step, centre = data.frequency_hz[1] - data.frequency_hz[0], pole.imag / (2 * np.pi)
-    reach = max(REACH * abs(pole.real) / (2 * np.pi), LINES_AROUND * step)
-    lines = np.flatnonzero(np.abs(data.frequency_hz - centre) < reach)
-    local = _part(data, lines)
-    near = np.abs(fit.poles.imag / (2 * np.pi) - centre) < reach
-    far = fit.residue[:, ~near] @ unit(local.lines, fit.poles[~near])
-    far += fit.residue[:, ~near].conj() @ unit(local.lines, fit.poles[~near].conj())
-    return replace(local, response=local.response - far[:, None]), lines, near
-
-
-def _explains(local: Data, less: SetPoles, more: SetPoles, variance: np.ndarray) -> bool:
-    """Whether a fit with one mode more is better than chance makes it."""
-    chi = [
-        float(np.sum(2 / variance * np.abs(local.response[:, 0] - fit.fitted) ** 2))
-        for fit in (less, more)
-    ]
-    scale = max(1.0, chi[1] / (2 * local.response.size))
-    return chi[0] - chi[1] > local.threshold * scale
-
-
-def _unsplit(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
-    places: Places, tested: set[tuple[int, int]],
-) -> np.ndarray:  # fmt: skip
-    """Poles with those pairs made one that sets of slightly different poles explain as well.
-
-    What one pole for all sets cannot follow, two poles within a bandwidth imitate; they excite and
-    are excited alike. `tested` are pairs (lines) that were found to be two.
-    """
-    poles = fit.poles[np.argsort(fit.poles.imag)]
-    kept: list[complex] = list(poles[:1])
-    for pole in poles[1:]:
-        last = kept[-1]
-        width = 2 * max(abs(last.real), abs(pole.real))
-        step = 2 * np.pi * (data.frequency_hz[1] - data.frequency_hz[0])
-        pair = round(last.imag / step), round(pole.imag / step)
-        near = abs(pole.imag - last.imag) < width and pair not in tested
-        if (
-            near
-            and _alike(fit, places, last, pole)
-            and _is_one(data, sets, fit, variance, last, pole)
-        ):
-            kept[-1] = (last + pole) / 2
-        else:
-            tested.add(pair)
-            kept.append(pole)
-    return np.array(kept)
-
-
-def _alike(fit: SetPoles, places: Places, first: complex, second: complex) -> bool:
-    """Whether two poles take part at the references alike; always so at a single one."""
-    rows, columns = places
-    vectors = []
-    for pole in (first, second):
-        near = int(np.argmin(np.abs(fit.poles - pole)))
-        table = np.zeros((rows.max() + 1, columns.max() + 1), complex)
-        table[rows, columns] = fit.residue[:, near]
-        vectors.append(np.linalg.svd(table, full_matrices=False)[2][0])
-    return bool(np.abs(np.vdot(*vectors)) ** 2 > ALIKE)
-
-
-def _is_one(
-    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
-    first: complex, second: complex,
-) -> bool:  # fmt: skip
-    middle = (first + second) / 2
-    local, lines, near = _around(data, fit, middle)
-    pair = (np.abs(fit.poles - first) < 1e-9) | (np.abs(fit.poles - second) < 1e-9)
-    if np.count_nonzero(pair) < 2:
-        return False
-    others = near & ~pair
-    own = np.column_stack([fit.own[:, others], np.full(len(sets), middle)])
-    start = np.append(fit.poles[others], middle)
+    if not real:
+        return None
     try:
-        one = fit_sets(local, sets, variance[:, lines], start, MERGED_ROUNDS, own)
-        two = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
+        before = fit_sets(local, sets, variance[:, lines], fit.poles[near], SETTLING, known)
     except StrayedError:
-        return False
-    return not _explains(local, one, two, variance[:, lines])
+        return None
+    return complex(new) if explains(local, before, after, variance[:, lines]) else None

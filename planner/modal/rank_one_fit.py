@@ -9,11 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDS, STILL = 60, 1e-8  # of alternating and of Gauss-Newton steps, relative to the shape
+ROUNDS = 60  # of alternating and of Gauss-Newton steps
+ROUGH, STILL = 1e-3, 1e-6  # a step below, relative to the shape, is the last: while weights change
 RIDGE = 1e-11
 # Relative to all entries, an error that each is given at first: none rules alone.
 START_SHARE = 0.03
-REWEIGHED = 3  # times that the weights follow what no shape explains
+REWEIGHED, SPREAD_ROUNDS = 4, 30  # times that weights follow what no shape explains; its steps
+SETTLED = 0.03  # relative change of the variance, below which it is settled
+LEAST_FREE = 1.0  # degrees of freedom, with fewer of which nothing is left over to tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,113 +66,175 @@ class FittedShape:
     """A shape over all points, with what is left of the residues.
 
     `sd` (points,) is of real and imaginary part each; `misfit` is χ² per degree of freedom of
-    the noise alone; NaN where no entry is left over to tell. Beyond it entries count as uncertain
-    in proportion to their size, as hits and sets make them.
+    the noise alone; NaN where no entry is left over to tell. `gains` (t,) are the relative errors
+    of the rows of the points `tied` (t,) that are rows and columns, with `gain_covariance` (t, t).
     """
 
     shape: np.ndarray  # (points,) complex
     sd: np.ndarray
     misfit: float
-    left: np.ndarray  # (e,) residues less what the shape explains, complex
+    tied: np.ndarray
+    gains: np.ndarray
+    gain_covariance: np.ndarray
 
 
 def fit_shape(
-    entries: Entries, residue: np.ndarray, variance: np.ndarray, damped_1_s: float
+    entries: Entries,
+    residue: np.ndarray,
+    variance: np.ndarray,
+    damped_1_s: float,
+    gain: float = 0.0,
+    near: np.ndarray | None = None,
 ) -> FittedShape:
     """Shape φ with residue ≈ φ_row φ_column / (2iω_d).
 
-    residue (e,) in m/(N·s), variance (e,) of real and imaginary part each; damped_1_s: ω_d. The
-    shape has unit modal mass (kg^−½) in groups whose scale is known; in others rows and columns
-    share the residue evenly.
+    residue (e,) in m/(N·s), variance (e,) of real and imaginary part each; damped_1_s: ω_d;
+    `gain`: relative sd by which whole rows err, which only rows of points that are columns too can
+    show; `near` (points,): a shape to start from. The shape has unit modal mass (kg^−½) in groups
+    whose scale is known; in others rows and columns share the residue evenly. What no shape
+    explains widens the variance: that of each column by a factor, that of all entries in
+    proportion to their size.
     """
     values = residue * 2j * damped_1_s
     noise = 2 * variance * (2 * damped_1_s) ** 2
     even = noise + START_SHARE**2 * np.mean(np.abs(values) ** 2)
-    shape = _fitted(entries, values, 1 / even, _start(entries, values, 1 / even))
-    weight = 1 / noise
+    tied = np.intersect1d(entries.rows, entries.columns) if gain else np.zeros(0, int)
+    problem = _Problem(entries, values, tied, max(gain, 1e-12))
+    near = _start(entries, values, 1 / even) if near is None else near
+    found = np.append(near, np.zeros(tied.size))
+    spread, proportional = even, np.zeros(even.size)
     for _ in range(REWEIGHED):
-        shape = _fitted(entries, values, weight, shape)
-        left = values - shape[entries.rows] * shape[entries.columns]
-        jacobian = _jacobian(entries, shape)
-        normal = jacobian.conj().T @ (weight[:, None] * jacobian)
-        free = residue.size - int(np.linalg.matrix_rank(normal, tol=1e-12 * np.trace(normal).real))
-        if free <= 0:
+        found = _fitted(problem, 1 / spread, found, ROUGH)
+        left, jacobian = problem.left(found), problem.jacobian(found)
+        covariance = problem.covariance(jacobian, 1 / spread)
+        taken = np.einsum("ea,ab,eb->e", jacobian.conj(), covariance, jacobian).real / spread
+        free = residue.size - float(np.sum(taken))
+        if free < LEAST_FREE:
+            spread, proportional = noise, np.zeros(noise.size)
             break
-        # What no shape explains is taken for hits and sets that differ in proportion.
-        size = np.abs(shape[entries.rows] * shape[entries.columns]) ** 2
-        beyond = np.sum((np.abs(left) ** 2 - noise) / noise)
-        share = max(0.0, float(beyond / max(np.sum(size / noise), 1e-300)))
-        weight = 1 / (noise + share * size)
-    shape = _fitted(entries, values, weight, shape)
-    left = values - shape[entries.rows] * shape[entries.columns]
-    jacobian = _jacobian(entries, shape)
-    normal = jacobian.conj().T @ (weight[:, None] * jacobian)
-    covariance = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)
-    free = residue.size - int(np.linalg.matrix_rank(normal, tol=1e-12 * np.trace(normal).real))
+        square = np.abs(left) ** 2 * residue.size / free
+        size = np.abs(values - left) ** 2
+        before = spread
+        constant, proportional = _spread(entries.columns, square, noise, size)
+        spread = constant + proportional
+        if np.all(np.abs(spread / before - 1) < SETTLED):
+            break
+    found = _fitted(problem, 1 / spread, found)
+    left, jacobian = problem.left(found), problem.jacobian(found)
+    # What errs in proportion errs in phase: all of it is in the real part, not half.
+    covariance = problem.covariance(jacobian, 1 / (spread + proportional))
+    free = residue.size - int(np.linalg.matrix_rank(covariance, hermitian=True)) + tied.size
     misfit = float(np.sum(np.abs(left) ** 2 / noise) / free) if free > 0 else float("nan")
-    wider = max(1.0, float(np.sum(weight * np.abs(left) ** 2) / free)) if free > 0 else 1.0
-    sd = np.sqrt(np.maximum(np.diag(covariance).real, 0.0) / 2 * wider)
-    return FittedShape(shape, sd, misfit, left / (2j * damped_1_s))
-
-
-def fit_halves(
-    entries: Entries, residue: np.ndarray, variance: np.ndarray, damped_1_s: float
-) -> FittedShape:
-    """As `fit_shape`, rows and columns each by themselves; points that are both give the scale."""
     n = entries.points
-    apart = Entries(entries.rows, entries.columns + n, 2 * n)
-    found = fit_shape(apart, residue, variance, damped_1_s)
-    rows, columns = found.shape[:n], found.shape[n:]
-    felt, hit = np.isin(np.arange(n), entries.rows), np.isin(np.arange(n), entries.columns)
-    both = felt & hit
-    if not both.any():
-        return fit_shape(entries, residue, variance, damped_1_s)
-    ratio = np.vdot(rows[both], columns[both]) / max(np.linalg.norm(rows[both]) ** 2, 1e-300)
-    root = np.sqrt(complex(ratio)) or 1.0
-    shape = np.where(felt, rows * root, columns / root)
-    sd = np.where(felt, found.sd[:n] * abs(root), found.sd[n:] / abs(root))
-    return FittedShape(shape, sd, found.misfit, found.left)
+    sd = np.sqrt(np.maximum(np.diag(covariance)[:n].real, 0.0) / 2)
+    alone = np.setdiff1d(entries.rows, tied)
+    sd[alone] = np.hypot(sd[alone], gain * np.abs(found[alone]))
+    return FittedShape(found[:n], sd, misfit, tied, found[n:], covariance[n:, n:].real / 2)
+
+
+def _spread(
+    columns: np.ndarray, square: np.ndarray, noise: np.ndarray, size: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(e,) variances κ_column · noise and share · size, most likely for squared errors (e,).
+
+    κ ≥ 1 and share ≥ 0 by multiplicative steps, as for the factors of spectra (Févotte, Bertin
+    and Durrieu 2009).
+    """
+    parts = [noise * (columns == c) for c in np.unique(columns)] + [size]
+    table = np.stack(parts)
+    factor = np.ones(len(parts))
+    factor[-1] = START_SHARE**2
+    for _ in range(SPREAD_ROUNDS):
+        total = factor @ table
+        step = (table @ (square / total**2)) / np.maximum(table @ (1 / total), 1e-300)
+        factor *= np.sqrt(step)
+        factor[:-1] = np.maximum(factor[:-1], 1.0)
+    return factor[:-1] @ table[:-1], factor[-1] * table[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """φ_row φ_column (1 + g_row) beside values (e,); unknowns: all φ, g of the `tied` points."""
+
+    entries: Entries
+    values: np.ndarray
+    tied: np.ndarray
+    gain: float
+
+    def factor(self, found: np.ndarray) -> np.ndarray:
+        """(e,) 1 + g of each entry's row."""
+        gains = np.zeros(self.entries.points, complex)
+        gains[self.tied] = found[self.entries.points :]
+        return 1 + gains[self.entries.rows]
+
+    def left(self, found: np.ndarray) -> np.ndarray:
+        """(e,) what is not explained."""
+        e = self.entries
+        return self.values - found[e.rows] * found[e.columns] * self.factor(found)
+
+    def jacobian(self, found: np.ndarray) -> np.ndarray:
+        """(e, unknowns) change of the model with the unknowns."""
+        e, factor = self.entries, self.factor(found)
+        jacobian = np.zeros((e.rows.size, found.size), complex)
+        index = np.arange(e.rows.size)
+        np.add.at(jacobian, (index, e.rows), found[e.columns] * factor)
+        np.add.at(jacobian, (index, e.columns), found[e.rows] * factor)
+        place = np.full(e.points, -1)
+        place[self.tied] = e.points + np.arange(self.tied.size)
+        there = index[place[e.rows] >= 0]
+        jacobian[there, place[e.rows[there]]] = (found[e.rows] * found[e.columns])[there]
+        return jacobian
+
+    def normal(self, jacobian: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """(unknowns, unknowns) with the prior of the gains."""
+        normal = jacobian.conj().T @ (weight[:, None] * jacobian)
+        known = np.arange(self.entries.points, len(normal))
+        # Real and imaginary part each err by the gain.
+        normal[known, known] += 1 / (2 * self.gain**2)
+        return normal
+
+    def covariance(self, jacobian: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """(unknowns, unknowns); directions that nothing determines count as known."""
+        normal = self.normal(jacobian, weight)
+        scale = np.sqrt(np.maximum(np.diag(normal).real, 1e-300))
+        inverse = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-12, hermitian=True)
+        return inverse / scale[:, None] / scale
+
+    def error(self, found: np.ndarray, weight: np.ndarray) -> float:
+        """χ² of the values and of the gains."""
+        gains = np.abs(found[self.entries.points :]) ** 2
+        left = np.abs(self.left(found)) ** 2
+        return float(np.sum(weight * left) + np.sum(gains) / (2 * self.gain**2))
 
 
 def _fitted(
-    entries: Entries, values: np.ndarray, weight: np.ndarray, shape: np.ndarray
+    problem: _Problem, weight: np.ndarray, found: np.ndarray, still: float = STILL
 ) -> np.ndarray:
-    """The shape that fits best, from a first one (Gauss-Newton)."""
+    """The unknowns that fit best, from first ones (Gauss-Newton)."""
+    n = problem.entries.points
     for _ in range(ROUNDS):
-        jacobian = _jacobian(entries, shape)
-        normal = jacobian.conj().T @ (weight[:, None] * jacobian)
-        left = values - shape[entries.rows] * shape[entries.columns]
+        jacobian = problem.jacobian(found)
+        normal = problem.normal(jacobian, weight)
+        slope = jacobian.conj().T @ (weight * problem.left(found))
+        slope[n:] -= found[n:] / (2 * problem.gain**2)
         # A ridge far below all that is determined: a scale that is free then stays where it is.
-        normal[np.diag_indices(entries.points)] += RIDGE * np.trace(normal).real / entries.points
-        step = np.linalg.solve(normal, jacobian.conj().T @ (weight * left))
-        shape = _shortened(entries, values, weight, shape, step)
-        if np.linalg.norm(step) < STILL * np.linalg.norm(shape):
+        normal[np.arange(n), np.arange(n)] += RIDGE * np.trace(normal[:n, :n]).real / n
+        step = np.linalg.solve(normal, slope)
+        found = _shortened(problem, weight, found, step)
+        if np.linalg.norm(step) < still * np.linalg.norm(found):
             break
-    return shape
-
-
-def _jacobian(entries: Entries, shape: np.ndarray) -> np.ndarray:
-    """(e, points) change of φ_row φ_column with the shape."""
-    jacobian = np.zeros((entries.rows.size, entries.points), complex)
-    index = np.arange(entries.rows.size)
-    np.add.at(jacobian, (index, entries.rows), shape[entries.columns])
-    np.add.at(jacobian, (index, entries.columns), shape[entries.rows])
-    return jacobian
+    return found
 
 
 def _shortened(
-    entries: Entries, values: np.ndarray, weight: np.ndarray, shape: np.ndarray, step: np.ndarray
+    problem: _Problem, weight: np.ndarray, found: np.ndarray, step: np.ndarray
 ) -> np.ndarray:
-    """The shape after the longest part of a step that does not make the fit worse."""
-
-    def error(at: np.ndarray) -> float:
-        return float(np.sum(weight * np.abs(values - at[entries.rows] * at[entries.columns]) ** 2))
-
-    now = error(shape)
+    """The unknowns after the longest part of a step that does not make the fit worse."""
+    now = problem.error(found, weight)
     for part in (1.0, 0.5, 0.2, 0.05):
-        if error(shape + part * step) <= now * (1 + 1e-12):
-            return shape + part * step
-    return shape
+        if problem.error(found + part * step, weight) <= now * (1 + 1e-12):
+            return found + part * step
+    return found
 
 
 def _start(entries: Entries, values: np.ndarray, weight: np.ndarray) -> np.ndarray:

@@ -59,46 +59,47 @@ def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0, tail_s: float = np.
 
 
 def unit(lines: Lines, poles: np.ndarray) -> np.ndarray:
-    """Response (m, F) to a unit residue of each pole, its conjugate's left out."""
-    apart = lines.x - poles[:, None]
+    """Response (…, m, F) to a unit residue of each pole (…, m), its conjugate's left out."""
+    apart = lines.x - poles[..., None]
     if not np.isfinite(lines.tail_s):
         return lines.factor / apart
     # A pole that grows would blow the tail up; only those that decay as recorded come this far.
-    tail = poles[:, None] ** 2 * np.exp(-apart * lines.tail_s)
+    tail = poles[..., None] ** 2 * np.exp(-apart * lines.tail_s)
     return (lines.factor - tail) / apart
 
 
 def unit_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
     """Derivative of `unit` by the poles (complex-analytic)."""
-    apart = lines.x - poles[:, None]
+    apart = lines.x - poles[..., None]
     if not np.isfinite(lines.tail_s):
         return lines.factor / apart**2
-    p = poles[:, None]
+    p = poles[..., None]
     end = np.exp(-apart * lines.tail_s)
     change = (2 * p + p**2 * lines.tail_s) * end
     return (lines.factor - p**2 * end) / apart**2 - change / apart
 
 
 def basis(lines: Lines, poles: np.ndarray, residual_terms: bool = True) -> np.ndarray:
-    """Response to unit real and imaginary parts of every coefficient, (columns, F) complex.
+    """Response to unit real and imaginary parts of every coefficient, (…, columns, F) complex.
 
-    poles (m,) in the plane of `lines`. Columns: Re R of each mode, Im R of each mode, then
+    poles (…, m) in the plane of `lines`. Columns: Re R of each mode, Im R of each mode, then
     the real parts of the out-of-band coefficients, then the imaginary ones.
     """
     up, down = unit(lines, poles), unit(lines, poles.conj())
     columns = [up + down, 1j * (up - down)]
     if residual_terms:
-        columns += [lines.rest, 1j * lines.rest]
-    return np.concatenate(columns)
+        rest = np.broadcast_to(lines.rest, (*up.shape[:-2], *lines.rest.shape))
+        columns += [rest, 1j * rest]
+    return np.concatenate(columns, axis=-2)
 
 
 def basis_slope(lines: Lines, poles: np.ndarray) -> np.ndarray:
-    """Basis (2m, F) of the derivative by the poles, for unit Re R and Im R.
+    """Basis (…, 2m, F) of the derivative by the poles (…, m), for unit Re R and Im R.
 
     ∂H/∂Re p = Re R·first + Im R·second and ∂H/∂Im p = Re R·second − Im R·first.
     """
     up, down = unit_slope(lines, poles), unit_slope(lines, poles.conj())
-    return np.concatenate([up + down, 1j * (up - down)])
+    return np.concatenate([up + down, 1j * (up - down)], axis=-2)
 
 
 def unpack(coefficients: np.ndarray, modes: int) -> Residues:

@@ -121,14 +121,16 @@ class Hit:
         if self.responses == tuple(Dof(sensor, axis) for axis in AXES):
             return self
         found = [i for axis in AXES for i, d in enumerate(self.responses) if d == Dof(sensor, axis)]
-        if len(found) < len(AXES):
-            return None
+        return self.as_heard(found) if len(found) == len(AXES) else None
+
+    def as_heard(self, rows: list[int]) -> "Hit":
+        """The hit as some of its channels have it."""
         out = self.taken_out_m_s2
         return replace(
             self,
-            acceleration_m_s2=self.acceleration_m_s2[found],
-            responses=tuple(self.responses[i] for i in found),
-            taken_out_m_s2=None if out is None else out[found],
+            acceleration_m_s2=self.acceleration_m_s2[rows],
+            responses=tuple(self.responses[i] for i in rows),
+            taken_out_m_s2=None if out is None else out[rows],
         )
 
     def label(self, row: int) -> str:

@@ -1,16 +1,12 @@
 """Screening of hits: what a careful engineer would refuse while standing at the robot."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from planner.recording.channel_faults import channel_faults, step
 from planner.recording.records import Fault, Hit
 
-# Overload: so improbable is it that equal samples at the top are chance, judged by samples that
-# lie below the top by a share of NEAR at most. A pulse of NARROW samples above its half is so sharp
-# that two are equal in one of 300 at a step of COARSE of its peak.
-BY_CHANCE, NEAR, NARROW, COARSE = 5e-4, 0.1, 6, 2e-3
 LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
 QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer to a hit
 NOTHING = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
@@ -33,7 +29,7 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
     limits, pulse = limits or ScreeningLimits(), hit.pulse
     if pulse.peak_n < NOTHING or np.max(np.abs(hit.acceleration_m_s2)) < NOTHING:
         return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
-    faults = [*_short(hit, limits), *_weak(hit, limits), *_clipping(hit)]
+    faults = [*_short(hit, limits), *_weak(hit, limits), *channel_faults(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
     return (
@@ -69,12 +65,6 @@ def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
                 f"hit harder.",
             )
         )
-    for i, samples in enumerate(hit.acceleration_m_s2):
-        if not np.any(samples - samples[0]):
-            name = hit.label(i)
-            faults.append(
-                Fault("dead", f"The acceleration along {name} is constant; check its cable.")
-            )
     ratio = _response_snr(hit)
     if ratio is not None and ratio < limits.least_response_snr:
         faults.append(
@@ -97,67 +87,10 @@ def _response_snr(hit: Hit) -> float | None:
         return None
     before = hit.acceleration_m_s2[:, : pulse.quiet]
     mean = np.mean(before, axis=1, keepdims=True)
-    rounding = np.array([_step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
+    rounding = np.array([step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
     noise = np.hypot(np.std(before, axis=1), rounding)
     answer = np.sqrt(np.mean((hit.acceleration_m_s2[:, after] - mean) ** 2, axis=1))
     return float(np.max(answer / np.maximum(noise, NOTHING)))
-
-
-def _clipping(hit: Hit) -> list[Fault]:
-    """Overload leaves the top flat: several samples equal to the last digit."""
-    faults = []
-    channels = [("force", hit.force_n)]
-    channels += [(f"acceleration {hit.label(i)}", s) for i, s in enumerate(hit.acceleration_m_s2)]
-    for name, samples in channels:
-        size = samples - np.median(samples)
-        for sense in (1.0, -1.0):
-            top = float(np.max(sense * size))
-            equal = sense * size >= top * (1 - 1e-6)
-            # A pulse has one top; a decaying response reaches the same top again and again.
-            flat = _longest_run(equal) if name == "force" else int(np.sum(equal))
-            if not _by_chance(np.maximum(sense * size, 0.0), flat, name == "force"):
-                level = float(samples[int(np.argmax(sense * size))])
-                faults.append(
-                    Fault(
-                        "clipped",
-                        f"The {name} is clipped at {level:.4g} ({flat} samples); raise the "
-                        f"channel's range or hit more softly.",
-                    )
-                )
-                break
-    return faults
-
-
-def _by_chance(size: np.ndarray, flat: int, pulse: bool) -> bool:
-    """Whether so many samples of |a channel| may be equal at its top without an overload.
-
-    Stored in steps, samples fall upon the top as upon any other step nearby: as often as by the
-    Poisson distribution. A pulse so narrow has a top so sharp that no two are equal.
-    """
-    top = float(np.max(size))
-    if top <= 0 or flat < 2:
-        return True
-    step = _step(size)
-    if pulse and int(np.sum(size > 0.5 * top)) <= NARROW and step < COARSE * top:
-        return False
-    if step > NEAR * top:
-        return True  # of so few steps nobody could tell
-    near = np.sum((size > (1 - NEAR) * top) & (size < top * (1 - 1e-6)))
-    each = (float(near) + 1) * step / (NEAR * top)
-    # Of the Poisson distribution: each^(flat−1) / (flat−1)!
-    return (flat - 1) * math.log(each) - math.lgamma(flat) > math.log(BY_CHANCE)
-
-
-def _step(samples: np.ndarray) -> float:
-    """The step in which a converter stored samples (n,): least difference of any two."""
-    steps = np.diff(np.unique(samples))
-    steps = steps[steps > 1e-9 * np.max(np.abs(samples))]
-    return float(np.min(steps)) if steps.size else 0.0
-
-
-def _longest_run(mask: np.ndarray) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
 
 
 def _polarity(hit: Hit) -> list[Fault]:

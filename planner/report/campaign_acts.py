@@ -9,6 +9,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
+from planner.report.log_words import act
 
 
 @dataclass(frozen=True)
@@ -71,19 +72,20 @@ class ExampleFolder(Answer):
 
 @dataclass(frozen=True)
 class UndoneAct(Answer):
-    """Answer of `undo`: number and kind of the log's entry that was taken back."""
+    """Answer of `undo`: number and kind of the log's entry that was taken back, and its words."""
 
     undone: int
     event: str
+    what: str
 
     @classmethod
     def of(cls, entry: Entry) -> "UndoneAct":
         """Of the entry that was taken back."""
-        return cls(entry.seq, msgspec.to_builtins(entry.event)["kind"])
+        return cls(entry.seq, msgspec.to_builtins(entry.event)["kind"], act(entry))
 
     def text(self) -> str:
         """One sentence."""
-        return f"Took back entry {self.undone} ({self.event})."
+        return f"Took back entry {self.undone}: {self.what}."
 
 
 @dataclass(frozen=True)

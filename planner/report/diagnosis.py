@@ -9,6 +9,7 @@ import numpy as np
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from planner.design.extra_sensor import ExtraSensor
 from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
@@ -83,7 +84,8 @@ class DiagnosisReport(Answer):
     """Answer of `diagnose`; `candidates` are most probable first and sum to 1.
 
     `undecided` are those that the recordings cannot tell apart; `sets` name, for what was found,
-    the effects any one of which may stand in its place. `explained` holds the fits.
+    the effects any one of which may stand in its place; `next_sensor` is where one more sensor
+    would part what is tied. `explained` holds the fits.
     """
 
     verdict: str
@@ -103,6 +105,7 @@ class DiagnosisReport(Answer):
     robot: str | None = None
     plots: tuple[str, ...] = ()
     next: NextHit | None = None
+    next_sensor: ExtraSensor | None = None
     seconds: float = 0.0
     explained: "Explained | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
@@ -176,8 +179,8 @@ class DiagnosisReport(Answer):
         for c in self.candidates[:SHOWN]:
             made.add_row(c.effect.replace("_", " "), c.at or "–", _percent(c.probability))
         parts += [made, self._agreement(), Text(self.shares.sentence)]
-        if self.next:
-            parts.append(Text(self.next.sentence, style="bold"))
+        more = (self.next, self.next_sensor)
+        parts += [Text(one.sentence, style="bold") for one in more if one]
         parts += remarks(self.remarks)
         files = (("Predictions", self.npz), ("Robot with what was found", self.robot))
         parts += [Text(f"{what}: {path}") for what, path in files if path]

@@ -12,7 +12,7 @@ from planner.errors import PlannerError
 from planner.frf.matrix import FrfMatrix, matrix_of
 from planner.modal.matrix_modes import MatrixMode, MatrixModes, modes_of_matrix, with_normal_modes
 from planner.recording.dof import Dof
-from planner.recording.geometry import read_geometry
+from planner.recording.geometry import Geometry, read_geometry
 from planner.recording.read import read
 from planner.recording.records import FrfRecord, Record
 from planner.report.answer import Answer, RefusedFile
@@ -140,7 +140,8 @@ def matrix_report(
         return None
     check_options(band_hz, quantity=quantity)
     matrix = matrix_of(frfs, quantity)
-    found = modes_of_matrix(matrix, band_hz)
+    geometry = read_geometry(tuple(files))
+    found = modes_of_matrix(matrix, band_hz, geometry)
     if real:
         found = with_normal_modes(found)
     return MatrixReport(
@@ -155,8 +156,8 @@ def matrix_report(
         accepted=tuple(str(path) for path in held),
         remarks=found.remarks,
         simulated=matrix.simulated,
-        exports=_export(matrix, found, files, real, files_to),
-        **_draw(pictures, matrix, found, files),
+        exports=_export(matrix, found, geometry, real, files_to),
+        **_draw(pictures, matrix, found, geometry, files),
     )
 
 
@@ -166,19 +167,27 @@ def named(dof: Dof) -> tuple[int | str, str]:
 
 
 def _export(
-    matrix: FrfMatrix, found: MatrixModes, files: Sequence[Path], real: bool, folder: Path | None
+    matrix: FrfMatrix,
+    found: MatrixModes,
+    geometry: Geometry | None,
+    real: bool,
+    folder: Path | None,
 ) -> tuple[str, ...]:
     """Write files for other programs, where wanted; where they are."""
     if folder is None:
         return ()
     from planner.report.matrix_files import Exported, export
 
-    what = Exported(matrix, found, read_geometry(tuple(files)), real)
+    what = Exported(matrix, found, geometry, real)
     return tuple(str(path) for path in export(what, folder.absolute()))
 
 
 def _draw(
-    pictures: Pictures, matrix: FrfMatrix, found: MatrixModes, files: Sequence[Path]
+    pictures: Pictures,
+    matrix: FrfMatrix,
+    found: MatrixModes,
+    geometry: Geometry | None,
+    files: Sequence[Path],
 ) -> dict[str, Any]:
     """Draw what is wanted; where it is."""
     if not pictures.wanted:
@@ -187,7 +196,6 @@ def _draw(
     from planner.report.shape_motion import animate
 
     name = files[0].name[-LONGEST_NAME:] + (f" and {len(files) - 1} more" if files[1:] else "")
-    geometry = read_geometry(tuple(files))
     drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name)
     if geometry is not None and pictures.folder is not None:
         moving = animate(found, geometry, pictures.folder.absolute())

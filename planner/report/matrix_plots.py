@@ -123,8 +123,10 @@ def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> F
     _draw_lines(panel, geometry, geometry.position_m, "0.7")
     felt = {dof.node for dof in matrix.responses}
     hit = {dof.node for dof in matrix.references}
-    for group, style in ((felt, {"marker": ".", "color": MEASURED}),
-                         (hit, {"marker": "^", "color": AHEAD, "s": 60})):  # fmt: skip
+    hammer = len(felt) < len(hit)  # roved, and not a sensor
+    roved, stayed = (hit, felt) if hammer else (felt, hit)
+    for group, style in ((roved, {"marker": ".", "color": MEASURED}),
+                         (stayed, {"marker": "^", "color": AHEAD, "s": 60})):  # fmt: skip
         at = np.array([p for n, p in zip(geometry.nodes, geometry.position_m, strict=True)
                        if n in group])  # fmt: skip
         if at.size:
@@ -133,8 +135,8 @@ def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> F
         for node, place in zip(geometry.nodes, geometry.position_m, strict=True):
             panel.text(*place, f" {node}", fontsize=6.5)
     handles = [
-        Line2D([], [], marker=".", ls="", color=MEASURED, label="long side of the matrix"),
-        Line2D([], [], marker="^", ls="", color=AHEAD, label="reference"),
+        Line2D([], [], marker=".", ls="", color=MEASURED, label="hit" if hammer else "felt"),
+        Line2D([], [], marker="^", ls="", color=AHEAD, label="felt" if hammer else "hit"),
     ]
     panel.legend(handles=handles, fontsize=8)
     _finish(panel, geometry.position_m)

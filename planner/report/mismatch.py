@@ -1,6 +1,6 @@
 """How much and where simulation and recordings differ, as the answer of `diagnose` states it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,13 +53,15 @@ class MismatchShares:
     @classmethod
     def of(cls, found: "Diagnosis") -> "MismatchShares":
         """Of a diagnosis."""
-        from planner.diagnosis.linear.fit import FINE
         from planner.diagnosis.linear.mismatch import Mismatch
+        from planner.diagnosis.linear.problem import FINE
 
+        given = replace(found.problem, lossy=False).misfit(found.refitted.effect, FINE)
         plain = found.problem.misfit(found.refitted.effect, FINE)
         best = found.problem.misfit(found.best.effect, FINE)
         last = Mismatch.of(best, found.best.x)
-        stated, refitted = (Mismatch.of(plain, x).whole for x in (plain.mean, found.refitted.x))
+        stated = Mismatch.of(given, given.mean).whole
+        refitted = Mismatch.of(plain, found.refitted.x).whole
         shares = stated, refitted, last.whole, last.left
         return cls(*(round(10 * float(np.log10(max(share, 1e-12))), 2) for share in shares))
 

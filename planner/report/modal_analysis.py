@@ -210,7 +210,13 @@ def _draw(
 
     more = f" and {len(accepted) - 1} more" if len(accepted) > 1 else ""
     name = f"{Path(accepted[0]).name[-LONGEST_NAME:]}{more}"
-    return pictures.write(modal_figures(frf, found, modal, name, simulated), name)
+
+    def record(rrd: Path) -> None:
+        from planner.report.rerun_modal import record_modes
+
+        record_modes(frf, found, modal, name, simulated, rrd)
+
+    return pictures.write(modal_figures(frf, found, modal, name, simulated), name, record)
 
 
 def _by_channel(

@@ -84,7 +84,7 @@ def stabilisation_figure(
     panel.set_ylabel(f"singular values of {kind}")
     panel.grid(True, alpha=0.25)
     orders = panel.twinx()
-    stays, moves = _poles(found)
+    stays, moves = poles_by_stability(found)
     orders.plot(*moves, **UNSTABLE, label="unstable pole")
     orders.plot(*stays, **STABLE, label="stable pole")
     orders.set_ylim(0, found.order + 1)
@@ -121,7 +121,7 @@ def cmif_figure(
     return figure
 
 
-def _poles(found: PoleIdentification | MatrixPoles) -> tuple[np.ndarray, np.ndarray]:
+def poles_by_stability(found: PoleIdentification | MatrixPoles) -> tuple[np.ndarray, np.ndarray]:
     """Frequency (Hz) and order, (2, k), of the poles on stable lines, and of all others."""
     lines = stable(found.diagram)
     kept = {(int(o), complex(p)) for x in lines for o, p in zip(x.orders, x.poles, strict=True)}
@@ -208,7 +208,7 @@ def _legend(figure: Figure, grid: Any, handles: list) -> None:
         panel.set_xlabel("frequency (Hz)", fontsize=9)
     handles = [
         *handles,
-        Patch(color=USABLE, alpha=0.15, label="usable band"),
+        Patch(color=USABLE, alpha=0.15, label="coherent, in the usable band"),
         Line2D([], [], color=MODE, ls=":", label="mode"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=9)

@@ -1,5 +1,6 @@
 """Where pictures go: files in a folder, and a Rerun recording."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,10 +29,20 @@ class Pictures:
     def wanted(self) -> bool:
         return self.folder is not None or self.rrd is not None
 
-    def write(self, figures: dict[str, "Figure"], name: str) -> dict[str, Any]:
-        """Write every figure; answers where they are. Raises InputError if that is impossible."""
+    def write(
+        self,
+        figures: dict[str, "Figure"],
+        name: str,
+        record: Callable[[Path], None] | None = None,
+    ) -> dict[str, Any]:
+        """Write every figure; answers where they are. Raises InputError if that is impossible.
+
+        `record` writes the Rerun file, which else has the figures.
+        """
         files = [] if self.folder is None else _files(figures, self.folder, self.format)
-        if self.rrd is not None:
+        if self.rrd is not None and record is not None:
+            record(self.rrd)
+        elif self.rrd is not None:
             _recording(figures, self.rrd, name)
         return {
             "plots": [str(file) for file in files],

@@ -15,7 +15,7 @@ from planner.modal.operating import OperatingModes
 from planner.report.plot_text import plain_text
 
 MODE, USABLE = "tab:blue", "tab:green"
-COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines) an FRF is shaded
+COHERENT, WINDOW = 0.8, 7  # from this coherence (median of so many lines around) an FRF is shaded
 COLUMNS = 9  # labels of several lines that fit side by side; more are turned upright
 
 
@@ -94,37 +94,38 @@ def number_modes(panel: Axes, modal: ModalModel | MatrixModes | OperatingModes) 
 
 
 def mark_band(panel: Axes, frf: Frf, response: int, hit: int) -> None:
-    """The whole frequency axis of an FRF; shaded where it can be used.
-
-    That is the FRF matrix' usable band, from where this FRF's coherence first holds.
-    """
+    """The whole frequency axis of an FRF; shaded where it is coherent in the usable band."""
     panel.set_xlim(0, frf.frequency_hz[-1])
-    low, high = frf.usable_band_hz
-    begins = _trusted_from(frf, response, hit, low, high)
-    if begins is not None:
-        panel.axvspan(begins, high, color=USABLE, alpha=0.08, lw=0)
+    for begins, ends in _trusted(frf, response, hit):
+        panel.axvspan(begins, ends, color=USABLE, alpha=0.08, lw=0)
     panel.grid(True, alpha=0.25)
     panel.tick_params(labelsize=8)
 
 
-def _trusted_from(frf: Frf, response: int, hit: int, low: float, high: float) -> float | None:
-    """The first line (Hz) around which an FRF is coherent; None where it never is.
+def _trusted(frf: Frf, response: int, hit: int) -> list[tuple[float, float]]:
+    """Where (Hz, from and to) an FRF is coherent within the matrix' usable band.
 
     Where a single hit tells no coherence, the share of the signal in |H|² stands for it.
     """
-    inside = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
-    coherence = frf.coherence[response, hit, inside]
+    low, high = frf.usable_band_hz
+    lines = np.flatnonzero((frf.frequency_hz >= low) & (frf.frequency_hz <= high))
+    coherence = frf.coherence[response, hit, lines]
     if not np.any(np.isfinite(coherence)):
-        power = np.abs(frf.accelerance[response, hit, inside]) ** 2
-        coherence = power / (power + np.nan_to_num(frf.variance[response, hit, inside]))
+        power = np.abs(frf.accelerance[response, hit, lines]) ** 2
+        coherence = power / (power + np.nan_to_num(frf.variance[response, hit, lines]))
     coherence = np.nan_to_num(coherence)
     if coherence.size < WINDOW:
-        return low if coherence.size and np.median(coherence) >= COHERENT else None
-    around = np.median(np.lib.stride_tricks.sliding_window_view(coherence, WINDOW), axis=1)
-    good = np.flatnonzero(around >= COHERENT)
-    if not good.size:
-        return None
-    return low if good[0] == 0 else float(frf.frequency_hz[inside][good[0] + WINDOW // 2])
+        good = coherence.size > 0 and np.median(coherence) >= COHERENT
+        return [(low, high)] if good else []
+    edge = WINDOW // 2
+    padded = np.pad(coherence, edge, mode="edge")
+    around = np.median(np.lib.stride_tricks.sliding_window_view(padded, WINDOW), axis=1)
+    good = np.concatenate([[False], around >= COHERENT, [False]])
+    first, beyond = np.flatnonzero(np.diff(good.astype(int))).reshape(-1, 2).T
+    half = float(frf.frequency_hz[1] - frf.frequency_hz[0]) / 2
+    hz = frf.frequency_hz[lines]
+    starts = np.maximum(hz[first] - half, low)
+    return list(zip(starts.tolist(), np.minimum(hz[beyond - 1] + half, high).tolist(), strict=True))
 
 
 def label_ends(panel: Axes, x: np.ndarray, values: np.ndarray, names: list[str]) -> None:

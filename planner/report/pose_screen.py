@@ -30,7 +30,9 @@ class JudgedHit:
         """One line, in colour."""
         axis = self.axis or "axis not stated"
         if self.kind == "good":
-            return Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
+            style = COLOURS["late"] if self.text else COLOURS["good"]
+            but = f", but – {self.text}" if self.text else ""
+            return Text(f"hit {self.number} ({axis}): good{but}", style=style)
         said = "late?" if self.kind == "late" else f"REPEAT HIT {self.number}"
         return Text(f"hit {self.number} ({axis}): {said} – {self.text}", style=COLOURS[self.kind])
 
@@ -74,7 +76,8 @@ class PosePage:
         parts: list[RenderableType] = [Text(title, style="bold reverse"), both]
         parts.append(_cut(f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {self.proposal.reason}"))
         parts.append(_cut(f"expected (Hz): {expected}", "bold"))
-        parts += [_cropped(hit.line) for hit in self.hits[-LAST:]]
+        parts += [_cropped(hit.line) for hit in self.hits[-LAST:-1]]
+        parts += [hit.line for hit in self.hits[-1:]]  # in full: it ends with what to do
         parts += [_cut(f"not whole yet: {why}", "dim") for why in self.unfinished[-2:]]
         if self.progress:
             parts.append(_cut(self.progress))

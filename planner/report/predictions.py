@@ -14,6 +14,8 @@ from planner.errors import InputError
 from planner.report.answer import Answer
 from planner.report.text import table, with_sd
 
+BESIDE = 0.01  # rad or m beyond the workspace that a readback may be: still inside
+
 if TYPE_CHECKING:
     from planner.surrogate.frf_bands import ModalPrediction
 
@@ -49,10 +51,11 @@ class ExpectedMode:
 
 @dataclass(frozen=True)
 class PosePrediction:
-    """The modes expected at a pose, from the lowest."""
+    """The modes expected at a pose, from the lowest; whether it lies `outside` the workspace."""
 
     pose: str
     modes: tuple[ExpectedMode, ...]
+    outside: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,7 @@ class PredictionReport(Answer):
     measurements: int
 
     def text(self) -> Group:
-        """A table of modes."""
+        """A table of modes, and which poses lie where nobody asked the model to be good."""
         made = table(
             f"After {self.measurements} measured poses",
             *("pose", "mode", "frequency (Hz)", "damping (%)"),
@@ -72,7 +75,13 @@ class PredictionReport(Answer):
         for pose in self.poses:
             for k, mode in enumerate(pose.modes):
                 made.add_row(pose.pose if k == 0 else "", str(k + 1), *mode.cells)
-        return Group(made, Text(f"FRFs (m/s²/N) with sd: {self.npz}"))
+        outside = [pose.pose for pose in self.poses if pose.outside]
+        told = []
+        if outside:
+            lie = "lies" if len(outside) == 1 else "lie"
+            said = f"{', '.join(outside)} {lie} outside the workspace of campaign.toml: sds and "
+            told = [Text(said + "bands are not to be trusted there.", style="yellow")]
+        return Group(made, *told, Text(f"FRFs (m/s²/N) with sd: {self.npz}"))
 
 
 def predictions(
@@ -85,8 +94,11 @@ def predictions(
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.predict(angles), campaign.frf(angles)
     save_frfs(npz, lines, mean, sd, names, np.rad2deg(angles))
+    cell = campaign.cell
+    inside = cell.workspace.contains(cell.robot, angles, BESIDE)
     poses = (
-        PosePrediction(name, ExpectedMode.all_of(prediction, i)) for i, name in enumerate(names)
+        PosePrediction(name, ExpectedMode.all_of(prediction, i), not inside[i])
+        for i, name in enumerate(names)
     )
     return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.model.labelled))
 

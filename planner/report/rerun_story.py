@@ -2,8 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from planner.campaign.cell import Cell
 from planner.campaign.events import (
     Confirmed,
@@ -26,6 +24,7 @@ class Story:
 
     def __init__(self, cell: Cell, rrd: Path | None, viewer: bool, simulated: bool = False):
         self._view = None
+        self._before: Model | None = None  # the model of the entry told last
         if rrd is not None or viewer:
             from planner.report.rerun_view import RerunView
 
@@ -70,7 +69,8 @@ class Story:
             case _:
                 view.text(number, f"Configured {model.cell.robot.name}", "INFO")
         if not isinstance(event, Proposed | Refused | Starred):
-            view.learning(number, _learning(model))
+            view.learning(number, model.frequency_sd_percent)
+        self._before = model
 
     def _imported(self, event: Imported, model: Model, measured: MeasuredPose | None) -> None:
         assert self._view is not None
@@ -96,10 +96,4 @@ class Story:
         if pose is None:
             self._view.text(number, text, "WARN")
         else:
-            self._view.measurement(number, model, pose, measured, text)
-
-
-def _learning(model: Model) -> dict[str, float]:
-    sd = model.frequency_sd_percent
-    values = {f"frequency_sd_percent/mode_{k + 1}": float(v) for k, v in enumerate(sd)}
-    return {**values, "frequency_sd_percent/all": float(np.sqrt(np.mean(sd**2)))}
+            self._view.measurement(number, model, self._before, pose, measured, text)

@@ -1,7 +1,7 @@
 """The Rerun view of a campaign.
 
-Timeline "measurement" counts measured poses. The recording holds nothing but what the campaign
-determines (no clock), so the same campaign gives the same recording.
+Timeline "measurement" counts measured poses; on "vibration" modes move. The recording holds
+nothing but what the campaign determines (no clock), so the same campaign gives the same recording.
 """
 
 import contextlib
@@ -11,7 +11,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib import colormaps
-from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell
@@ -19,8 +18,9 @@ from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report import frf_plots
-from planner.report.modal_plots import frequency_figure
+from planner.report.rerun_chart import chart_view
+from planner.report.rerun_curves import WIDE, CurveDrawing, frf_views, progress_views
+from planner.report.rerun_modes import VIBRATION, ModeDrawing, mode_views
 from planner.report.rerun_robot import WORLD, RobotDrawing
 from planner.report.rerun_stream import open_stream
 
@@ -31,7 +31,24 @@ COLOURS = {
     "hit": (70, 140, 255),
     "obstacle": (140, 150, 155),
 }
-LINES = 300  # frequency lines of the pictures
+SCALE = "0.1 % dark to 10 % yellow"
+BEFORE_US = -1000  # measurements lie so long before the vibration, 1 µs apart
+NEAR = 0.75  # modes are seen from nearer than the cell
+ARROW = 0.18  # length of a hit's arrow, in units of the robot's reach
+NOTE = """\
+Timeline `measurement` counts the measured poses: drag it, or play it.
+Choose the timeline `vibration` at the bottom and press play: the modes move as at the pose
+measured last, slowed down and exaggerated.
+
+- **Cell**: the robot at the pose measured last or proposed next; orange: proposed; red: measured;
+  blue: hits; grey: table and fences; small dots: poses of the workspace, coloured by the sd of
+  their natural frequencies ({scale}).
+- **FRFs**: white as measured; orange what was predicted before it was measured, with ± 2 sd; blue
+  what is believed with it.
+- **Modes**: the robot as the simulation has it, yellow where it moves most; white: sensors as
+  measured; thin: at rest. MAC 1: same shape, 0: none in common.
+- **Progress**: what is not known yet of the workspace; frequencies expected and measured.
+"""
 
 
 class RerunView:
@@ -41,16 +58,20 @@ class RerunView:
         self._cell = cell
         identity = f"{cell.robot.name}|{cell.config}"
         self._stream = open_stream(identity, cell.robot.name, _blueprint(cell), rrd, viewer)
-        self._simulated = False
+        self._curves = CurveDrawing(self._stream, cell.config.stop.frequency_sd_percent)
+        self._modes = ModeDrawing(self._stream)
         self._drawing = self._robot()
         self._obstacles()
+        self._note("")
         if simulated:
             self.label_simulated()
 
     def label_simulated(self) -> None:
         """Say on screen that the recordings are simulated."""
-        self._simulated = True
-        text = "# SIMULATED RECORDINGS\nNothing in this campaign was measured on a real robot."
+        self._note("# SIMULATED RECORDINGS\nNothing here was measured on a real robot.\n\n")
+
+    def _note(self, head: str) -> None:
+        text = f"{head}# {self._cell.robot.name}\n{NOTE.format(scale=SCALE)}"
         self._stream.log("note", rr.TextDocument(text, media_type="text/markdown"), static=True)
 
     def _robot(self) -> RobotDrawing | None:
@@ -79,6 +100,7 @@ class RerunView:
 
     def _at(self, number: int) -> None:
         self._stream.set_time(TIMELINE, sequence=number)
+        self._stream.set_time(VIBRATION, duration=np.timedelta64(BEFORE_US + number, "us"))
 
     def _move(self, q: np.ndarray) -> None:
         if self._drawing is not None:
@@ -101,95 +123,40 @@ class RerunView:
         self,
         number: int,
         model: Model,
+        before: Model | None,
         pose: LabelledPose,
         measured: MeasuredPose | None,
         text: str,
     ) -> None:
-        """A measured pose: robot, hits, FRF with band, workspace, learning."""
+        """A measured pose: robot, hits, FRFs and modes against what was expected `before`."""
         self._at(number)
         self._move(pose.q)
         if measured is not None:
             self._hits(pose, measured)
-        self._frf(model, pose, measured)
-        self._campbell(model.labelled)
+            self._curves.hits(measured)
+        self._curves.frfs(model, before, pose, measured)
+        self._curves.frequencies(number, before, pose)
+        self._modes.pose(model, pose, measured)
         self._measured_poses(model)
         self.workspace(number, model)
-        for k, mode in enumerate(pose.modes):
-            if mode is not None:
-                path = f"modes/mode_{k + 1}"
-                self._stream.log(f"{path}/frequency_hz", rr.Scalars(mode.frequency_hz))
-                self._stream.log(f"{path}/damping_percent", rr.Scalars(100 * mode.damping_ratio))
         self.text(number, text, "INFO")
 
     def _hits(self, pose: LabelledPose, measured: MeasuredPose) -> None:
         rotation, position = self._cell.robot.forward(pose.q)
         axes = sorted({hit.axis for hit in measured.hits})
-        vectors = [0.25 * hit_sign(a) * rotation[:, "xyz".index(a[1])] for a in axes]
+        size = ARROW * self._cell.robot.reach_m
+        vectors = [size * hit_sign(a) * rotation[:, "xyz".index(a[1])] for a in axes]
         if axes:
             self._stream.log(
                 "cell/hits",
                 rr.Arrows3D(
                     origins=[position - v for v in vectors],
                     vectors=vectors,
-                    radii=0.008,
+                    radii=0.03 * size,
                     labels=axes,
                     colors=COLOURS["hit"],
                 ),
             )
-        for axis in axes:
-            hit = next(h for h in measured.hits if h.axis == axis)
-            ms = 1000 * np.arange(hit.force_n.size) / hit.sampling_rate_hz
-            head = slice(0, min(hit.force_n.size, 256))
-            series = (
-                ("force_n", hit.force_n),
-                ("acceleration_m_s2", hit.acceleration_m_s2[hit.axis_index]),
-            )
-            for name, samples in series:
-                path = f"hits/{axis}/{name}"
-                self._stream.log(path, rr.BarChart(samples[head], abscissa=ms[head]))
-
-    def _frf(self, model: Model, pose: LabelledPose, measured: MeasuredPose | None) -> None:
-        low, high = self._cell.config.modes.band_hz
-        lines = np.linspace(low, high, LINES)
-        mean, sd = model.frf(pose.q[None], lines)
-        for i, axis in enumerate("xyz"):
-            decibels = 20 * np.log10(np.maximum(np.abs(mean[0, i, i]), 1e-12))
-            self._stream.log(f"frf/{axis}{axis}_db", rr.BarChart(decibels, abscissa=lines))
-        frf = measured.frf if measured else None
-        inside = (frf.frequency_hz >= low) & (frf.frequency_hz <= high) if frf else None
-        figure = frf_plots.frf_figure(
-            lines,
-            mean[0],
-            sd[0],
-            frf.frequency_hz[inside] if frf else None,
-            frf.accelerance[:, :, inside] if frf else None,
-            frf.coherence[:, :, inside] if frf else None,
-            f"Pose {pose.pose}: FRF measured, and fused with its band",
-        )
-        self._picture("frf/picture", figure)
-
-    def _campbell(self, poses: tuple[LabelledPose, ...]) -> None:
-        """Measured and simulated natural frequencies, by label, over the measured poses."""
-        nothing = (np.nan, np.nan)
-        rows = [
-            [nothing if m is None else (m.frequency_hz, m.frequency_sd_hz) for m in pose.modes]
-            for pose in poses
-        ]
-        frequency, sd = np.moveaxis(np.array(rows), -1, 0)
-        simulated = np.array([pose.simulated_hz for pose in poses])
-        mark = "SIMULATED recordings · " if self._simulated else ""
-        figure = frequency_figure(
-            tuple(pose.pose for pose in poses),
-            frequency,
-            sd,
-            simulated if np.any(np.isfinite(simulated)) else None,
-            title=f"{mark}Natural frequencies over the measured poses",
-        )
-        self._picture("campbell/picture", figure)
-
-    def _picture(self, path: str, figure: Figure) -> None:
-        image = rr.EncodedImage(contents=frf_plots.png(figure), media_type="image/png")
-        self._stream.log(path, image)
 
     def _measured_poses(self, model: Model) -> None:
         q = np.array([p.q for p in model.labelled])
@@ -216,11 +183,10 @@ class RerunView:
         points = rr.Points3D(self._cell.candidates.position_m, radii=0.008, colors=colours)
         self._stream.log("cell/workspace", points)
 
-    def learning(self, number: int, values: dict[str, float]) -> None:
-        """Learning curves, by path."""
+    def learning(self, number: int, sd_percent: np.ndarray) -> None:
+        """The sd (count,) in % of the natural frequencies over the workspace."""
         self._at(number)
-        for path, value in values.items():
-            self._stream.log(f"learning/{path}", rr.Scalars(value))
+        self._curves.learning(number, sd_percent)
 
     def text(self, number: int, text: str, level: str = "INFO") -> None:
         """A line in the log."""
@@ -244,8 +210,11 @@ def _quaternion(rpy_deg: tuple[float, float, float]) -> np.ndarray:
     return Rotation.from_euler("xyz", rpy_deg, degrees=True).as_quat()
 
 
-def _eye(cell: Cell) -> rrb.EyeControls3D:
-    """A look from the side and above at robot and workspace, whatever lies around them."""
+def _eye(cell: Cell, near: float = 1.0) -> rrb.EyeControls3D:
+    """A look from the side and above at robot and workspace, whatever lies around them.
+
+    `near` below 1 goes nearer.
+    """
     shoulder, reach = cell.robot.shoulder_m, cell.robot.reach_m
     away = np.mean(cell.candidates.position_m, axis=0) - shoulder
     side = np.array([away[1], -away[0], 0.0]) + 0.6 * np.array([away[0], away[1], 0.0])
@@ -253,45 +222,40 @@ def _eye(cell: Cell) -> rrb.EyeControls3D:
     side = side / size if size > 1e-6 else np.array([0.0, -1.0, 0.0])
     target = shoulder + 0.5 * away
     return rrb.EyeControls3D(
-        position=target + reach * (1.3 * side + np.array([0.0, 0.0, 0.6])),
+        position=target + near * reach * (1.3 * side + np.array([0.0, 0.0, 0.6])),
         look_target=target,
         eye_up=(0.0, 0.0, 1.0),
     )
 
 
 def _blueprint(cell: Cell) -> rrb.Blueprint:
+    count = cell.config.modes.count
+    robot = rrb.Spatial3DView(
+        origin="/",
+        contents=["/robot/**", "/cell/**"],
+        name=f"{cell.robot.name}; dots: workspace by sd of its frequencies, {SCALE}",
+        spatial_information=rrb.SpatialInformation(target_frame=WORLD),
+        eye_controls=_eye(cell),
+    )
+    log = rrb.TextLogView(
+        origin="/log",
+        name="Decisions",
+        columns=rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"]),
+    )
+    beside = rrb.Vertical(
+        chart_view("frf/xx", "FRF xx of the tool", WIDE),
+        chart_view("learning", "What is not known yet", WIDE),
+        log,
+    )
     return rrb.Blueprint(
-        rrb.Vertical(
-            rrb.Horizontal(
-                rrb.Spatial3DView(
-                    origin="/",
-                    contents=["/robot/**", "/cell/**"],
-                    name=cell.robot.name,
-                    spatial_information=rrb.SpatialInformation(target_frame=WORLD),
-                    eye_controls=_eye(cell),
-                ),
-                rrb.Vertical(
-                    rrb.Tabs(
-                        rrb.Spatial2DView(origin="/frf/picture", name="FRF with band"),
-                        rrb.Spatial2DView(origin="/campbell/picture", name="Campbell diagram"),
-                    ),
-                    rrb.TimeSeriesView(origin="/learning", name="sd of frequencies (%)"),
-                    row_shares=[3, 2],
-                ),
-                column_shares=[3, 2],
-            ),
-            rrb.Horizontal(
-                rrb.TextLogView(origin="/log", name="Log"),
-                rrb.Tabs(
-                    rrb.BarChartView(origin="/hits/+x/force_n", name="Force +x (N over ms)"),
-                    rrb.TimeSeriesView(origin="/modes", name="Modes (Hz, %)"),
-                    rrb.TextDocumentView(origin="/note", name="Note"),
-                ),
-                column_shares=[3, 2],
-            ),
-            row_shares=[4, 1],
+        rrb.Tabs(
+            rrb.Horizontal(robot, beside, column_shares=[3, 2], name="Cell"),
+            frf_views(),
+            mode_views(count, _eye(cell, NEAR)),
+            progress_views(count),
+            rrb.TextDocumentView(origin="/note", name="What is what"),
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", loop_mode="all"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )

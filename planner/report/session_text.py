@@ -11,6 +11,7 @@ from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.report.pose_screen import PosePage
+from planner.report.text import with_sd
 
 HELP = """\
 a, Enter  import the hits that wait          r  set the waiting hits aside, do not import them
@@ -47,10 +48,10 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
             off = (mode.frequency_hz - expected) / np.hypot(sd, mode.frequency_sd_hz)
             table.add_row(
                 str(k + 1),
-                f"{mode.frequency_hz:.3f} ± {mode.frequency_sd_hz:.3f}",
+                with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
                 f"{expected:.2f} ± {sd:.2f}",
                 Text(f"{off:+.1f}", style="bold yellow" if abs(off) > 3 else ""),
-                f"{100 * mode.damping_ratio:.2f} ± {100 * mode.damping_sd:.2f}",
+                with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
                 sure,
             )
     parts: list[RenderableType] = [table, *_missed(report)]
@@ -123,7 +124,8 @@ def progress_line(
 ) -> Text:
     """Time per pose, and from how many to how many it takes until the target, by the trend so far.
 
-    `history` is the overall sd (%) after each measurement; it falls about geometrically.
+    Short, for it shares a line of 80 columns. `history` is the overall sd (%) after each
+    measurement; it falls about geometrically.
     """
     parts = []
     if seconds_per_pose is not None:
@@ -132,11 +134,12 @@ def progress_line(
     if left == (0, 0):
         parts.append("overall sd below the target")
     elif left is not None:
-        parts.append(f"{_span(left)} more pose{'s' if left != (1, 1) else ''} by the trend so far")
+        more = f"{_span(left)} more pose{'s' if left != (1, 1) else ''}"
         if seconds_per_pose is not None:
             minutes = [None if n is None else n * seconds_per_pose / 60 for n in left]
             rounded = [None if m is None else max(1, round(m)) for m in minutes]
-            parts.append(f"{_span((rounded[0] or 1, rounded[1]))} min to go")
+            more += f", {_span((rounded[0] or 1, rounded[1]))} min to go"
+        parts.append(more)
     elif len(history) > 1:
         parts.append("no trend yet that tells how many more it takes")
     return Text("; ".join(parts))

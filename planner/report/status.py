@@ -111,10 +111,13 @@ class DecisionStatus:
     @classmethod
     def of(cls, model: "Model") -> "DecisionStatus | None":
         """Of a campaign's model; None where campaign.toml names no cut."""
+        table = model.cell.config.cut
+        if table is msgspec.UNSET or not model.labelled:
+            return None
         from planner.campaign.decision import measurements_left
 
-        decision, table = model.decision, model.cell.config.cut
-        if decision is None or table is msgspec.UNSET or not model.labelled:
+        decision = model.decision
+        if decision is None:
             return None
         probability = model.cell.config.stop.probability
         sure = decision.sure(probability)

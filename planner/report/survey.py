@@ -10,7 +10,7 @@ from rich.text import Text
 
 from planner.campaign.hit_habits import HitMiss, habits
 from planner.campaign.misses import CampaignMisses, Visited, told_by
-from planner.dataset.hit_columns import columns_of
+from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import RefusedError
@@ -188,10 +188,10 @@ def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
 def _visited(pose: str, rows: list[PoseRow], measured: MeasuredPose) -> Visited:
     """A pose whose FRF is known, with what each accepted hit says."""
     sources = tuple(v.source for v in measured.verdicts if v.accepted)
-    columns = columns_of(sources, measured.band_hz, measured.window_rate_1_s)
+    hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
     files, q = tuple(source.name for source in sources), np.deg2rad(rows[0].joints_deg)
     assert measured.frf is not None
-    return Visited(pose, files, q, columns, measured.frf)
+    return Visited(pose, files, q, hits, measured.frf)
 
 
 def _misses(

@@ -23,8 +23,14 @@ def number(value: float | None, form: str = ".2f") -> str:
 
 
 def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
-    """A number and its standard deviation."""
-    return f"{number(value, form)} ± {number(sd, form)}"
+    """A number and its standard deviation; one that rounds to 0 is said to be below the last digit.
+
+    `form` has fixed decimals (".2f").
+    """
+    said = number(sd, form)
+    if sd and said.strip("0.") == "":
+        said = f"<{10.0 ** -int(form[1:-1]):{form}}"
+    return f"{number(value, form)} ± {said}"
 
 
 def remarks(lines: Sequence[str]) -> list[Text]:

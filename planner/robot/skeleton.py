@@ -1,5 +1,6 @@
 """The robot as lines from joint to joint, for drawings of robots whose URDF has no shapes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,3 +37,30 @@ def _body(robot: Robot, number: int) -> BodyShape:
     apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
     links = tuple(frame.name for frame in frames)
     return BodyShape(links[0], links, np.array(apart or [np.zeros(3)]))
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """The robot at a pose as points (p, 3) in the world, m, and lines between pairs of them."""
+
+    names: tuple[str, ...]  # frames of the URDF: the bodies' own, in their order, and the tcp
+    place_m: np.ndarray
+    lines: tuple[tuple[int, int], ...]
+
+
+def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
+    """Lines from joint to joint and to the tcp at joint angles q (dof,) in rad."""
+    own, model = bodies(robot), robot.model
+    names = (*(body.link for body in own), robot.config.tcp_frame)
+    ids = [*(robot.frame_id("link", body.link) for body in own), robot.tcp_id]
+    lines = [(int(model.parents[k]), k) for k in range(1, len(own))]
+    lines.append((int(model.frames[robot.tcp_id].parentJoint), len(own)))
+    return Skeleton(names, placements(robot, q, ids)[1], tuple(lines))
+
+
+def placements(robot: Robot, q: np.ndarray, frames: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations (n, 3, 3) and places (n, 3) of frames, by Pinocchio's numbers, in the world."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.asarray(q, float))
+    rotation = np.array([data.oMf[i].rotation for i in frames]).reshape(-1, 3, 3)
+    return rotation, np.array([data.oMf[i].translation for i in frames]).reshape(-1, 3)

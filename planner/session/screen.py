@@ -1,6 +1,7 @@
 """The session's screen: one page that is drawn anew when something changed, and a bell."""
 
 from collections import deque
+from collections.abc import Mapping
 
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
@@ -16,6 +17,7 @@ class Screen:
         self._page: RenderableType | None = None
         self._notes: deque[Text] = deque(maxlen=NOTES)
         self._shown = ""
+        self._rung: set[tuple[str, int]] = set()
 
     def show(self, page: RenderableType) -> None:
         """Draw a page in the place of the one before; nothing where it is the same."""
@@ -33,6 +35,17 @@ class Screen:
             self._draw()
         else:
             self.console.print(sentence)
+
+    def ring(self, kinds: Mapping[tuple[str, int], str]) -> None:
+        """Ring for hits, by file and number, that were not rung for: more often for bad ones.
+
+        Sentences under the page are dropped then.
+        """
+        new = {kind for hit, kind in kinds.items() if hit not in self._rung}
+        self._rung |= kinds.keys()
+        if new:
+            self.forget()
+            self.bell(3 if new - {"good"} else 1)
 
     def forget(self) -> None:
         """Drop the sentences: they spoke of what was before."""

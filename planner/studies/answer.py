@@ -63,18 +63,24 @@ class StudyAnswer(Answer):
 
 @dataclass(frozen=True)
 class StudiesAnswer(Answer):
-    """Answer of `study all`; `taken` names those that were finished before and not run again."""
+    """Answer of `study all`; `taken` names those that were finished before and not run again.
+
+    `damaged` names those that were run again because what was kept of them was damaged.
+    """
 
     studies: tuple[StudyAnswer, ...]
     taken: tuple[str, ...]
     files: list[str]
     seconds: float
+    damaged: tuple[str, ...] = ()
 
     def text(self) -> Group:
         """The claims of all studies, and where the rest is."""
         parts: list[RenderableType] = [_shown(study.claims) for study in self.studies]
         if self.taken:
             parts.append(f"finished before, and not run again: {', '.join(self.taken)}")
+        if self.damaged:
+            parts.append(f"kept before, but damaged, and run again: {', '.join(self.damaged)}")
         parts.append(f"all pages: {self.files[0]}")
         return Group(*parts)
 

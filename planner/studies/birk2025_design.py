@@ -19,7 +19,10 @@ from planner.identification.result import TOLD
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Points (k,), how many parameters they determine, and FRAC in % at all others."""
+    """Points (k,), how many parameters they determine, and FRAC in % at all others.
+
+    FRAC is NaN where nothing was identified from them.
+    """
 
     name: str
     rows: np.ndarray
@@ -27,41 +30,44 @@ class Design:
     frac: float
 
 
-def best_points(
-    simulation: Simulation, frfs: Sequence[Frf], q: np.ndarray, count: int, misfit: float,
-    band_hz: tuple[float, float],
-) -> np.ndarray:  # fmt: skip
-    """Rows (count,) of q (n, dof) in rad, the most informative first."""
-    covariance, information = _open(simulation, frfs, q, misfit, band_hz)
-    chosen: list[int] = []
-    for _ in range(count):
-        root = np.linalg.cholesky(covariance)
-        gained = np.eye(len(root)) + root.T @ information @ root
-        gain = np.linalg.slogdet(gained)[1]
-        gain[chosen] = -np.inf
-        chosen.append(int(np.argmax(gain)))
-        covariance = root @ np.linalg.inv(gained[chosen[-1]]) @ root.T
-        covariance = (covariance + covariance.T) / 2
-    return np.array(chosen)
+@dataclass(frozen=True, eq=False)
+class Informative:
+    """What hits at n poses would tell of p parameters' logarithms.
 
+    `covariance` (p, p) before, `information` (n, 3, p, p) of a hit along each axis.
+    """
 
-def determined(
-    simulation: Simulation, frfs: Sequence[Frf], q: np.ndarray, rows: np.ndarray, misfit: float,
-    band_hz: tuple[float, float],
-) -> int:  # fmt: skip
-    """How many parameters hits at some poses determine: their sd is less than half of before."""
-    covariance, information = _open(simulation, frfs, q, misfit, band_hz)
-    after = np.linalg.inv(np.linalg.inv(covariance) + information[rows].sum(axis=0))
-    return int(np.sum(np.sqrt(np.diag(after) / np.diag(covariance)) < TOLD))
+    covariance: np.ndarray
+    information: np.ndarray
 
+    @classmethod
+    def of(
+        cls, simulation: Simulation, priors: Priors, frfs: Sequence[Frf], q: np.ndarray,
+        misfit: float, band_hz: tuple[float, float],
+    ) -> "Informative":  # fmt: skip
+        """At poses q (n, dof) in rad, with the noise of these FRFs and a misfit as found."""
+        p = parametrise(simulation, priors)
+        covariance = np.diag([parameter.log_sd**2 for parameter in p.parameters])
+        noise = FrfNoise.of(tuple(frfs), band_hz, misfit)
+        open_ = OpenParameters(simulation, p, covariance, noise, band_hz)
+        return cls(covariance, open_.information(q))
 
-def _open(
-    simulation: Simulation, frfs: Sequence[Frf], q: np.ndarray, misfit: float,
-    band_hz: tuple[float, float],
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Prior covariance (p, p) and information (n, p, p) of a hit along each axis."""
-    p = parametrise(simulation, Priors())
-    covariance = np.diag([parameter.log_sd**2 for parameter in p.parameters])
-    noise = FrfNoise.of(tuple(frfs), band_hz, misfit)
-    told = OpenParameters(simulation, p, covariance, noise, band_hz).information(q)
-    return covariance, told.sum(axis=1)
+    def best(self, count: int) -> np.ndarray:
+        """Rows (count,), the most informative first, each hit along all axes."""
+        covariance, told = self.covariance, self.information.sum(axis=1)
+        chosen: list[int] = []
+        for _ in range(count):
+            root = np.linalg.cholesky(covariance)
+            gained = np.eye(len(root)) + root.T @ told @ root
+            gain = np.linalg.slogdet(gained)[1]
+            gain[chosen] = -np.inf
+            chosen.append(int(np.argmax(gain)))
+            covariance = root @ np.linalg.inv(gained[chosen[-1]]) @ root.T
+            covariance = (covariance + covariance.T) / 2
+        return np.array(chosen)
+
+    def determined(self, rows: np.ndarray, axes: Sequence[int] = (0, 1, 2)) -> int:
+        """How many parameters hits along `axes` determine: sd less than half of before."""
+        told = self.information[rows][:, list(axes)].sum(axis=(0, 1))
+        after = np.linalg.inv(np.linalg.inv(self.covariance) + told)
+        return int(np.sum(np.sqrt(np.diag(after) / np.diag(self.covariance)) < TOLD))

@@ -121,13 +121,15 @@ def _moments(seen: AnalysedPoses, train: np.ndarray, target: int) -> tuple[np.nd
 
         frequency = Samples.of(x[train], modes.frequency_hz[train, k])
         models: list[FidelityLevel] = [
-            fit_kennedy_ohagan(frequency, Exact(value), Normalisation.of(low))
+            fit_kennedy_ohagan(frequency, Exact(value), Normalisation.of(low), True),
+            fit_likelihood(
+                Samples.of(x[train], modes.damping_ratio[train, k]), "cubic", isotropic=True
+            ),
         ]
-        models.append(fit_likelihood(Samples.of(x[train], modes.damping_ratio[train, k]), "cubic"))
         for i, j in PAIRS:
             residue = modes.residue[train, k, i, j]
             for part in (residue.real, residue.imag):
-                models.append(fit_likelihood(Samples.of(x[train], part), "rbf"))
+                models.append(fit_likelihood(Samples.of(x[train], part), "rbf", isotropic=True))
         told = [model.predict(x[[target]]) for model in models]
         mean[k], sd[k] = ([float(t[i][0]) for t in told] for i in (0, 1))
     return mean, sd

@@ -6,6 +6,7 @@ from pathlib import Path
 import msgspec
 
 from planner import content_hash
+from planner.campaign.checked_file import read_checked, write_checked
 from planner.errors import InputError
 from planner.progress import Tell, within
 from planner.report.answer import encoded
@@ -50,12 +51,14 @@ def conduct_all(folder: Path | None, small: bool, progress: Tell) -> StudiesAnsw
     if folder is None:
         raise InputError("All studies take long and are kept; name a folder with --out.")
     check_folder(folder)
-    start, done, taken = time.perf_counter(), [], []
+    start, done, taken, damaged = time.perf_counter(), [], [], []
     count = len(registry.NAMES)
     for i, name in enumerate(registry.NAMES):
         there, tell = folder / name, within(progress, i / count, (i + 1) / count)
         before = _finished(there, small)
         if before is None:
+            file = there / FINISHED
+            damaged += [name] if file.exists() and not read_checked(file, Finished) else []
             before = conduct(name, there, small, lambda text, share, n=name, t=tell: t(
                 f"{n}: {text}", share))  # fmt: skip
             _keep(before, there, small)
@@ -68,7 +71,8 @@ def conduct_all(folder: Path | None, small: bool, progress: Tell) -> StudiesAnsw
         write_page(index_page(done), folder / "index.html"),
         write_table(Table("claims", "Claims of all papers", columns, tuple(claims)), folder),
     ]
-    return StudiesAnswer(tuple(done), tuple(taken), files, time.perf_counter() - start)
+    seconds = time.perf_counter() - start
+    return StudiesAnswer(tuple(done), tuple(taken), files, seconds, tuple(damaged))
 
 
 def _key(small: bool) -> str:
@@ -78,17 +82,15 @@ def _key(small: bool) -> str:
 def _finished(folder: Path, small: bool) -> StudyAnswer | None:
     """The study that is there whole, computed by this program in this size."""
     try:
-        kept = msgspec.json.decode((folder / FINISHED).read_bytes(), type=Finished)
-        if kept.key != _key(small):
+        kept = read_checked(folder / FINISHED, Finished)
+        if kept is None or kept.key != _key(small):
             return None
         answer = StudyAnswer.from_json(kept.answer)
-    except (OSError, msgspec.MsgspecError, KeyError, TypeError):
+    except (msgspec.MsgspecError, KeyError, TypeError):
         return None
     return answer if all(Path(file).exists() for file in answer.files) else None
 
 
 def _keep(answer: StudyAnswer, folder: Path, small: bool) -> None:
     data = {"key": _key(small), "answer": msgspec.json.decode(encoded(answer))}
-    fresh = folder / f".{FINISHED}"
-    fresh.write_bytes(msgspec.json.encode(data))
-    fresh.replace(folder / FINISHED)
+    write_checked(folder / FINISHED, data)

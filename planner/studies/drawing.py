@@ -14,7 +14,8 @@ COLOURS = {
     "MFDGP": "tab:brown", "simulation": "0.6", "fused modes": "tab:red", "diagnosed": "black",
     "x": "tab:blue", "y": "tab:orange", "z": "tab:green",
     "scatter allows": "0.8", "one by one": "tab:blue", "by kind": "tab:red",
-    "all at once": "tab:orange",
+    "all at once": "tab:orange", "groups of three": "tab:green",
+    "groups, others known": "limegreen",
 }  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from planner.progress import Tell, within
 from planner.studies.models.fidelity_levels import Samples
 from planner.studies.models.likelihood_gp import fit_likelihood
 from planner.studies.models.multitask import fit_multitask
-from planner.studies.report import PaperClaim, Report, Table
+from planner.studies.report import Report, Table
 from planner.studies.seyedhosseini2025_data import (
     DAMPING,
     FREQUENCY,
@@ -26,6 +26,7 @@ from planner.studies.seyedhosseini2025_data import (
     PostureData,
     load,
 )
+from planner.studies.seyedhosseini2025_findings import findings
 from planner.studies.seyedhosseini2025_pictures import (
     HELD_OUT,
     LINES_HZ,
@@ -64,7 +65,7 @@ def study(progress: Tell, small: bool = False) -> Report:
         "trajectory of its tool, nine hits each at three levels with everyday errors; joints rub, "
         "brakes engage anew at each posture.",
         (errors, models, steps, correlation, quality),
-        _findings(errors, models, steps, correlation, quality, seconds),
+        findings(errors, models, steps, correlation, quality, seconds, data),
         {
             "seyedhosseini2025_figure_2": heatmap(correlation),
             "seyedhosseini2025_figure_4": last_postures(data, mean, sd),
@@ -103,7 +104,8 @@ def _alone(data: PostureData) -> np.ndarray:
     for kind in (FREQUENCY, DAMPING):
         x, y = _trained(data, kind)
         columns += [
-            fit_likelihood(Samples.of(x, c), "rbf", starts=1).predict(there)[0] for c in y.T
+            fit_likelihood(Samples.of(x, c), "rbf", starts=1, isotropic=True).predict(there)[0]
+            for c in y.T
         ]
     return np.column_stack(columns)
 
@@ -131,7 +133,10 @@ def _steps_table(data: PostureData) -> Table:
 
 def _models_table(data: PostureData, mean: np.ndarray, alone: np.ndarray) -> Table:
     rows = []
-    for name, told in (("multi-task by kind", mean), ("one GP an output (published)", alone)):
+    for name, told in (
+        ("multi-task by kind (ours)", mean),
+        ("one GP an output (published)", alone),
+    ):
         off = told[:, : 2 * MODES] - data.clean[-HELD_OUT:, : 2 * MODES]
         percent = 100 * np.abs(np.expm1(off))
         rows.append((name, float(percent[:, FREQUENCY].mean()), float(percent[:, DAMPING].mean())))
@@ -190,58 +195,4 @@ def _synthesised(parameters: np.ndarray) -> np.ndarray:
     parts = parameters[:, RESIDUE].reshape(-1, MODES, 3, 2)
     return synthesis.accelerance(
         LINES_HZ, synthesis.pole(f, np.minimum(zeta, 0.95)), parts[..., 0] + 1j * parts[..., 1]
-    )
-
-
-def _findings(
-    errors: Table, models: Table, steps: Table, correlation: Table, quality: Table, seconds: float
-) -> tuple[PaperClaim, ...]:
-    f, zeta, inside = (np.array([row[i] for row in errors.rows], float) for i in (1, 2, 5))
-    strength = np.abs([row[1:4] for row in correlation.rows]).max(axis=1)
-    r2 = np.array([row[1:] for row in quality.rows], float)
-    step = {str(row[0]): float(row[1]) for row in steps.rows}
-    multi, single = (np.array(row[1:], float) for row in models.rows)
-    return (
-        PaperClaim(
-            "Joints 2 and 3 matter far more to modes 1 to 3 than joint 1.",
-            "largest |correlation| of joints 1 to 6: " + ", ".join(f"{v:.2f}" for v in strength),
-            bool(min(strength[1], strength[2]) > 2 * strength[0]),
-            "on this trajectory joint 1 turns together with others",
-        ),
-        PaperClaim(
-            "The four-step check makes modal parameters reliable.",
-            f"largest error of a frequency {step['f off by, before: largest %']:.1f} % before, "
-            f"{step['f off by, after: largest %']:.1f} % after; "
-            f"{step['dropped by the check']:.0f} dropped, "
-            f"{step['recovered by neighbours']:.0f} recovered",
-            step["f off by, after: largest %"] <= step["f off by, before: largest %"],
-            "it drops or recovers wrong ones",
-        ),
-        PaperClaim(
-            "A GP over joint angles predicts the last 15 postures' modal parameters accurately.",
-            f"frequencies off by {f.mean():.2f} %, {inside.mean():.0f} % inside their 95 % "
-            f"interval; fitted in {seconds:.1f} s",
-            bool(f.mean() < 2.0 and inside.mean() > 75),
-            "hits with everyday errors, at a new level of the trajectory, leave more open",
-        ),
-        PaperClaim(
-            "Damping ratios are predicted less surely than frequencies.",
-            f"off by {zeta.mean():.1f} % against {f.mean():.2f} %",
-            bool(zeta.mean() > f.mean()),
-        ),
-        PaperClaim(
-            "FRFs put together from predicted modes agree with those measured.",
-            f"R² of |H| at two postures from {r2.min():.3f} to {r2.max():.3f}",
-            bool(r2.min() > 0.9),
-            f"the least is {r2.min():.2f}: peaks' heights hang on damping ratios, which are off by "
-            f"{zeta.mean():.0f} %",
-        ),
-        PaperClaim(
-            "GPs together within a kind predict better than one GP an output, as published.",
-            f"frequencies off by {multi[0]:.2f} against {single[0]:.2f} %, damping by "
-            f"{multi[1]:.1f} against {single[1]:.1f} %",
-            bool(multi[0] < single[0]),
-            "so many postures leave nothing to share",
-            ours=True,
-        ),
     )

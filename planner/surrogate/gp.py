@@ -6,20 +6,36 @@ the measurement's own variance plus a nugget τ². The hyperparameters θ (see `
 averaged (see `importance`).
 """
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.linalg.lapack import dtrtri
+from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
-from planner.surrogate.importance import Gaussians, normal_points, sample
+from planner.surrogate.data_covariance import data_covariance
+from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
-from planner.surrogate.likelihood import data_covariance, log_likelihoods
+from planner.surrogate.likelihood import log_likelihoods
 from planner.surrogate.predictive import Predictive
-from planner.surrogate.training_data import Padded
+from planner.surrogate.training_data import Padded, thinned
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
 SILENT_JITTER = 1e-10  # of the prior variance; a larger one is reported
+# Points up to which all of them are looked at for every sample of θ. Of more, θ is sampled in
+# stages: as ever by the first number of them, then by more points with half the samples each time,
+# around what the stage before favours. Beyond the last number θ is known well enough, and the
+# evidence is that of so many points.
+AT_ONCE = 64
+STAGES = 32, 64, 128
+BLOCK_ELEMENTS = 2**18  # of covariances that are worked out side by side
+MOST_FEWER = 4  # θ is the better known the more points there are: samples kept, by this at most
+NO_FIT = (
+    "No Gaussian process fits the measured modes; set aside poses that are measured twice "
+    "or far off with `planner withdraw`."
+)
 SINGULAR_REMARK = (
     "The covariance was singular until {:g} of its variance was added to the noise: two poses are "
     "nearly the same, and their sds claim more than that."
@@ -43,23 +59,84 @@ class Prior:
 
 
 @dataclass(frozen=True, eq=False)
+class Solved:
+    """What an output's data say at each of k samples: L⁻¹ (k, c, c) and K⁻¹(y − mean) (k, c).
+
+    K = LLᵀ is their covariance; `jitter`, relative to the prior variance, had to be added to it.
+    """
+
+    whiten: np.ndarray
+    weights: np.ndarray
+    jitter: float
+
+
+@dataclass(frozen=True, eq=False)
 class Posterior:
     """m outputs, k hyperparameter samples of equal weight, c padded training points.
 
-    Everything after the fit is plain NumPy on few, small matrices.
+    Everything after the fit is plain NumPy on few matrices, which are worked out when asked for:
+    of models that were weighed and found improbable they never are.
     """
 
     x: np.ndarray  # (c, d)
+    y: np.ndarray  # (m, c) less the prior mean
+    variance: np.ndarray  # (m, c) of the measurements
     low: np.ndarray  # (m, c) centred
     mask: np.ndarray  # (m, c)
     theta: np.ndarray  # (m, k, p)
     slope_sd: np.ndarray  # (m, k) of ρ'
-    whiten: np.ndarray  # (m, k, c, c) inverse of the Cholesky factor
-    weights: np.ndarray  # (m, k, c) K⁻¹(y − mean)
     prior: Prior
     kernel: str
     log_evidence: np.ndarray  # (m,) log p(y | model), θ averaged out
-    remarks: tuple[str, ...] = ()
+    jitter: float  # relative to the prior variance, that θ was sampled with
+
+    _found: dict[int, Solved] = field(default_factory=dict, init=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Matrices of many points are worked out again as fast as they are read.
+        few = len(self.x) <= AT_ONCE
+        return vars(self) | {"_found": self._found if few else {}}
+
+    def solved(self, j: int) -> Solved:
+        """Of output j; InputError where no jitter makes its covariances regular."""
+        if j not in self._found:
+            for jitter in JITTERS[JITTERS.index(self.jitter) :]:
+                try:
+                    # The same digits wherever those of many points are worked out again.
+                    with threadpool_limits(1) if len(self.x) > AT_ONCE else nullcontext():
+                        whiten = self._whitening(j, jitter)
+                except np.linalg.LinAlgError:
+                    continue
+                weights = np.swapaxes(whiten, 1, 2) @ (whiten @ self.y[j][:, None])
+                self._found[j] = Solved(whiten, weights[..., 0], jitter)
+                break
+            else:
+                raise InputError(NO_FIT)
+        return self._found[j]
+
+    def _whitening(self, j: int, jitter: float) -> np.ndarray:
+        """Inverse Cholesky factors (k, c, c); LinAlgError where a covariance is singular."""
+        kept, c = len(self.theta[j]), len(self.x)
+        own = self.low[j], self.mask[j], self.variance[j], self.prior.bias_sd[j]
+        found = np.empty((kept, c, c))
+        few = max(1, BLOCK_ELEMENTS // c**2)
+        for block in (slice(i, i + few) for i in range(0, kept, few)):
+            slope_sd = self.slope_sd[j, block, None, None]
+            theta = self.theta[j, block]
+            k = data_covariance(np, self.kernel, self.x, *own, slope_sd, jitter, theta)
+            found[block] = [dtrtri(f, lower=True)[0] for f in np.linalg.cholesky(k)]
+        return found
+
+    @property
+    def whiten(self) -> list[np.ndarray]:
+        """(k, c, c) of each output: inverses of the Cholesky factors."""
+        return [self.solved(j).whiten for j in range(len(self.mask))]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What went wrong."""
+        jitter = max(self.solved(j).jitter for j in range(len(self.mask)))
+        return (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
 
     def predict(
         self,
@@ -85,7 +162,8 @@ class Posterior:
     def predictive(self, j: int, x: np.ndarray, low: np.ndarray) -> Predictive:
         """Output j, noise-free, at x (q, d) with centred low (q,), one Gaussian per sample."""
         cross, white = self._cross(j, x, low)
-        means = self.prior.mean[j] + (self.weights[j][:, None, :] @ cross)[:, 0]
+        weights = self.solved(j).weights[:, None, self.known(j)]
+        means = self.prior.mean[j] + (weights @ cross)[:, 0]
         own = self._own(j, x, low) - np.sum(white**2, axis=1)
         return Predictive(np.full(len(means), 1 / len(means)), means, np.sqrt(np.maximum(own, 0.0)))
 
@@ -107,7 +185,7 @@ class Posterior:
 
     def slopes(self, j: int) -> np.ndarray:
         """Posterior mean (k,) of ρ' of output j, per sample."""
-        return self.slope_sd[j] ** 2 * (self.weights[j] @ (self.low[j] * self.mask[j]))
+        return self.slope_sd[j] ** 2 * (self.solved(j).weights @ (self.low[j] * self.mask[j]))
 
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
@@ -132,11 +210,22 @@ class Posterior:
 
         Padding is left out here: n counts the points that hold a value.
         """
-        known = np.flatnonzero(self.mask[j])
+        known = self.known(j)
         cross = self._prior(j, self.x[known], self.low[j][known], x, low)
-        full = np.zeros((len(cross), self.mask.shape[1], len(x)))
-        full[:, known] = cross
-        return full, self.whiten[j][:, known[:, None], known[None, :]] @ cross
+        return cross, self.whitening(j) @ cross
+
+    def known(self, j: int) -> slice | np.ndarray:
+        """Which of the training points hold a value of output j."""
+        rows = np.flatnonzero(self.mask[j])
+        # A slice of large arrays is a view, which costs nothing.
+        return slice(0, len(rows)) if self.mask[j][: len(rows)].all() else rows
+
+    def whitening(self, j: int) -> np.ndarray:
+        """L⁻¹ (k, n, n) of output j between the points that hold a value."""
+        known, whole = self.known(j), self.solved(j).whiten
+        if isinstance(known, slice):
+            return whole[:, known, known]
+        return whole[:, known[:, None], known[None, :]]
 
 
 def fit(
@@ -146,49 +235,41 @@ def fit(
     """Posterior of all outputs; y and low of `padded` as they are, prior mean taken off here.
 
     `samples` of θ from the prior and as many in each of `rounds`; `start`, in units of the prior,
-    is where the first round looks, as `marginal.laplace` finds.
+    is where the first round looks, as `marginal.laplace` finds. Of more than AT_ONCE points, θ is
+    sampled in stages (`growing`), and fewer samples are kept.
 
     InputError if the covariance stays singular whatever is added to its diagonal.
     """
     m, p = prior.theta_mean.shape
-    normal = [normal_points(samples, p, seed) for seed in range(1, 2 + rounds)]
-    y = (padded.y - prior.mean[:, None]) * padded.mask
-
-    def theta(z: np.ndarray) -> np.ndarray:
-        return prior.theta_mean[:, None, :] + prior.theta_sd[:, None, :] * z
-
+    c = len(padded.x)
+    first, more = padded, []
+    if start is None and c > AT_ONCE:
+        first, *more = [thinned(padded, size) for size in STAGES]
+        kept = max(kept // MOST_FEWER, kept * AT_ONCE // c)
+    normal = [normal_points(samples, p, seed) for seed in range(1, 2 + rounds + len(more))]
     for jitter in JITTERS:
+        score, *scores = [_score(kernel, part, prior, jitter) for part in (first, *more)]
+        later = [Stage(s, max(samples // 2**i, 1)) for i, s in enumerate(scores, 1)]
         try:
-            z, evidence = sample(
-                lambda z, j=jitter: log_likelihoods(
-                    kernel, padded, y, prior.bias_sd, prior.slope_sd, j, theta(z)
-                ),
-                normal, m, kept, start, prior.nugget_shared,
-            )  # fmt: skip
-            whiten = _whitening(kernel, padded, prior, jitter, theta(z))
+            z, evidence = sample(score, normal, m, kept, start, prior.nugget_shared, later)
         except np.linalg.LinAlgError:
             continue
-        weights = (np.swapaxes(whiten, 2, 3) @ (whiten @ y[:, None, :, None]))[..., 0]
-        evidence = evidence - 0.5 * np.log(2 * np.pi) * np.sum(padded.mask, axis=1)
-        remarks = (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
+        y = (padded.y - prior.mean[:, None]) * padded.mask
         slope_sd = np.repeat(prior.slope_sd[:, None], kept, axis=1)
+        weighed = np.sum((more or [first])[-1].mask, axis=1)
         return Posterior(
-            padded.x, padded.low, padded.mask, theta(z), slope_sd, whiten, weights, prior, kernel,
-            evidence, remarks,
+            padded.x, y, padded.variance, padded.low, padded.mask, _theta(prior, z), slope_sd,
+            prior, kernel, evidence - 0.5 * np.log(2 * np.pi) * weighed, jitter,
         )  # fmt: skip
-    raise InputError(
-        "No Gaussian process fits the measured modes; set aside poses that are measured twice "
-        "or far off with `planner withdraw`."
-    )
+    raise InputError(NO_FIT)
 
 
-def _whitening(
-    kernel: str, data: Padded, prior: Prior, jitter: float, theta: np.ndarray
-) -> np.ndarray:
-    """Inverse Cholesky factors (m, k, c, c); LinAlgError where a covariance is singular."""
-    outputs = zip(data.low, data.mask, data.variance, prior.bias_sd, prior.slope_sd, strict=True)
-    each = [
-        np.linalg.cholesky(data_covariance(np, kernel, data.x, *own, jitter, t))
-        for t, own in zip(theta, outputs, strict=True)
-    ]
-    return np.array([[dtrtri(factor, lower=True)[0] for factor in factors] for factors in each])
+def _theta(prior: Prior, z: np.ndarray) -> np.ndarray:
+    return prior.theta_mean[:, None, :] + prior.theta_sd[:, None, :] * z
+
+
+def _score(kernel: str, data: Padded, prior: Prior, jitter: float) -> Score:
+    """Log likelihoods (m, s) of some data at z (m, s, p), in units of the prior."""
+    y = (data.y - prior.mean[:, None]) * data.mask
+    own = y, prior.bias_sd, prior.slope_sd, jitter
+    return lambda z: log_likelihoods(kernel, data, *own, _theta(prior, z))

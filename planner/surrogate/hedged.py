@@ -105,9 +105,9 @@ def _choose(first: np.ndarray, a: AR1, b: AR1) -> AR1:
     p, q = a.posterior, b.posterior
     pairs = zip(vars(p.prior).values(), vars(q.prior).values(), strict=True)
     prior = Prior(*(pick(u, v) for u, v in pairs))
-    names = ("low", "mask", "theta", "slope_sd", "whiten", "weights", "log_evidence")
+    names = ("y", "variance", "low", "mask", "theta", "slope_sd", "log_evidence")
     picked = {name: pick(getattr(p, name), getattr(q, name)) for name in names}
-    posterior = replace(p, prior=prior, remarks=p.remarks + q.remarks, **picked)
+    posterior = replace(p, prior=prior, jitter=max(p.jitter, q.jitter), **picked)
     return AR1(
         posterior, pick(a.uses_low, b.uses_low), pick(a.centre, b.centre),
         pick(a.unknown_sd, b.unknown_sd),

@@ -5,7 +5,8 @@ prior × likelihood over the mixture they came from (deterministic mixture weigh
 2000), then resampled to a few of equal weight. Everything is in units of the prior, N(0, 1).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -17,8 +18,10 @@ from planner.dataset.store import Store
 MOST_SHARED = 0.95  # points of one output are too few to stand for a narrower one
 SHARED_NODES = np.linspace(-4.0, 4.0, 33)  # of what outputs share, in its own sd
 PROPOSAL_INFLATION = 1.4  # of the second stage's spread, so that tails are sampled too
+LATER_INFLATION = 1.1  # of a later stage's: fewer points favour a wider spread already
 
 Gaussians = tuple[np.ndarray, np.ndarray]  # centre (m, p) and root (m, p, p)
+Score = Callable[[np.ndarray], np.ndarray]  # of points (m, s, p): (m, s)
 
 
 @cache
@@ -50,18 +53,48 @@ def _normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
     return ndtri(np.clip(unit, 1e-6, 1 - 1e-6))
 
 
+@dataclass(frozen=True)
+class Stage:
+    """A score and how many points it is asked for."""
+
+    score: Score
+    count: int
+
+
 def sample(
-    score: Callable[[np.ndarray], np.ndarray], normal: list[np.ndarray], outputs: int, kept: int,
+    score: Score, normal: list[np.ndarray], outputs: int, kept: int,
     start: Gaussians | None = None, shared: np.ndarray | None = None,
+    later: Sequence[Stage] = (),
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """`kept` points z (m, kept, p) of equal weight from N(0, 1) × exp(score); log of its integral.
 
-    `score` takes z (m, s, p) and returns (m, s). The first set (s, p) of `normal` are points from
-    the prior, each further one is moved to a Gaussian around what weighs most so far; `start` is
-    the first of these Gaussians, if there is one. `shared` (m,) is the share of the prior variance
-    of the second coordinate that all outputs have in common, so that each also learns from the
-    others (the integral stays its own). LinAlgError if an output has no finite score.
+    The first set (s, p) of `normal` are points from the prior, each further one is moved to a
+    Gaussian around what weighs most so far; `start` is the first of these Gaussians, if there is
+    one. `shared` (m,) is the share of the prior variance of the second coordinate that all outputs
+    have in common, so that each also learns from the others (the integral stays its own). With
+    `later` stages, whose scores replace this one, each takes a set more and looks only around what
+    the one before favours. LinAlgError if an output has no finite score.
     """
+    first = len(normal) - len(later)
+    points, log_weight = _from_prior(score, normal[:first], outputs, start)
+    for stage, base in zip(later, normal[first:], strict=True):
+        centre, root = _around(points, softmax(log_weight, axis=1))
+        wide = LATER_INFLATION * root
+        points = centre[:, None, :] + base[: stage.count] @ np.swapaxes(wide, 1, 2)
+        like = stage.score(points)
+        if not np.isfinite(like).any(axis=1).all():
+            raise np.linalg.LinAlgError
+        log_weight = like + _log_normal(points) - _log_gaussian(points, centre, wide)
+    evidence = logsumexp(log_weight, axis=1) - np.log(points.shape[1])
+    if shared is not None and shared.any():
+        log_weight = log_weight + _learned_together(points[:, :, 1], log_weight, shared)
+    return _resampled(points, softmax(log_weight, axis=1), kept), evidence
+
+
+def _from_prior(
+    score: Score, normal: list[np.ndarray], outputs: int, start: Gaussians | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (m, s, p) of all sets, and their log weights (m, s)."""
     points = np.broadcast_to(normal[0], (outputs, *normal[0].shape))
     like = score(points)
     if not np.isfinite(like).any(axis=1).all():
@@ -76,11 +109,7 @@ def sample(
         moved = centre[:, None, :] + PROPOSAL_INFLATION * base @ np.swapaxes(root, 1, 2)
         points = np.concatenate([points, moved], axis=1)
         like = np.concatenate([like, score(moved)], axis=1)
-    log_weight = _log_weight(points, like, proposals)
-    evidence = logsumexp(log_weight, axis=1) - np.log(points.shape[1])
-    if shared is not None and shared.any():
-        log_weight = log_weight + _learned_together(points[:, :, 1], log_weight, shared)
-    return _resampled(points, softmax(log_weight, axis=1), kept), evidence
+    return points, _log_weight(points, like, proposals)
 
 
 def _learned_together(z: np.ndarray, log_weight: np.ndarray, shared: np.ndarray) -> np.ndarray:

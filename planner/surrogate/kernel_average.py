@@ -24,9 +24,14 @@ class KernelAverage:
     weights: np.ndarray
 
     @property
+    def counted(self) -> list[int]:
+        """Which of the models are not negligible for every output."""
+        return np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
+
+    @property
     def posteriors(self) -> tuple[Posterior, ...]:
-        """One a kernel."""
-        return tuple(model.posterior for model in self.models)
+        """Of the models that count."""
+        return tuple(self.models[i].posterior for i in self.counted)
 
     @property
     def log_evidence(self) -> np.ndarray:
@@ -36,7 +41,7 @@ class KernelAverage:
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        used = np.flatnonzero(self.weights.max(axis=1) > NEGLIGIBLE_WEIGHT).tolist()
+        used = self.counted
         predictions = [self.models[i].predict(x, low) for i in used]
         w = self.weights[used][:, None, :] / self.weights[used].sum(axis=0)
         means, sds = (np.array([f[i] for f in predictions]) for i in (0, 1))

@@ -47,9 +47,9 @@ def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
     error, sd, rank = (np.full(shape, np.nan) for _ in range(3))
     for j in range(shape[1]):
         known = np.flatnonzero(posterior.mask[j][:measurements])
-        white = posterior.whiten[j]
+        white = posterior.solved(j).whiten
         precision = np.sum(white**2, axis=1)[:, known]  # (k, i): diagonal of K⁻¹
-        off, spread = posterior.weights[j][:, known] / precision, 1 / np.sqrt(precision)
+        off, spread = posterior.solved(j).weights[:, known] / precision, 1 / np.sqrt(precision)
         needed = 0.5 * (off / spread) ** 2 + np.log(spread) + 0.5 * np.log(2 * np.pi)
         w = np.exp(needed - needed.max(axis=0))
         w = np.minimum(w, np.sqrt(len(w)) * w.mean(axis=0))

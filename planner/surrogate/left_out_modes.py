@@ -17,9 +17,9 @@ def left_out_modes(surrogate: Surrogate, seen: ModalObservations) -> ModalPredic
     plain = surrogate.predict(seen.x, seen.simulated)
     assert surrogate.residue is not None
     frequency = _without([surrogate.primary.posterior], np.ones((1, k)), np.log(seen.frequency_hz))
-    damping = _without(
-        list(surrogate.damping.posteriors), surrogate.damping.weights, np.log(seen.damping_ratio)
-    )
+    fits = surrogate.damping
+    weights = fits.weights[fits.counted]
+    damping = _without(list(fits.posteriors), weights, np.log(seen.damping_ratio))
     hertz = _log_normal(frequency, plain.frequency_hz, plain.frequency_sd_hz)
     zeta = _log_normal(damping, plain.damping_ratio, plain.damping_sd)
     scale = surrogate.scale[:, None, None]

@@ -1,32 +1,17 @@
-"""Covariance of an output's data and their likelihood at many hyperparameters at once.
+"""Likelihood of an output's data at many hyperparameters at once.
 
 Few poses are done by NumPy: importing JAX and tracing a function for them would take a second, and
 gain nothing. Which of the two it is follows from the sizes alone, so that it is the same each time.
 """
 
-from typing import Any
-
 import numpy as np
 
-from planner.surrogate.kernels import parse
+from planner.surrogate.data_covariance import data_covariance
 from planner.surrogate.training_data import Padded
 
 # Elements of all covariances together up to which NumPy is as fast: 4 outputs, 256 samples and 64
 # poses take it 0.1 s, those of 32 poses 0.025 s (compiled: 0.013 s after 0.24 s of tracing).
 NUMPY_ELEMENTS = 2**22
-
-
-def data_covariance(
-    xp: Any, kernel: str, x: Any, low: Any, mask: Any, variance: Any, bias: Any, slope: Any,
-    jitter: Any, theta: Any,
-) -> Any:  # fmt: skip
-    """Covariance (…, c, c) of one output's data at θ (…, p); what does not count is decoupled."""
-    delta = parse(kernel, x.shape[1]).covariance(xp, theta, x, x)
-    both = mask[:, None] * mask[None, :]
-    known = (delta + (bias**2 + slope**2 * low[:, None] * low[None, :])) * both
-    noise = variance + xp.exp(2 * theta[..., 1, None])
-    noise = noise + jitter * (xp.exp(2 * theta[..., 0, None]) + bias**2)
-    return known + xp.where(mask > 0, noise, 1.0)[..., None] * xp.eye(len(x))
 
 
 def log_likelihoods(
@@ -36,13 +21,14 @@ def log_likelihoods(
     """(m, s) of y (m, c) at θ (m, s, p), without the constant; −∞ where there is none."""
     outputs = y, data.low, data.mask, data.variance, bias_sd, slope_sd
     m, samples, _ = theta.shape
-    if m * samples * len(data.x) ** 2 > NUMPY_ELEMENTS:
+    x = np.broadcast_to(data.x, (m, *data.x.shape[-2:]))
+    if m * samples * x.shape[1] ** 2 > NUMPY_ELEMENTS:
         from planner.surrogate.compiled_likelihood import compiled_log_likelihoods
 
-        return compiled_log_likelihoods(kernel, data.x, *outputs, jitter, theta)
+        return compiled_log_likelihoods(kernel, x, *outputs, jitter, theta)
     return np.array(
         [
-            _of_an_output(kernel, data.x, jitter, theta[j], *(values[j] for values in outputs))
+            _of_an_output(kernel, x[j], jitter, theta[j], *(values[j] for values in outputs))
             for j in range(m)
         ]
     )

@@ -103,22 +103,30 @@ class Surrogate:
         of the pose's mean over many visits, which is what further poses narrow down.
         """
         q, k = len(x), self.count
-        mean, sd = self.primary.predict(x, _log(simulated.frequency_hz), self.visits and visit)
+        f, f_sd = self.frequencies(x, simulated.frequency_hz, visit)
         log_zeta, zeta_sd = self.damping.predict(
             np.clip(x, *DAMPING_RANGE), _log(simulated.damping_ratio)
         )
-        f, zeta = np.exp(mean), np.exp(log_zeta)
+        zeta = np.exp(log_zeta)
         parts, parts_sd = self._parts(x, simulated)
         parts = parts.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
         parts_sd = parts_sd.reshape(q, k, 3, 3, 2) * self.scale[:, None, None, None]
         return ModalPrediction(
             f,
-            f * _relative_sd(sd),
+            f_sd,
             zeta,
             zeta * _relative_sd(zeta_sd),
             parts[..., 0] + 1j * parts[..., 1],
             np.sqrt(np.mean(parts_sd**2, axis=-1)),
         )
+
+    def frequencies(
+        self, x: np.ndarray, simulated_hz: np.ndarray, visit: bool = True
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Frequencies and their sds (q, k) in Hz, as of `predict`."""
+        mean, sd = self.primary.predict(x, _log(simulated_hz), self.visits and visit)
+        f = np.exp(mean)
+        return f, f * _relative_sd(sd)
 
     def _parts(self, x: np.ndarray, simulated: SimulatedModes) -> tuple[np.ndarray, np.ndarray]:
         """Scaled parts of the residues and their sd, (q, 18 k) each."""

@@ -70,10 +70,8 @@ def _averaged(models: list[AR1], asked: np.ndarray) -> AR1:
             [np.pad(p.theta, [(0, 0), (0, 0), (0, size - p.theta.shape[2])]) for p in posteriors]
         ),
         slope_sd=picked([p.slope_sd for p in posteriors]),
-        whiten=picked([p.whiten for p in posteriors]),
-        weights=picked([p.weights for p in posteriors]),
         # Each is believed as much as a GP that ignores the simulation, with which this is compared.
         log_evidence=logsumexp(evidence, axis=0),
-        remarks=tuple(dict.fromkeys(remark for p in posteriors for remark in p.remarks)),
+        jitter=max(p.jitter for p in posteriors),
     )
     return replace(models[0], posterior=posterior)

@@ -25,7 +25,7 @@ class TrainingData:
 class Padded:
     """The same, output first, with `mask` (m, c) saying which entries count."""
 
-    x: np.ndarray  # (c, d)
+    x: np.ndarray  # (c, d), or (m, c, d) where outputs have points of their own
     y: np.ndarray  # (m, c)
     variance: np.ndarray  # (m, c)
     low: np.ndarray  # (m, c)
@@ -52,3 +52,20 @@ def pad(data: TrainingData, uses_low: np.ndarray) -> Padded:
     out.variance[:, :n] = np.where(known, np.nan_to_num(data.sd), 1.0).T ** 2
     out.low[:, :n] = np.where(known & uses_low, data.low, 0.0).T
     return out
+
+
+def thinned(data: Padded, size: int) -> Padded:
+    """At most `size` of each output's known points, spread evenly over their order."""
+    rows = np.array([_spread(mask, size) for mask in data.mask])
+    each = np.arange(len(rows))[:, None]
+    picked = (v[each, rows] for v in (data.y, data.variance, data.low, data.mask))
+    return Padded(data.x[rows], *picked)
+
+
+def _spread(mask: np.ndarray, size: int) -> np.ndarray:
+    """Indices (size,) of known entries, filled up with others, in order."""
+    known, other = np.flatnonzero(mask > 0), np.flatnonzero(mask <= 0)
+    most = min(size, len(known))
+    some = known[np.linspace(0, len(known) - 1, most).round().astype(int)]
+    rest = np.setdiff1d(known, some)
+    return np.sort(np.concatenate([some, np.concatenate([other, rest])[: size - most]]))

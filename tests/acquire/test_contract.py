@@ -203,20 +203,11 @@ def held(changed, open_):
 
 def test_slopes_are_the_derivatives_of_ln_f(open_):
     q, p = some_q(2), open_.parametrisation
-    slope = log_frequency_slope(open_.simulation, p, q, 4)
+    slope = log_frequency_slope(open_.simulation, p, q, open_.simulation.modes(q, 4))
     x, count = np.concatenate([p.mean, np.zeros(len(p.nuisances))]), len(p.parameters)
 
     def log_hz(at):
-        changed = moved(open_, at)
-        lossless = changed.changed(
-            type(changed.elasticity)(
-                changed.elasticity.stiffness,
-                0 * changed.elasticity.damping,
-                changed.elasticity.loss_factor,
-            ),
-            p.inertia_change(at[count:]),
-        )
-        return np.log(held(lossless, open_).modes(q, 4).frequency_hz)
+        return np.log(moved(open_, at).modes(q, 4).frequency_hz)
 
     for i in (0, 3, 11, count, count + 7, len(x) - 1):
         step = np.zeros(len(x))
@@ -277,7 +268,7 @@ def test_left_out_residuals_are_those_of_refits(surrogate):
             for s in range(len(post.theta[k])):
                 whiten = post.whiten[k][s][np.ix_(known, known)]
                 noisy = np.linalg.inv(whiten.T @ whiten)
-                y = noisy @ post.weights[k][s][known]
+                y = noisy @ post.solved(k).weights[s][known]
                 rest = np.arange(len(known)) != i
                 pull = np.linalg.solve(noisy[np.ix_(rest, rest)], noisy[rest, i])
                 means.append(y[i] - pull @ y[rest])

@@ -1,7 +1,9 @@
 """Models as published beside public ones of the same model on the same data.
 
-NARGP beside emukit's: same kernels, noise and data; the hyperparameters of the greatest likelihood
-are found by each one's own climb. `pytest -m slow -s tests/benchmarks/test_published_peers.py`
+NARGP beside emukit's: same kernels, noise and data. At emukit's hyperparameters both must say the
+same. Each finds hyperparameters by its own climb: ours must never end lower, and where both end on
+the same peak, predict the same; where ours ends higher, emukit's is not the greatest likelihood.
+`pytest -m slow -s tests/benchmarks/test_published_peers.py`
 prints the tables; the peers run in the interpreter that PEERS_PYTHON names (see
 `test_fusion_peers`). PEERS_SEEDS (10) says how many designs per problem.
 """
@@ -29,7 +31,11 @@ from tests.support.fusion_problems import PROBLEMS, Design, Problem, design
 SEEDS = int(os.environ.get("PEERS_SEEDS", "10"))
 NOISE = 1e-3  # sd over the cheap values' sd: the variance of 1e-6 that emukit's is given
 EXPENSIVE = 15
-STARTS = 10  # of each level's climb, as many as emukit's restarts
+LOW_STARTS, STARTS = 5, 30  # of the levels' climbs; of 30 each is rough at first
+SAME_PEAK = 0.15  # difference of log-likelihoods of two climbs that say the same
+# Of some hundred: 25 points on a line with next to no noise leave a nearly singular matrix.
+LIKELIHOODS = 0.03
+DRAWN = 0.02  # what emukit's 2,000 draws of the cheap level leave of an RMSE of 0.3 %
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 
 pytestmark = [
@@ -69,14 +75,11 @@ def scaled(d: Design) -> Design:
 
 
 def own_nargp(d: Design, theta_low=None, theta_high=None) -> tuple[NARGP, float]:
-    """The model and the sum of its levels' log-likelihoods; at given hyperparameters, or its own.
-
-    Emukit's predictions draw the cheap level with its noise: so does this one then.
-    """
+    """The model and its levels' log-likelihoods' sum; at given hyperparameters, or its own."""
     same = Normalisation(0.0, 1.0)
     cheap, measured = Samples.of(d.x_low, d.y_low), Samples.of(d.x_high, d.y_high)
     if theta_low is None or theta_high is None:
-        low = fit_low(cheap, NOISE, STARTS)
+        low = fit_low(cheap, NOISE, LOW_STARTS)
         model = fit_nargp(measured, low, same, NOISE, same, STARTS)
     else:
         low = at_hyperparameters(cheap, "rbf", theta_low, same)
@@ -135,12 +138,14 @@ def test_nargp_is_as_good_as_emukits(tmp_path):
             f"{name:14s} emukit {np.median(peer):.5f}  at its hyperparameters {np.median(same):.5f}"
             f" (largest difference {100 * np.max(np.abs(same / peer - 1)):.2f} %)"
             f"  own {np.median(own):.5f}  likelihoods differ by {np.abs(differs).max():.4f}, own "
-            f"climb gains {np.array2string(np.round(gain, 1))}"
+            f"climb gains {np.array2string(np.round(gain, 1))}, RMSE off by "
+            f"{np.array2string(np.round(100 * (own / peer - 1), 2))} %"
         )
-    for each in rows.values():
+    for name, each in rows.items():
         peer, same, own, differs, gain = np.transpose(each)
-        # Where both are exact to a thousandth, emukit's own draws of the cheap level's noise show.
-        assert np.median(np.abs(same / peer - 1)) < 0.01
-        assert abs(np.median(same) / np.median(peer) - 1) < 0.01
-        assert np.all(np.abs(differs) < 0.01)
-        assert np.mean(gain > -0.1) >= 0.7  # both climbs end on one of several peaks
+        assert np.all(np.abs(differs) < LIKELIHOODS), name
+        assert np.median(np.abs(same / peer - 1)) < 0.01, name
+        assert np.all(np.abs(same / peer - 1) < DRAWN), name
+        assert np.all(gain > -SAME_PEAK), name
+        assert abs(np.median(own / peer - 1)) < 0.01, name
+        assert np.median(np.abs(own / peer - 1)[np.abs(gain) < SAME_PEAK]) < 0.01, name

@@ -10,7 +10,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.frf_model import ErrorByZone, LeftOut, local_size, share_of
 from planner.campaign.frf_posterior import FrfPosterior
 from planner.campaign.frf_simulation import completed, widened
-from planner.campaign.low_fidelity import PRIORS
+from planner.campaign.low_fidelity import OF_EXACT_HITS
 from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.dynamics.simulation import Simulation
@@ -105,7 +105,7 @@ def test_a_record_cut_off_is_completed(tmp_path):
 
 def test_a_wider_structure_lists_every_spring_once_and_can_be_identified(tmp_path):
     simulation = Simulation(Robot.load(KR210.write(tmp_path)))
-    wide = widened(Structure(simulation, PRIORS))
+    wide = widened(Structure(simulation, OF_EXACT_HITS))
     places = [place_name(block) for block in wide.simulation.robot.config.compliance]
     assert len(set(places)) == len(places)
     assert {"base along x", "base along y", "base along z", "base about z"} <= set(places)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from planner.campaign.build import build
 from planner.campaign.campaign import Campaign
 from planner.campaign.hit_habits import HitMiss, habits
-from planner.campaign.model import build
 from planner.dataset.store import Store
 from planner.replay import replay
 from planner.report.imports import ImportedPoses

@@ -13,6 +13,7 @@ from planner.campaign.events import MeasuredMode, Proposed
 from planner.campaign.question import compare
 from planner.campaign.state import fold
 from planner.demo import NAME, Pool, shipped
+from planner.dynamics.vibration import SimulatedModes
 from planner.errors import InputError
 from planner.recording.folder import TABLE
 from planner.replay import replay
@@ -213,5 +214,22 @@ def test_a_mode_that_was_not_found_is_none_that_is_off():
     assert not one.contradicts(False)
     two = compare(expected, sd, tuple(map(mode, (10.5, 12.6, 18.0, 28.0))))
     assert two.contradicts(False)
+    # Where a strong mode is missing and one that nothing explains is found, it is one that is off.
+    strong = MeasuredMode(53.0, 0.01, 0.03, 0.001, (), ((9.0, 0.0, 0.01),) * 9)
+    weak = MeasuredMode(53.0, 0.01, 0.03, 0.001, (), ((0.1, 0.0, 0.01),) * 9)
+    here = tuple(
+        MeasuredMode(hz, 0.01, 0.03, 0.001, (), ((1.0, 0.0, 0.01),) * 9)
+        for hz in (10.0, 18.0, 28.0)
+    )
+    residues = np.ones((1, 4, 3, 3)) + 0j
+    there = SimulatedModes(expected[None], np.full((1, 4), 0.03), residues)
+    assert compare(expected, sd, (*here, strong), there).contradicts(True)
+    assert not compare(expected, sd, (*here, weak), there).contradicts(True)
+    # Modes at their places that move the tool another way are those of another pose.
+    turned = SimulatedModes(expected[None], np.full((1, 4), 0.03), -residues)
+    other = compare(expected, sd, here, turned)
+    assert not other.far[[0, 2, 3]].any()
+    assert other.answers_otherwise
+    assert other.contradicts(False)
     slight = compare(expected, sd, tuple(map(mode, (10.15, 12.2, 18.3, 28.4))))
     assert not slight.contradicts(True)

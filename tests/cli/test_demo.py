@@ -39,11 +39,11 @@ def check_against_truth(summary):
 def check_recording(path):
     """Opened with the SDK: entities, timeline and blueprint are there."""
     contents, frames = recording_contents(path), Frames(path)
-    wanted = ("/robot", "/cell/workspace", "/cell/measured", "/cell/proposed", "/frf/picture",
-              "/campbell/picture", "/hits", "/learning", "/log", "/note", "/modes")  # fmt: skip
+    wanted = ("/robot", "/cell/workspace", "/cell/measured", "/cell/proposed", "/frf/xx",
+              "/frequency", "/hits/force", "/learning", "/log", "/note", "/modes")  # fmt: skip
     for entity in wanted:
         assert any(e.startswith(entity) for e in contents["entities"]), entity
-    assert contents["timelines"] == {"measurement"}
+    assert contents["timelines"] == {"measurement", "vibration"}
     assert contents["stores"] == {"recording", "blueprint"}
     drawn = ("workspace", "measured", "proposed", "hits", "obstacles")
     assert {f"/cell/{name}" for name in drawn} <= set(frames.shapes)

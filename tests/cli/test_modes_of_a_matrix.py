@@ -149,8 +149,55 @@ def test_a_turned_sign_and_exchanged_nodes_are_named(structure, matrix, tmp_path
     assert "Node 14's and node 26's rows (z) fit each other's places" in told
 
 
+def places(structure):
+    """Datasets 15 and 82: where the nodes are and what joins them."""
+    nodes = np.array(structure.nodes)
+    place = np.array([structure.position_m[n] for n in structure.nodes])
+    traces = [
+        {"type": 82, "trace_num": k + 1, "n_nodes": 2, "color": 1, "id": "", "nodes": np.array(two)}
+        for k, two in enumerate(structure.lines)
+    ]
+    at = {"x": place[:, 0], "y": place[:, 1], "z": place[:, 2]}
+    return [{"type": 15, "node_nums": nodes, **at}, *traces]
+
+
+@pytest.mark.parametrize("hammer", [True, False])
+def test_points_without_a_reference_are_told_by_their_neighbours(
+    structure, matrix, tmp_path, capsys, hammer
+):
+    turned = matrix.accelerance.copy()
+    turned[24] *= -1
+    one = replace(matrix, accelerance=turned)
+    one = one.transposed() if hammer else one
+    path = write_matrix(tmp_path / "turned.uff", one, before=places(structure))
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    done = "hit" if hammer else "felt"
+    (remark,) = answer["remarks"]
+    assert f"The sign at node 25, z is turned where it was {done}" in remark
+    agree(answer, structure)
+    other = exchange(matrix, 8, 30)
+    other = other.transposed() if hammer else other
+    path = write_matrix(tmp_path / "exchanged.uff", other, before=places(structure))
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    (remark,) = answer["remarks"]
+    assert "Node 9's and node 31's rows fit each other's places" in remark
+
+
+def test_single_frfs_are_named(structure, matrix, tmp_path, capsys):
+    values = matrix.accelerance.copy()
+    values[20, 0] *= -1
+    values[[5, 33], 2] = values[[33, 5], 2]
+    path = write_matrix(tmp_path / "odd.uff", replace(matrix, accelerance=values))
+    _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    told = " ".join(answer["remarks"])
+    assert "The FRF felt at node 21, z and hit at node 1, z has a turned sign" in told
+    assert "felt at node 6, z and hit at node 38, z and felt at node 34, z and hit at" in told
+    assert len(answer["remarks"]) == 2
+    agree(answer, structure)
+
+
 def test_nothing_is_named_where_nothing_is_wrong(structure, matrix, tmp_path, capsys):
-    path = write_matrix(tmp_path / "set.uff", matrix)
+    path = write_matrix(tmp_path / "set.uff", matrix, before=places(structure))
     _, answer, _ = modes(capsys, path, "--band-hz", *BAND)
     assert answer["remarks"] == []
 

@@ -1,7 +1,6 @@
 """`next` with every acquisition, and on a robot that cannot be checked for collision."""
 
 import contextlib
-import hashlib
 import io
 import json
 from pathlib import Path
@@ -11,11 +10,11 @@ from rich.console import Console
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Configured, Proposed
-from planner.campaign.journal import encode_line, parse
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS
 from planner.session.keys import NoKeys
 from planner.session.watch import watch
+from tests.support.earlier_logs import GRAVITY, SCATTER, written_earlier
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 UNCHECKED = "Nothing is checked for collision, because plain.urdf has no collision geometry"
@@ -122,29 +121,6 @@ def test_a_robot_with_collision_geometry_is_not_told_of(robot, tmp_path):
     shape = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>'
     urdf.write_text(urdf.read_text().replace("</inertial></link>", f"</inertial>{shape}", 1))
     assert ask("next", begun(tmp_path, robot))["remarks"] == []
-
-
-GRAVITY, SCATTER = b',"geometric_stiffness":true', b',"visit_scatter":true'
-
-
-def written_earlier(cell: Path, left_out: tuple[bytes, ...]) -> Path:
-    """The log as versions wrote it that left this out of the model: they do not mention it."""
-    path, check, lines = cell / "log.jsonl", "", []
-    for entry in parse(path.read_bytes()).entries:
-        line, _ = encode_line(check, entry)
-        body = line.split(b'"entry":', 1)[1]
-        for later in left_out:
-            assert later in body
-            body = body.replace(later, b"")
-        line, check = _chained(check, body[:-2])
-        lines.append(line)
-    path.write_bytes(b"".join(lines))
-    return cell
-
-
-def _chained(check: str, body: bytes) -> tuple[bytes, str]:
-    check = hashlib.sha256(check.encode() + body).hexdigest()[:16]
-    return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
 
 
 def test_a_campaign_goes_on_with_the_gravity_that_it_began_with(robot, tmp_path):

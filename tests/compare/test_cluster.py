@@ -59,7 +59,7 @@ def numbers(out: Path) -> dict[str, list]:
     """All that the runs kept in a folder say, but for the time they took."""
     found = {}
     for path in (out / "runs").glob("*.json"):
-        run = json.loads(path.read_bytes())
+        run = json.loads(path.read_bytes())["kept"]
         found[path.name] = [v for k, v in run.items() if not k.endswith("_seconds")]
     return found
 

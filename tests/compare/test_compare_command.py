@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planner.campaign.model import build
+from planner.campaign.build import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from planner.cli.run import run as call
@@ -94,12 +94,16 @@ def test_what_is_done_is_not_done_again(pool, out, first):
     assert len(kept) == 6
     runs = sorted((out / "runs").iterdir())
     runs[0].unlink()
+    flipped = runs[1].read_bytes().replace(b"0.", b"1.", 1)
+    runs[1].write_bytes(flipped)  # a figure that reads as well as the one before
     again = json.loads(planner(*command(pool, out, "--json")).stdout)
     for name, curve in first["strategies"].items():
         for key in ("n", "frequency_rmse_percent", "r2", "coverage95"):
             assert again["strategies"][name][key] == curve[key]
     after = {path: path.stat().st_mtime_ns for path in kept}
-    assert [path for path in kept if after[path] != kept[path]] == [runs[0]]
+    assert sorted(path for path in kept if after[path] != kept[path]) == runs[:2]
+    assert [said for said in again["remarks"] if runs[1].name in said and "damaged" in said]
+    assert runs[1].read_bytes() != flipped
 
 
 def test_more_repeats_take_up_those_that_are_there(pool, out, first):
@@ -130,7 +134,7 @@ def test_ctrl_c_keeps_what_is_finished(pool, tmp_path):
     assert "kept" in said
     done = list((tmp_path / "runs").glob("*.json"))
     assert 2 <= len(done) < 500
-    assert all(json.loads(path.read_bytes())["n"] == [2, 3, 4] for path in done)
+    assert all(json.loads(path.read_bytes())["kept"]["n"] == [2, 3, 4] for path in done)
     assert not list((tmp_path / "runs").glob(".*"))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from planner.diagnosis.effects import library
-from planner.diagnosis.linear.fit import Problem
+from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear_diagnosis import diagnose
 from planner.truth.deviation import AttachedMass, AttachedResonator, Spring

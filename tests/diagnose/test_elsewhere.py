@@ -4,8 +4,9 @@ import pytest
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import Problem, fit, settle
+from planner.diagnosis.linear.fit import fit, settle
 from planner.diagnosis.linear.other_places import elsewhere
+from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.linear_diagnosis import again, diagnose
 from planner.truth.deviation import AttachedResonator
 from tests.support.concealed import hidden

@@ -11,6 +11,7 @@ from planner.report.diagnosis import DiagnosisReport
 from planner.truth.deviation import (
     AttachedMass,
     AttachedResonator,
+    BentLink,
     Deviation,
     Feedback,
     ScaledJoint,
@@ -23,6 +24,8 @@ from tests.support.small_cases import SCATTER, small_case, unlike
 
 TILTS = tuple(Spring("base", axis, 2.5e5, 200.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
 HOSE = AttachedResonator("link_3", (0.2, 0.0, 0.1), (0.0, 0.6, 0.8), 1.2, 24.0, 0.02)
+BEARING = tuple(Spring("joint_2", axis, 2e5, 60.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
+BEAM = BentLink("link_3", (3e4, 3e4), 3e4, 1e-3)
 TURNED = Rotation.from_rotvec(np.deg2rad([0, 0, 15])).as_matrix()
 
 
@@ -50,6 +53,10 @@ CASES = {
         ),
         said=(("joint_stiffness", "joint_3"),),
     ),
+    "bearing that tilts": Concealed(
+        unlike(extra=BEARING), said=(("transverse_compliance", "joint_2"),)
+    ),
+    "link that bends": Concealed(unlike(beams=(BEAM,)), said=(("link_flexibility", "link_3"),)),
     "quiet channel": Concealed(
         artefact=Artefact(gain=(1.0, 0.75, 1.0)), said=(("sensor_gain", "sensor_y"),)
     ),

@@ -5,7 +5,8 @@ import pytest
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import Both
-from planner.diagnosis.linear.fit import COARSE, Fit, Problem
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.problem import COARSE, Problem
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.diagnosis.write_explained import explained_simulation, write_explained
 from planner.dynamics.simulation import Simulation

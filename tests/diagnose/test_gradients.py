@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.diagnosis.effects import library
-from planner.diagnosis.linear.fit import Grade, Problem
+from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot

@@ -13,7 +13,7 @@ import pytest
 from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, Whitening, hit_columns
-from planner.diagnosis.linear.fit import tolerances_of
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.misses_again import abstained
 from planner.diagnosis.screens import drift, force_levels, repeats
 from planner.diagnosis.screens.screen import screen

@@ -14,7 +14,8 @@ from planner.diagnosis.effects.sensor_chain import SensorChain
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import Grade, fit
+from planner.diagnosis.linear.fit import fit
+from planner.diagnosis.linear.problem import Grade
 from planner.diagnosis.screens import artefacts, drift, force_levels
 from planner.diagnosis.screens import screen as screens
 from planner.diagnosis.screens.exponential_window import screen_window

@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from planner.diagnosis.linear.fit import PRIORS
+from planner.diagnosis.linear.problem import PRIORS
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import parametrise

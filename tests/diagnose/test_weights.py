@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
-from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, size_priors
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
 from planner.diagnosis.linear.evidence import shares_of
 from planner.diagnosis.thresholds import ALIKE, DISCREPANCIES, NOISE_OVERSTATED
 from planner.inference.evidence import shared_noise, temper
@@ -36,8 +36,10 @@ def test_shared_noise_is_the_sum_over_lags(spacing_hz, rate_1_s):
 def worth(evidence: float, size: float) -> Worth:
     """Of a fit whose discrepancy is known to have one of the sizes."""
     place = DISCREPANCIES.index(size)
-    known, unknown = (evidence + prior[place] for prior in size_priors())
-    return Worth(known, unknown, np.full(POSES, -2 * evidence / POSES), 1.0, size, np.zeros(14))
+    by_size = np.full(len(DISCREPANCIES), -1e9)
+    by_size[place] = evidence
+    scores = np.full((len(DISCREPANCIES), POSES), -2 * evidence / POSES)
+    return Worth(by_size, scores, 1.0, size, np.zeros(14))
 
 
 def shares(*fits: tuple[float, float, float], prior=None) -> np.ndarray:

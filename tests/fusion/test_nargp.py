@@ -39,6 +39,20 @@ def test_no_neighbour_of_the_hyperparameters_is_likelier():
             assert value(fitted.theta + step * (np.arange(4) == i)) < best
 
 
+def test_an_isotropic_kernel_has_one_length_scale_and_a_lower_peak():
+    s = samples(14)
+    free, tied = (fit_likelihood(s, noise=0.1, isotropic=isotropic) for isotropic in (False, True))
+    assert tied.theta[2] == tied.theta[3]
+    assert free.theta[2] != free.theta[3]
+    assert tied.log_likelihood < free.log_likelihood
+    only_length = samples(14)
+    only_length.x[:, 1] = 0.5  # nothing varies along it: both find the same peak
+    free, tied = (
+        fit_likelihood(only_length, noise=0.1, isotropic=isotropic) for isotropic in (False, True)
+    )
+    np.testing.assert_allclose(tied.log_likelihood, free.log_likelihood, atol=1e-3)
+
+
 def test_the_level_below_is_integrated_over():
     """By quadrature as by a great many samples of it."""
 

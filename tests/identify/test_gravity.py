@@ -9,10 +9,12 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
+from planner.identification.effort import QUICK
 from planner.identification.identify import identify
 from planner.identification.measured_frfs import stack
 from planner.identification.objective import Objective, stands
 from planner.identification.parameters import Priors, parametrise
+from planner.identification.staged_problem import StagedProblem
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation
@@ -77,3 +79,23 @@ def test_springs_that_could_never_carry_the_robot_are_said(tmp_path, frfs):
     simulation = Simulation(Robot.load(make_plain_arm(tmp_path, softer=1e7)))
     with pytest.raises(InputError, match="far too soft to carry the robot's weight"):
         identify(frfs, Q, simulation, band_hz=BAND_HZ, starts=1)
+
+
+def test_what_buckles_just_beyond_the_prior_is_made_to_stand(arm, frfs):
+    """Where the prior's edge stands and a start a little beyond it does not."""
+    simulation = Simulation(Robot.load(arm))
+    matrices = simulation.elastic.matrices(Q)
+    softness = np.linspace(0.0, 5.0, 500)
+    buckling = next(
+        s for s in softness if not stands(matrices, np.exp(-s) * simulation.elasticity.stiffness)
+    )
+    p = parametrise(simulation, Priors(stiffness_factor=float(np.exp(buckling / 6.75))))
+    problem = StagedProblem(
+        tuple(frfs), Q, simulation.elastic, BAND_HZ, matrices,
+        p.inertias(simulation.elastic.body_jacobians(Q)), p, None, QUICK, None, None,
+    )  # fmt: skip
+    springs = np.array([x.kind == "stiffness" for x in p.parameters])
+    soft = p.mean - 7.5 * p.log_sd * springs
+    assert not stands(matrices, p.elasticity(soft).stiffness)
+    assert stands(matrices, p.elasticity(p.near(soft)).stiffness)
+    assert stands(matrices, p.elasticity(problem.standing(soft)).stiffness)

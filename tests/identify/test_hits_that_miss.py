@@ -89,8 +89,8 @@ def test_what_poses_share_is_integrated_out_once(folder):
     slope = rng.standard_normal(shape) + 1j * rng.standard_normal(shape)
     residual = 0.1 * slope[:, 0] + rng.standard_normal(h.shape)
     found = left_open.integrated(residual, slope)
-    own = [factor @ b for factor, b in zip(left_open.factor, left_open.own, strict=True)]
-    common = np.concatenate(left_open.common, axis=1)
+    own = [pose.factor @ pose.own for pose in left_open.poses]
+    common = np.concatenate([p.common + p.across.T @ p.own for p in left_open.poses], axis=1)
     b = np.zeros((2 * len(own[0]) + CHAIN_NUMBERS, common.shape[1]))
     half, size = len(own[0]), own[0].shape[1]
     b[:half, :size], b[half : 2 * half, size:], b[2 * half :] = own[0], own[1], common

@@ -11,7 +11,8 @@ from planner.dynamics.gradient import laplace, response, response_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.identify import QUICK, identify
+from planner.identification.effort import QUICK
+from planner.identification.identify import identify
 from planner.identification.measured_frfs import matrices_at
 from planner.identification.measurement_model import (
     Part,
@@ -152,6 +153,20 @@ def test_hits_elsewhere_and_sensors_that_rove(toml: Path, tmp_path: Path) -> Non
     assert one.measured.modal is not None
     assert other.measured.frf is None
     assert "modes of the tool are not told" in (other.measured.remarks[-1])
+
+
+def test_a_dead_channel_leaves_the_other_sensors_of_its_hits(toml: Path, tmp_path: Path) -> None:
+    robot, sensors = Robot.load(toml), ("sensor", "elbow")
+    stays = [(f"P{i}", q, "tcp", sensors) for i, q in enumerate(poses(2))]
+    record(tmp_path / "hits", toml, stays, Secret(Deviation(3)), dead={"P1": 4})
+    found = Dataset.read(tmp_path / "hits", robot.joint_names, (4.0, 90.0), points=robot.points)
+    assert not found.refused
+    assert [frf.layout.sensors for frf in found.frfs] == [sensors, ("sensor",)]
+    whole, lacking = found.measured
+    assert whole.measured.modal is not None
+    assert lacking.measured.modal is not None
+    assert all("elbow y" in " ".join(v.remarks) for v in lacking.measured.verdicts)
+    assert not any(v.remarks for v in whole.measured.verdicts)
 
 
 def test_springs_are_identified_from_hits_away_from_the_tool(toml: Path, tmp_path: Path) -> None:

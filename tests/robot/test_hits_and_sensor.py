@@ -5,7 +5,7 @@ import pytest
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import load_campaign_config
-from planner.diagnosis.linear.fit import tolerances_of
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.robot import Robot

@@ -12,7 +12,7 @@ def test_a_steady_fall_is_followed_to_the_target():
     history = [8.0, 4.0, 2.0, 1.0]
     assert poses_to_go(history, 0.25, 3) == (2, 2)
     said = progress_line(history, 0.25, 120.0, 3).plain
-    assert said == "2.0 min per pose; 2 more poses by the trend so far; 4 min to go"
+    assert said == "2.0 min per pose; 2 more poses, 4 min to go"
 
 
 @pytest.mark.parametrize(

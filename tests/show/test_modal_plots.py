@@ -190,7 +190,7 @@ def test_what_is_unknown_is_not_drawn():
     assert any("two hits" in text.get_text() for text in axes.texts)
     legend = [text.get_text() for text in figures["frf"].legends[0].get_texts()]
     assert "± 2 sd" not in legend
-    assert {"measured", "fit", "usable band", "mode"} <= set(legend)
+    assert {"measured", "fit", "coherent, in the usable band", "mode"} <= set(legend)
 
 
 def test_mac_matrix_and_the_values_in_its_cells(five):
@@ -269,13 +269,16 @@ def test_the_same_modes_give_the_same_file(five, tmp_path, form):
     assert (tmp_path / f"first.{form}").read_bytes() == (tmp_path / f"second.{form}").read_bytes()
 
 
-def test_the_usable_band_begins_where_the_frf_becomes_coherent(five):
+def test_an_frf_is_shaded_where_it_is_coherent(five):
     frf = five[1]
     low, high = frf.usable_band_hz
     begins = low + 0.3 * (high - low)
     coherence = frf.coherence.copy()
     coherence[0, 0, frf.frequency_hz < begins] = 0.2
     coherence[1, 0] = 0.1
+    hole = low + np.array([0.4, 0.6]) * (high - low)
+    coherence[2, 0] = 0.95
+    coherence[2, 0, (frf.frequency_hz > hole[0]) & (frf.frequency_hz < hole[1])] = 0.3
     partly = replace(frf, coherence=coherence)
     spans = []
     for response in range(3):
@@ -286,4 +289,4 @@ def test_the_usable_band_begins_where_the_frf_becomes_coherent(five):
     assert abs(spans[0][0][0] - begins) <= 4 * step
     assert spans[0][0][1] == high
     assert spans[1] == []
-    assert spans[2] == [(low, high)]
+    assert np.allclose(spans[2], [(low, hole[0]), (hole[1], high)], atol=4 * step)

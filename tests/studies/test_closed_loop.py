@@ -10,8 +10,8 @@ import os
 import numpy as np
 import pytest
 
+from planner.campaign.build import build
 from planner.campaign.events import Proposal
-from planner.campaign.model import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState
 from tests.support.fidelity_cells import MODES, UNUSED, band_of, cell_of, hit, soft, truth_of

@@ -76,6 +76,16 @@ def test_what_is_finished_is_not_run_again(ran, tmp_path):
     assert ran == [("busch2022", False), ("lei2023", False)]
 
 
+def test_a_study_that_was_damaged_runs_again_and_is_named(ran, tmp_path):
+    conduct.conduct_all(tmp_path, True, quietly)
+    file = tmp_path / "lei2023" / "study.json"
+    file.write_bytes(file.read_bytes().replace(b"2.5", b"2.6"))
+    ran.clear()
+    told = conduct.conduct_all(tmp_path, True, quietly)
+    assert ran == [("lei2023", True)]
+    assert told.damaged == ("lei2023",)
+
+
 def test_a_study_whose_picture_is_gone_runs_again(ran, tmp_path):
     conduct.conduct_all(tmp_path, True, quietly)
     next((tmp_path / "busch2022").glob("*.png")).unlink()

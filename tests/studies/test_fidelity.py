@@ -9,8 +9,8 @@ import os
 import numpy as np
 import pytest
 
+from planner.campaign.build import build
 from planner.campaign.cell import Cell
-from planner.campaign.model import build
 from planner.campaign.state import CampaignState
 from tests.support.fidelity_cells import CELLS, MeasuredCell
 

@@ -19,7 +19,7 @@ MUST_HOLD = {
     "busch2022": ("No kernel follows the damping ratios", "Residues are best modelled with RBF"),
     "busch2020": ("The simulation alone, which lacks a mode",),
     "seyedhosseini2025": ("Damping ratios are predicted less surely",),
-    "lei2023": ("parameters train in less time",),
+    "lei2023": ("Groups halve the number of models",),
     "birk2025": ("24P reproduces FRFs far better than 12P", "Nobody reaches 100 %"),
 }
 

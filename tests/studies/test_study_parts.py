@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from planner.errors import InputError
+from planner.identification.parameters import Priors
 from planner.studies import (
     birk2025,
     birk2025_data,
@@ -154,18 +155,14 @@ def test_the_most_informative_points_come_first():
     truth = birk2025_data.true_robot()
     q, path = birk2025_data.poses(truth, 6)
     assert list(path[:6]) == ["S1"] * 6
-    chosen = birk2025_design.best_points(simulation, (), q, 4, 1.0, (5.0, 200.0))
+    informative = birk2025_design.Informative.of(simulation, Priors(), (), q, 1.0, (5.0, 200.0))
+    chosen = informative.best(4)
     assert len(set(chosen.tolist())) == 4
-    told = [
-        birk2025_design.determined(simulation, (), q, rows, 1.0, (5.0, 200.0))
-        for rows in (chosen, np.array([0, 1, 2, 3]))
-    ]
-    assert told[0] >= told[1]
-    covariance, information = birk2025_design._open(simulation, (), q, 1.0, (5.0, 200.0))
+    assert informative.determined(chosen) >= informative.determined(np.arange(4))
+    covariance, told = informative.covariance, informative.information.sum(axis=1)
 
     def gain(rows):
-        whole = np.eye(len(covariance)) + covariance @ information[rows].sum(axis=0)
-        return np.linalg.slogdet(whole)[1]
+        return np.linalg.slogdet(np.eye(len(covariance)) + covariance @ told[rows].sum(axis=0))[1]
 
     assert all(gain([chosen[0]]) >= gain([i]) for i in range(len(q)))
     assert gain(chosen) > gain([0, 1, 2, 3])

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.acquisition_inputs import cost_of
+from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.log_conversion import from_mode
-from planner.campaign.model import Model, build
+from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
 from planner.frf.frf import Frf

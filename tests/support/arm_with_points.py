@@ -79,8 +79,12 @@ def record(
     secret: Secret,
     handling: Handling = LABORATORY,
     seed: int = 0,
+    dead: dict[str, int] | None = None,
 ) -> Truth:
-    """Hits along x, y, z at stays: pose, q in rad, hit point, sensors; the truth behind them."""
+    """Hits along x, y, z at stays: pose, q in rad, hit point, sensors; the truth behind them.
+
+    `dead` names channels that recorded nothing, by pose.
+    """
     rng, truth = np.random.default_rng(seed), load_truth(robot_toml, secret.deviation)
     hammer = Hammer(peak_n=250.0, noise=0.004)
     shots = [(f"+{axis}", 250.0) for axis in "xyz"]
@@ -89,6 +93,9 @@ def record(
         for _, q, point, sensors in stays
     ]
     found = hit_poses(truth, secret, visits, hammer, rng)
+    for (name, *_), hits in zip(stays, found, strict=True):
+        for hit in hits if dead and name in dead else ():
+            hit.acceleration_m_s2[dead[name]] = 0.0
     rows = [
         (name, np.rad2deg(q), 1, hit)
         for (name, q, *_), hits in zip(stays, found, strict=True)

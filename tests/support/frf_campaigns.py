@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
 from planner.campaign.log_conversion import from_modal
-from planner.campaign.model import Model, build
+from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.errors import RefusedError
 from planner.frf import metrics

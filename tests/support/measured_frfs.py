@@ -5,20 +5,20 @@ from pathlib import Path
 import numpy as np
 
 from planner.frf.frf import Frf
+from planner.studies.birk2025_bounds import (
+    DAMPING_BOUNDS,
+    DEGREE,
+    TORSION_BOUNDS,
+    TRANSVERSE_BOUNDS,
+)
 from planner.truth.model import Truth
 from tests.support.known_robots import KR10
 
-DEGREE = 180 / np.pi  # per degree to per radian
-# Birk et al. 2025, Table 7 and Table 2: N·m/°, N·m/(°/s).
+# Birk et al. 2025, Table 7: N·m/°, N·m/(°/s).
 TORSION = (881.7, 1503.8, 896.7, 600.8, 208.8, 409.6)
 TORSION_DAMPING = (0.316, 0.457, 0.468, 0.045, 0.01, 0.233)
 TRANSVERSE = (5500.9, 22403.9, 10884.6, 10358.5, 6176.4, 5528.6)
 TRANSVERSE_DAMPING = (0.204, 0.029, 0.235, 0.118, 0.154, 0.178)
-TORSION_BOUNDS = ((500, 5000), (500, 5000), (250, 3000), (100, 1500), (30, 1000), (30, 1000))
-TRANSVERSE_BOUNDS = (
-    (2500, 80000), (2500, 80000), (1250, 40000), (500, 5000), (150, 12000), (150, 12000)
-)  # fmt: skip
-DAMPING_BOUNDS = (0.0001, 0.7)
 
 
 def birk_folder(folder: Path, transverse: bool = True) -> Path:

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from planner.campaign.build import build
 from planner.campaign.cell import Cell
 from planner.campaign.config import config_from_builtins
-from planner.campaign.model import build
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.dataset import Dataset, Visit

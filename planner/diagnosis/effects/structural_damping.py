@@ -6,8 +6,10 @@ import msgspec
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.thresholds import STRUCTURAL_SHARE
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import place_name
+from planner.robot.config import Compliance
 from planner.robot.robot import Robot
 
 
@@ -26,16 +28,7 @@ class StructuralDamping(Effect):
 
     def structure(self, simulation: Simulation) -> Simulation:
         """The simulation with loss factors in the place of its dampers."""
-        robot: Robot = simulation.robot
-        middle = 2 * np.pi * float(np.sqrt(np.prod(robot.config.band_hz)))
-        blocks = tuple(
-            msgspec.structs.replace(
-                b, damping=0.0, loss_factor=min(1.0, b.damping * middle / b.stiffness)
-            )
-            for b in robot.config.compliance
-        )
-        config = msgspec.structs.replace(robot.config, compliance=blocks)
-        return Simulation(replace(robot, config=config))
+        return _damped(simulation, viscous=0.0, structural=1.0)
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
         """Names of the loss factors."""
@@ -50,3 +43,31 @@ class StructuralDamping(Effect):
             f"Damping does not grow with frequency: loss factors of {min(eta):.2g} to "
             f"{max(eta):.2g} describe it better than viscous dampers."
         )
+
+
+def partly_structural(simulation: Simulation, stated: int) -> Simulation:
+    """The simulation with a loss factor beside each damper that has none, of `stated` first blocks.
+
+    Gears dissipate in both ways; how much in which nobody states, and it says nothing of what is
+    wrong with the robot.
+    """
+    return _damped(simulation, viscous=1.0, structural=STRUCTURAL_SHARE, most=stated)
+
+
+def _damped(
+    simulation: Simulation, viscous: float, structural: float, most: int | None = None
+) -> Simulation:
+    """Shares of the first blocks' dampers that stay, and that a loss factor takes mid-band."""
+    robot: Robot = simulation.robot
+    middle = 2 * np.pi * float(np.sqrt(np.prod(robot.config.band_hz)))
+
+    def changed(b: Compliance) -> Compliance:
+        if b.loss_factor or not b.damping:
+            return b
+        loss = min(1.0, structural * b.damping * middle / b.stiffness)
+        return msgspec.structs.replace(b, damping=viscous * b.damping, loss_factor=loss)
+
+    there = robot.config.compliance
+    blocks = (*map(changed, there[:most]), *there[len(there[:most]) :])
+    config = msgspec.structs.replace(robot.config, compliance=blocks)
+    return Simulation(replace(robot, config=config))

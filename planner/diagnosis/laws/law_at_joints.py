@@ -6,7 +6,8 @@ import numpy as np
 
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.torque_laws import Law
-from planner.diagnosis.linear.fit import Fit, Problem
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.thresholds import (
     LAW_ANGLE_LOG_SD,
     LAW_FARTHEST,

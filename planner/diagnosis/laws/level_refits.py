@@ -16,7 +16,8 @@ from planner.diagnosis.laws.equivalent_stiffness import receptances, swing, syst
 from planner.diagnosis.laws.starting_values import faded
 from planner.diagnosis.laws.torque_laws import LEAST_SHARE, Law
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import FINE, GLANCE, Fit
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.problem import FINE, GLANCE
 from planner.diagnosis.thresholds import LAW_ANGLE_LOG_SD, LAW_LOG_SHARE, LAW_LOG_SHARE_SD
 from planner.dynamics.simulation import Simulation
 from planner.inference.least_squares import minimise

@@ -146,7 +146,10 @@ def free_angles(
 
 
 def modal(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Poles (p,), shapes (e, p), entries (p, e); conjugates are in the shapes' factor 2."""
+    """Poles (p,), shapes (e, p), entries (p, e); conjugates are in the shapes' factor 2.
+
+    A loss factor damps each mode as it does at the mode's own frequency, to first order.
+    """
     springs = system.elasticity
     e = len(springs.stiffness)
     inverse = np.linalg.inv(system.mass[visit])
@@ -157,6 +160,8 @@ def modal(system: System, visit: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     state[e:, e:] = -inverse * springs.damping
     poles, vectors = np.linalg.eig(state)
     entry = np.linalg.inv(vectors)[:, e:] @ inverse
+    lost = springs.stiffness * springs.loss_factor * np.sign(poles.imag)[:, None]
+    poles = poles - 1j * np.einsum("pe,pe,ep->p", entry, lost, vectors[:e])
     one = poles.imag >= 0
     twice = np.where(poles.imag[one] > 0, 2.0, 1.0)
     return poles[one], vectors[:e, one] * twice, entry[one]

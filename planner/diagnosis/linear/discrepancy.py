@@ -84,13 +84,13 @@ class InnerProducts:
         """Evidence over all sizes, χ² counting 1/`temper`."""
         each = [self._at(size, temper) for size in DISCREPANCIES]
         evidence = np.array([one[0] for one in each])
+        scores = np.array([one[1] for one in each])
         likeliest = int(np.argmax(evidence))
-        known, unknown = (log_sum(evidence + p) for p in size_priors())
-        _, score, chi2, step = each[likeliest]
+        _, _, chi2, step = each[likeliest]
         values = max(float(self.fit.misfit.counts.sum()), 1.0)
         size = DISCREPANCIES[likeliest]
         chain = self.chain + step[: len(self.chain)]
-        return Worth(known, unknown, score, chi2 / values, size, chain)
+        return Worth(evidence, scores, chi2 / values, size, chain)
 
     def _at(self, size: float, temper: float) -> tuple[float, np.ndarray, float, np.ndarray]:
         """Log evidence, −2 ln likelihood (n,) of each pose, χ², and the step, at a `size`.
@@ -126,18 +126,22 @@ class InnerProducts:
 
 @dataclass(frozen=True, eq=False)
 class Worth:
-    """Log evidence of a fit, with a simulation's usual discrepancy and with that of the unknown.
+    """Log evidence (sizes,) of a fit, and −2 ln likelihood (sizes, n) of each pose.
 
-    −2 ln likelihood (n,) of each pose, what is left of χ² per value, and the chain's numbers are
-    those of the likeliest `size` of the discrepancy.
+    What is left of χ² per value, and the chain's numbers, are those of the likeliest `size` of the
+    discrepancy.
     """
 
-    log_evidence: float
-    log_evidence_unknown: float
-    score: np.ndarray
+    by_size: np.ndarray
+    scores: np.ndarray
     per_value: float
     size: float
     chain: np.ndarray
+
+    @property
+    def log_evidence(self) -> float:
+        """Over all sizes, as they are where nothing unknown is there."""
+        return log_sum(self.by_size + size_priors()[0])
 
 
 def multiples(misfit: Misfit, springs: Sequence[str]) -> np.ndarray:

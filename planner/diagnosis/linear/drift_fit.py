@@ -7,8 +7,8 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import Grade, Problem
 from planner.diagnosis.linear.objective import Misfit
+from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.gradient import Inertias, Turned, response_parts
 from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band

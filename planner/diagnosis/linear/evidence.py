@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, log_sum, size_priors
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.thresholds import (
@@ -34,9 +34,13 @@ def temper_of(fits: Sequence[Fit]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Probabilities of fits in their order, then of "unknown"; T; what each is worth and leaves."""
+    """Probabilities of fits in their order, then of "unknown"; T; what each is worth and leaves.
+
+    `log_evidence` is that of all of them together, priors and "unknown" included.
+    """
 
     probabilities: np.ndarray
+    log_evidence: float
     temper: float
     worth: tuple[Worth, ...]
     mismatch: tuple[Mismatch, ...]
@@ -65,7 +69,8 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     seen = np.array([m.resolution for m in mismatch])
     matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters_percent / 100
     shares = shares_of(worth, left, prior, matters, float(seen.min()), seed)
-    return Weights(shares, t, worth, mismatch)
+    total = log_sum(_log_joint(worth, np.maximum(left, seen.min()), prior, matters, seen.min()))
+    return Weights(shares, total, t, worth, mismatch)
 
 
 def shares_of(
@@ -83,18 +88,26 @@ def shares_of(
     lets `seen` be seen). Where refitting leaves less than `matters`, what is unknown does not
     matter: the first fit will do.
     """
-    before, left = np.log(prior), np.maximum(left, seen)
-    known = np.array([w.log_evidence for w in worth]) + before + left_alone(left, matters, seen)
-    strange = np.array([w.log_evidence_unknown for w in worth]) + before
-    strange += np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
-    scores = np.tile([w.score for w in worth], (2, 1))
-    both = np.concatenate([known, strange])
-    alone, beside, _ = np.split(
-        bootstrapped(scores, both, 1.0, -np.inf, BOOTSTRAPS, seed), [len(known), len(both)]
-    )
+    left = np.maximum(left, seen)
+    both = _log_joint(worth, left, prior, matters, seen)
+    # Sizes are told apart in each resample anew: poses differ in which of them they tell.
+    scores = np.tile(np.concatenate([w.scores for w in worth]), (2, 1))
+    found = bootstrapped(scores, both.ravel(), 1.0, -np.inf, BOOTSTRAPS, seed)[:-1]
+    alone, beside = found.reshape(both.shape).sum(axis=2)
     counts = float(norm.cdf(np.log(left[0] / matters) / np.log(LEFT_FACTOR)))
     alone[0] += (1 - counts) * beside.sum()
     return np.append(alone, counts * beside.sum())
+
+
+def _log_joint(
+    worth: Sequence[Worth], left: np.ndarray, prior: Sequence[float], matters: float, seen: float
+) -> np.ndarray:
+    """ln of prior times evidence (2, k, sizes): of fits alone, and beside something unknown."""
+    usual, unusual = size_priors()
+    each = np.array([w.by_size for w in worth]) + np.log(prior)[:, None]
+    known = each + usual + left_alone(left, matters, seen)[:, None]
+    strange = each + unusual + np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
+    return np.array([known, strange])
 
 
 def stated_springs(none: Fit) -> tuple[str, ...]:

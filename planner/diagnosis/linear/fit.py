@@ -2,138 +2,26 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
-from planner.diagnosis.effects.effect import Effect, Setting
+from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, own_names
-from planner.diagnosis.thresholds import (
-    COM_SD_M,
-    DAMPING_FACTOR,
-    INERTIA_SD,
-    MASS_SD,
-    STIFFNESS_FACTOR,
-)
-from planner.dynamics.gradient import Inertias
-from planner.dynamics.simulation import Simulation
-from planner.frf.frf import Frf
-from planner.identification.identify import QUICK, STAGES, Effort, identify
-from planner.identification.measured_frfs import Measured, layout_of, matrices_at, stack
-from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import UNITS, Parametrisation, Priors, parametrise
+from planner.diagnosis.linear.problem import CLOSE, COARSE, FINE, GLANCE, Grade, Problem
+from planner.identification.effort import QUICK, STAGES, Effort
+from planner.identification.identify import identify
+from planner.identification.parameters import UNITS
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
-from planner.recording.points import Layout
-from planner.robot.elastic_model import Matrices
 
-PRIORS = Priors(
-    stiffness_factor=STIFFNESS_FACTOR, damping_factor=DAMPING_FACTOR,
-    mass=MASS_SD, inertia=INERTIA_SD, com_m=COM_SD_M,
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Grade:
-    """How closely one looks: lines a pose, relative sd of all that no simulation follows.
-
-    As in `Misfit`: whether logarithms are compared, and whether inertias are free.
-    """
-
-    lines: int
-    model_error: float = 0.003
-    logarithmic: bool = False
-    inertial: bool = True
-
-
-GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
-CLOSE, FINE = Grade(40), Grade(72)
-# More sensors tell more at fewer lines: of these, a power of the number of 3 × 3 FRFs is looked at.
-# Chosen so that four sensors take about twice the time of one; resonances need the least number.
-SHARED_WORK, LEAST_LINES = -0.35, 28
 ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
 # The way home from afar: all bands, and every step that logarithms need.
 PATIENT = replace(QUICK, stages=STAGES, log_steps=40)
 KEPT = 2  # starts that are followed
-
-
-def tolerances_of(simulation: Simulation) -> Tolerances:
-    """What the simulation's robot.toml says of hits, sensor and readback."""
-    return Tolerances.of(simulation.robot.config)
-
-
-@dataclass(frozen=True, eq=False)
-class Problem:
-    """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation.
-
-    Where it is `exact`, hits are taken to be on their axes and the measuring chain to be perfect.
-    """
-
-    frfs: tuple[Frf, ...]
-    q: np.ndarray
-    simulation: Simulation
-    band_hz: tuple[float, float]
-    priors: Priors = PRIORS
-    exact: bool = False
-
-    @property
-    def layout(self) -> Layout:
-        """The points between which FRFs were measured."""
-        return layout_of(self.frfs)
-
-    @property
-    def blocks(self) -> int:
-        """How many FRF matrices of 3 × 3 there are: from each hit point to each sensor."""
-        rows, columns = self.layout.shape
-        return rows * columns // 9
-
-    def misfit(self, effect: Effect, grade: Grade) -> Misfit:
-        """Misfit with an effect."""
-        body, measured = _prepared(self, effect), _measured(self, grade)
-        setting = Setting(body.simulation, self.q, measured.s, body.jacobians, self.layout)
-        inertias, p = body.inertias, body.parametrisation
-        tolerances = None if self.exact else tolerances_of(self.simulation)
-        kind = grade.logarithmic, grade.inertial, tolerances
-        return Misfit(measured, setting, body.matrices, inertias, p, effect, *kind)
-
-    def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:
-        """The simulation with an effect's structure, and its parameters."""
-        body = _prepared(self, effect)
-        return body.simulation, body.parametrisation
-
-    def at(self, poses: Sequence[int]) -> "Problem":
-        """The same with some of the poses only."""
-        kept = list(poses)
-        return replace(self, frfs=tuple(self.frfs[i] for i in kept), q=self.q[kept])
-
-
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """What does not depend on the lines."""
-
-    simulation: Simulation
-    parametrisation: Parametrisation
-    matrices: Matrices
-    jacobians: np.ndarray
-    inertias: Inertias
-
-
-@lru_cache(maxsize=512)
-def _prepared(problem: Problem, effect: Effect) -> _Prepared:
-    simulation = effect.structure(problem.simulation)
-    p = parametrise(simulation, effect.priors(simulation, problem.priors))
-    jacobians = simulation.elastic.body_jacobians(problem.q)
-    matrices = matrices_at(simulation.elastic, problem.q, problem.frfs, sloped=True)
-    return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
-
-
-@lru_cache(maxsize=16)
-def _measured(problem: Problem, grade: Grade) -> Measured:
-    lines = max(round(grade.lines * problem.blocks**SHARED_WORK), min(grade.lines, LEAST_LINES))
-    return stack(problem.frfs, problem.band_hz, lines, grade.model_error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,10 +107,10 @@ def staged(problem: Problem, effect: Effect) -> Fit:
 
 
 def _identified(problem: Problem, effect: Effect, effort: Effort) -> Fit:
-    body = _prepared(problem, effect)
-    priors = effect.priors(body.simulation, problem.priors)
+    simulation = problem.parametrised(effect)[0]
+    priors = effect.priors(simulation, problem.priors)
     found = identify(
-        problem.frfs, problem.q, body.simulation, priors,
+        problem.frfs, problem.q, simulation, priors,
         band_hz=problem.band_hz, starts=1, effort=effort,
     )  # fmt: skip
     return _settled(problem.misfit(effect, FINE), found.mean)
@@ -241,6 +129,18 @@ def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     """A few steps with all that is free, from an earlier fit."""
     close = problem.misfit(effect, CLOSE)
     return approached(close, points(close, warm), PROMISE_STEPS)
+
+
+def unbent(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+    """As `promise`, and a single effect of the robot from the prior's median, as `fit` begins.
+
+    From inertias that were bent to fit nothing leads to what they imitate.
+    """
+    near = promise(problem, effect, warm)
+    if len(effect.parts()) > 1 or effect.artefact:
+        return near
+    afresh = approached(near.misfit, [_approach(problem, effect)])
+    return min((near, afresh), key=lambda f: f.misfit(f.x).value)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:

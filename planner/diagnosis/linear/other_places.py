@@ -10,11 +10,14 @@ import numpy as np
 
 from planner.diagnosis.effects.combined import Both, together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import CLOSE, Fit, Problem, approached, fit, points, settle
+from planner.diagnosis.effects.places import links
+from planner.diagnosis.linear.fit import Fit, approached, fit, points, settle
+from planner.diagnosis.linear.problem import CLOSE, Problem
 from planner.diagnosis.thresholds import INERTIA_STRAYED
 from planner.inference.parallel import side_by_side
 
 MOVABLE = MASS, RESONATOR = "added_mass", "local_resonator"
+HEAVY = -0.8, 0.8  # prior sds of a mass that is begun with beside bent inertias
 KEPT = "mass", "frequency", "damping_ratio"  # where and which way is asked anew
 
 
@@ -43,14 +46,29 @@ def _moved(problem: Problem, found: Fit, move: tuple[Effect, Effect, Effect]) ->
     return approached(misfit, list(np.unique(starts, axis=0)))
 
 
+def inertias_bent(found: Fit) -> bool:
+    """Whether a fit moved inertias far, so that they may hide what the simulation lacks."""
+    return farthest_bent(found)[1] > INERTIA_STRAYED
+
+
+def farthest_bent(fit: Fit) -> tuple[str, float]:
+    """The link whose mass, centre or moments a fit moved farthest, and by how many prior sds."""
+    a, b = fit.misfit.split
+    if a == b:
+        return "", 0.0
+    away = np.abs((fit.x - fit.misfit.mean) / fit.misfit.sd)[a:b]
+    most = int(np.argmax(away))
+    body = fit.misfit.names[a + most].split(" of ", 1)[1]
+    named = {joint: link.replace("_", " ") for link, joint in links(fit.misfit.setting.simulation)}
+    return named.get(body, body), float(away[most])
+
+
 def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Fits with one mass at each place, where inertias were moved far to imitate one.
 
     From a fit that has bent them nothing leads to the mass: each is fitted from afar too.
     """
-    a, b = found.misfit.split
-    away = np.abs((found.x - found.misfit.mean) / found.misfit.sd)[a:b]
-    if away.max(initial=0.0) < INERTIA_STRAYED:
+    if not inertias_bent(found):
         return ()
     masses = [e for e in effects if e.name == MASS]
     rest = [p for p in found.effect.parts() if p.at and p.name != MASS]
@@ -61,7 +79,16 @@ def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[F
 
 def _from_afar(problem: Problem, found: Fit, effect: Effect) -> Fit:
     # Valleys from inertias to a mass are long: a fit that stops early is still on its way.
-    return settle(problem, fit(problem, effect, [found]))
+    far, misfit = fit(problem, effect, [found]), problem.misfit(effect, CLOSE)
+    x, place = points(misfit, found)[0], misfit.names.index(f"mass of {MASS} at {_mass_at(effect)}")
+    starts = [np.where(np.arange(len(x)) == place, s * misfit.sd[place], x) for s in HEAVY]
+    # Either way has its own valley: the one that is steeper at first need not be the deeper one.
+    ends = [approached(misfit, [start]) for start in starts if misfit.possible(start)]
+    return min((settle(problem, one) for one in (far, *ends)), key=lambda f: f.misfit(f.x).value)
+
+
+def _mass_at(effect: Effect) -> str:
+    return next(p.at for p in effect.parts() if p.name == MASS)
 
 
 def rigid(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:

@@ -1,16 +1,18 @@
 """What a fit says: FRFs at any pose with uncertainty, and how well it agrees where one measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.diagnosis.linear.fit import Fit, Grade, Problem, fit, settle
+from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.diagnosis.linear.objective import Misfit
+from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.gradient import laplace
 from planner.identification.agreement import Similarity, similarity_of
 from planner.identification.held_out import set_aside
 from planner.identification.measured_frfs import Measured
+from planner.recording.points import TOOL, Layout
 
 ALL = Grade(256)
 SHORT = 10  # steps from a fit on all poses to one on most of them
@@ -47,24 +49,33 @@ def _columns(found: Fit) -> np.ndarray:
 
 
 def misfit_at(
-    problem: Problem, effect: Effect, q: np.ndarray, frequency_hz: np.ndarray, rate_1_s: float = 0.0
+    problem: Problem,
+    effect: Effect,
+    q: np.ndarray,
+    frequency_hz: np.ndarray,
+    rate_1_s: float = 0.0,
+    layout: Layout = TOOL,
 ) -> Misfit:
     """Misfit to nothing measured at q (n, dof) in rad and frequency_hz (F,): for its response.
 
-    FRFs of records with an exponential window have its rate.
+    Between the points of `layout`. FRFs of records with an exponential window have its rate.
     """
     simulation, p = problem.parametrised(effect)
     lines = np.tile(frequency_hz, (len(q), 1))
-    shape = (len(q), 3, 3, len(frequency_hz))
+    shape = (len(q), *layout.shape, len(frequency_hz))
     s = laplace(lines, rate_1_s)
-    nothing = Measured(lines, s, np.ones(shape, complex), np.full(shape, np.inf), np.zeros(len(q)))
+    unknown, end = np.full(shape, np.inf), np.zeros(len(q))
+    nothing = Measured(lines, s, np.ones(shape, complex), unknown, end, layout)
     jacobians = simulation.elastic.body_jacobians(q)
-    setting, matrices = Setting(simulation, q, s, jacobians), simulation.elastic.with_slopes(q)
+    setting = Setting(simulation, q, s, jacobians, layout)
+    matrices = simulation.elastic.with_slopes(q, layout)
     return Misfit(nothing, setting, matrices, p.inertias(jacobians), p, effect)
 
 
 def similarity(problem: Problem, found: Fit | None) -> Similarity:
     """Of a fit (None: the simulation as it stands) to the FRFs of a problem, artefacts included."""
+    if found is None:
+        problem = replace(problem, lossy=False)
     misfit = problem.misfit(Effect("") if found is None else found.effect, ALL)
     h = misfit.response(misfit.mean if found is None else found.x)[0]
     return similarity_of(misfit.measured, h)

@@ -10,19 +10,9 @@ from planner.diagnosis.effects.combined import Both, Family, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
-from planner.diagnosis.linear.fit import (
-    CLOSE,
-    FINE,
-    Fit,
-    Grade,
-    Problem,
-    carried_on,
-    glance,
-    promise,
-    settle,
-    staged,
-)
-from planner.diagnosis.linear.other_places import burdened, elsewhere, rigid
+from planner.diagnosis.linear.fit import Fit, carried_on, glance, promise, settle, staged, unbent
+from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_bent, rigid
+from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS, SPRING_STRAYED
 from planner.identification.held_out import farthest_first
@@ -87,7 +77,7 @@ def search(
         found = _composed(problem, found, effects, tell)
     found = _lessened(problem, _rigid(problem, found, effects))
     found = _spared(problem, _accompanied(problem, found, effects, tell), effects)
-    return _distinct(_burdened(problem, found, effects))
+    return distinct(_burdened(problem, found, effects))
 
 
 def _best_of_few(found: Found) -> Fit:
@@ -173,6 +163,8 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
         return found
     tell("looking for a small second effect", 0.98)
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
+    if not pairs:
+        return found
     more = _round(problem, best, pairs, quietly)
     return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
 
@@ -207,6 +199,9 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds a mass at each place where the best moved inertias far to explain everything."""
+    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    if any(p.artefact for p in best.effect.parts()):  # what is beside one may be all there is
+        found = distinct(_lessened(problem, found))
     robots = [f for f in found.finalists if not any(p.artefact for p in f.effect.parts())]
     best = min(robots, key=lambda f: f.misfit(f.x).value)
     if best.per_value > AT_NOISE:
@@ -218,7 +213,7 @@ def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
     return carried_on(problem, *pair, LAST_STEPS)
 
 
-def _distinct(found: Found) -> Found:
+def distinct(found: Found) -> Found:
     """Each set of effects once, at its best, though it was come upon from several sides."""
     best: dict[frozenset[Effect], Fit] = {}
     for f in found.finalists:
@@ -277,7 +272,8 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     none = settle(problem, warm, CLOSE, STEPS)
     clearly = none.per_value > CLEARLY_WRONG
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
-    looked = partial(glance if clearly else promise, few, warm=none)
+    look = glance if clearly else unbent if inertias_bent(none) else promise
+    looked = partial(look, few, warm=none)
     share = 0.6 / max(len(effects), 1)
     fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
     if clearly:

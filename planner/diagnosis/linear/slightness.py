@@ -12,7 +12,8 @@ from scipy.stats import norm
 
 from planner.diagnosis.effects.combined import Both
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import LAST_STEPS, Fit, Problem, carried_on
+from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
+from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.thresholds import LEFT_FACTOR
 
 FOLLOWED = 1e-3  # shares below it are left where they are
@@ -31,7 +32,7 @@ def without_slight(
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
         if shares[i] < FOLLOWED:
             continue
-        kept = {(e.name, e.at) for e in told[i] if e.absorbed or e.artefact}
+        kept = {(e.name, e.at) for e in told[i] if e.absorbed}
         fewer = [
             j
             for j in range(len(fits))
@@ -54,18 +55,27 @@ def without_slight(
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
     """Fits without one effect of `whole`, then without a second, and so on: the slightest first.
 
-    Those that are among `fits` already are not made again.
+    Those among `fits` may have come from elsewhere and stopped in another minimum: each is followed
+    from `whole` too.
     """
     known = {frozenset(f.effect.parts()): f for f in fits}
     made: list[Fit] = []
     while len(parts := whole.effect.parts()) > 1:
-        sets = [[p for p in parts if p is not part] for part in parts]
-        wanted = [kept for kept in sets if frozenset(kept) not in known]
-        more = list(map(partial(_carried_on, problem, whole), wanted))
-        made += more
-        known |= {frozenset(f.effect.parts()): f for f in more}
+        # What refitting takes the place of changes nothing, and says nothing of the others.
+        sets = [[p for p in parts if p is not part] for part in parts if not part.absorbed]
+        if not sets:
+            break
+        for kept in sets:
+            again, key = _carried_on(problem, whole, kept), frozenset(kept)
+            if key not in known or _value(again) < _value(known[key]):
+                known[key] = again
+                made.append(again)
         whole = min((known[frozenset(kept)] for kept in sets), key=partial(change, whole=whole))
     return made
+
+
+def _value(fit: Fit) -> float:
+    return fit.misfit(fit.x).value
 
 
 def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:

@@ -16,7 +16,8 @@ from planner.diagnosis.effects.combined import Both, Family, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.extra_compliance import ExtraCompliance
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear.fit import GLANCE, Fit, Problem, approached, points
+from planner.diagnosis.linear.fit import Fit, approached, points
+from planner.diagnosis.linear.problem import GLANCE, Problem
 from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 

@@ -18,7 +18,8 @@ from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.sensor_chain import SensorChain
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear.fit import Problem, fit, tolerances_of
+from planner.diagnosis.linear.fit import fit
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens.exponential_window import screen_window
 from planner.diagnosis.thresholds import (
     ALIKE,
@@ -95,16 +96,17 @@ class Chain:
     gain: float
 
 
-def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
-    """All artefacts that are clear; none where the recordings are in order."""
+def screen(recorded: Dataset, nominal: Simulation, *, chain: bool = True) -> tuple[Finding, ...]:
+    """All artefacts that are clear, without `chain` windows alone; none where all is in order."""
     window = screen_window(recorded)
     told = window is not None and window.log_evidence > CLEAR
     found = [window] if window is not None and told else []
     clean = correct(recorded, found)
-    told = [*found]
-    for sensor in _triaxial(clean):
-        chain, t = measure_chain(clean, nominal, sensor), tolerances_of(nominal)
-        told += [f for f in (_delay(chain, t), _matrix(chain, t)) if f]
+    told, t = [*found], tolerances_of(nominal)
+    chains = [measure_chain(clean, nominal, s) for s in _triaxial(clean)] if chain else []
+    if chains:
+        told.append(_delay(chains, t))
+    told += [f for f in (_matrix(one, t) for one in chains) if f]
     return tuple(f for f in told if f.log_evidence > CLEAR)
 
 
@@ -148,18 +150,24 @@ def _off(chain: Chain, bounds: tuple[float, float]) -> float:
     return float(np.hypot(low, high * np.sqrt(chain.misfit / CHAIN_MISFIT)))
 
 
-def _delay(chain: Chain, t: Tolerances) -> Finding | None:
-    sd = float(np.hypot(chain.delay_sd_s, _off(chain, DELAY_OFF_S)))
+def _delay(chains: Sequence[Chain], t: Tolerances) -> Finding:
+    """One analyser records all sensors: what it delays, each of them shows.
+
+    Where they disagree by more than their sds (physics that the simulation lacks may look like a
+    delay at one of them), the sd of what they have in common grows with that (Birge 1932).
+    """
+    late = np.array([c.delay_s for c in chains])
+    weight = np.array([c.delay_sd_s**2 + _off(c, DELAY_OFF_S) ** 2 for c in chains]) ** -1
+    mean = float(weight @ late / weight.sum())
+    apart = float(weight @ (late - mean) ** 2) / max(len(chains) - 1, 1)
+    sd = float(np.sqrt(max(apart, 1.0) / weight.sum()))
     usual = float(np.hypot(sd, t.delay_s))  # what every chain has is no artefact
-    evidence = min(savage_dickey(chain.delay_s, usual, DELAY_SD_S), chain.gain)
-    which = "All responses" if chain.sensor == SENSOR else f"All responses at {chain.sensor}"
+    evidence = min(savage_dickey(mean, usual, DELAY_SD_S), sum(c.gain for c in chains))
     text = (
-        f"{which} come {1e3 * chain.delay_s:.3g} ± {1e3 * sd:.1g} ms after the force: the "
+        f"All responses come {1e3 * mean:.3g} ± {1e3 * sd:.1g} ms after the force: the "
         f"phase falls in proportion to frequency. Check filters and sampling of the channels."
     )
-    return Finding(
-        "channel_delay", chain.sensor, evidence, {"delay": (chain.delay_s, sd, "s")}, text
-    )
+    return Finding("channel_delay", SENSOR, evidence, {"delay": (mean, sd, "s")}, text)
 
 
 def _matrix(chain: Chain, t: Tolerances) -> Finding | None:
@@ -253,7 +261,7 @@ def correct(recorded: Dataset, findings: Sequence[Finding]) -> Dataset:
             own = np.linalg.inv(matrix_of(finding, sensor))
             if not np.array_equal(own, np.eye(3)):
                 inverse[sensor] = inverse.get(sensor, np.eye(3)) @ own
-            if (finding.effect, finding.at) == ("channel_delay", sensor):
+            if finding.effect == "channel_delay":
                 delay[sensor] += finding.parameters["delay"][0]
         if finding.effect == "exponential_window":
             rate += finding.parameters["rate"][0]

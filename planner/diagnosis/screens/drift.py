@@ -15,7 +15,8 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
 from planner.diagnosis.linear.drift_fit import DriftProblem, problem_of
-from planner.diagnosis.linear.fit import Fit, fit, settle, tolerances_of
+from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
     ALIKE,
     CLEAR,

@@ -14,7 +14,8 @@ from planner.dataset.level_columns import Column, column
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import Fit, fit, settle, tolerances_of
+from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances, hit_basis

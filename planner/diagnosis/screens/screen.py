@@ -24,9 +24,14 @@ class Screened:
     hit_errors: HitErrors = ()
 
 
-def screen(recorded: Dataset, nominal: Simulation, tell: Tell = quietly) -> Screened:
-    """Find artefacts first, so that they are not called physics, then the rest in clean data."""
-    found = artefacts.screen(recorded, nominal)
+def screen(
+    recorded: Dataset, nominal: Simulation, tell: Tell = quietly, *, chain: bool = True
+) -> Screened:
+    """Find artefacts first, so that they are not called physics, then the rest in clean data.
+
+    Without `chain`, gains, signs, axes and delays of the sensors are taken as they are.
+    """
+    found = artefacts.screen(recorded, nominal, chain=chain)
     clean = artefacts.correct(recorded, found)
     by_level, missed, errors = force_levels.screen(clean, nominal, tell=tell), clean, ()
     if not by_level and force_levels.differ(clean, nominal):

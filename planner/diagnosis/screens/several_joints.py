@@ -24,7 +24,7 @@ from planner.diagnosis.laws.several_joints import (
     straightened,
 )
 from planner.diagnosis.laws.torque_laws import LAWS, Law, behaviour
-from planner.diagnosis.linear.fit import tolerances_of
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
     INDEPENDENT,
     SEVERAL_CHANGES,

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable
 
-import msgspec
 import numpy as np
 
 from planner.campaign.config import CampaignConfig
-from planner.campaign.events import Configured, Entry, Imported, Proposed, Undone
+from planner.campaign.events import Undone
 from planner.campaign.state import Measurement
 from planner.check.remark import CheckRemark
+from planner.recording.points import SENSOR, TCP
+from planner.report.log_words import act
 from planner.report.page.facts import Facts
 from planner.report.page.html import (
     Markup,
@@ -34,6 +35,7 @@ def asked(facts: Facts) -> Markup:
         ("Robot", f"{robot.name}: {len(robot.joint_names)} joints, {mass:.4g} kg move"),
         ("Simulation", _simulation(config, len(robot.config.compliance))),
         ("Hit point and sensor", f"{robot.config.tcp_frame}, {robot.config.sensor_frame}"),
+        *_points(facts),
         *_workspace(config, robot.joint_names),
         ("Modes", f"the {config.modes.count} lowest in {_range(config.modes.band_hz)} Hz"),
         ("Poses chosen by", config.acquisition.name),
@@ -41,6 +43,16 @@ def asked(facts: Facts) -> Markup:
     ]
     words = tag("table", *(tag("tr", tag("th", a), tag("td", b)) for a, b in rows), class_="words")
     return section("What was asked", words, findings(cell.examined.remarks), id_="asked")
+
+
+def _points(facts: Facts) -> list[tuple[str, str]]:
+    """Sensors and hit points beside the tool's that recordings name."""
+    hits = [hit for m in facts.state.recorded for hit in m.hits]
+    named = dict.fromkeys(
+        name for hit in hits for name in (hit.hit_point, *hit.response_points)
+        if name and name not in (TCP, SENSOR)
+    )  # fmt: skip
+    return [("Other points", ", ".join(named))] if named else []
 
 
 def _range(values: Iterable[float]) -> str:
@@ -138,25 +150,6 @@ def decisions(facts: Facts) -> Markup:
     return section(
         "Log of decisions", words_table(("entry", "time (UTC)", "what"), rows), id_="log"
     )
-
-
-def act(entry: Entry) -> str:
-    """What an entry of the log says, in words."""
-    event = entry.event
-    if isinstance(event, Configured):
-        return f"configured, with planner {event.planner}"
-    if isinstance(event, Proposed):
-        poses = ", ".join(p.pose for p in event.proposals)
-        return f"proposed {poses} by {event.acquisition}"
-    if isinstance(event, Imported):
-        used = sum(hit.accepted for hit in event.hits)
-        held = "; held: a question was asked" if event.question else ""
-        return f"imported {used} of {len(event.hits)} hits at {event.pose}{held}"
-    if isinstance(event, Undone):
-        return f"took back entry {event.act}"
-    told = msgspec.to_builtins(event)
-    reason = f": {told['reason']}" if told.get("reason") else ""
-    return f"{told['kind']} {told['pose']}{reason}"
 
 
 def reproduce(facts: Facts) -> Markup:

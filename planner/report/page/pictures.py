@@ -124,8 +124,12 @@ def frfs(facts: Facts) -> Markup:
     drawn = []
     for i, m in enumerate(shown):
         modes = expected.frequency_hz[i]
-        figure = frf_sheet(lines, mean[i], sd[i], campaign.frf_of(m, table_), modes)
-        says = f"{m.pose}: direct FRFs; dotted lines are the model's natural frequencies."
+        frf = campaign.frf_of(m, table_)
+        figure = frf_sheet(lines, mean[i], sd[i], frf, modes)
+        single = "" if np.any(np.isfinite(frf.coherence)) else (
+            " Coherence is not known: it takes two hits an axis."
+        )  # fmt: skip
+        says = f"{m.pose}: direct FRFs; dotted lines are the model's natural frequencies.{single}"
         drawn.append(tag("h3", f"Pose {m.pose}"))
         drawn.append(picture(png(figure, DPI), says))
     text = (

@@ -1,7 +1,7 @@
 """One multi-task GP of all outputs at once: intrinsic coregionalisation of any number of tasks.
 
-cov(f_a(x), f_b(x')) = B_ab k(x, x') (Bonilla et al. 2008, eq. 2; Lei et al. 2023, section 2.3) with
-B = W Wᵀ + diag(κ), W of few columns (eq. 4 there and its section 3: a low rank), and a noise per
+cov(f_a(x), f_b(x')) = B_ab k(x, x') (Bonilla et al. 2008; Lei et al. 2023, section 4.4.2) with
+B = W Wᵀ + diag(κ), W of few columns (a low rank), and a noise per
 task. Lei et al. train groups of three, for their direct Cholesky factor of n·m numbers costs
 O(n³ m³); with every output observed at every pose K is B ⊗ K_x + D and two eigendecompositions do,
 O(n³ + m³) (`multitask.solve_kronecker`). Hyperparameters: the most probable ones, begun at the

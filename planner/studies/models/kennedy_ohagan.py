@@ -27,12 +27,15 @@ class KennedyOHagan:
 
 
 def fit_kennedy_ohagan(
-    measured: Samples, low: FidelityLevel, low_units: Normalisation
+    measured: Samples, low: FidelityLevel, low_units: Normalisation, isotropic: bool = False
 ) -> KennedyOHagan:
-    """AR1 of the measured samples over a cheap level that is known exactly."""
+    """AR1 of the measured samples over a cheap level that is known exactly.
+
+    `isotropic`: δ has one length scale.
+    """
     d = measured.x.shape[1]
     wide = Samples(_with_low(low, measured.x, low_units), measured.y, measured.sd)
-    model = fit_likelihood(wide, f"linear[{d}:{d + 1}]+rbf[0:{d}]")
+    model = fit_likelihood(wide, f"linear[{d}:{d + 1}]+rbf[0:{d}]", isotropic=isotropic)
     return KennedyOHagan(low, model, low_units)
 
 

@@ -8,15 +8,13 @@ averages instead): it is here because the papers do so.
 
 from dataclasses import dataclass
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs
 
-from planner import jax_setup
-from planner.inference.quasi_newton import Peak, maximise
+from planner.inference.quasi_newton import RELATIVE_TOLERANCE, Peak, maximise
 from planner.studies.models.fidelity_levels import Samples, spread
+from planner.studies.models.multitask import pull
 from planner.surrogate.kernels import parse
 from planner.surrogate.training_data import capacity
 
@@ -29,7 +27,11 @@ JITTER = 1e-8  # variance over y's scale squared, as GPy adds it
 # step ends where every point stands alone: most climbs begin with more noise, then with less.
 # Too much of it at first leads them all to one peak: so each start begins one level further on.
 NOISES = (0.5, 0.1, 0.01)
-MOST_STEPS, FEW_STEPS = 200, 30  # of a climb; of one that begins near the peak
+# Steps, and the relative gain after which a climb ends: of every start at first; the LAST likeliest
+# of them go on to the end.
+ROUGHLY, LAST = (60, 1e-5), 2
+MOST_STEPS, FEW_STEPS = 200, 30  # of a climb to the end; of one that begins near the peak
+FTOL = 1e-7  # of one that begins near the peak: less of the log-likelihood changes no prediction
 STARTS = 5  # "five optimization runs" (Busch et al. 2022, section 2.3.1)
 
 
@@ -76,6 +78,7 @@ def fit_likelihood(
     starts: int = STARTS,
     seed: int = 0,
     begin: np.ndarray | None = None,
+    isotropic: bool = False,
 ) -> LikelihoodGP:
     """Maximum-likelihood GP of `samples`.
 
@@ -87,34 +90,70 @@ def fit_likelihood(
         starts: how many; the first is in the middle, the others random around it.
         seed: of the random starts.
         begin: log θ (p,) near the peak, such as that of fewer points: the only start then.
+        isotropic: one length scale for all columns of a factor (Busch et al. 2022, eqs. 4 to 7).
     """
-    x = samples.x
     units = units or Normalisation.of(samples.y)
-    y = (samples.y - units.centre) / units.scale
-    middle, _ = parse(kernel, x.shape[1]).prior(1.0, NOISES[0], LENGTH, 0.0, 0.0)
-    size = len(middle)
-    lower, upper = np.full(size, LOWEST), np.full(size, HIGHEST)
-    lower[1] = np.log(LEAST_NOISE if noise is None else noise)
-    upper[1] = 0.0 if noise is None else lower[1]
-    rng = np.random.default_rng(seed)
-    near = middle + np.vstack([np.zeros(size), rng.standard_normal((starts - 1, size))])
-    padded = _padded(x, y)
+    hill = _Hill.of(samples, kernel, noise, units, isotropic)
+    if begin is not None:
+        best = hill.climb(begin[hill.kept], FEW_STEPS, FTOL)
+    else:
+        levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
+        ends = []
+        for i, z in enumerate(hill.starts(starts, seed)):
+            for held in levels[i % (len(levels) + 1) :]:
+                z = hill.climb(z, *ROUGHLY, held).x
+            ends.append(hill.climb(z, *ROUGHLY))
+        ends = sorted(ends, key=lambda peak: -peak.log_density)[:LAST]
+        best = max((hill.climb(e.x) for e in ends), key=lambda peak: peak.log_density)
+    return at_hyperparameters(samples, kernel, best.x[hill.own], units)
 
-    def climb(theta: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Peak:
-        start = [np.clip(theta, lower, upper)]
-        steps = MOST_STEPS if begin is None else FEW_STEPS
-        return maximise(lambda z: _log_likelihood(kernel, z, *padded), start, lower, upper, steps)
 
-    ends = []
-    levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
-    for i, theta in enumerate(near if begin is None else [begin]):
-        for held in levels[i % (len(levels) + 1) :] if begin is None else ():
-            at = np.where(np.arange(size) == 1, np.log(held), 0.0)
-            free = np.arange(size) != 1
-            theta = climb(theta, np.where(free, lower, at), np.where(free, upper, at)).x
-        ends.append(climb(theta, lower, upper))
-    best = max(ends, key=lambda peak: peak.log_density)
-    return at_hyperparameters(samples, kernel, best.x, units)
+@dataclass(frozen=True, eq=False)
+class _Hill:
+    """A log-likelihood over the parameters z that are climbed: θ = z[own], z = θ[kept]."""
+
+    kernel: str
+    padded: np.ndarray
+    y: np.ndarray
+    own: np.ndarray
+    kept: np.ndarray
+    middle: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @classmethod
+    def of(
+        cls, samples: Samples, kernel: str, noise: float | None, units: Normalisation,
+        isotropic: bool,
+    ) -> "_Hill":  # fmt: skip
+        x, y = samples.x, (samples.y - units.centre) / units.scale
+        own = _free(kernel, x.shape[1], isotropic)
+        kept = np.unique(own, return_index=True)[1]
+        middle = parse(kernel, x.shape[1]).prior(1.0, NOISES[0], LENGTH, 0.0, 0.0)[0][kept]
+        lower, upper = np.full(len(kept), LOWEST), np.full(len(kept), HIGHEST)
+        lower[1] = np.log(LEAST_NOISE if noise is None else noise)
+        upper[1] = 0.0 if noise is None else lower[1]
+        return cls(kernel, _padded(x), y, own, kept, middle, lower, upper)
+
+    def starts(self, count: int, seed: int) -> np.ndarray:
+        """The middle, and normal around it (count, …)."""
+        normal = np.random.default_rng(seed).standard_normal((count - 1, len(self.kept)))
+        return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
+
+    def density(self, z: np.ndarray) -> tuple[float, np.ndarray]:
+        """log p(y) and its slope in z."""
+        value, slope = _log_likelihood(self.kernel, z[self.own], self.padded, self.y)
+        return value, np.bincount(self.own, slope)
+
+    def climb(
+        self, z: np.ndarray, steps: int = MOST_STEPS, ftol: float = RELATIVE_TOLERANCE,
+        noise: float | None = None,
+    ) -> Peak:  # fmt: skip
+        """Where L-BFGS ends from z; with `noise` held there."""
+        lower, upper = self.lower.copy(), self.upper.copy()
+        if noise is not None:
+            lower[1] = upper[1] = np.log(noise)
+        return maximise(self.density, [np.clip(z, lower, upper)], lower, upper, steps, ftol)
 
 
 def at_hyperparameters(
@@ -129,31 +168,45 @@ def at_hyperparameters(
     return LikelihoodGP(kernel, theta, samples.x, root, cho_solve((root, True), y), units, value)
 
 
+def _free(kernel: str, d: int, isotropic: bool) -> np.ndarray:
+    """Which parameter that is climbed each of θ (p,) is."""
+    parsed = parse(kernel, d)
+    first = np.arange(parsed.size)
+    for factor in (f for term in parsed.terms for f in term):
+        if isotropic and factor.scales.stop > factor.scales.start:
+            first[factor.scales] = factor.scales.start
+    return np.unique(first, return_inverse=True)[1]
+
+
 def _covariance(kernel: str, theta: np.ndarray, x: np.ndarray) -> np.ndarray:
     k = parse(kernel, x.shape[1]).covariance(np, theta, x, x)
     noise = np.exp(2 * theta[1]) + JITTER
     return k + noise * np.eye(len(x))
 
 
-def _padded(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """x (c, d), y (c,) and which of them count (c,), so that few sizes are compiled."""
-    more = capacity(len(x)) - len(x)
-    mask = np.concatenate([np.ones(len(x)), np.zeros(more)])
-    return np.pad(x, ((0, more), (0, 0))), np.pad(y, (0, more)), mask
-
-
-@jax_setup.compiled(static_argnums=0)
 def _log_likelihood(
-    kernel: str, theta: Array, x: Array, y: Array, mask: Array
-) -> tuple[Array, Array]:
-    """log p(y | θ) and its slope; entries without mask have covariance I and value 0."""
+    kernel: str, theta: np.ndarray, padded: np.ndarray, y: np.ndarray
+) -> tuple[float, np.ndarray]:
+    """log p(y | θ) and its slope (p,), by ∂/∂K = ½ (α αᵀ − K⁻¹) (Rasmussen & Williams, eq. 5.9).
 
-    def value(theta: Array) -> Array:
-        k = parse(kernel, x.shape[1]).covariance(jnp, theta, x, x) * mask[:, None] * mask[None, :]
-        noise = jnp.exp(2 * theta[1]) + JITTER
-        root = jnp.linalg.cholesky(k + jnp.diag(jnp.where(mask > 0, noise, 1.0)))
-        white = jax.scipy.linalg.solve_triangular(root, y, lower=True)
-        size = jnp.sum(jnp.log(jnp.diagonal(root))) + 0.5 * jnp.sum(mask) * jnp.log(2 * jnp.pi)
-        return -0.5 * jnp.sum(white**2) - size
+    −∞ where the covariance is no longer positive definite. The first len(y) rows of `padded` are x.
+    """
+    n, size = len(y), len(padded)
+    root, failed = dpotrf(_covariance(kernel, theta, padded[:n]), lower=1, overwrite_a=1)
+    if failed:
+        return -np.inf, np.zeros(len(theta))
+    alpha = dpotrs(root, y, lower=1)[0]
+    value = -0.5 * y @ alpha - np.log(root.diagonal()).sum() - 0.5 * n * np.log(2 * np.pi)
+    inverse = dpotri(root, lower=1)[0]  # its lower triangle, beside zeros
+    slope_k = np.zeros((size, size))
+    slope_k[:n, :n] = -np.tril(inverse)  # k is symmetric: twice the lower triangle will do
+    slope_k[:n, :n].flat[:: n + 1] *= 0.5
+    slope_k[:n, :n] += 0.5 * alpha[:, None] * alpha
+    slope = np.array(pull(kernel, theta, padded, slope_k))
+    slope[1] += 2 * np.exp(2 * theta[1]) * slope_k.trace()
+    return float(value), slope
 
-    return jax.value_and_grad(value)(theta)
+
+def _padded(x: np.ndarray) -> np.ndarray:
+    """x (c, d) with zeros below, so that few sizes are compiled."""
+    return np.concatenate([x, np.zeros((capacity(len(x)) - len(x), x.shape[1]))])

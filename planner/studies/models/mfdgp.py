@@ -1,9 +1,9 @@
 """MFDGP as published (Cutajar et al. 2019): a deep GP over fidelities, all layers trained together.
 
 Layer 1, f_1 ~ GP(0, k_1(x)), explains the cheap samples; layer 2 is a GP of (x, f_1(x)) with the
-kernel k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) (eq. 8 there) and explains the expensive ones. Each
+kernel k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) and explains the expensive ones. Each
 has inducing values u_l with a normal q(u_l) of its own. What is climbed is the doubly stochastic
-bound (Salimbeni & Deisenroth 2017, eqs. 15 to 18; eq. 11 of Cutajar et al.)
+bound (Salimbeni & Deisenroth 2017)
 
     Σ_t Σ_i E[log p(y_i^t | f_t(x_i))] − Σ_l KL(q(u_l) ‖ p(u_l)),
 
@@ -37,12 +37,13 @@ START_OWN = 0.3  # amplitude of k_δ at the start, over the output's sd
 START_NOISE = 0.1  # sd over the output's, held in the first stage
 START_SPREAD = 0.1  # of q(L⁻¹u) at the start, held in the first stage
 MOST_TO_BEGIN = 1500  # points from which q(u) begins
+DRAWS, MOST_DRAWN = 256, 20_000  # of f_1 in the bound that is told: at a point, and in all
 DECAY_1, DECAY_2, SMALL = 0.9, 0.999, 1e-8  # of Adam
 
 
 @dataclass(frozen=True)
 class CutajarKernel:
-    """k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) over the columns (x_1 … x_d, f) (eq. 8).
+    """k_ρ(x) (σ² f f' + k_f(f, f')) + k_δ(x) over the columns (x_1 … x_d, f).
 
     θ = (log σ_ρ, log τ, d scales of k_ρ, log σ, scale of k_f, log σ_δ, d scales of k_δ).
     """
@@ -158,7 +159,8 @@ def fit_mfdgp(
     for i, (steps, rate, free) in enumerate(stages):
         stage = 3 * seed + i
         layers = _climbed(layers, data, stage, rate, free, steps, how.batch, how.draws)
-    value = float(bound(layers, data, 3 * seed + 2, 256))
+    draws = max(1, min(DRAWS, MOST_DRAWN // len(y_high)))
+    value = float(bound(layers, data, 3 * seed + 2, draws))
     return MFDGP(layers, data, low_units, high_units, value)
 
 
@@ -179,7 +181,7 @@ def _at_the_data(
 
 
 def _marginal(kernel: Covarying, layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
-    """Mean and variance (q,) of f at x (q, d) under q(u) (Salimbeni & Deisenroth, eqs. 9, 10)."""
+    """Mean and variance (q,) of f at x (q, d) under q(u)."""
     own = kernel.variance(jnp, layer.theta, x)
     covariance = kernel.covariance(jnp, layer.theta, z, z)
     scale = jnp.mean(jnp.diagonal(covariance))

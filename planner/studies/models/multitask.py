@@ -1,9 +1,9 @@
-"""Multi-task GP: t outputs share what they learn about poses (Lei et al. 2023, section 2.3).
+"""Multi-task GP: t outputs share what they learn about poses (Lei et al. 2023, section 4.4.2).
 
 cov(f_a(x), f_b(x')) = B_ab k(x, x') (intrinsic coregionalisation, Bonilla et al. 2008), with
 B = L Lᵀ free and a noise per task. Every output is observed at every pose, so that K is
 B ⊗ K_x + D and two small eigendecompositions do what one large Cholesky factor would (Rakitsch et
-al. 2013). Hyperparameters: the most probable ones.
+al. 2013). Hyperparameters: the most probable ones, or the likeliest.
 """
 
 from dataclasses import dataclass
@@ -155,10 +155,11 @@ def solve_kronecker(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarr
 
 
 def fit_multitask(
-    x: np.ndarray, y: np.ndarray, kernel: str = "rbf", iterations: int = 200
+    x: np.ndarray, y: np.ndarray, kernel: str = "rbf", iterations: int = 200, prior: bool = True
 ) -> MultiTaskGP:
     """Fit y (n, t) at x (n, d) scaled to about [0, 1], of at most `iterations` steps.
 
+    Without `prior` it is the greatest likelihood, as published.
     InputError where a value is missing.
     """
     data = normalised(x, y)
@@ -169,7 +170,8 @@ def fit_multitask(
     # In units of the prior's sds: what is held fast (1e-6) would spoil the steps of all others.
     def posterior(z: np.ndarray) -> tuple[float, np.ndarray]:
         value, slope = log_density(tasks, guess.like(middle + width * z))
-        return value - 0.5 * float(z @ z), width * slope - z
+        believed = float(prior) * z
+        return value - 0.5 * float(believed @ z), width * slope - believed
 
     def climb(z: np.ndarray, reach: float | np.ndarray, steps: int) -> np.ndarray:
         return maximise(posterior, [z], -reach, reach, steps, FTOL).x

@@ -1,10 +1,10 @@
 """NARGP as published (Perdikaris et al. 2017): each level is a GP of the pose and the level below.
 
-f_t(x) = g_t(x, f_{t−1}(x)) with g_t ~ GP(0, k_ρ(x, x') k_f(f(x), f(x')) + k_δ(x, x')) (eqs. 2.12
-and 2.13 there), nothing in front; all kernels RBF with a length scale per coordinate. Each
-level's hyperparameters are those of the greatest likelihood, level after level, g_t trained at the
-posterior mean of the level below. A prediction is the integral over the level below (eq. 2.14), by
-Gauss–Hermite quadrature with its mean and variance, where the paper and emukit use Monte Carlo.
+f_t(x) = g_t(x, f_{t−1}(x)) with g_t ~ GP(0, k_ρ(x, x') k_f(f(x), f(x')) + k_δ(x, x')), nothing in
+front; all kernels RBF with a length scale per coordinate. Each level's hyperparameters are those
+of the greatest likelihood, level after level, g_t trained at the posterior mean of the level below.
+A prediction is the integral over the level below, by Gauss–Hermite quadrature with its mean and
+variance, where the paper and emukit use Monte Carlo: the same integral without its noise.
 AR1 in front, and averaged hyperparameters, are in `ar1_nargp`.
 """
 
@@ -44,7 +44,7 @@ class NARGP:
 
 
 def perdikaris(d: int, shape: str = "rbf") -> str:
-    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l) (eq. 2.13)."""
+    """Kernel expression k_ρ(x) k_f(l) + k_δ(x) over the columns (x_1 … x_d, l)."""
     return f"{shape}[0:{d}]*{shape}[{d}:{d + 1}]+{shape}[0:{d}]"
 
 
@@ -56,6 +56,7 @@ def fit_nargp(
     units: Normalisation | None = None,
     starts: int = STARTS,
     seed: int = 0,
+    isotropic: bool = False,
 ) -> NARGP:
     """NARGP of the measured samples over a cheap level, which is fitted already or exact.
 
@@ -63,12 +64,13 @@ def fit_nargp(
         measured: expensive values at x (n, d).
         low: the cheap level; `fit_low` fits one to samples.
         low_units: by what the cheap level's value is normalised as an input.
-        noise, units, starts, seed: as of `fit_likelihood`.
+        noise, units, starts, seed, isotropic: as of `fit_likelihood`.
     """
     below, _ = low.predict(measured.x)
     wide = Samples(_widened(measured.x, below, low_units), measured.y, measured.sd)
     kernel = perdikaris(measured.x.shape[1])
-    return NARGP(low, fit_likelihood(wide, kernel, noise, units, starts, seed), low_units)
+    high = fit_likelihood(wide, kernel, noise, units, starts, seed, isotropic=isotropic)
+    return NARGP(low, high, low_units)
 
 
 def fit_low(

@@ -1,0 +1,111 @@
+"""A campaign's model from its cell and its state: labels, simulation, surrogate."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.campaign.cell import Cell
+from planner.campaign.config import ModesTable
+from planner.campaign.labels import LabelledPose, frequencies, label, observations
+from planner.campaign.low_fidelity import LowFidelity, learn
+from planner.campaign.misses import tell, visits_of
+from planner.campaign.model import FrfOf, Model
+from planner.campaign.state import CampaignState, Measurement
+from planner.dataset.hit_columns import PoseHits
+from planner.design.parameter_sensitivity import FrfNoise
+from planner.surrogate.gp import STAGES
+from planner.surrogate.hedged import HedgedAR1
+from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
+
+# Logarithms: of the chance that a mode is not found, and of the density in ln f of those found
+# that are none.
+MISSED, STRAY = float(np.log(0.1)), float(np.log(0.01))
+
+
+def build(
+    cell: Cell,
+    state: CampaignState,
+    frf_of: FrfOf,
+    hits_of: Callable[[Measurement, ModesTable], PoseHits] | None = None,
+) -> Model:
+    """Label and fit everything that the state's measurements hold.
+
+    `frf_of` gives the tool's FRFs of a measurement, `hits_of` what its hits say at all points,
+    which is asked only where the simulation learns. Without it nothing is told of single hits.
+    """
+    low, used, table = cell.frozen, state.used, cell.config.modes
+    noise, misses, learns = None, (), cell.config.fidelity.simulation == "updated"
+    if learns and used:
+        frfs = tuple(frf_of(m, table) for m in used)
+        hits = tuple(hits_of(m, table) for m in used) if hits_of else None
+        whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
+        q = np.deg2rad(np.array([m.joints_deg for m in used]))
+        low = learn(low, whole, q, table.band_hz)
+        misfit = low.identified.misfit if low.identified else 1.0
+        noise = FrfNoise.of(frfs, table.band_hz, misfit)
+        if hits is not None and low.learned is not None:
+            told = tell(visits_of(used, hits, frfs), low.learned, cell.tolerances, table.band_hz)
+            misses, used = told.poses, tuple(map(told.corrected, used))
+    candidates = [_Guided.by(cell, used, low)]
+    if low.learned is not None and not low.learned.fits:
+        # What lacks physics is bent by fitting it: as it stands it may be a better
+        # guide, or none.
+        stated = replace(cell.frozen, suspect=low.learned)
+        candidates += [
+            _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
+        ]
+    best = max(candidates, key=lambda guided: guided.log_evidence)
+    surrogate = fit_surrogate(
+        best.seen,
+        primary=best.primary,
+        residues=False,
+        taught=best.low.taught,
+        visits=cell.visit_scatter,
+    )
+    model = Model(
+        cell, best.labelled, best.low, best.seen, surrogate, noise, misses, state.used, frf_of
+    )
+    if learns:
+        _ = model.frfs  # which are at hand, and kept with the model
+    return model
+
+
+@dataclass(frozen=True, eq=False)
+class _Guided:
+    """Labels and frequencies as one low fidelity makes them."""
+
+    low: LowFidelity
+    used: tuple[Measurement, ...]
+    labelled: tuple[LabelledPose, ...]
+    seen: ModalObservations
+    primary: HedgedAR1
+
+    @classmethod
+    def by(cls, cell: Cell, used: tuple[Measurement, ...], low: LowFidelity) -> "_Guided":
+        labelled = label(cell, used, low)
+        seen = observations(cell, labelled, low)
+        known = low.discrepancy(frequencies(labelled)) if labelled else None
+        primary = fit_primary(seen, known, low.left_out, low.belief, cell.visit_scatter)
+        return cls(low, used, labelled, seen, primary)
+
+    @property
+    def log_evidence(self) -> float:
+        """How probable the measured modes were, all labels together.
+
+        A label without a mode, and a mode below the last label that got none, are rare too.
+        """
+        labels = self.primary.log_evidence[: self.low.count]
+        missed = sum(mode is None for pose in self.labelled for mode in pose.modes)
+        share = min(1.0, STAGES[-1] / max(len(self.labelled), 1))  # of the poses it is about
+        return float(np.sum(labels)) + share * (missed * MISSED + self.stray * STRAY)
+
+    @property
+    def stray(self) -> int:
+        """Measured modes that are no label's though labels lie above them."""
+        count = 0
+        for pose, measurement in zip(self.labelled, self.used, strict=True):
+            given = {mode.frequency_hz for mode in pose.modes if mode is not None}
+            free = [m.frequency_hz for m in measurement.modes if m.likely]
+            count += sum(f not in given and f < max(given, default=0.0) for f in free)
+        return count

@@ -1,0 +1,83 @@
+"""What an engineer says of a campaign's poses: confirm, withdraw, skip, undo."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from planner.cli.answer import AsJson, refusals, respond
+
+Directory = Annotated[Path, typer.Argument(metavar="DIR", help="Campaign folder.")]
+PoseArgument = Annotated[str, typer.Argument(metavar="POSE", help="Name of the pose.")]
+
+
+def confirm(
+    directory: Directory,
+    pose: PoseArgument,
+    at: Annotated[
+        str | None, typer.Option("--at", metavar="POSE", help="Where they are from instead.")
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Use the held hits of a pose: they are from there indeed, or from another pose.
+
+    Example: planner confirm cell7 P014 --at P009
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.report.campaign_acts import ConfirmedPose
+    from planner.report.imports import ImportedPoses
+
+    campaign = Campaign(directory)
+    if at is None:
+        campaign.confirm(pose)
+        return respond(ConfirmedPose(pose, campaign.model.frequency_sd_percent), as_json)
+    answer = ImportedPoses.of((campaign.move(pose, at),))
+    return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
+
+
+def undo(directory: Directory, as_json: AsJson = False) -> int:
+    """Take back the last act.
+
+    Example: planner undo cell7
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.report.campaign_acts import UndoneAct
+
+    return respond(UndoneAct.of(Campaign(directory).undo()), as_json)
+
+
+def withdraw(
+    directory: Directory,
+    pose: PoseArgument,
+    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
+    as_json: AsJson = False,
+) -> int:
+    """Set a measured pose aside; its recordings stay.
+
+    Example: planner withdraw cell7 P003 --reason "loose sensor"
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.report.campaign_acts import WithdrawnPose
+
+    Campaign(directory).withdraw(pose, reason)
+    return respond(WithdrawnPose(pose, reason), as_json)
+
+
+def skip(
+    directory: Directory,
+    pose: PoseArgument,
+    reason: Annotated[str, typer.Option(help="Why; kept in the log.")] = "",
+    as_json: AsJson = False,
+) -> int:
+    """Say that a proposed pose cannot be measured; it is not offered again.
+
+    With a reason its neighbours are not offered either: what stands in the way there does so
+    around it too.
+
+    Example: planner skip cell7 P007 --reason "hose in the way"
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.report.campaign_acts import SkippedPose
+
+    Campaign(directory).skip(pose, reason, neighbours=bool(reason))
+    return respond(SkippedPose(pose, reason), as_json)

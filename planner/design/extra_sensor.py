@@ -1,0 +1,85 @@
+"""The point where one more sensor would best tell apart what a diagnosis leaves tied."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.design.discrimination import MOST_CANDIDATES, separation
+from planner.design.next_hit import in_words
+from planner.diagnosis.diagnose import Explained
+from planner.recording.points import SENSOR, TCP, Layout
+
+MOST_POSES = 12  # at which the points are compared, evenly taken from those there are
+# A sensor is only worth being moved where it tells so much more than the same hit without it;
+# chosen: odds of 20.
+WORTH = float(np.log(20.0))
+
+
+@dataclass(frozen=True)
+class ExtraSensor:
+    """A `point` of robot.toml, and the hit at the tcp that a sensor there should listen to.
+
+    `log_odds` is what that hit would tell, `log_odds_without` the best hit without the sensor;
+    `between` are the explanations, in words. Joint angles are in degrees.
+    """
+
+    point: str
+    pose: str
+    joints_deg: tuple[float, ...]
+    hit: str
+    log_odds: float
+    log_odds_without: float
+    between: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """For the engineer."""
+        angles = ", ".join(f"{v:.1f}" for v in self.joints_deg)
+        return (
+            f"A sensor at {self.point} would part {' from '.join(self.between)}: hit along "
+            f"{self.hit} at {self.pose} ({angles}°); the odds are expected to become "
+            f"e^{self.log_odds:.1f}, without it e^{self.log_odds_without:.1f}."
+        )
+
+
+def extra_sensor(explained: Explained, offered: Mapping[str, np.ndarray]) -> ExtraSensor | None:
+    """At which point of robot.toml that no sensor was at one would part most.
+
+    Hits are at the poses that were measured or are `offered`, by name: joint angles (dof,) in rad.
+    None where nothing is tied, no such point is stated, or none tells much more than the sensors
+    that there were.
+    """
+    recorded, found = explained.recorded, explained.judged.diagnosis
+    tied = [c for c in found.undecided if c.fit is not None][:MOST_CANDIDATES]
+    problem = found.problem
+    there = tuple(dict.fromkeys((SENSOR, *problem.layout.sensors)))
+    named = problem.simulation.robot.points
+    places = {named.sensor(name) for name in named.axes} - {*there, TCP}
+    if len(tied) < 2 or not places:
+        return None
+    poses = {**dict(zip(recorded.poses, recorded.q, strict=True)), **offered}
+    kept = np.unique(np.linspace(0, len(poses) - 1, MOST_POSES).round().astype(int))
+    names, q = [list(poses)[i] for i in kept], np.array([*poses.values()])[kept]
+    fits, shares = [c.fit for c in tied if c.fit is not None], [c.probability for c in tied]
+
+    def told(sensors: tuple[str, ...]) -> np.ndarray:
+        layout = Layout((TCP,), sensors)
+        return np.nan_to_num(separation(problem, fits, shares, q, found.temper, layout))
+
+    without = float(told(there).max())
+    each = {place: told((*there, place)) for place in sorted(places)}
+    best = max(each, key=lambda place: each[place].max())
+    most = float(each[best].max())
+    if most < without + WORTH:
+        return None
+    pose, axis = np.unravel_index(np.argmax(each[best]), each[best].shape)
+    return ExtraSensor(
+        best,
+        names[pose],
+        tuple(round(float(v), 3) for v in np.rad2deg(q[pose])),
+        "xyz"[axis],
+        most,
+        without,
+        tuple(in_words(c.places, c.probability) for c in tied),
+    )

@@ -1,0 +1,126 @@
+"""Laws of one joint that were fitted to hits of several levels: weighed, and told."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.diagnosis.finding import Finding
+from planner.diagnosis.laws.equivalent_stiffness import System
+from planner.diagnosis.laws.law_at_joints import LawMisfit, Laws
+from planner.diagnosis.laws.level_data import LevelData
+from planner.diagnosis.laws.torque_laws import behaviour
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.thresholds import ALIKE, INDEPENDENT, LAW_INEXACT, LAW_UNEXPLAINED, TIED
+from planner.inference.evidence import occam, temper, unexplained_shares
+
+
+@dataclass(frozen=True)
+class LevelMisfit:
+    """Σ weight |error|²: of a linear joint, what noise alone would leave, and the former's excess.
+
+    A linear simulation says that levels do not differ; of the strongest only the noise is counted,
+    because a linear fit could still follow them.
+    """
+
+    linear: float
+    expected: float
+    excess: float
+
+    def explained(self, candidate: LawMisfit) -> float:
+        """Share of the excess that a law takes away."""
+        return 1 - max(candidate.chi2 - self.expected, 0.0) / self.excess
+
+
+@dataclass(frozen=True, eq=False)
+class WeighedLaw:
+    """A law at a joint: its log evidence over a linear joint, and the share that it explains.
+
+    `levels` is what it was to explain.
+    """
+
+    candidate: LawMisfit
+    at: str
+    log_evidence: float
+    explained: float
+    levels: LevelMisfit
+    per_value: float
+    parameters: dict[str, tuple[float, float, str]]
+    temper: float
+
+
+def weighed_laws(
+    data: LevelData, plain: Fit, system: System, kept: Sequence[LawMisfit]
+) -> tuple[WeighedLaw, ...]:
+    count = 2 * int(np.count_nonzero(data.weight))
+    t = temper(min(2 * c.chi2 for c in kept) / count, ALIKE)
+    levels = levels_of(data)
+    out = []
+    for c in kept:
+        evidence = (levels.linear - c.chi2) / t - _volume(c, t)
+        explained = levels.explained(c)
+        at, per_value = system.ports[c.law.ports[0]], 2 * c.chi2 / count
+        parameters = _parameters(c, t)
+        out.append(WeighedLaw(c, at, evidence, explained, levels, per_value, parameters, t))
+    return tuple(sorted(out, key=lambda w: -w.log_evidence))
+
+
+def levels_of(data: LevelData) -> LevelMisfit:
+    weaker = data.weaker[:, 0, 0]
+    differing = float(np.sum(data.chi2(data.compared(data.h))[weaker]))
+    strongest = float(np.count_nonzero(data.weight[~weaker]))
+    values = float(np.count_nonzero(data.weight[weaker]))
+    excess = max(differing - values, 1e-9)
+    return LevelMisfit(differing + strongest, strongest + values, excess)
+
+
+def _volume(candidate: LawMisfit, temper: float) -> float:
+    """What ν costs: ln of how much narrower the data make it than the prior, and its distance."""
+    mean, sd = candidate.law.law_prior()
+    spread = np.sqrt(np.diagonal(candidate.covariance(temper))[-2:])
+    return occam((candidate.law.nu.ravel() - mean) / sd, spread, sd)
+
+
+def _parameters(candidate: LawMisfit, temper: float) -> dict[str, tuple[float, float, str]]:
+    law = candidate.law
+    return law.parameters(0, candidate.covariance(temper)[-2:, -2:], LAW_INEXACT)
+
+
+def shares_of_laws(weighed: Sequence[WeighedLaw]) -> tuple[list[WeighedLaw], tuple[float, ...]]:
+    """The laws at the joint of the best, and the shares that all that is not explained gives."""
+    at, levels = weighed[0].at, weighed[0].levels
+    there = sorted((w for w in weighed if w.at == at), key=lambda w: w.candidate.chi2)
+    chi2 = np.array([w.candidate.chi2 for w in there])
+    # Below what noise is expected to leave, the best law is as good as any: others count from it.
+    beyond = chi2 - min(levels.expected, chi2[0])
+    left = np.maximum(beyond, max(LAW_UNEXPLAINED * levels.excess, INDEPENDENT / 2))
+    return there, tuple(unexplained_shares(left, INDEPENDENT).tolist())
+
+
+def law_finding(there: Sequence[WeighedLaw], laws: Laws) -> Finding:
+    best = there[0]
+    others = zip(there[1:], laws.probability[1:], strict=True)
+    rivals = {w.candidate.law.effect: share for w, share in others}
+    (first, (k, k_sd, unit)), (second, (a, a_sd, other)) = best.parameters.items()
+    name = best.candidate.law.effect
+    text = (
+        f"{best.at.replace('_', ' ').capitalize()} {behaviour(name, k)} "
+        f"({first.replace('_', ' ')} {k:.3g} ± {k_sd:.1g} {unit}, {second.replace('_', ' ')} "
+        f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
+        f"change with the force.{_or_else(there[1:], laws.probability[1:])}"
+    )
+    return Finding(
+        name, best.at, best.log_evidence, best.parameters, text, best.per_value, best.explained,
+        tuple(rivals.items()), laws,
+    )  # fmt: skip
+
+
+def _or_else(others: Sequence[WeighedLaw], shares: Sequence[float]) -> str:
+    """What else the joint may be: the same finding by another name."""
+    laws = [w.candidate.law for w in others]
+    told = [
+        f"{behaviour(law.effect, float(law.k[0]))} ({100 * share:.0f} %)"
+        for law, share in zip(laws, shares, strict=True)
+        if share > TIED
+    ]
+    return f" These hits cannot tell it from a joint that {' or '.join(told)}." if told else ""

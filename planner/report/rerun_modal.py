@@ -1,0 +1,160 @@
+"""A modal analysis as a Rerun recording: poles of all orders, FRFs with their fit, MAC."""
+
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from matplotlib import colormaps
+
+from planner.frf.frf import Frf
+from planner.modal.mac import mac_matrix
+from planner.modal.mode_selection import model
+from planner.modal.modes import ModalModel
+from planner.modal.pole_identification import PoleIdentification
+from planner.report.frf_plots import AXES
+from planner.report.modal_plots import poles_by_stability
+from planner.report.rerun_chart import (
+    BRIGHT,
+    GREY,
+    Chart,
+    ChartAxis,
+    ChartBand,
+    Curve,
+    chart_view,
+    draw,
+    log_range,
+    write,
+)
+from planner.report.rerun_stream import open_stream
+
+FIT, BAND, MODE = (255, 120, 100), (70, 74, 80), (90, 190, 255)
+STABLE, UNSTABLE = (110, 220, 110), (240, 160, 60)
+RESPONSES = ((255, 110, 110), (120, 220, 120), (110, 160, 255))
+WIDE, WIDER = 2.0, 5.0  # times the height; where charts lie one above the other
+
+
+def record_modes(
+    frf: Frf | None, found: PoleIdentification, modal: ModalModel, name: str, simulated: bool,
+    rrd: Path,
+) -> None:  # fmt: skip
+    """Write the recording; without an FRF what needs none. InputError if it cannot be written."""
+    columns = [] if frf is None else np.flatnonzero(frf.measured).tolist()
+    stream = open_stream(f"modes|{name}", name, _blueprint(columns, len(modal.modes)), rrd)
+    mark = "SIMULATED recordings · " if simulated else ""
+    note = f"# {name}\n{mark}Modes are blue; white is measured, with ± 2 sd; red the fit."
+    stream.log("note", rr.TextDocument(note, media_type="text/markdown"), static=True)
+    _stabilisation(stream, frf, found, modal, f"{mark}stable and unstable poles, order upwards")
+    if frf is not None:
+        fitted = model(found.data, found.fit.refined)
+        for k, column in enumerate(columns):
+            for i in range(3):
+                _frf(stream, frf, found.data.frequency_hz, fitted[i, k], modal, i, column)
+            _coherence(stream, frf, modal, column)
+    shapes = np.array([mode.shape for mode in modal.modes])
+    names = [f"{k + 1}: {mode.frequency_hz:.2f} Hz" for k, mode in enumerate(modal.modes)]
+    about = f"AutoMAC, shapes of {shapes.shape[-1]} coordinates: different modes can look alike"
+    draw_mac(stream, "modes/mac", mac_matrix(shapes, shapes), names, names, about)
+    stream.flush(timeout_sec=10.0)
+    stream.disconnect()
+
+
+def draw_mac(
+    stream: rr.RecordingStream, path: str, mac: np.ndarray, rows: list[str], columns: list[str],
+    note: str,
+) -> None:  # fmt: skip
+    """Log a MAC matrix (k, l) as cells with values and names; dark where nothing is known."""
+    cells = (255 * colormaps["viridis"](np.nan_to_num(mac))[..., :3]).astype(np.uint8)
+    cells[~np.isfinite(mac)] = 0
+    stream.log(f"{path}/cells", rr.Image(cells))
+    words = [
+        (f"{value:.2f}", (j + 0.5, k + 0.42))
+        for (k, j), value in np.ndenumerate(mac) if np.isfinite(value)
+    ]  # fmt: skip
+    words += [(name, (-0.45, k + 0.42)) for k, name in enumerate(rows)]
+    words += [(name, (j + 0.5, -0.3)) for j, name in enumerate(columns)]
+    words.append((note, (mac.shape[1] / 2, mac.shape[0] + 0.1)))
+    write(stream, f"{path}/words", words, [BRIGHT] * (len(words) - 1) + [GREY])
+
+
+def mac_view(path: str, name: str, count: int) -> rrb.Spatial2DView:
+    """The view of a MAC matrix of so many modes with all its words in sight."""
+    bounds = rrb.VisualBounds2D(x_range=[-0.9, count + 0.2], y_range=[-0.6, count + 0.4])
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
+
+
+def _blueprint(columns: list[int], modes: int) -> rrb.Blueprint:
+    tabs: list[rrb.View | rrb.Container] = [
+        chart_view("modes/stabilisation", "Stabilisation diagram", WIDE)
+    ]
+    if columns:
+        frfs = [
+            chart_view(f"modes/frf/{AXES[i]}{AXES[k]}", f"response {AXES[i]}, hit {AXES[k]}", WIDE)
+            for i in range(3) for k in columns
+        ]  # fmt: skip
+        tabs.append(rrb.Grid(*frfs, grid_columns=len(columns), name="FRFs and their fit"))
+        coherence = [
+            chart_view(f"modes/coherence/{AXES[k]}", f"hit {AXES[k]}", WIDER) for k in columns
+        ]
+        tabs.append(rrb.Vertical(*coherence, name="Coherence"))
+    tabs.append(mac_view("modes/mac", "AutoMAC", modes))
+    tabs.append(rrb.TextDocumentView(origin="/note", name="What is what"))
+    return rrb.Blueprint(rrb.Tabs(*tabs), rrb.TimePanel(state="hidden"), collapse_panels=True)
+
+
+def _modes(modal: ModalModel, bottom: float, top: float) -> Curve:
+    """All modes as lines from bottom to top."""
+    hz = np.array([mode.frequency_hz for mode in modal.modes])
+    ends = np.tile([bottom, top, np.nan], len(hz))
+    return Curve("mode", np.repeat(hz, 3), ends, MODE, thick=0.5)
+
+
+def _stabilisation(
+    stream: rr.RecordingStream, frf: Frf | None, found: PoleIdentification, modal: ModalModel,
+    title: str,
+) -> None:  # fmt: skip
+    hz, responses = found.data.frequency_hz, found.data.response
+    singular = np.linalg.svd(np.moveaxis(responses, -1, 0), compute_uv=False)[:, 0]
+    unit = " (m/s²/N)" if frf is not None else ""
+    y = ChartAxis(*log_range([singular]), f"CMIF{unit}", log=True)
+    stable, unstable = poles_by_stability(found)
+    orders = max((float(p[1].max()) for p in (stable, unstable) if p.size), default=1.0)
+    clouds = [
+        Curve(name, p[0], y.low * (y.high / y.low) ** (p[1] / (1.05 * orders)), colour, True, 0.7)
+        for name, p, colour in (("unstable", unstable, UNSTABLE), ("stable", stable, STABLE))
+    ]
+    draw(stream, "modes/stabilisation", Chart(
+        title, ChartAxis(float(hz[0]), float(hz[-1]), "frequency (Hz)"), y,
+        (_modes(modal, y.low, y.high), Curve("CMIF", hz, singular, BRIGHT), *clouds), wide=WIDE,
+    ))  # fmt: skip
+
+
+def _frf(
+    stream: rr.RecordingStream, frf: Frf, fitted_hz: np.ndarray, fitted: np.ndarray,
+    modal: ModalModel, response: int, hit: int,
+) -> None:  # fmt: skip
+    low, high = float(fitted_hz[0]), float(fitted_hz[-1])
+    inside = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
+    hz, size = frf.frequency_hz[inside], np.abs(frf.accelerance[response, hit, inside])
+    sd = np.sqrt(frf.variance[response, hit, inside] / 2)  # of a magnitude
+    y = ChartAxis(*log_range([size, np.abs(fitted)]), "|H| (m/s²/N)", log=True)
+    band = ChartBand("± 2 sd", hz, np.maximum(size - 2 * sd, 0.0), size + 2 * sd, BAND)
+    draw(stream, f"modes/frf/{AXES[response]}{AXES[hit]}", Chart(
+        f"response {AXES[response]}, hit {AXES[hit]} ({frf.hits[hit]} averaged)",
+        ChartAxis(low, high, "frequency (Hz)"), y,
+        (_modes(modal, y.low, y.high), Curve("measured", hz, size, BRIGHT),
+         Curve("fit", fitted_hz, np.abs(fitted), FIT)), (band,), WIDE,
+    ))  # fmt: skip
+
+
+def _coherence(stream: rr.RecordingStream, frf: Frf, modal: ModalModel, hit: int) -> None:
+    known = bool(np.any(np.isfinite(frf.coherence[:, hit])))
+    curves = [
+        Curve(f"response {AXES[i]}", frf.frequency_hz, frf.coherence[i, hit], RESPONSES[i])
+        for i in range(3)
+    ]
+    title = f"hit {AXES[hit]}" if known else f"hit {AXES[hit]}: not known, it takes two hits"
+    draw(stream, f"modes/coherence/{AXES[hit]}", Chart(
+        title, ChartAxis(0.0, float(frf.frequency_hz[-1]), "frequency (Hz)"),
+        ChartAxis(0.0, 1.05, "coherence"), (_modes(modal, 0.0, 1.0), *curves), wide=WIDER,
+    ))  # fmt: skip

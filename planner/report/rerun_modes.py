@@ -1,0 +1,150 @@
+"""Modes of a measured pose in a Rerun recording: the robot vibrating, and the MAC matrix beside.
+
+On the timeline "measurement" a mode stands still at its largest deflection; on "vibration" it
+moves, slowed down and exaggerated, as at the pose measured last.
+"""
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from matplotlib import colormaps
+
+from planner.campaign.labels import LabelledPose
+from planner.campaign.model import Model
+from planner.dataset.measure import MeasuredPose
+from planner.recording.points import Layout
+from planner.report.rerun_chart import BRIGHT
+from planner.report.rerun_modal import draw_mac, mac_view
+from planner.report.robot_motion import (
+    PointShapes,
+    agreement,
+    alone,
+    matched,
+    measured_shapes,
+    simulated_shapes,
+)
+from planner.robot.skeleton import Skeleton, skeleton
+
+VIBRATION = "vibration"
+FRAMES, FRAME_MS = 24, 100  # of one period on the screen
+LARGEST = 0.12  # of the robot's reach: how far the point moves that moves most
+PIECES = 6  # a line is drawn in, each in the colour of its motion
+THICK, THIN, BALL = 0.02, 0.004, 0.03  # radii in units of the reach
+MEASURED, REST = (255, 255, 255), (85, 88, 92)
+
+
+def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
+    """A view for each mode, and the MAC matrix with them."""
+    views: list[rrb.View] = [
+        rrb.Spatial3DView(origin=f"/modes/mode_{k + 1}", name=f"mode {k + 1}", eye_controls=eye)
+        for k in range(count)
+    ]
+    mac = mac_view("modes/mac", "MAC: measured (rows) and simulated (columns)", count)
+    return rrb.Grid(*views, mac, name="Modes")
+
+
+class ModeDrawing:
+    """Draws the modes of each measured pose, and the matrix that compares their shapes."""
+
+    def __init__(self, stream: rr.RecordingStream):
+        self._stream = stream
+
+    def pose(self, model: Model, pose: LabelledPose, measured: MeasuredPose | None) -> None:
+        """Modes of a pose, at the recording's current time, moving from then on."""
+        robot, simulation = model.cell.robot, model.low.simulation
+        seen = measured_shapes(robot, pose, measured)
+        drawn = skeleton(robot, pose.q)
+        whole = None
+        if simulation is None:
+            seen = alone(seen)
+        else:
+            layout = Layout(sensors=seen.names)
+            count = len(pose.modes)
+            whole, there = simulated_shapes(simulation, pose.q, drawn, layout, count)
+            self._mac(pose, agreement(seen, there), len(seen.names))
+            seen = matched(seen, there)
+        for k in range(len(pose.modes)):
+            path = f"modes/mode_{k + 1}"
+            self._still(path, drawn, _title(pose, k), robot.reach_m)
+            size = LARGEST * robot.reach_m
+            if whole is not None and np.all(np.isfinite(whole.motion[k])):
+                self._moving(f"{path}/simulated", drawn, size * whole.motion[k], robot.reach_m)
+            self._points(f"{path}/measured", seen, k, size, robot.reach_m)
+
+    def _still(self, path: str, drawn: Skeleton, title: str, reach_m: float) -> None:
+        lines = [drawn.place_m[list(pair)] for pair in drawn.lines]
+        self._stream.log(f"{path}/rest", rr.LineStrips3D(lines, radii=THIN * reach_m, colors=REST))
+        below = drawn.place_m[0] - [0.0, 0.0, 0.08 * reach_m]
+        self._stream.log(
+            f"{path}/title",
+            rr.Points3D([below], radii=0.0001, labels=[title], colors=BRIGHT, show_labels=True),
+        )
+
+    def _moving(self, path: str, drawn: Skeleton, motion: np.ndarray, reach_m: float) -> None:
+        """The robot in pieces (p, 2, 3) that are coloured by how far they move."""
+        rest, way = _pieces(drawn, drawn.place_m), _pieces(drawn, motion)
+        largest = np.max(np.linalg.norm(np.abs(motion), axis=1)) or 1.0
+        share = np.linalg.norm(np.abs(way.mean(axis=1)), axis=1) / largest
+        colours = (255 * colormaps["plasma"](0.1 + 0.85 * share)).astype(np.uint8)
+        self._stream.log(
+            path,
+            rr.LineStrips3D(rest + way.real, radii=THICK * reach_m, colors=colours),
+        )
+        places = [rest + np.real(way * turn) for turn in _turns()]
+        strips = rr.LineStrips3D.columns(strips=[s for place in places for s in place])
+        self._stream.send_columns(path, [_times()], strips.partition([len(rest)] * FRAMES))
+
+    def _points(self, path: str, seen: PointShapes, k: int, size: float, reach_m: float) -> None:
+        """Sensors where they move to by the measured shape."""
+        known = np.all(np.isfinite(seen.motion[k]), axis=1)
+        places, motion = seen.place_m[known], size * seen.motion[k][known]
+        names = [f"{n} (measured)" for n, there in zip(seen.names, known, strict=True) if there]
+        balls = rr.Points3D(
+            places + motion.real, radii=BALL * reach_m, colors=MEASURED, labels=names,
+            show_labels=len(names) > 1,
+        )  # fmt: skip
+        self._stream.log(path, balls)
+        if len(places):
+            every = np.concatenate([places + np.real(motion * turn) for turn in _turns()])
+            columns = rr.Points3D.columns(positions=every).partition([len(places)] * FRAMES)
+            self._stream.send_columns(path, [_times()], columns)
+
+    def _mac(self, pose: LabelledPose, mac: np.ndarray, points: int) -> None:
+        rows = [
+            f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
+            for k, mode in enumerate(pose.modes)
+        ]
+        columns = [f"{j + 1}: {hz:.1f} Hz" for j, hz in enumerate(pose.simulated_hz)]
+        note = f"{pose.pose}, shapes at {3 * points} coordinates"
+        few = "; different modes can look alike in so few" if points == 1 else ""
+        draw_mac(self._stream, "modes/mac", mac, rows, columns, note + few)
+
+
+def _title(pose: LabelledPose, k: int) -> str:
+    mode, simulated = pose.modes[k], pose.simulated_hz[k]
+    said = [f"{pose.pose}, mode {k + 1}:"]
+    if mode is None:
+        said.append("not found in the recordings")
+    else:
+        said.append(f"{mode.frequency_hz:.2f} Hz, damping {100 * mode.damping_ratio:.1f} %")
+    if np.isfinite(simulated):
+        said.append(f"(simulation {simulated:.2f} Hz)")
+    return " ".join(said)
+
+
+def _pieces(drawn: Skeleton, values: np.ndarray) -> np.ndarray:
+    """Ends (lines · PIECES, 2, 3) of values (p, 3) at points, between them in proportion."""
+    at = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
+    pieces = []
+    for a, b in drawn.lines:
+        along = values[a] + at * (values[b] - values[a])
+        pieces.append(np.stack([along[:-1], along[1:]], axis=1))
+    return np.concatenate(pieces)
+
+
+def _turns() -> np.ndarray:
+    return np.exp(2j * np.pi * np.arange(FRAMES) / FRAMES)
+
+
+def _times() -> rr.TimeColumn:
+    return rr.TimeColumn(VIBRATION, duration=FRAME_MS * np.arange(FRAMES).astype("timedelta64[ms]"))

@@ -1,0 +1,223 @@
+"""What the engineer's keys do. Each act changes the campaign and gives the session's next value."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
+from planner.campaign.importing import ImportReport
+from planner.errors import NoPoseLeftError, PlannerError
+from planner.recording.folder import TABLE
+from planner.report import session_text
+from planner.report.campaign_acts import UndoneAct
+from planner.session.course import Course, Visit
+from planner.session.page import page_with_hits, page_without_hits
+from planner.session.station import Station
+from planner.session.verdicts import PoseBefore
+
+ENTER = ("a", "\n", "\r")
+IMPORTING = "importing and refitting"
+ACTS: dict[type, Callable[[Any], str]] = {  # in words, where an interruption has to say them
+    Imported: lambda event: f"the hits of {event.pose}",
+    Confirmed: lambda event: f"the answer about {event.pose}",
+    Refused: lambda event: f"the refusal of hits at {event.pose}",
+    Skipped: lambda event: f"the skip of {event.pose}",
+    Starred: lambda event: f"the star of {event.pose}",
+    Undone: lambda event: f"that entry {event.act} is taken back",
+}
+
+
+def arrive(station: Station, course: Course) -> Course:
+    """Propose a pose and show its page; pictures of what went before are made then."""
+    campaign = station.campaign
+    try:
+        with station.screen.working("choosing the next pose"):
+            proposal = campaign.next()[0]
+    except NoPoseLeftError as error:
+        station.say(str(error))
+        return replace(course, stop="no pose left")
+    station.teller.note()
+    page = page_without_hits(
+        campaign, proposal, station.hits_per_pose, station.inbox.folder, course
+    )
+    page = page_with_hits(page, (), (), undoable(station), station.auto, course)
+    station.screen.show(page.page())
+    station.teller.tell()
+    return replace(course, visit=Visit(proposal, page, time.monotonic()))
+
+
+def undoable(station: Station) -> bool:
+    """Whether there is an act to take back."""
+    state = station.campaign.state
+    return bool(state.recorded or state.events > 2)  # the campaign's start and a first proposal
+
+
+def on_key(station: Station, course: Course, visit: Visit, key: str | None) -> Course:
+    """Act on a key at a pose; without a visit the pose is over."""
+    try:
+        return _act(station, course, visit, key)
+    except PlannerError as error:
+        station.say(str(error), "red")
+        return course
+
+
+def _act(station: Station, course: Course, visit: Visit, key: str | None) -> Course:
+    campaign, pose = station.campaign, visit.proposal.pose
+    over = replace(course, visit=None)
+    match key:
+        case "a" | "\n" | "\r":
+            if visit.good and not visit.page.complete and not visit.pressed:
+                station.say(session_text.incomplete(visit.page), "yellow")
+                return replace(course, visit=replace(visit, pressed=True))
+            files = [path for path in visit.whole if path not in visit.late]
+            return import_waiting(station, course, visit, files)
+        case "b" if visit.late:
+            return _to_before(station, course, sorted(visit.late))
+        case "h" if visit.late:
+            return replace(course, here=course.here | visit.late)
+        case "r" if visit.whole:
+            campaign.refuse(pose, visit.whole)
+            station.teller.note()
+            station.say(f"{len(visit.whole)} hits set aside; hit again.")
+        case "s":
+            campaign.star(pose)
+            station.say(f"★ {pose}")
+        case "k":
+            campaign.skip(pose, "skipped in the session")
+            station.say(f"{pose} will not be offered again.")
+            return over
+        case "u":
+            return undo(station, over)
+        case "n":
+            campaign.skip(pose, "another was asked for")
+            return over
+        case "q":
+            return replace(course, stop="quit")
+        case "?":
+            station.say(session_text.HELP)
+        case _:
+            pass
+    return course
+
+
+def import_waiting(station: Station, course: Course, visit: Visit, files: Sequence[Path]) -> Course:
+    """Import the waiting hits; the pose is over when it gave modes."""
+    if not files:
+        station.say("No whole new file waits yet.", "yellow")
+        return course
+    folder = station.inbox.folder
+    table = (folder / TABLE).is_file()
+    try:
+        with station.screen.working(IMPORTING):
+            reports = station.campaign.import_paths(
+                (folder,) if table else tuple(files), None if table else visit.proposal.pose
+            )
+    except PlannerError as error:
+        station.say(str(error), "red")
+        bad = {station.inbox.digest(path) for path in files} if station.auto else set()
+        return replace(course, aside=course.aside | bad)
+    station.teller.note(reports)
+    for report in reports:
+        course = replace(course, aside=course.aside | {hit.sha256 for hit in report.left_out})
+        course = _imported(station, course, report)
+    if not any(report.measurement and report.measurement.modes for report in reports):
+        station.teller.tell()
+        return course
+    hits = tuple(hit for verdict in visit.verdicts for hit in verdict.hits)
+    before = PoseBefore(visit.proposal.pose, hits)
+    return replace(course, visit=None, before=before, here=frozenset())
+
+
+def undo(station: Station, course: Course) -> Course:
+    """Take back the last act of the engineer."""
+    entry = station.campaign.undo(decisions_only=True)
+    station.teller.note()
+    station.screen.forget()
+    station.say(UndoneAct.of(entry).text())
+    return course.undone(station.campaign.state)
+
+
+def answer(station: Station, course: Course, key: str | None, other: str) -> Course:
+    """Act on a key while a question is open; `other` is the open pose the hits may be from.
+
+    Once it is answered, `asking` is empty.
+    """
+    campaign, pose = station.campaign, course.asking
+    answered = replace(course, asking="")
+    if key in ENTER:
+        with station.screen.working("refitting"):
+            campaign.confirm(pose)
+            station.teller.note()
+        station.say(f"The hits of {pose} are used.")
+        answered = measured(station, answered, pose)
+    elif key == "r":
+        campaign.refuse_held(pose)
+        station.teller.note()
+        station.say(f"The hits of {pose} are set aside; hit again.")
+    elif key == "o" and other:
+        with station.screen.working(IMPORTING):
+            report = campaign.move(pose, other)
+        station.teller.note([report])
+        answered = _after(station, answered, report)
+    elif key == "u":
+        answered = undo(station, answered)
+    else:
+        return replace(course, stop="quit") if key == "q" else course
+    station.teller.tell()
+    return answered
+
+
+def measured(station: Station, course: Course, pose: str) -> Course:
+    """Say how far the campaign is after one more pose."""
+    state, model = station.campaign.state, station.campaign.model
+    seconds = time.monotonic() - station.started
+    further = course.after(pose, model, state, seconds, station.auto)
+    if not station.screen.console.is_terminal:  # there it stands on the page
+        station.say(further.progress.split("; ", 1)[1])
+    if station.explaining is not None and len(state.used) >= station.explain_from:
+        station.explaining.ask()
+    if further.announced and not course.announced:
+        station.say("The target of campaign.toml is reached.", "bold green")
+    return further
+
+
+def _to_before(station: Station, course: Course, late: Sequence[Path]) -> Course:
+    """Import hits that came late to the pose that they are of."""
+    with station.screen.working(IMPORTING):
+        reports = station.campaign.import_paths(tuple(late), course.before.pose)
+    station.teller.note(reports)
+    for report in reports:
+        station.say(session_text.result_line(report), "bold")
+    return course
+
+
+def interrupted(station: Station) -> str:
+    """Which acts of the engineer an interruption left in the log, in a sentence."""
+    said = [ACTS[type(event)](event) for event in station.teller.gained() if type(event) in ACTS]
+    if not said:
+        return "Stopped: nothing that was begun is in the log; hits that were not imported wait."
+    there = ", ".join(dict.fromkeys(said))
+    return f"Stopped: {there}: that is in the log; planner undo takes the last act back."
+
+
+def _imported(station: Station, course: Course, report: ImportReport) -> Course:
+    if report.question is not None:
+        # Without anybody to ask, say so; else the question comes next.
+        if station.auto and report.measured is not None:
+            station.say(f"Held back, not used: {report.question.text}", "red")
+        return course
+    return _after(station, course, report) if report.accepted or report.refused else course
+
+
+def _after(station: Station, course: Course, report: ImportReport) -> Course:
+    if report.question is not None:  # at the pose it was moved to it does not fit either
+        return course
+    simulated = bool(report.measurement and report.measurement.simulated)
+    station.screen.show(session_text.import_panel(report, simulated))
+    if station.screen.console.is_terminal:  # the page goes with the next pose
+        station.say(session_text.result_line(report), "bold")
+        for alert in report.alerts:
+            station.say(alert, "yellow")
+    return measured(station, course, report.pose)

@@ -1,0 +1,98 @@
+"""What a session knows beside the campaign, as values: each act gives the next one."""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.events import Proposal
+from planner.campaign.model import Model
+from planner.campaign.state import CampaignState
+from planner.report import session_text
+from planner.report.pose_screen import PosePage
+from planner.session.verdicts import HitVerdict, PoseBefore
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """A pose while the robot stands there: what is on the page, and which files wait.
+
+    `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
+    pressed though hits are missing.
+    """
+
+    proposal: Proposal
+    page: PosePage
+    since: float
+    whole: tuple[Path, ...] = ()
+    verdicts: tuple[HitVerdict, ...] = ()
+    shown: tuple | None = None
+    pressed: bool = False
+
+    @property
+    def late(self) -> frozenset[Path]:
+        """Files with hits that answer as the pose before did."""
+        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "late")
+
+    @property
+    def good(self) -> bool:
+        """Whether a hit that can be used waits."""
+        return any(verdict.kind == "good" for verdict in self.verdicts)
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """How far a session is. All else is the campaign's, so that it may end anywhere.
+
+    `asking` is the pose whose question is on the page; `here` are files that looked late and are
+    of the open pose; `aside`, by content, what could not be imported without the engineer;
+    `history` the overall sd (%) after each measurement; `announced`: the target was.
+    """
+
+    visit: Visit | None = None
+    asking: str = ""
+    before: PoseBefore = field(default_factory=PoseBefore)
+    here: frozenset[Path] = frozenset()
+    aside: frozenset[str] = frozenset()
+    measured: tuple[str, ...] = ()
+    history: tuple[float, ...] = ()
+    progress: str = ""
+    announced: bool = False
+    stop: str = ""
+    ended: str = ""
+
+    def known(self, state: CampaignState) -> set[str]:
+        """Content hashes of files that are not to be offered: used, refused or set aside."""
+        hits = {hit.sha256 for pose in state.recorded for hit in pose.hits}
+        return {*self.aside, *state.refused, *hits}
+
+    def undone(self, state: CampaignState) -> "Course":
+        """After an act was taken back: what was measured may be gone with it."""
+        before = self.before if self.before.pose in state.measurements else PoseBefore()
+        kept = [k for k, pose in enumerate(self.measured) if pose in state.measurements]
+        measured = tuple(self.measured[k] for k in kept)
+        history = tuple(self.history[k] for k in kept)
+        return replace(self, before=before, measured=measured, history=history, progress="")
+
+    def after(
+        self, pose: str, model: Model, state: CampaignState, seconds: float, auto: bool
+    ) -> "Course":
+        """After one more measurement, `seconds` into the session."""
+        stop = model.cell.config.stop
+        measured = (*self.measured, pose)
+        overall = float(np.sqrt(np.mean(model.frequency_sd_percent**2)))
+        history = (*self.history, overall)
+        earlier = max(0, len(state.used) - len(history))  # by sessions before this one
+        left = session_text.progress_line(
+            list(history), stop.frequency_sd_percent, seconds / len(measured),
+            stop.measurements_min - earlier,
+        )  # fmt: skip
+        ends = self.stop
+        if model.done and not self.announced:
+            ends = "target reached" if auto else ""
+        if len(state.used) >= stop.measurements_max:
+            ends = "as many measurements as campaign.toml allows"
+        return replace(
+            self, measured=measured, history=history, announced=self.announced or model.done,
+            progress=f"sd of all {overall:.2f} %; {left}", stop=ends,
+        )  # fmt: skip

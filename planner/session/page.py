@@ -1,0 +1,69 @@
+"""The page of a pose, made of what the campaign expects there and of the hits that wait."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import Proposal
+from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
+from planner.session.course import Course
+from planner.session.verdicts import HitVerdict
+
+
+def page_without_hits(
+    campaign: Campaign, proposal: Proposal, hits_per_pose: int, folder: Path, course: Course
+) -> PosePage:
+    """What the screen says of a pose before anything was hit there."""
+    model, robot = campaign.model, campaign.cell.robot
+    expected = model.predict(np.deg2rad([proposal.joints_deg]))
+    return PosePage(
+        proposal, len(model.labelled) + 1, robot.joint_names, robot.config.tcp_frame,
+        max(1, hits_per_pose // len(proposal.hits)), (),
+        tuple(expected.frequency_hz[0].tolist()), tuple(expected.frequency_sd_hz[0].tolist()),
+        folder, progress=course.progress, pose_before=course.before.pose,
+    )  # fmt: skip
+
+
+def page_with_hits(
+    page: PosePage,
+    verdicts: Sequence[HitVerdict],
+    waiting: Sequence[tuple[Path, str]],
+    undoable: bool,
+    auto: bool,
+    course: Course,
+) -> PosePage:
+    """The page with the hits that wait, the files that are not whole yet, and keys that do."""
+    before = course.before.pose
+    hits = tuple(_judged(number, one, before) for number, one in enumerate(verdicts, 1))
+    page = replace(
+        page, hits=hits, unfinished=tuple(_named(*one) for one in waiting),
+        progress=course.progress,
+    )  # fmt: skip
+    return replace(page, keys="" if auto else _keys(page, before, undoable))
+
+
+def _judged(number: int, verdict: HitVerdict, before: str) -> JudgedHit:
+    late = f"answers as {before} did: [b] it is from there, [h] from here"
+    text = late if verdict.kind == "late" else verdict.text
+    return JudgedHit(number, verdict.axis, verdict.kind, text)
+
+
+def _keys(page: PosePage, before: str, undoable: bool) -> str:
+    kinds = {hit.kind for hit in page.hits}
+    return keys_that_do([
+        ("a", "accept" if page.complete else "accept as it is", "good" in kinds),
+        ("r", "refuse all", bool(page.hits)),
+        ("b", f"late ones to {before}", "late" in kinds),
+        ("h", "late ones are from here", "late" in kinds),
+        ("s", "star", True), ("k", "skip", True), ("n", "other pose", True),
+        ("u", "undo", undoable), ("q", "quit", True), ("?", "help", True),
+    ])  # fmt: skip
+
+
+def _named(path: Path, why: str) -> str:
+    """What is the matter with a file, by its name alone."""
+    text = why.replace(str(path), path.name)
+    return text if path.name in text else f"{path.name} {text}"

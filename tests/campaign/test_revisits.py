@@ -1,0 +1,89 @@
+"""Drift: a pose that is hit again, and a pose whose modes all lie to one side."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.events import MeasuredMode
+from planner.campaign.revisits import hit_again, suspected
+from planner.campaign.state import CampaignState, Measurement
+from planner.truth.deviation import Deviation
+from planner.truth.load import load_truth
+from tests.support.outside import record, told
+from tests.support.plain_arm import make_plain_arm, plain_campaign
+
+
+def modes(*hertz: float) -> tuple[MeasuredMode, ...]:
+    empty = ((None, None, None),) * 9
+    return tuple(MeasuredMode(hz, 1e-4 * hz, 0.02, 1e-3, (), empty) for hz in hertz)
+
+
+def model(scatter: float, poses: int = 5) -> Any:
+    """A model that expects 10 and 20 Hz everywhere."""
+    expected = SimpleNamespace(
+        frequency_hz=np.array([[10.0, 20.0]]), frequency_sd_hz=np.array([[0.02, 0.03]])
+    )
+    return SimpleNamespace(
+        surrogate=SimpleNamespace(visit_scatter=np.array([scatter, scatter])),
+        labelled=(None,) * poses, predict=lambda q: expected,
+        low=SimpleNamespace(simulation=None, simulate=lambda q, more: None),
+    )  # fmt: skip
+
+
+KNOWN = Measurement("P001", (0.0, 0.0), (), modes(10.0, 20.0))
+
+
+@pytest.mark.parametrize(
+    ("hertz", "scatter", "differs"),
+    [((10.0, 20.01), 1e-3, False), ((10.08, 20.0), 1e-3, True), ((10.08, 20.0), 5e-3, False),
+     ((9.9, 19.7), 1e-3, True)],
+)  # fmt: skip
+def test_a_second_visit_is_held_against_the_scatter_of_visits(hertz, scatter, differs):
+    (said,) = hit_again(model(scatter), KNOWN, modes(*hertz))
+    assert ("differs" in said) == differs
+    assert "P001" in said
+
+
+def test_few_poses_do_not_tell_how_visits_scatter():
+    (said,) = hit_again(model(5e-3, poses=4), KNOWN, modes(10.08, 20.0))
+    assert "differs" in said
+
+
+def test_modes_that_are_found_nowhere_again_say_nothing():
+    assert hit_again(model(1e-3), KNOWN, modes(12.0, 33.0)) == ()
+
+
+@pytest.mark.parametrize(
+    ("hertz", "hinted"),
+    [((9.93, 19.86), True), ((10.07, 20.14), True), ((9.93, 20.14), False),
+     ((9.99, 19.98), False), ((9.93,), False)],
+)  # fmt: skip
+def test_modes_to_one_side_ask_for_the_first_pose_again(hertz, hinted):
+    state = CampaignState(measurements={"P001": KNOWN})
+    said = suspected(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
+    assert bool(said) == hinted
+    assert not said or "Hit P001, the first pose, again (0.000, 0.000°)" in said[0]
+
+
+def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
+    robot = make_plain_arm(tmp_path / "robot")
+    plan = plain_campaign(tmp_path / "plan" / "campaign.toml", "maximin_lhs")
+    cell = tmp_path / "cell"
+    Campaign.new(cell, robot, plan)
+    for day, common in enumerate((1.0, 1.0, 1.0, 0.98)):
+        truth = load_truth(robot, Deviation(seed=3, stiffness=0.1, common=common))
+        proposal = told("next", cell)["proposals"][0]
+        folder = record(truth, tmp_path / f"day{day}", proposal["pose"], proposal["joints_deg"])
+        last = told("import", cell, folder)
+    assert any("Hit P001, the first pose, again" in text for text in last["remarks"])
+    first = Campaign(cell).state.used[0]
+    same = load_truth(robot, Deviation(seed=3, stiffness=0.1))
+    for now, word in ((same, "is as it was"), (truth, "differs from the hits before")):
+        folder = record(now, tmp_path / word, "P001", list(first.joints_deg), seed=8)
+        again = told("import", cell, folder)
+        (said,) = (text for text in again["remarks"] if "P001 was hit again" in text)
+        assert word in said
+        told("undo", cell)

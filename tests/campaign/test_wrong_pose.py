@@ -1,0 +1,68 @@
+"""Hits of another pose of the workspace, under a pose's name, after three measurements."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.log_conversion import from_modal
+from planner.campaign.question import question
+from planner.dataset.measure import measure
+from planner.dataset.screened_files import Source
+from planner.recording.folder import TABLE
+from tests.support.generated_arms import BAND_HZ, Arm, make_generated_arm
+
+ARMS = ((911, 4, 2), (912, 4, 3), (913, 5, 3), (914, 4, 2), (915, 5, 3))  # seed, joints, modes
+POSES, PAIRS = 24, 40
+
+
+def three_measured(arm: Arm, folder) -> Campaign:
+    campaign = Campaign.new(folder / "campaign", arm.robot_toml, arm.campaign_toml)
+    for number in range(3):
+        (pose,) = campaign.next()
+        named = [(pose.pose, np.deg2rad(pose.joints_deg))]
+        (report,) = campaign.import_paths((arm.record(folder / pose.pose, named, number),))
+        assert report.question is None
+    return campaign
+
+
+def modes_at(arm: Arm, folder, q: np.ndarray) -> list:
+    """Modes by the hits at each of the poses q (n, dof) in rad."""
+    made = arm.record(folder / "others", [(f"W{i}", row) for i, row in enumerate(q)], 9)
+    with open(made / TABLE, newline="") as file:
+        rows = list(csv.DictReader(file))
+    sources = {
+        f"W{i}": tuple(Source(made / r["file"], r["file"], r["hit"], int(r["repeat"]))
+                       for r in rows if r["pose"] == f"W{i}")
+        for i in range(len(q))
+    }  # fmt: skip
+    return [from_modal(measure(own, BAND_HZ).modal) for own in sources.values()]
+
+
+def judged(folder, seed: int, joints: int, modes: int) -> tuple[bool, int, int]:
+    """Whether the simulation fits, and how often was asked of wrong poses and of right ones."""
+    arm = make_generated_arm(folder, seed, joints, modes)
+    campaign = three_measured(arm, folder)
+    rng = np.random.default_rng(seed + 2)
+    q = rng.uniform(*arm.box_rad.T, (POSES, joints))
+    found = modes_at(arm, folder, q)
+
+    def asked(at: int, hits: int) -> bool:
+        angles = tuple(np.rad2deg(q[at]).tolist())
+        return question(campaign.model, campaign.state, "X", angles, found[hits]) is not None
+
+    pairs = [rng.choice(POSES, 2, replace=False).tolist() for _ in range(PAIRS)]
+    wrong = sum(asked(stated, true) for stated, true in pairs)
+    return campaign.model.low.taught, wrong, sum(asked(i, i) for i in range(POSES))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_another_pose_is_asked_about(tmp_path):
+    found = [judged(tmp_path / str(seed), seed, *size) for seed, *size in ARMS]
+    for (seed, joints, modes), (taught, wrong, false) in zip(ARMS, found, strict=True):
+        print(f"arm {seed}, {joints} joints, {modes} modes, simulation fits: {taught}; asked of "
+              f"{wrong} of {PAIRS} wrong poses and {false} of {POSES} right ones")  # fmt: skip
+    assert sum(wrong for _, wrong, _ in found) >= 0.95 * PAIRS * len(ARMS)
+    assert sum(false for *_, false in found) <= 0.02 * POSES * len(ARMS)

@@ -1,0 +1,77 @@
+"""Turned signs and exchanged points, told by how their neighbours move."""
+
+import numpy as np
+import pytest
+
+from planner.modal.row_places import exchanged_nodes, turned_rows
+from planner.recording.dof import Dof
+from planner.recording.geometry import Geometry
+from tests.support.struck_structures import dof_of, unit_mass_shapes
+from tests.support.structures import plate
+
+
+@pytest.fixture(scope="module")
+def sheet():
+    """Points, shapes with rows that err by 3 %, places."""
+    structure = plate(9, 6, (0.7, 0.4), 0.003)
+    rng = np.random.default_rng(8)
+    shapes = unit_mass_shapes(structure)[1][:, 3:13].real
+    shapes = shapes * (1 + 0.03 * rng.normal(size=(len(shapes), 1)))
+    names = tuple(str(n) for n in structure.position_m)
+    lines = tuple((str(a), str(b)) for a, b in structure.lines)
+    place = Geometry(names, np.array(list(structure.position_m.values())), lines)
+    return [dof_of(structure, k) for k in range(len(shapes))], shapes, place
+
+
+def without_lines(place):
+    return Geometry(place.nodes, place.position_m)
+
+
+def test_nothing_is_told_where_nothing_is_wrong(sheet):
+    for place in (sheet[2], without_lines(sheet[2])):
+        assert turned_rows(*sheet[:2], place) == ()
+        assert exchanged_nodes(*sheet[:2], place) is None
+
+
+@pytest.mark.parametrize("row", [0, 8, 22, 31, 53])
+def test_a_turned_row_is_told(sheet, row):
+    dofs, shapes, place = sheet
+    turned = shapes.copy()
+    turned[row] *= -1
+    for known in (place, without_lines(place)):
+        assert turned_rows(dofs, turned, known) == (row,)
+
+
+def test_several_turned_rows_are_told(sheet):
+    dofs, shapes, place = sheet
+    turned = shapes.copy()
+    turned[[4, 20, 40]] *= -1
+    assert set(turned_rows(dofs, turned, place)) == {4, 20, 40}
+
+
+@pytest.mark.parametrize("pair", [(0, 53), (10, 30), (22, 23)])
+def test_two_exchanged_points_are_told(sheet, pair):
+    dofs, shapes, place = sheet
+    exchanged = shapes.copy()
+    exchanged[list(pair)] = shapes[list(pair[::-1])]
+    assert set(exchanged_nodes(dofs, exchanged, place)) == {dofs[k].node for k in pair}
+
+
+def test_points_of_unknown_place_and_few_modes_say_nothing(sheet):
+    dofs, shapes, place = sheet
+    turned = shapes.copy()
+    turned[22] *= -1
+    elsewhere = Geometry(tuple(f"9{n}" for n in place.nodes), place.position_m)
+    assert turned_rows(dofs, turned, elsewhere) == ()
+    assert turned_rows(dofs, turned[:, :2], place) == ()
+    unknown = turned.copy()
+    unknown[22] = np.nan
+    assert turned_rows(dofs, unknown, place) == ()
+
+
+def test_directions_are_told_apart(sheet):
+    dofs, shapes, place = sheet
+    both = [*dofs, *(Dof(dof.node, "x") for dof in dofs)]
+    moved = np.concatenate([shapes, shapes[:, ::-1]])
+    moved[60] *= -1
+    assert turned_rows(both, moved, place) == (60,)

@@ -1,0 +1,69 @@
+"""A campaign learns from every sensor that listened, as identify and diagnose do."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.dataset.store import Store
+from planner.replay import replay
+from planner.truth.deviation import Deviation, Spring
+from planner.truth.handling import EVERYDAY
+from planner.truth.model import Truth
+from planner.truth.secret import Secret
+from tests.support.arm_with_points import poses, record, write_arm
+from tests.support.earlier_logs import ERRING, written_earlier
+
+PLAN = "[workspace]\njoints_deg = [[-60, 60], [-40, 30], [20, 100], [-50, 50]]\n"
+PLAN += "[modes]\ncount = 3\nband_hz = [4.0, 80.0]\n"
+SOFT_FLOOR = tuple(Spring("base", axis, 1.1e6, 330.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Truth]:
+    """Hit once along each axis at three poses, by hand, on a floor that gives way."""
+    folder = tmp_path_factory.mktemp("cell")
+    toml = write_arm(folder / "robot")
+    (folder / "campaign.toml").write_text(PLAN)
+    secret = Secret(Deviation(31, 0.12, 0.3, 0.05, 0.006, extra=SOFT_FLOOR))
+    sensors = ("sensor", "shoulder", "elbow"), ("sensor", "foot"), ("sensor", "shoulder", "elbow")
+    where = zip(poses(3, 77), sensors, strict=True)
+    stays = [(f"P{i}", q, "tcp", s) for i, (q, s) in enumerate(where)]
+    hand = replace(EVERYDAY, angle_deg=2.0, offset_m=0.005)
+    truth = record(folder / "hits", toml, stays, secret, hand, seed=5)
+    Campaign.new(folder / "new", toml, folder / "campaign.toml")
+    Campaign(folder / "new", Store(None)).import_paths((folder / "hits",))
+    return folder, truth
+
+
+def worst_percent(campaign: Campaign, truth: Truth) -> float:
+    """Root mean square error of the worst mode at poses never hit."""
+    unseen = poses(12, 5)
+    true_hz = np.array([truth.modes(q, 3)[0] for q in unseen])
+    off = np.log(campaign.predict(unseen).frequency_hz / true_hz)
+    return float(100 * np.sqrt(np.mean(off**2, axis=0)).max())
+
+
+def test_the_simulation_explains_what_all_sensors_heard(cell: tuple[Path, Truth]) -> None:
+    folder, truth = cell
+    campaign = Campaign(folder / "new", Store(None))
+    model = campaign.model
+    assert model.low.taught
+    assert "base about x" in model.remarks[0]
+    assert worst_percent(campaign, truth) < 0.1
+    assert model.frequency_sd_percent.max() < 0.3
+
+
+def test_a_campaign_that_began_with_the_tools_sensor_goes_on_so(
+    cell: tuple[Path, Truth], tmp_path: Path
+) -> None:
+    folder, truth = cell
+    shutil.copytree(folder / "new", tmp_path / "old")
+    campaign = Campaign(written_earlier(tmp_path / "old", (ERRING,)), Store(None))
+    assert campaign.cell.hits_err is False
+    assert not campaign.model.low.taught
+    assert worst_percent(campaign, truth) > 0.1
+    assert {step.check for step in replay(campaign)} <= {"identical", "kept"}
