@@ -62,8 +62,7 @@ class Cell:
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
         workspace = Workspace.from_table(config.workspace, robot)
         _check_angles(robot, config)
-        table = config.cut
-        cut = None if table is msgspec.UNSET else load_cut(robot_toml.parent / table.file)
+        cut = _cut_of(robot_toml, config)
         return cls(
             config, robot, simulation, workspace,
             visit_scatter=visit_scatter, hits_err=hits_err, cut=cut,
@@ -193,6 +192,19 @@ def _check_angles(robot: Robot, config: CampaignConfig) -> None:
                 f"campaign.toml, [[forbidden]] joints_deg has {len(zone.joints_deg)} ranges, the "
                 f"robot {len(robot.joint_names)} joints; give one range a joint."
             )
+
+
+def _cut_of(robot_toml: Path, config: CampaignConfig) -> Cut | None:
+    table = config.cut
+    if table is msgspec.UNSET:
+        return None
+    cut = load_cut(robot_toml.parent / table.file)
+    if table.joints_deg is None and cut.feed_in == "path":
+        raise InputError(
+            f'{table.file}: feed_in = "path" needs the path\'s poses; give [cut] joints_deg in '
+            f"campaign.toml, or state the feed."
+        )
+    return cut
 
 
 def _handled(robot: Robot, config: CampaignConfig) -> Robot:

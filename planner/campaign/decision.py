@@ -15,6 +15,7 @@ from planner.frf.frequency_lines import frequency_lines
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import of_accelerance
 from planner.milling.decision import PoseDecision, decide
+from planner.milling.feed import cuts_at
 from planner.milling.structure import of_frf
 
 if TYPE_CHECKING:
@@ -63,8 +64,11 @@ def decided(model: "Model") -> Decision | None:
     q = _poses(model, table)
     lines = frequency_lines(cell.config.modes.band_hz)
     mean, sd = model.frf(q, lines)
-    found = [_at(cut, table, f"pose {i + 1} of the cut", lines, mean[i], sd[i])
-             for i in range(len(q))]  # fmt: skip
+    names = [f"pose {i + 1} of the cut" for i in range(len(q))]
+    cuts = cuts_at(cut, *cell.robot.forward_batch(q), names)
+    found = [
+        _at(cuts[i], table, names[i], lines, mean[i], sd[i]) for i in range(len(q))
+    ]  # fmt: skip
     return Decision(q, tuple(found))
 
 

@@ -18,6 +18,10 @@ SECOND = 1e-3  # share of the FRF, anywhere, below which a residue's second part
 LEAST_LINES = 16
 FAR = 3.0  # times the highest line
 WORSE = 2.0  # times a fit's error that modes may be off by which leave far poles out; chosen
+# Relative error at which a fit to exact FRFs is close enough. What a loss factor or modes beyond
+# the lines add is no few modes': closer fits follow it with pairs of far poles that nearly cancel,
+# and chatter where nothing is known.
+EXACT = 1e-3
 BESIDE_SD = 0.1  # of the FRFs' sd: a fit as close as this adds nothing to it; chosen
 
 
@@ -87,9 +91,9 @@ class PlaneFrf:
         The mean of uncertain FRFs is that of no modes: more poles would follow that, and no more.
         """
         if self.sd is None:
-            return CLOSE
+            return EXACT
         size = np.linalg.norm(self.receptance, axis=(0, 1))
-        return max(CLOSE, BESIDE_SD * float(np.median(np.linalg.norm(self.sd, axis=(0, 1)) / size)))
+        return max(EXACT, BESIDE_SD * float(np.median(np.linalg.norm(self.sd, axis=(0, 1)) / size)))
 
     def error(self, modes: CutterModes) -> float:
         """Root mean square over lines of ‖H − modes‖/‖H‖."""

@@ -58,8 +58,9 @@ def moved(modes: CutterModes, by: np.ndarray) -> CutterModes:
     _, group = np.unique(modes.poles, return_inverse=True)
     frequency, damping, size = (part[group] for part in np.split(by[:-1], 3))
     omega = np.abs(modes.poles) * np.exp(frequency)
-    zeta = -modes.poles.real / np.abs(modes.poles) * np.exp(damping)
-    zeta = np.minimum(zeta, MOST_DAMPING)
+    own = -modes.poles.real / np.abs(modes.poles)
+    # A fit may bring a pole that is more damped: that stays, or nothing changed would change it.
+    zeta = np.minimum(own * np.exp(damping), np.maximum(own, MOST_DAMPING))
     damped = omega * np.sqrt(1 - zeta**2)
     factor = np.exp(size + by[-1]) * modes.poles.imag / damped
     return replace(

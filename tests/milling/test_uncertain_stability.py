@@ -10,7 +10,7 @@ from planner.frf.quantities import convert
 from planner.milling.cutter_frf import CutterFrf, PlaneFrf, of_accelerance
 from planner.milling.cutter_modes import CutterModes, real_modes
 from planner.milling.lobes import losses
-from planner.milling.spread import ModeSpread, explaining, sampled
+from planner.milling.spread import ModeSpread, explaining, moved, sampled
 from planner.milling.structure import Structure, of_frf
 from planner.milling.uncertainty import sampled_limits
 from planner.modal.rational_fit import rational_fit
@@ -110,6 +110,31 @@ def test_spread_of_modes_explains_the_sd_that_it_makes():
     # Of a mode with 11 % damping 0.2 % hardly show: lines count alike, whatever their sd.
     np.testing.assert_allclose(found.frequency, spread.frequency, atol=7e-4)
     assert 0.9 < given < 1.1
+
+
+def test_a_pole_that_hardly_swings_hides_no_uncertainty():
+    """Fits bring poles with a damping ratio of almost one; unchanged they are what they were."""
+    modes, heavy = two_each_way(), np.array([-0.999 + 1j * np.sqrt(1 - 0.999**2)]) * 3000.0
+    modes = replace(
+        modes, poles=np.append(modes.poles, heavy),
+        shapes=np.vstack([modes.shapes, [[1e-4, 0]]]), drives=np.vstack([modes.drives, [[1, 0]]]),
+    )  # fmt: skip
+    assert moved(modes, np.zeros(16)).poles == pytest.approx(modes.poles, rel=1e-12)
+    plane = tip(modes).in_plane(cut())
+    frf = type(plane)(plane.name, LINES, plane.receptance, 0.05 * np.abs(plane.receptance))
+    found, given = explaining(modes, frf)
+    assert 0.7 < given < 1.3
+    assert found.common > 0.02
+
+
+def test_few_lines_that_are_unknown_do_not_make_all_unsure():
+    modes = two_each_way()
+    plane = tip(modes).in_plane(cut())
+    share = np.where(np.arange(len(LINES)) < 0.04 * len(LINES), 0.5, 0.02)
+    frf = type(plane)(plane.name, LINES, plane.receptance, share * np.abs(plane.receptance))
+    found, _ = explaining(modes, frf)
+    assert 0.01 < found.common < 0.03
+    assert np.all(found.size < 0.06)
 
 
 def test_what_is_known_exactly_has_one_limit():

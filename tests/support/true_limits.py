@@ -31,11 +31,14 @@ class LimitPair:
 
 
 def limit_pair(
-    cut: Cut, lines: np.ndarray, mean: np.ndarray, sd: np.ndarray, true: np.ndarray, samples: int
-) -> LimitPair:
-    """Of accelerances (3, 3, F) in m/s²/N."""
+    cut: Cut, lines: np.ndarray, mean: np.ndarray, sd: np.ndarray, true: np.ndarray, samples: int,
+    true_lines: np.ndarray | None = None,
+) -> LimitPair:  # fmt: skip
+    """Of accelerances (3, 3, F) in m/s²/N; the true ones at lines of their own, where given."""
     told = of_frf(of_accelerance("predicted", lines, mean, sd), cut)
-    known = of_frf(of_accelerance("true", lines, true, None), cut)
+    known = of_frf(
+        of_accelerance("true", lines if true_lines is None else true_lines, true, None), cut
+    )
     found = losses(told.machine(cut))
     drawn = sampled_limits(told.samples(cut, samples), found).depth_m
     return LimitPair(
