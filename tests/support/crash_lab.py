@@ -36,6 +36,9 @@ ENOUGH = 5  # measured poses, after which a campaign is replayed and another beg
 LATEST_S, MOST_CHANGES = 1.2, 150  # of a command's life; beyond, most have ended
 DISK, PAGE = "16m", 4096
 
+# What a second time has nothing left to act upon, where the first one was done before the end.
+DONE_ONCE = ("new", "skip", "withdraw", "undo")
+
 Command = list[str]
 
 
@@ -174,7 +177,7 @@ def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     if command[0] != "watch" and rng.random() < 0.5:
         before = entries(cell)
         again = forked(doing(command), log)
-        codes = (0, 2, 3) if command[0] in ("new", "skip", "withdraw") else (0, 3)
+        codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
         faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
     return {"command": command[:1], "killed": outcome.killed, "cpu_s": outcome.cpu_s,
             "gib": outcome.peak_gib, "faults": faults}  # fmt: skip
@@ -200,7 +203,7 @@ def interrupt(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     if not watching:
         before = entries(cell)
         again = forked(doing(command), log)
-        codes = (0, 2, 3) if command[0] in ("new", "skip", "withdraw") else (0, 3)
+        codes = (0, 2, 3) if command[0] in DONE_ONCE else (0, 3)
         faults += again.faults(codes) + lost(cell, before, command, again) + left_over(cell)
     return {"command": command[:1], "code": outcome.code, "change": change,
             "said": outcome.err.strip()[-200:], "faults": faults}  # fmt: skip
@@ -233,7 +236,7 @@ def starve(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     shutil.rmtree(cell.root / "out", ignore_errors=True)
     (cell.root / "out").mkdir()
     command = cell.command(rng)
-    if rng.random() < 0.3 and cell.log.exists():
+    if rng.random() < 0.3 and cell.log.exists() and cell.state().used:
         more = others(cell)
         command = more[int(rng.choice(len(more)))]
     before, read_only = entries(cell), bool(rng.random() < 0.2)
@@ -248,7 +251,8 @@ def starve(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
         subprocess.run(["mount", "-o", "remount,rw", disk], check=True)
     filler.unlink(missing_ok=True)
     faults = outcome.faults((0, 2, 3)) + lost(cell, before, command, outcome)
-    if outcome.code == 2 and len(outcome.err.strip().splitlines()) != 1:
+    said = outcome.err.strip().splitlines()
+    if outcome.code == 2 and len(said) != 1 and not watching:  # whose page goes there too
         faults.append(f"no one sentence: {outcome.err[:400]}")
     before = entries(cell)
     again = forked(doing(command), log, after_s=watching)
