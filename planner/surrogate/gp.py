@@ -128,11 +128,6 @@ class Posterior:
         return found
 
     @property
-    def whiten(self) -> list[np.ndarray]:
-        """(k, c, c) of each output: inverses of the Cholesky factors."""
-        return [self.solved(j).whiten for j in range(len(self.mask))]
-
-    @property
     def remarks(self) -> tuple[str, ...]:
         """What went wrong."""
         jitter = max(self.solved(j).jitter for j in range(len(self.mask)))

@@ -178,7 +178,7 @@ def test_repeating_is_a_refit_with_half_the_variance(surrogate):
                 k, post.x[known], post.low[k][known], target.poses.x, target.poses.low[:, k]
             )
             for s in range(len(post.theta[k])):
-                whiten = post.whiten[k][s][np.ix_(known, known)]
+                whiten = post.solved(k).whiten[s][np.ix_(known, known)]
                 noisy = np.linalg.inv(whiten.T @ whiten)
                 less = noisy.copy()
                 less[i, i] -= 1e-7 / 2
@@ -266,7 +266,7 @@ def test_left_out_residuals_are_those_of_refits(surrogate):
         for i in range(len(known)):
             means, variances = [], []
             for s in range(len(post.theta[k])):
-                whiten = post.whiten[k][s][np.ix_(known, known)]
+                whiten = post.solved(k).whiten[s][np.ix_(known, known)]
                 noisy = np.linalg.inv(whiten.T @ whiten)
                 y = noisy @ post.solved(k).weights[s][known]
                 rest = np.arange(len(known)) != i
