@@ -41,6 +41,11 @@ class PoolCell(Cell):
         _, position = self.robot.forward_batch(self.pool_q)
         return Candidates(self.pool_q, self.features(self.pool_q), position, {})
 
+    @property
+    def spread(self) -> int:
+        """All of them stand for the workspace."""
+        return len(self.pool_q)
+
 
 @dataclass(frozen=True, eq=False)
 class Bench:
@@ -68,7 +73,9 @@ class Bench:
 def cell_of(bench: Bench) -> PoolCell:
     """The bench's cell, made once in each process; it is not safe to share among threads."""
     loaded = Cell.load(bench.robot.path, bench.config, bench.robot)
-    return PoolCell(loaded.config, loaded.robot, loaded.simulation, loaded.workspace, bench.q)
+    return PoolCell(
+        loaded.config, loaded.robot, loaded.simulation, loaded.workspace, bench.q, cut=loaded.cut
+    )
 
 
 def decide(
