@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from planner import content_hash
-from planner.campaign import model as model_module
+from planner.campaign import build as build_module
 from planner.campaign.campaign import Campaign
 from planner.campaign.store import CONFIG
 from planner.dataset.store import Store
@@ -46,13 +46,13 @@ def store(tmp_path):
 @pytest.fixture
 def fitted(monkeypatch):
     """Counts the models that are fitted."""
-    count, build = [], model_module.build
+    count, build = [], build_module.build
 
     def counted(*given):
         count.append(given)
         return build(*given)
 
-    monkeypatch.setattr(model_module, "build", counted)
+    monkeypatch.setattr(build_module, "build", counted)
     return count
 
 

@@ -29,6 +29,7 @@ def model(scatter: float, poses: int = 5) -> Any:
     return SimpleNamespace(
         surrogate=SimpleNamespace(visit_scatter=np.array([scatter, scatter])),
         labelled=(None,) * poses, predict=lambda q: expected,
+        frequencies=lambda q: (expected.frequency_hz, expected.frequency_sd_hz),
         low=SimpleNamespace(simulation=None, simulate=lambda q, more: None),
     )  # fmt: skip
 
