@@ -76,16 +76,16 @@ def play(
     steps: list[DemonstrationStep] = []
     started = time.perf_counter()
     with Story(campaign.cell, rrd, viewer, simulated=True) as story:
-        story.tell(campaign.entries[0], campaign.state, campaign.model)
+        story.tell(campaign.entries[0], campaign.model)
         proposal = campaign.next()[0]
-        story.tell(campaign.entries[-1], campaign.state, campaign.model)
+        story.tell(campaign.entries[-1], campaign.model)
         while len(used) < min(measurements, len(pool.rows)) and not campaign.model.done:
             pose = pool.nearest(campaign.cell, proposal, used)
             progress(f"measurement {len(used) + 1}: pose {pose}")
             if used:
                 started = time.perf_counter()
             report = campaign.import_paths((pool.folder,), pose)[0]
-            imported = campaign.entries[-1], campaign.state, campaign.model
+            imported = campaign.entries[-1], campaign.model
             used.append(pose)
             try:
                 proposal = campaign.next()[0]
@@ -94,7 +94,7 @@ def play(
             finally:
                 steps.append(_step(report, proposal, time.perf_counter() - started))
                 story.tell(*imported, report.measured)
-            story.tell(campaign.entries[-1], campaign.state, campaign.model)
+            story.tell(campaign.entries[-1], campaign.model)
     return _summary(campaign, pool, used, steps, rrd, progress)
 
 

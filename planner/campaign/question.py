@@ -5,8 +5,9 @@ that a model judged a pose's own hits it asked never, and once when two modes we
 hits under another pose's name, where a frequency differs by 2 %, it asks for 99 % on the plane and
 91 to 99 % in joint boxes, if the simulation learns and can have the physics; for a third on the
 plane with a frozen one, a tenth with none, and for none in joint boxes where no simulation fits:
-the model is not sure enough there. Poses whose frequencies are alike differ in how their modes
-answer at the tool: residues are held against the simulation's, and alike poses are asked about too.
+the model is not sure enough there (all of this by frequencies alone). Poses whose frequencies are
+alike differ in how their modes answer at the tool: residues are held against the simulation's, and
+alike poses are asked about too.
 """
 
 from collections.abc import Sequence

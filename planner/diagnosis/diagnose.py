@@ -132,7 +132,7 @@ def _screened(
     artefacts = [f.effect.replace("_", " ") for f in found.findings if f.effect in ARTEFACTS]
     said = [f"The recordings were corrected for: {', '.join(artefacts)}."] if artefacts else []
     if found.hit_errors:
-        said.append(describe(recorded, found.hit_errors))
+        said.append(describe(found.hit_errors))
     if not said:
         return recorded, recorded, found.findings
     clean = replace(found.clean, remarks=(*recorded.remarks, *said))

@@ -60,11 +60,6 @@ def savage_dickey(value: float, sd: float, prior_sd: float) -> float:
     return value**2 / (2 * sd**2) + float(np.log(sd / prior_sd))
 
 
-def flat_occam(sd: float, width: float) -> float:
-    """Log evidence that a parameter costs whose prior is flat over `width`, found to ± sd."""
-    return float(np.log(np.sqrt(2 * np.pi) * sd / width))
-
-
 def probability(log_evidence: float, prior: float) -> float:
     """Of a hypothesis with a log Bayes factor over its opposite and a prior probability."""
     odds = log_evidence + np.log(prior / (1 - prior))

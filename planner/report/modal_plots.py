@@ -290,7 +290,7 @@ def frequency_figure(
     panel.set_ylabel("natural frequency (Hz)")
     panel.grid(True, alpha=0.25)
     names = [f"mode {k + 1}" for k in range(frequency_hz.shape[1])]
-    label_ends(panel, x[order], frequency_hz[order], names)
+    label_ends(panel, frequency_hz[order], names)
     handles = [Line2D([], [], color="0.3", marker="o", label="measured, ± 2 sd")]
     if simulated_hz is not None:
         handles.append(

@@ -128,8 +128,8 @@ def _trusted(frf: Frf, response: int, hit: int) -> list[tuple[float, float]]:
     return list(zip(starts.tolist(), np.minimum(hz[beyond - 1] + half, high).tolist(), strict=True))
 
 
-def label_ends(panel: Axes, x: np.ndarray, values: np.ndarray, names: list[str]) -> None:
-    """Name of each curve of values (n, k) over x (n,) beside its last point, kept apart."""
+def label_ends(panel: Axes, values: np.ndarray, names: list[str]) -> None:
+    """Name of each curve of values (n, k) beside its last point, kept apart."""
     drawn = [k for k in range(values.shape[1]) if np.any(np.isfinite(values[:, k]))]
     last = np.array([values[np.isfinite(values[:, k]), k][-1] for k in drawn])
     order = np.argsort(last, kind="stable")

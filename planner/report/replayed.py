@@ -143,7 +143,7 @@ def replayed(
     with Story(campaign.cell, rrd, viewer, simulated) as story:
         for step in replay(campaign, until, acquisition):
             progress(f"{step.entry.seq} of {len(campaign.entries)} {step.detail}")
-            story.tell(step.entry, step.state, step.model, step.measured)
+            story.tell(step.entry, step.model, step.measured)
             steps.append(ReplayedStep.of(step))
     if acquisition is not None:
         progress(f"playing {acquisition} on what was measured")

@@ -15,7 +15,6 @@ from planner.campaign.events import (
     Withdrawn,
 )
 from planner.campaign.model import Model
-from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 
 
@@ -40,11 +39,10 @@ class Story:
     def tell(
         self,
         entry: Entry,
-        state: CampaignState,
         model: Model,
         measured: MeasuredPose | None = None,
     ) -> None:
-        """Show one event; `state` and `model` are those after it."""
+        """Show one event; `model` is that after it."""
         if self._view is None:
             return
         view, event, number = self._view, entry.event, len(model.labelled)

@@ -7,18 +7,17 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import AnyEvent, Entry, Imported
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
-from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.report.rerun_story import Story
 
 
 class Teller:
-    """Keeps each new entry with the state right after it until there is time to show it."""
+    """Keeps each new entry with the model right after it until there is time to show it."""
 
     def __init__(self, campaign: Campaign, story: Story):
         self._campaign, self._story = campaign, story
         self._noted = len(campaign.entries)
-        self._untold: deque[tuple[Entry, CampaignState, Model, MeasuredPose | None]] = deque()
+        self._untold: deque[tuple[Entry, Model, MeasuredPose | None]] = deque()
 
     def note(self, reports: Sequence[ImportReport] = ()) -> None:
         """Keep what the log gained."""
@@ -26,7 +25,7 @@ class Teller:
         for entry in self._campaign.entries[self._noted :]:
             event = entry.event
             measured = found.get(event.pose) if isinstance(event, Imported) else None
-            self._untold.append((entry, self._campaign.state, self._campaign.model, measured))
+            self._untold.append((entry, self._campaign.model, measured))
         self._noted = len(self._campaign.entries)
 
     def tell(self) -> None:

@@ -67,7 +67,7 @@ def watch(
         story = stack.enter_context(Story(campaign.cell, rrd, viewer))
         if rrd is not None or viewer:  # a resumed session shows what went before, too
             for step in replay(campaign):
-                story.tell(step.entry, step.state, step.model, step.measured)
+                story.tell(step.entry, step.model, step.measured)
         explaining = DiagnosisProcess(campaign.directory) if explain else None
         if explaining is not None:
             stack.callback(explaining.close)

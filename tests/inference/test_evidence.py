@@ -6,7 +6,6 @@ from scipy.stats import multivariate_normal, norm
 
 from planner.inference.evidence import (
     bootstrapped,
-    flat_occam,
     laplace,
     occam,
     probability,
@@ -39,11 +38,6 @@ def test_savage_dickey_is_the_ratio_of_densities_at_none():
     value, sd, prior_sd = 0.3, 0.1, 2.0
     ratio = norm(0, prior_sd).logpdf(0) - norm(value, sd).logpdf(0)
     assert savage_dickey(value, sd, prior_sd) == pytest.approx(ratio)
-
-
-def test_a_flat_prior_costs_the_share_that_is_left_of_it():
-    assert flat_occam(1.0, np.sqrt(2 * np.pi)) == pytest.approx(0.0)
-    assert flat_occam(0.1, 5.0) < flat_occam(0.2, 5.0) < 0
 
 
 def test_probability_of_odds():

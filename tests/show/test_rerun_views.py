@@ -33,7 +33,7 @@ def told(named, tmp_path_factory):
     rrd = tmp_path_factory.mktemp("rrd") / "named.rrd"
     with Story(named.cell, rrd, viewer=False, simulated=True) as story:
         for step in replay(named):
-            story.tell(step.entry, step.state, step.model, step.measured)
+            story.tell(step.entry, step.model, step.measured)
     reader, rows = RrdReader(rrd), {}
     for chunk in reader.stream(store=reader.recordings()[0]):
         for row in chunk.to_record_batch().to_pylist():

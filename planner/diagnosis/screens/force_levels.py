@@ -186,7 +186,7 @@ def weigh(
     tell("fitting the best laws to the end", 0.8)
     last = side_by_side(partial(_followed, problem, found), told)
     rest = (c for c in ends if all(c is not t for t in told))
-    return weighed_laws(data, plain, system, [*last, *rest])
+    return weighed_laws(data, system, [*last, *rest])
 
 
 def _followed(problem: LawProblem, found: Equivalent, at: LawMisfit) -> LawMisfit:

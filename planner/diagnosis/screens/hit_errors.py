@@ -184,7 +184,7 @@ def _one(hit: Hit, basis: np.ndarray, error: HitError, length: int, off: float) 
     return replace(hit, acceleration_m_s2=rest, taken_out_m_s2=extra, taken_out_sd=off)
 
 
-def describe(recorded: Dataset, errors: HitErrors) -> str:
+def describe(errors: HitErrors) -> str:
     """One sentence on how the hits scatter about their axes and the point."""
     each = [error for visit in errors for error in visit]
     tilt = float(np.rad2deg(np.sqrt(np.mean([e.tilt_rad**2 for e in each]))))

@@ -10,7 +10,6 @@ from planner.diagnosis.laws.equivalent_stiffness import System
 from planner.diagnosis.laws.law_at_joints import LawMisfit, Laws
 from planner.diagnosis.laws.level_data import LevelData
 from planner.diagnosis.laws.torque_laws import behaviour
-from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import ALIKE, INDEPENDENT, LAW_INEXACT, LAW_UNEXPLAINED, TIED
 from planner.inference.evidence import occam, temper, unexplained_shares
 
@@ -50,8 +49,13 @@ class WeighedLaw:
 
 
 def weighed_laws(
-    data: LevelData, plain: Fit, system: System, kept: Sequence[LawMisfit]
+    data: LevelData, system: System, kept: Sequence[LawMisfit]
 ) -> tuple[WeighedLaw, ...]:
+    """Every fitted law of `kept` against a linear joint, the most probable first.
+
+    `system` names the joints. Errors are weighed as if only as many values were independent as the
+    best law's misfit allows (`temper`).
+    """
     count = 2 * int(np.count_nonzero(data.weight))
     t = temper(min(2 * c.chi2 for c in kept) / count, ALIKE)
     levels = levels_of(data)
@@ -66,6 +70,7 @@ def weighed_laws(
 
 
 def levels_of(data: LevelData) -> LevelMisfit:
+    """What a linear joint leaves of the differences between levels, and what noise alone would."""
     weaker = data.weaker[:, 0, 0]
     differing = float(np.sum(data.chi2(data.compared(data.h))[weaker]))
     strongest = float(np.count_nonzero(data.weight[~weaker]))
@@ -98,6 +103,7 @@ def shares_of_laws(weighed: Sequence[WeighedLaw]) -> tuple[list[WeighedLaw], tup
 
 
 def law_finding(there: Sequence[WeighedLaw], laws: Laws) -> Finding:
+    """The best law `there`, at its joint, with its rivals by name and share."""
     best = there[0]
     others = zip(there[1:], laws.probability[1:], strict=True)
     rivals = {w.candidate.law.effect: share for w, share in others}

@@ -209,6 +209,7 @@ def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
 
 
 def solve(tasks: Tasks, h: Hyperparameters) -> Solved:
+    """K⁻¹y and all slopes at hyperparameters, by Kronecker's structure."""
     k = parse(tasks.kernel, tasks.x.shape[1]).covariance(np, h.theta, tasks.x, tasks.x)
     k = k + RELATIVE_JITTER * np.mean(np.diag(k)) * np.eye(len(k))
     return solve_kronecker(tasks.y, k, h.task_covariance, h.noise)
