@@ -186,18 +186,19 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     fits = list(found.finalists)
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters_percent
     named = [_told_of(f, weights.temper) for f in fits]
-    shares = list(without_slight(fits, named, weights.probabilities[:-1], matters / 100))
+    prior = _priors([f.effect for f in fits], all_)
+    shares = list(without_slight(fits, named, weights.probabilities[:-1], prior, matters / 100))
     unknown = float(weights.probabilities[-1])
     leader = int(np.argmax(shares))
-    own = _priors([fits[leader].effect], all_)[0]
+    own = prior[leader]
     before = _priors([effect for effect, _, _ in found.left], all_)
     best = fits[leader]
     half = float(best.misfit.counts.sum()) / (2 * weights.temper)
-    for (_, behind, left), prior in zip(found.left, before, strict=True):
+    for (_, behind, left), weight in zip(found.left, before, strict=True):
         fits.append(left)
         # It was left while nothing fitted, when little told apart; by now more would.
         since = max(behind, half * (left.per_value - best.per_value))
-        shares.append(shares[leader] * float(np.exp(-since)) * prior / own)
+        shares.append(shares[leader] * float(np.exp(-since)) * weight / own)
     total = sum(shares) + unknown
     parts = [_told_of(f, weights.temper) for f in fits]
     groups: dict[tuple, list[int]] = {}

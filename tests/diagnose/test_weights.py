@@ -42,11 +42,13 @@ def worth(evidence: float, size: float) -> Worth:
     return Worth(by_size, scores, 1.0, size, np.zeros(14))
 
 
-def shares(*fits: tuple[float, float, float], prior=None) -> np.ndarray:
+def shares(
+    *fits: tuple[float, float, float], prior=None, bent: np.ndarray | float = 0.0
+) -> np.ndarray:
     """Of fits with log evidence, size of the discrepancy, and what is left."""
     left = np.array([one[2] for one in fits])
     made = [worth(evidence, size) for evidence, size, _ in fits]
-    return shares_of(made, left, prior or [100.0] + [1.0] * (len(fits) - 1), 0.03, 1e-3)
+    return shares_of(made, left, prior or [100.0] + [1.0] * (len(fits) - 1), 0.03, 1e-3, bent=bent)
 
 
 @given(
@@ -93,6 +95,19 @@ def test_what_does_not_say_more_than_each_pose_for_itself_is_not_named():
 def test_the_more_is_left_the_likelier_is_something_unknown(left, factor):
     now = shares((-900.0, 3e-3, left))[-1]
     assert shares((-900.0, 3e-3, factor * left))[-1] >= now - 1e-9
+
+
+def test_what_bends_the_simulation_far_is_beside_something_unknown():
+    """An effect that takes most of the mismatch once springs lie far from where they are stated."""
+    fits = (-900.0, 0.1, 0.3), (-500.0, 1e-2, 0.04)
+    assert shares(*fits)[1] > 0.5
+    assert shares(*fits, bent=np.array([20.0, 12.0]))[-1] > 0.99
+
+
+def test_little_is_left_of_what_matters_only_where_refitting_bends_little():
+    fits = (-900.0, 1e-2, 0.01), (-500.0, 3e-2, 0.009)
+    assert shares(*fits)[0] > 0.9
+    assert shares(*fits, bent=np.array([15.0, 12.0]))[-1] > 0.9
 
 
 def test_evidence_is_that_of_one_normal_distribution():

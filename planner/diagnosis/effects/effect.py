@@ -1,7 +1,7 @@
 """An effect: a change of the simulation, its priors, Z, or the measured FRFs."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -88,6 +88,7 @@ class Effect:
     `springs` names the parameters of `priors` that belong to the effect: they are reported with
     `quantities`, the ones that it adds. `absorbed`: springs and inertias that are refitted can take
     its place, so that only its own size says how much it matters, not what FRFs lack without it.
+    `vanishing` names the quantities that are 0 where it is not there.
     """
 
     at: str
@@ -96,6 +97,7 @@ class Effect:
     name = "none"
     artefact = False
     absorbed = False
+    vanishing: ClassVar[tuple[str, ...]] = ()
 
     @property
     def prior(self) -> float:

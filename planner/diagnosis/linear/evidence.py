@@ -4,12 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, log_sum, size_priors
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.mismatch import Mismatch
+from planner.diagnosis.linear.stated_values import pulled
 from planner.diagnosis.thresholds import (
     ALIKE,
     LEFT_FACTOR,
@@ -21,6 +23,7 @@ from planner.inference.evidence import bootstrapped, shared_noise, temper
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 BOOTSTRAPS = 400
+LOG_KNOWN = float(np.log(1 / SOMETHING_UNKNOWN - 1))  # odds, before any data, of nothing unknown
 
 
 def temper_of(fits: Sequence[Fit]) -> float:
@@ -68,8 +71,10 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     left = np.array([m.unexplained for m in mismatch])
     seen = np.array([m.resolution for m in mismatch])
     matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters_percent / 100
-    shares = shares_of(worth, left, prior, matters, float(seen.min()), seed)
-    total = log_sum(_log_joint(worth, np.maximum(left, seen.min()), prior, matters, seen.min()))
+    bent = np.array([pulled(f, fits[0]) for f in fits])
+    least = float(seen.min())
+    shares = shares_of(worth, left, prior, matters, least, seed, bent)
+    total = log_sum(_log_joint(worth, np.maximum(left, least), prior, matters, least, bent))
     return Weights(shares, total, t, worth, mismatch)
 
 
@@ -80,33 +85,42 @@ def shares_of(
     matters: float,
     seen: float,
     seed: int = 0,
+    bent: np.ndarray | float = 0.0,
 ) -> np.ndarray:
     """Probabilities (k + 1,) of k fits, each of them all there is, and of "unknown".
 
     Something unknown may be there alone, as it were beside the first fit, or beside any other. How
-    large the discrepancy is tells, and how much is `left` (k,), relative to the recordings (noise
-    lets `seen` be seen). Where refitting leaves less than `matters`, what is unknown does not
-    matter: the first fit will do.
+    large the discrepancy is tells, how much is `left` (k,), relative to the recordings (noise lets
+    `seen` be seen), and how far what is stated had to go (`bent` (k,), see `pulled`). Where
+    refitting leaves less than `matters`, and bends little, what is unknown does not matter: the
+    first fit will do.
     """
     left = np.maximum(left, seen)
-    both = _log_joint(worth, left, prior, matters, seen)
+    both = _log_joint(worth, left, prior, matters, seen, bent)
     # Sizes are told apart in each resample anew: poses differ in which of them they tell.
     scores = np.tile(np.concatenate([w.scores for w in worth]), (2, 1))
     found = bootstrapped(scores, both.ravel(), 1.0, -np.inf, BOOTSTRAPS, seed)[:-1]
     alone, beside = found.reshape(both.shape).sum(axis=2)
-    counts = float(norm.cdf(np.log(left[0] / matters) / np.log(LEFT_FACTOR)))
+    unmoved = expit(LOG_KNOWN - np.broadcast_to(bent, len(left))[0])
+    counts = 1 - unmoved * norm.cdf(np.log(matters / left[0]) / np.log(LEFT_FACTOR))
     alone[0] += (1 - counts) * beside.sum()
     return np.append(alone, counts * beside.sum())
 
 
 def _log_joint(
-    worth: Sequence[Worth], left: np.ndarray, prior: Sequence[float], matters: float, seen: float
+    worth: Sequence[Worth],
+    left: np.ndarray,
+    prior: Sequence[float],
+    matters: float,
+    seen: float,
+    bent: np.ndarray | float,
 ) -> np.ndarray:
     """ln of prior times evidence (2, k, sizes): of fits alone, and beside something unknown."""
     usual, unusual = size_priors()
     each = np.array([w.by_size for w in worth]) + np.log(prior)[:, None]
     known = each + usual + left_alone(left, matters, seen)[:, None]
-    strange = each + unusual + np.log(SOMETHING_UNKNOWN / (1 - SOMETHING_UNKNOWN))
+    strange = each + unusual - LOG_KNOWN
+    strange += np.broadcast_to(bent, len(each))[:, None]
     return np.array([known, strange])
 
 

@@ -17,6 +17,7 @@ from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
 
 ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
+AFRESH_STEPS = 24  # of one effect from its prior's median: valleys of inertias are long
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
 # The way home from afar: all bands, and every step that logarithms need.
@@ -132,15 +133,24 @@ def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
 
 
 def unbent(problem: Problem, effect: Effect, warm: Fit) -> Fit:
-    """As `promise`, and a single effect of the robot from the prior's median, as `fit` begins.
+    """As `promise`, or as `fit` begins where that leads farther."""
+    return afresh(problem, promise(problem, effect, warm), ROUGH_STEPS)
 
-    From inertias that were bent to fit nothing leads to what they imitate.
+
+def afresh(problem: Problem, near: Fit, steps: int = AFRESH_STEPS) -> Fit:
+    """The better of a fit and, for a single effect of the robot, one from the prior's median.
+
+    From inertias and springs that were bent to fit nothing hardly anything leads to what they
+    imitate.
     """
-    near = promise(problem, effect, warm)
-    if len(effect.parts()) > 1 or effect.artefact:
+    if len(near.effect.parts()) > 1 or near.effect.artefact:
         return near
-    afresh = approached(near.misfit, [_approach(problem, effect)])
-    return min((near, afresh), key=lambda f: f.misfit(f.x).value)
+    rough = _approach(problem, near.effect)
+    starts = [rough]
+    if steps > ROUGH_STEPS:
+        starts.append(_best(problem.misfit(near.effect, COARSE), starts).x)
+    far = approached(near.misfit, starts, steps)
+    return min((near, far), key=lambda f: f.misfit(f.x).value)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:

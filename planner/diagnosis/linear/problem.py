@@ -10,11 +10,8 @@ from planner.diagnosis.effects.effect import Effect, Setting
 from planner.diagnosis.effects.structural_damping import partly_structural
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.thresholds import (
-    COM_SD_M,
     DAMPING_FACTOR,
-    INERTIA_SD,
     LOSS_FACTOR_FACTOR,
-    MASS_SD,
     STIFFNESS_FACTOR,
 )
 from planner.dynamics.gradient import Inertias
@@ -22,13 +19,13 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.measured_frfs import Measured, layout_of, matrices_at, stack
 from planner.identification.measurement_model import Tolerances
-from planner.identification.parameters import Parametrisation, Priors, parametrise
+from planner.identification.parameters import CAD_INERTIAS, Parametrisation, Priors, parametrise
 from planner.recording.points import Layout
 from planner.robot.elastic_model import Matrices
 
-PRIORS = Priors(
-    stiffness_factor=STIFFNESS_FACTOR, damping_factor=DAMPING_FACTOR,
-    loss_factor_factor=LOSS_FACTOR_FACTOR, mass=MASS_SD, inertia=INERTIA_SD, com_m=COM_SD_M,
+PRIORS = replace(
+    CAD_INERTIAS, stiffness_factor=STIFFNESS_FACTOR, damping_factor=DAMPING_FACTOR,
+    loss_factor_factor=LOSS_FACTOR_FACTOR,
 )  # fmt: skip
 
 

@@ -10,11 +10,21 @@ from planner.diagnosis.effects.combined import Both, Family, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
-from planner.diagnosis.linear.fit import Fit, carried_on, glance, promise, settle, staged, unbent
+from planner.diagnosis.linear.fit import (
+    Fit,
+    afresh,
+    carried_on,
+    glance,
+    promise,
+    settle,
+    staged,
+    unbent,
+)
 from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_bent, rigid
 from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
+from planner.diagnosis.linear.stated_values import strayed
 from planner.diagnosis.linear.suspects import resonant, suspects
-from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS, SPRING_STRAYED
+from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS
 from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 from planner.progress import Tell, quietly, within
@@ -191,8 +201,8 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
     if not best.effect.at or best.per_value > AT_NOISE:
         return found
-    strayed = [e for e in effects if _strayed(best, e)]
-    pairs = [p for e in strayed if (p := together(best.effect, e)) is not None]
+    spared = [e for e in effects if strayed(best, e)]
+    pairs = [p for e in spared if (p := together(best.effect, e)) is not None]
     more = side_by_side(partial(_carried_on, problem), [(best, pair) for pair in pairs])
     return Found((*found.finalists, *more), found.left)
 
@@ -255,18 +265,6 @@ def _leaders(found: Found) -> list[Fit]:
     return list(leaders.values())
 
 
-def _strayed(fit: Fit, effect: Effect) -> bool:
-    """Whether an effect would spare springs that a fit has moved far from where they are stated.
-
-    That costs no χ² that would be left to explain, but the prior's.
-    """
-    misfit = fit.misfit
-    springs = effect.springs(misfit.setting.simulation) if effect.name == "joint_stiffness" else ()
-    away = np.abs(fit.x - misfit.mean) / misfit.sd
-    names = [p.name for p in misfit.parametrisation.parameters]
-    return any(away[names.index(name)] > SPRING_STRAYED for name in springs if name in names)
-
-
 def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
     """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
     none = settle(problem, warm, CLOSE, STEPS)
@@ -279,6 +277,7 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     if clearly:
         order = np.argsort([f.misfit(f.x).value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
+        close = side_by_side(partial(afresh, problem), close)
         worst = max(lag([none, *close]))
         left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
     else:

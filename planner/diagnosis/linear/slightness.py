@@ -8,48 +8,75 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from scipy.special import expit
 from scipy.stats import norm
 
 from planner.diagnosis.effects.combined import Both
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
 from planner.diagnosis.linear.problem import Problem
+from planner.diagnosis.linear.stated_values import pulled
 from planner.diagnosis.thresholds import LEFT_FACTOR
 
 FOLLOWED = 1e-3  # shares below it are left where they are
 
 
 def without_slight(
-    fits: Sequence[Fit], told: Sequence[Sequence[Effect]], shares: np.ndarray, matters: float
+    fits: Sequence[Fit],
+    told: Sequence[Sequence[Effect]],
+    shares: np.ndarray,
+    prior: Sequence[float],
+    matters: float,
 ) -> np.ndarray:
     """Shares (k,) of fits on the same lines, those of effects that do not matter given on.
 
-    `told` are the effects by which each fit is called. A fit gives as much as FRFs say that one of
-    them changes less than `matters` of them once the rest is refitted; the fit without it takes it.
+    The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
+    weights before any data. A fit gives as much as FRFs say that one of its effects changes less
+    than `matters` of them once the rest is refitted; the fit without it takes it. FRFs that are
+    nearly the same leave it to what was known before which of both it is: the farther the rest had
+    to go, the likelier is an effect that pulls at it.
     """
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
-    shares = np.array(shares, dtype=float)
+    shares, bent = np.array(shares, dtype=float), [pulled(f, fits[0]) for f in fits]
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
         if shares[i] < FOLLOWED:
             continue
-        kept = {(e.name, e.at) for e in told[i] if e.absorbed}
         fewer = [
-            j
-            for j in range(len(fits))
-            if len(called[i]) == len(called[j]) + 1
-            and called[j] < called[i]
-            and not (called[i] - called[j]) & kept
-        ]
+            j for j in range(len(fits))
+            if len(called[i]) == len(called[j]) + 1 and called[j] < called[i]
+        ]  # fmt: skip
         if not fewer:
             continue
-        changes = [change(fits[j], fits[i]) for j in fewer]
-        least = int(np.argmin(changes))
-        told_of = float(
-            norm.cdf(np.log(max(changes[least], 1e-12) / matters) / np.log(LEFT_FACTOR))
-        )
-        shares[fewer[least]] += (1 - told_of) * shares[i]
-        shares[i] *= told_of
+        given = [
+            _slight(fits[j], fits[i], _only(told[i], called[j]), matters)
+            * expit(np.log(prior[j] / prior[i]) + bent[i] - bent[j])
+            for j in fewer
+        ]
+        most = int(np.argmax(given))
+        shares[fewer[most]] += given[most] * shares[i]
+        shares[i] *= 1 - given[most]
     return shares
+
+
+def _only(told: Sequence[Effect], others: frozenset) -> Effect:
+    return next(e for e in told if e.at and (e.name, e.at) not in others)
+
+
+def _slight(without: Fit, whole: Fit, part: Effect, matters: float) -> float:
+    """Probability that an effect of `whole` does not matter."""
+    size = removal(without, whole, part) if part.absorbed else change(without, whole)
+    return float(norm.cdf(np.log(matters / max(size, 1e-12)) / np.log(LEFT_FACTOR)))
+
+
+def removal(without: Fit, whole: Fit, part: Effect) -> float:
+    """As `change`, where an effect is taken from `whole` and nothing is refitted."""
+    misfit, x = whole.misfit, whole.x.copy()
+    stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
+    for name in part.springs(misfit.setting.simulation):
+        x[misfit.names.index(name)] = stated[name]
+    for name in part.vanishing:
+        x[misfit.names.index(f"{name} of {part.name} at {part.at}")] = 0.0
+    return _apart(misfit.parts(x)[0], whole)
 
 
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -84,7 +111,11 @@ def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:
 
 def change(without: Fit, whole: Fit) -> float:
     """Root mean square by which two fits' FRFs differ, relative to those that were measured."""
+    return _apart(without.misfit.parts(without.x)[0], whole)
+
+
+def _apart(frfs: np.ndarray, whole: Fit) -> float:
     used = whole.misfit.weight > 0
-    difference = (whole.misfit.parts(whole.x)[0] - without.misfit.parts(without.x)[0])[used]
+    difference = (whole.misfit.parts(whole.x)[0] - frfs)[used]
     measured = whole.misfit.measured.accelerance[used]
     return float(np.sqrt(np.sum(np.abs(difference) ** 2) / np.sum(np.abs(measured) ** 2)))

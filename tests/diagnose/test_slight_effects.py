@@ -1,0 +1,94 @@
+"""A slight effect is given up only where the rest need not go far to take its place."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from planner.diagnosis.effects import library
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.problem import COARSE, Problem
+from planner.diagnosis.linear.slightness import without_slight
+from planner.diagnosis.linear.stated_values import away, pulled
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.robot.robot import Robot
+from tests.support.known_robots import KR10
+
+LINES = np.linspace(6.0, 60.0, 20)
+STIFF, HEAVY = 12.0, 40.0  # ln of how much stiffer than likely; kg
+Moved = dict[str, float]
+
+
+@pytest.fixture(scope="module")
+def at(tmp_path_factory) -> Callable[[str, str, Moved], Fit]:
+    """A fit with one effect, some of its entries moved by so much from their priors' means."""
+    simulation = Simulation(Robot.load(KR10.write(tmp_path_factory.mktemp("robot"))))
+    q, nothing = KR10.poses(2, 5), np.full((3, 3, len(LINES)), np.nan)
+    frfs = tuple(
+        Frf(LINES, h, 1e-4 * np.abs(h) ** 2, nothing, (3, 3, 3), (6.0, 60.0))
+        for h in simulation.accelerance(q, LINES)
+    )
+    problem = Problem(frfs, q, simulation, (6.0, 60.0))
+    every = {(e.name, e.at): e for e in library(simulation)} | {("none", ""): Effect("")}
+
+    def made(name: str, place: str, moved: Moved) -> Fit:
+        effect = every[name, place]
+        misfit = problem.misfit(effect, COARSE)
+        x = misfit.mean.copy()
+        for entry, by in moved.items():
+            there = [i for i, known in enumerate(misfit.names) if known.startswith(entry)]
+            assert there
+            x[there] += by
+        return Fit(effect, misfit, x, misfit.by_pose(x))
+
+    return made
+
+
+def given_on(whole: Fit, without: Fit, prior=(100.0, 1.0)) -> float:
+    """Share of the effect that ends up with the fit without it."""
+    told = [without.effect.parts(), whole.effect.parts()]
+    return float(without_slight([without, whole], told, np.array([0.0, 1.0]), prior, 0.03)[0])
+
+
+def test_what_changes_nothing_is_given_to_the_simulation_without_it(at):
+    stiff = at("base_compliance", "base", {"stiffness of base": STIFF})
+    assert given_on(stiff, at("none", "", {})) > 0.95
+
+
+def test_what_only_bent_inertias_make_up_for_stays(at):
+    """The simulation without it is nearly the same, but of a robot that hardly can be there."""
+    stiff = at("base_compliance", "base", {"stiffness of base": STIFF})
+    bent = {f"i_{ab} of": s for ab, s in (("xy", 2.5), ("xz", -2.5), ("yz", 2.5))}
+    found = at("none", "", bent)
+    assert max(map(abs, away(found, found).values())) == pytest.approx(2.5)
+    assert given_on(stiff, found) < 0.01
+
+
+def test_a_mass_of_nothing_is_none_and_one_that_counts_stays(at):
+    none = at("none", "", {})
+    assert given_on(at("added_mass", "link_3", {}), none) > 0.95
+    assert given_on(at("added_mass", "link_3", {"mass of added_mass": HEAVY}), none) < 0.05
+
+
+def test_values_far_from_stated_are_likelier_where_something_unknown_pulls(at):
+    springs = at("none", "", {"stiffness of": 0.0})
+    one = next(n for n in springs.misfit.names if n.startswith("stiffness"))
+    sd = springs.misfit.sd[springs.misfit.names.index(one)]
+    told = [pulled(at("none", "", {one: s * sd}), springs) for s in (0.0, 2.0, 4.0, 6.0)]
+    assert told[0] < 0
+    assert np.all(np.diff(told) > 0)
+    assert told[3] - told[0] > 10
+
+
+def test_dampers_say_nothing_of_what_is_stated(at):
+    none = at("none", "", {})
+    assert pulled(at("none", "", {"damping of": 2.0}), none) == pulled(none, none)
+
+
+def test_of_the_halves_of_a_link_that_bends_nothing_is_stated(at):
+    none, bent = at("none", "", {}), at("link_flexibility", "link_3", {})
+    moved = at("link_flexibility", "link_3", {"i_xx of link_3": 5.0, "i_xx of joint_3": 5.0})
+    assert pulled(moved, none) == pulled(bent, none)
+    assert pulled(at("none", "", {"i_xx of joint_3": 5.0}), none) > pulled(none, none) + 5
