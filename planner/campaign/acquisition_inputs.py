@@ -113,4 +113,5 @@ def cost_of(cell: Cell) -> Cost:
     speed = cell.robot.velocity_rad_s * table.speed_share
     # A URDF may leave a speed out: a slow one is assumed.
     speed = np.where(np.isfinite(speed) & (speed > 0), speed, 0.5)
-    return Cost(speed, table.minutes_per_pose, table.minutes_per_hit, table.hits_per_axis)
+    per_hit, per_sensor = table.minutes_per_hit, table.minutes_per_sensor
+    return Cost(speed, table.minutes_per_pose, per_hit, table.hits_per_axis, per_sensor)

@@ -43,7 +43,7 @@ def build(
         q = np.deg2rad(np.array([m.joints_deg for m in used]))
         low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
-        noise = FrfNoise.of(frfs, table.band_hz, misfit)
+        noise = FrfNoise.of(whole, table.band_hz, misfit)
         if hits is not None and low.learned is not None:
             told = tell(visits_of(used, hits, frfs), low.learned, cell.tolerances, table.band_hz)
             misses, used = told.poses, tuple(map(told.corrected, used))
