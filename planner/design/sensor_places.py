@@ -1,4 +1,4 @@
-"""Where another sensor, or another point to hit, would tell most of the simulation, per minute."""
+"""Where another sensor, or hits at another point too, tell most of the simulation per minute."""
 
 from dataclasses import dataclass
 
@@ -15,11 +15,12 @@ TINY = 1e-12  # share of the variance that is always left
 
 @dataclass(frozen=True)
 class BetterPlaces:
-    """A point to hit at a pose, and the `sensors` that should listen, by names of robot.toml.
+    """A point to hit at a pose besides the tool, and the `sensors` that should listen, by name.
 
-    `sd_percent` is what open parameters are expected to leave of the workspace's frequencies (root
-    mean square) then, `sd_percent_as_it_is` with the hits at the tool and the sensors there are;
-    `minutes` what either takes. `added` is the sensor that is put there first, "" if none is.
+    "" is no such point, and `added` the sensor that is put there first, "" if none is. `sd_percent`
+    is what open parameters are expected to leave of the workspace's frequencies (root mean square)
+    then, `sd_percent_as_it_is` with hits at the tool alone and the sensors there are; `minutes`
+    what either takes.
     """
 
     pose: str
@@ -36,9 +37,9 @@ class BetterPlaces:
     def sentence(self) -> str:
         """For the engineer."""
         what = [f"put a sensor at {self.added} too"] if self.added else []
-        what += [f"hit at {self.hit_point}"] if self.hit_point != TCP else []
+        what += [f"hit at {self.hit_point} too"] if self.hit_point else []
         return (
-            f"At {self.pose} {' and '.join(what)}, where that can be done: what the simulation's "
+            f"At {self.pose} {' and '.join(what)}, if you can: what the simulation's "
             f"parameters leave open of the frequencies is expected to go from "
             f"{self.sd_percent_now:.2g} to {self.sd_percent:.2g} % in {self.minutes:.0f} min; with "
             f"hits at the tool and the sensors of the last pose to {self.sd_percent_as_it_is:.2g} "
@@ -54,7 +55,7 @@ def better_places(
     travel: float,
     target_percent: float,
 ) -> BetterPlaces | None:
-    """The hits with one sensor more, or at another point, that gain most per minute.
+    """One sensor more, or hits at another point too, that gain most per minute.
 
     The gain is that of the logarithm of what is left: so it adds up from pose to pose. A sensor
     stays, yet its minutes are all charged here. None where hits at the tool with the sensors there
@@ -70,25 +71,26 @@ def better_places(
     """
     name, at, q = pose
     named, there = open_.simulation.robot.points, open_.noise.sensors
-    free = [None, *sorted({named.sensor(one) for one in named.axes} - {*there, SENSOR})]
-    hits = [TCP, *sorted({named.hit(one) for one in named.axes} - {TCP})]
+    free = ["", *sorted({named.sensor(one) for one in named.axes} - {*there, SENSOR})]
+    points = ["", *sorted({named.hit(one) for one in named.axes} - {TCP})]
     workspace = outputs.workspace
     open_now = outputs.parameter_variance(workspace.poses)
     now = float(np.sum(workspace.importance * open_now))
 
-    def left(hit: str, added: str | None) -> tuple[float, float]:
+    def left(point: str, added: str) -> tuple[float, float]:
         """Variance that is left, and the minutes that it takes."""
         sensors = (*there, added) if added else there
-        told = open_.information(q[None], Layout((hit,), sensors))
-        seen = Poses(at.x, at.low, at.slope, told)
-        minutes = travel + cost.per_pose + cost.hitting(ALL_AXES)
+        hits = (TCP, point) if point else (TCP,)
+        told = sum(open_.information(q[None], Layout((hit,), sensors)) for hit in hits)
+        seen = Poses(at.x, at.low, at.slope, np.asarray(told))
         gain = float(parameter_reduction(outputs, seen, workspace)[0])
+        minutes = travel + cost.per_pose + len(hits) * cost.hitting(ALL_AXES)
         return max(now - gain, TINY * now), minutes + (cost.per_sensor if added else 0.0)
 
-    plain = TCP, None
+    plain = "", ""
     if 100 * np.sqrt(left(*plain)[0]) <= target_percent:
         return None
-    each = {(hit, added): left(hit, added) for hit in hits for added in free}
+    each = {(point, added): left(point, added) for point in points for added in free}
     rate = {key: np.log(now / rest) / minutes for key, (rest, minutes) in each.items()}
     best = max(rate, key=rate.__getitem__)
     if best == plain:
@@ -98,7 +100,7 @@ def better_places(
         name,
         best[0],
         (*there, best[1]) if best[1] else there,
-        best[1] or "",
+        best[1],
         each[best][1],
         each[plain][1],
         percent[best],

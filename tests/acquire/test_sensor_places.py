@@ -71,9 +71,11 @@ def test_what_is_proposed_holds_what_it_promises(open_, outputs):
     # By hand: Σ' = (Σ⁻¹ + F)⁻¹, and its mean variance over the workspace.
     for sensors, point, stated in (
         (found.sensors, found.hit_point, found.sd_percent),
-        (("sensor",), "tcp", found.sd_percent_as_it_is),
+        (("sensor",), "", found.sd_percent_as_it_is),
     ):
-        told = open_.information(q[None], Layout((point,), sensors))[0].sum(axis=0)
+        told = open_.information(q[None], Layout(("tcp",), sensors))[0].sum(axis=0)
+        if point:
+            told = told + open_.information(q[None], Layout((point,), sensors))[0].sum(axis=0)
         after = np.linalg.inv(np.linalg.inv(open_.covariance) + told)
         slope = outputs.workspace.poses.slope * outputs.trust[:, None]
         variance = np.einsum("ukp,pr,ukr->uk", slope, after, slope)
@@ -83,7 +85,8 @@ def test_what_is_proposed_holds_what_it_promises(open_, outputs):
     minutes = np.array([found.minutes, found.minutes_as_it_is])
     rate = np.log(found.sd_percent_now / left) / minutes
     assert rate[0] > rate[1]
-    assert minutes[0] - minutes[1] == pytest.approx(COST.per_sensor * bool(found.added))
+    more = COST.per_sensor * bool(found.added) + COST.hitting((0, 1, 2)) * bool(found.hit_point)
+    assert minutes[0] - minutes[1] == pytest.approx(more)
 
 
 def test_no_sensor_is_asked_for_where_all_are_there(open_, outputs):
