@@ -31,8 +31,9 @@ def propose(
             f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
             f"widen [workspace] or raise candidates in campaign.toml."
         )
+    joints = cell.robot.joints
     angles = [
-        tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])) for pick in picks
+        tuple(round(float(v), 4) for v in joints.shown(candidates.q[pick.index])) for pick in picks
     ]
     return tuple(
         Proposal(
@@ -58,9 +59,9 @@ def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
 
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
     cell = model.cell
-    x = cell.candidates.features
+    joints, x = cell.robot.joints, cell.candidates.features
     taken = [m.joints_deg for m in state.measurements.values()]
-    at = np.deg2rad(taken[-1]) if taken else None
+    at = joints.internal(taken[-1]) if taken else None
     taken += [m.joints_deg for m in state.held.values()]
     shares = None
     if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
@@ -69,7 +70,7 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     taken += [state.proposals[pose].joints_deg for pose in state.skipped]
     allowed = cell.allowed
     for pose in state.avoided:
-        there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
+        there = cell.features(joints.internal([state.proposals[pose].joints_deg]))
         allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
     asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
     if acquisition in INFORMED:
@@ -83,7 +84,7 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
         x[asked],
         said[asked],
         count=count,
-        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
+        exclude=cell.features(joints.internal(taken)) if taken else None,
         seed=state.events,
         outlook=seen,
         travel=travel.among(asked),

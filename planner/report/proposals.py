@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.design.stopping import Forecast
+from planner.recording.joints import JointUnits
 from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import table
@@ -29,10 +30,10 @@ class ProposedPose(Answer):
         """The proposal's own keys, and "expected"."""
         return {**plain(self.proposal), "expected": plain(self.expected)}
 
-    def parts(self, joint_names: tuple[str, ...]) -> list[RenderableType]:
+    def parts(self, joints: JointUnits) -> list[RenderableType]:
         """Angles, place and expected modes as text."""
         proposal = self.proposal
-        angles = table(f"Pose {proposal.pose}", *(f"{name} (°)" for name in joint_names))
+        angles = table(f"Pose {proposal.pose}", *joints.headings)
         angles.add_row(*(f"{value:.3f}" for value in proposal.joints_deg))
         expected = table("expected there", "mode", "frequency (Hz)", "damping (%)")
         for k, mode in enumerate(self.expected):
@@ -75,6 +76,12 @@ class ProposalsReport(Answer):
     forecast: Forecast
     repeat: RepeatedPose | None
     remarks: tuple[str, ...] = ()
+    joint_units: Any = msgspec.UNSET
+
+    @property
+    def joints(self) -> JointUnits:
+        """Their names and units."""
+        return JointUnits.declared_as(self.joint_names, self.joint_units)
 
     def to_json(self) -> dict[str, Any]:
         """With the forecast's sentence."""
@@ -82,7 +89,7 @@ class ProposalsReport(Answer):
 
     def text(self) -> Group:
         """Each pose, then what one more measurement is worth."""
-        parts = [part for one in self.proposals for part in one.parts(self.joint_names)]
+        parts = [part for one in self.proposals for part in one.parts(self.joints)]
         said = [self.forecast.text, self.repeat.text if self.repeat else ""]
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks)
@@ -95,7 +102,7 @@ def forecast_json(forecast: Forecast) -> dict[str, Any]:
 
 def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsReport:
     """Of the poses that `Campaign.next` gave."""
-    expected = campaign.predict(np.deg2rad(np.array([p.joints_deg for p in found])))
+    expected = campaign.predict(campaign.cell.robot.joints.internal([p.joints_deg for p in found]))
     model = campaign.model
     return ProposalsReport(
         tuple(ProposedPose(p, ExpectedMode.all_of(expected, i)) for i, p in enumerate(found)),
@@ -103,4 +110,5 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         model.forecast,
         RepeatedPose.of(model),
         tuple(campaign.cell.remarks),
+        campaign.cell.robot.joints.declared,
     )
