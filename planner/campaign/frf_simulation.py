@@ -114,16 +114,18 @@ def widened(structure: Structure) -> Structure:
         structure = extended(structure.simulation, structure.priors)
     robot = structure.simulation.robot
     stated = robot.config.compliance[: len(robot.config.compliance) - structure.added]
-    stiffest = max(block.stiffness for block in stated if not block.slide)
+    turning = [block for block in stated if not block.slide]
+    stiffest = max((b.stiffness for b in turning), default=max(robot.turning_stiffness()))
     ways = _links(structure.simulation)
-    longest = max(float(np.linalg.norm(way)) for _, _, way in ways)
+    longest = max((float(np.linalg.norm(way)) for _, _, way in ways), default=0.0) or robot.reach_m
     listed = {place_name(block) for block in robot.config.compliance}
     springs = [_spring(FLOOR, np.eye(3)[2], stiffest)]
     springs += [_spring(FLOOR, a, stiffest / (2 * longest) ** 2, slide=True) for a in np.eye(3)]
     for link, joint, way in ways:
         length = np.linalg.norm(way)
         if length > SHORT * longest:
-            own = [b.stiffness for b in stated if b.joint == joint] or [stiffest]
+            own = [b.stiffness for b in stated if b.joint == joint and not robot.slides_along(b)]
+            own = own or [stiffest]
             axes = (*across(way / length), way / length)
             springs += [_spring(link, axis, BEND * max(own)) for axis in axes]
     springs = [(b, limits) for b, limits in springs if place_name(b) not in listed]

@@ -16,6 +16,7 @@ from planner.robot.config_file import check_own_springs, load_config, with_effec
 from planner.robot.points import PREFIX, check_points, names_of, with_points
 from planner.robot.urdf import build_model, joint_axes, joint_slides, parse_urdf, read_urdf
 
+LEVER_M = 0.3  # half the length of a carriage, chosen
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 # A link and the joint that carries it may share a name; the link is meant.
 FRAME_TYPES = (
@@ -133,13 +134,31 @@ class Robot:
                 return frame.name
         raise KeyError(joint)
 
+    def slides(self, joint: str) -> bool:
+        """Whether a joint slides along its axis."""
+        return self.joints.slides[self.joint_names.index(joint)]
+
     def is_own(self, block: Compliance) -> bool:
         """Whether an elastic degree of freedom is its joint's own: about its axis, or along it."""
         if block.joint not in self.joint_names:
             return False
         joint = self.joint_names.index(block.joint)
         along = abs(np.array(block.axis) @ self.joint_axes[joint]) > 0.9
-        return bool(along) and block.slide == self.joints.slides[joint]
+        return bool(along) and block.slide == self.slides(block.joint)
+
+    def slides_along(self, block: Compliance) -> bool:
+        """Whether an elastic degree of freedom is a shift of a joint that slides."""
+        return block.slide and block.joint in self.joint_names and self.slides(block.joint)
+
+    def turning_stiffness(self, joint: str = "") -> tuple[float, ...]:
+        """Stated stiffnesses (N·m/rad) of rotations at a joint, where it has any, or of all.
+
+        Where all springs slide: what they are worth at a lever of LEVER_M.
+        """
+        turning = [b for b in self.config.compliance if not b.slide]
+        sliding = [b.stiffness * LEVER_M**2 for b in self.config.compliance]
+        at = [b.stiffness for b in turning if b.joint == joint]
+        return tuple(at or [b.stiffness for b in turning] or sliding)
 
     def carries(self, link: str) -> tuple[int, int] | None:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""

@@ -45,5 +45,5 @@ class BaseCompliance(ExtraCompliance):
 
 def _largest(simulation: Simulation) -> float:
     """Of the stiffnesses about the joints' own axes, roughly: the median of the largest three."""
-    sizes = sorted(b.stiffness for b in simulation.robot.config.compliance if not b.slide)
+    sizes = sorted(simulation.robot.turning_stiffness())
     return float(np.median(sizes[-3:]))

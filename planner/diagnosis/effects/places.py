@@ -56,9 +56,7 @@ def with_blocks(simulation: Simulation, blocks: tuple[Compliance, ...]) -> Simul
 
 def stiffest(simulation: Simulation, joint: str) -> float:
     """Largest stiffness listed at a joint (N·m/rad), of the robot where it lists none."""
-    blocks = [b for b in simulation.robot.config.compliance if not b.slide]
-    own = [b.stiffness for b in blocks if b.joint == joint]
-    return max(own or [b.stiffness for b in blocks])
+    return max(simulation.robot.turning_stiffness(joint))
 
 
 def damping_time(simulation: Simulation) -> float:
