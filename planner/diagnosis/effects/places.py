@@ -1,11 +1,13 @@
 """Places of a robot, and simulations with more elastic rotations."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.robot.config import Compliance
 
 
@@ -52,6 +54,21 @@ def with_blocks(simulation: Simulation, blocks: tuple[Compliance, ...]) -> Simul
     together = (*robot.config.compliance, *blocks)
     config = msgspec.structs.replace(robot.config, compliance=together)
     return Simulation(replace(robot, config=config))
+
+
+def movable(simulation: Simulation, blocks: Sequence[Compliance]) -> tuple[Compliance, ...]:
+    """Those that, one after the other, move an inertia of their own beside what is listed.
+
+    A base without mass that shifts along a rail does what the rail's own spring does.
+    """
+    kept: tuple[Compliance, ...] = ()
+    for block in blocks:
+        try:
+            _ = with_blocks(simulation, (*kept, block)).elastic
+        except InputError:
+            continue
+        kept = (*kept, block)
+    return kept
 
 
 def stiffest(simulation: Simulation, joint: str) -> float:
