@@ -8,7 +8,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """Joint speeds (dof,) in rad/s at which the robot moves between poses, and minutes.
+    """Joint speeds (dof,) in rad/s (slides: m/s) at which the robot moves to poses, and minutes.
 
     `per_pose` is for brakes, settling and the analyser; `per_hit` for one hit, of which there are
     `hits_per_axis` along each axis; `per_sensor` for putting up one more sensor.
