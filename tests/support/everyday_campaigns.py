@@ -124,7 +124,7 @@ def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[Secret, 
         secret = deviate(secret, beams=[BentLink(links[joint], bending, twist, damping_s)])
     elif kind == "hose":
         link = str(rng.choice(list(links.values())[1:]))
-        moving = sum(float(m.get("value", 0)) for m in root.iterfind("link/inertial/mass"))
+        moving = _mass_that_moves(root)
         low, *_, high = truth.modes(np.mean([truth.lower_rad, truth.upper_rad], axis=0), 4)[0]
         small = AttachedResonator(
             link, triple(rng.uniform(0.3, 1.0) * beam_end(link, root)), triple(some_direction(rng)),
@@ -133,6 +133,13 @@ def lacking(kind: str, robot: Robot, rng: np.random.Generator) -> tuple[Secret, 
         )  # fmt: skip
         secret = deviate(secret, resonators=[small])
     return secret, size
+
+
+def _mass_that_moves(root: ElementTree.Element) -> float:
+    """Of all links but the one that stands on the floor, in kg."""
+    carried = {child.get("link") for child in root.iterfind("joint/child")}
+    moving = [link for link in root.findall("link") if link.get("name") in carried]
+    return sum(float(m.get("value", 0)) for link in moving for m in link.iterfind("inertial/mass"))
 
 
 def _children(root: ElementTree.Element, joints: tuple[str, ...]) -> dict[str, str]:
