@@ -11,7 +11,7 @@ from planner.errors import InputError
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK, Effort
-from planner.identification.extended_structure import FLOOR, Structure, extended
+from planner.identification.extended_structure import FLOOR, Structure, added_softer, extended
 from planner.identification.frequency_uncertainty import frequency_sd
 from planner.identification.identify import identify
 from planner.identification.measured_frfs import layout_of
@@ -28,6 +28,10 @@ OF_EXACT_HITS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
 # identifying it without that pose; into so many parts at most.
 SUSPECT, EXACT_SUSPECT, FOLDS = 2.0, 3.0, 2
 BEST = 0.95  # misfit below which no springs that are added can bring it
+# By how much softer than expected springs that are added begin, one after the other while nothing
+# fits; of a suspect misfit, how much makes one look for a mass that swings; and of that, how much
+# makes one look at length.
+SOFTER, SWINGS, FAR_OFF = (1.0, 7.0), 2.0, 5.0
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
@@ -72,16 +76,15 @@ class Learned:
 
         The softest first, in units of the stiffest that is stated at the same place.
         """
-        size = self.structure.simulation.elastic.size
+        stated = len(self.structure.simulation.robot.config.compliance) - self.structure.added
         springs = [
-            e
-            for e in self.identified.estimates
-            if e.kind == "stiffness" and min(e.blocks) >= size - self.structure.added
-        ]
+            e for e in self.identified.estimates
+            if e.kind == "stiffness" and min(e.blocks) >= stated
+        ]  # fmt: skip
         told = [e for e in springs if e.log_sd < KNOWN and e.value < MATTERS * e.prior_median]
         told.sort(key=lambda e: e.value / e.prior_median)
         return tuple(
-            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} N·m/rad"
+            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} {e.unit}"
             for e in told
         )
 
@@ -182,11 +185,13 @@ class LowFidelity:
         learned = self.learned or self.suspect
         if learned is None:
             return ""
+        swinging = learned.structure.swinging
         if learned.fits:
-            return _lacking(learned.found) if learned.structure.added else ""
+            lacking = _lacking(learned.found) if learned.structure.added else ""
+            return " ".join(filter(None, (swinging, lacking)))
         text = (
             f"Identified from the recordings, the simulation still misses them by "
-            f"{np.sqrt(learned.identified.misfit):.0f} times their noise: it lacks physics"
+            f"{np.sqrt(learned.identified.misfit):.2g} times their noise: it lacks physics"
         )
         if self.learned is None:
             return f"{text}, so that it is used as robot.toml states it, or not at all."
@@ -230,7 +235,10 @@ def learn(
     if nominal is None or not frfs:
         return before
     lesson = _Lesson(tuple(frfs), q, band_hz, before.tolerances)
-    learned = _wider(lesson.identified(Structure(nominal, before.priors)), lesson)
+    stated = lesson.identified(Structure(nominal, before.priors))
+    learned = _wider(stated, lesson)
+    if learned.identified.misfit > SWINGS * learned.suspect and lesson.tolerances is not None:
+        learned = _swinging(stated, learned, lesson)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)
@@ -246,9 +254,15 @@ class _Lesson:
     band_hz: tuple[float, float]
     tolerances: Tolerances | None
 
-    def identified(self, structure: Structure, warm: Identification | None = None) -> Learned:
+    def identified(
+        self,
+        structure: Structure,
+        warm: Identification | None = None,
+        starts: int | np.ndarray = 1,
+    ) -> Learned:
         suspect = EXACT_SUSPECT if self.tolerances is None else SUSPECT
-        return Learned(structure, self._identify(structure, warm, _effort(self.frfs)), suspect)
+        found = self._identify(structure, warm, _effort(self.frfs), starts)
+        return Learned(structure, found, suspect)
 
     def without(self, away: np.ndarray, warm: Learned) -> Identification:
         """From fewer poses, starting where all of them led; `away` (n,) bool."""
@@ -259,7 +273,11 @@ class _Lesson:
         return fewer._identify(warm.structure, warm.identified, rough)
 
     def _identify(
-        self, structure: Structure, warm: Identification | None, effort: Effort
+        self,
+        structure: Structure,
+        warm: Identification | None,
+        effort: Effort,
+        starts: int | np.ndarray = 1,
     ) -> Identification:
         return identify(
             self.frfs,
@@ -267,7 +285,7 @@ class _Lesson:
             structure.simulation,
             structure.priors,
             band_hz=self.band_hz,
-            starts=1,
+            starts=starts,
             warm=warm,
             effort=effort,
             tolerances=self.tolerances,
@@ -280,16 +298,44 @@ def _wider(stated: Learned, lesson: _Lesson) -> Learned:
     That is where χ² falls by more than ln n for each of their parameters (Schwarz 1978).
     """
     structure = extended(stated.structure.simulation, stated.structure.priors)
+    structure = replace(structure, swinging=stated.structure.swinging)
     first = stated.identified
     penalty = 2 * structure.added * np.log(first.values)
     if first.values * (first.misfit - BEST) < penalty:
         return stated
-    try:
-        wider = lesson.identified(structure, first if stated.fits else None)
-    except InputError:  # a search that ended where the robot would not stand
-        return stated
+    found = [stated]
+    for softer in SOFTER if lesson.tolerances is not None else SOFTER[:1]:
+        warm = first if stated.fits else None
+        try:
+            found.append(lesson.identified(structure, warm, added_softer(structure, softer)))
+        except InputError:  # a search that ended where the robot would not stand
+            continue
+        if found[-1].fits:
+            break
+    wider = min(found, key=lambda one: one.identified.misfit)
     gain = first.values * (first.misfit - wider.identified.misfit)
     return wider if gain > penalty else stated
+
+
+def _swinging(stated: Learned, learned: Learned, lesson: _Lesson) -> Learned:
+    """With a mass that swings on a link, beside what is stated and what else may be missing."""
+    from planner.campaign.swinging_mass import with_swinging_mass  # of the diagnosis: half a second
+
+    found, enough = [learned], SWINGS * learned.suspect
+    springs = stated if stated.identified.misfit < 2 * learned.identified.misfit else learned
+    ways = [(stated, False), (learned, False)] if learned is not stated else [(stated, False)]
+    for beside, everywhere in (*ways, (springs, True)):
+        best = min(one.identified.misfit for one in found)
+        if best <= (FAR_OFF if everywhere else 1.0) * enough:
+            break
+        structure, starts = with_swinging_mass(
+            beside.structure, beside.identified, lesson.frfs, lesson.q, lesson.band_hz, everywhere
+        )
+        try:
+            found.append(_wider(lesson.identified(structure, starts=starts), lesson))
+        except InputError:
+            continue
+    return min(found, key=lambda one: one.identified.misfit)
 
 
 def _left_out(warm: Learned, lesson: _Lesson, count: int) -> np.ndarray:
