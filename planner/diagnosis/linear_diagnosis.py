@@ -187,7 +187,9 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters_percent
     named = [_told_of(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
-    shares = list(without_slight(fits, named, weights.probabilities[:-1], prior, matters / 100))
+    shares = list(
+        without_slight(fits, named, weights.probabilities[:-1], prior, weights.bent, matters / 100)
+    )
     unknown = float(weights.probabilities[-1])
     leader = int(np.argmax(shares))
     own = prior[leader]

@@ -39,7 +39,7 @@ def worth(evidence: float, size: float) -> Worth:
     by_size = np.full(len(DISCREPANCIES), -1e9)
     by_size[place] = evidence
     scores = np.full((len(DISCREPANCIES), POSES), -2 * evidence / POSES)
-    return Worth(by_size, scores, 1.0, size, np.zeros(14))
+    return Worth(by_size, scores, 1.0, size, np.zeros(14), np.zeros((len(by_size), 0)))
 
 
 def shares(
@@ -101,13 +101,13 @@ def test_what_bends_the_simulation_far_is_beside_something_unknown():
     """An effect that takes most of the mismatch once springs lie far from where they are stated."""
     fits = (-900.0, 0.1, 0.3), (-500.0, 1e-2, 0.04)
     assert shares(*fits)[1] > 0.5
-    assert shares(*fits, bent=np.array([20.0, 12.0]))[-1] > 0.99
+    assert shares(*fits, bent=np.array([[20.0], [12.0]]))[-1] > 0.99
 
 
 def test_little_is_left_of_what_matters_only_where_refitting_bends_little():
     fits = (-900.0, 1e-2, 0.01), (-500.0, 3e-2, 0.009)
     assert shares(*fits)[0] > 0.9
-    assert shares(*fits, bent=np.array([15.0, 12.0]))[-1] > 0.9
+    assert shares(*fits, bent=np.array([[15.0], [12.0]]))[-1] > 0.9
 
 
 def test_evidence_is_that_of_one_normal_distribution():

@@ -24,6 +24,7 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_USUAL,
 )
 from planner.identification.measurement_model import ChainTransfer, OpenNumbers, basis
+from planner.identification.objective import FARTHEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +89,16 @@ class InnerProducts:
         likeliest = int(np.argmax(evidence))
         _, _, chi2, step = each[likeliest]
         values = max(float(self.fit.misfit.counts.sum()), 1.0)
-        size = DISCREPANCIES[likeliest]
-        chain = self.chain + step[: len(self.chain)]
-        return Worth(evidence, scores, chi2 / values, size, chain)
+        size, chain = DISCREPANCIES[likeliest], len(self.chain)
+        ends = np.array([self._moved(one[3][chain:]) for one in each])
+        return Worth(evidence, scores, chi2 / values, size, self.chain + step[:chain], ends)
+
+    def _moved(self, step: np.ndarray) -> np.ndarray:
+        """x (D,) after a step (free,) in prior sds, no farther off than is looked for."""
+        misfit = self.fit.misfit
+        far = (self.fit.x - misfit.mean) / misfit.sd
+        far[misfit.free] += step
+        return misfit.mean + misfit.sd * np.clip(far, -FARTHEST, FARTHEST)
 
     def _at(self, size: float, temper: float) -> tuple[float, np.ndarray, float, np.ndarray]:
         """Log evidence, −2 ln likelihood (n,) of each pose, χ², and the step, at a `size`.
@@ -129,7 +137,7 @@ class Worth:
     """Log evidence (sizes,) of a fit, and −2 ln likelihood (sizes, n) of each pose.
 
     What is left of χ² per value, and the chain's numbers, are those of the likeliest `size` of the
-    discrepancy.
+    discrepancy; `ends` (sizes, D) is where x is best at each.
     """
 
     by_size: np.ndarray
@@ -137,6 +145,7 @@ class Worth:
     per_value: float
     size: float
     chain: np.ndarray
+    ends: np.ndarray
 
     @property
     def log_evidence(self) -> float:

@@ -14,6 +14,8 @@ from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.stated_values import pulled
 from planner.diagnosis.thresholds import (
     ALIKE,
+    DISCREPANCIES,
+    DISCREPANCY_USUAL,
     LEFT_FACTOR,
     LEFT_SHARE,
     NOISE_OVERSTATED,
@@ -23,6 +25,7 @@ from planner.inference.evidence import bootstrapped, shared_noise, temper
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 BOOTSTRAPS = 400
+USUAL = DISCREPANCIES.index(DISCREPANCY_USUAL)  # what every robot has may move as much
 LOG_KNOWN = float(np.log(1 / SOMETHING_UNKNOWN - 1))  # odds, before any data, of nothing unknown
 
 
@@ -39,7 +42,8 @@ def temper_of(fits: Sequence[Fit]) -> float:
 class Weights:
     """Probabilities of fits in their order, then of "unknown"; T; what each is worth and leaves.
 
-    `log_evidence` is that of all of them together, priors and "unknown" included.
+    `bent` (k,) are how far each had to move what is stated, see `pulled`. `log_evidence` is that of
+    all of them together, priors and "unknown" included.
     """
 
     probabilities: np.ndarray
@@ -47,6 +51,7 @@ class Weights:
     temper: float
     worth: tuple[Worth, ...]
     mismatch: tuple[Mismatch, ...]
+    bent: np.ndarray
 
     @property
     def likeliest(self) -> int:
@@ -71,11 +76,20 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     left = np.array([m.unexplained for m in mismatch])
     seen = np.array([m.resolution for m in mismatch])
     matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters_percent / 100
-    bent = np.array([pulled(f, fits[0]) for f in fits])
+    bent = np.array([_bent(f, w, fits[0]) for f, w in zip(fits, worth, strict=True)])
     least = float(seen.min())
     shares = shares_of(worth, left, prior, matters, least, seed, bent)
     total = log_sum(_log_joint(worth, np.maximum(left, least), prior, matters, least, bent))
-    return Weights(shares, total, t, worth, mismatch)
+    return Weights(shares, total, t, worth, mismatch, bent[:, USUAL])
+
+
+def _bent(fit: Fit, worth: Worth, plain: Fit) -> np.ndarray:
+    """See `pulled`, at each size (sizes,) of the discrepancy.
+
+    Where a step goes too far for what is linear, where the fit is counts.
+    """
+    here = pulled(fit, fit.x, plain)
+    return np.array([min(here, pulled(fit, x, plain)) for x in worth.ends])
 
 
 def shares_of(
@@ -91,7 +105,7 @@ def shares_of(
 
     Something unknown may be there alone, as it were beside the first fit, or beside any other. How
     large the discrepancy is tells, how much is `left` (k,), relative to the recordings (noise lets
-    `seen` be seen), and how far what is stated had to go (`bent` (k,), see `pulled`). Where
+    `seen` be seen), and how far what is stated had to go (`bent` (k, sizes), see `pulled`). Where
     refitting leaves less than `matters`, and bends little, what is unknown does not matter: the
     first fit will do.
     """
@@ -101,7 +115,7 @@ def shares_of(
     scores = np.tile(np.concatenate([w.scores for w in worth]), (2, 1))
     found = bootstrapped(scores, both.ravel(), 1.0, -np.inf, BOOTSTRAPS, seed)[:-1]
     alone, beside = found.reshape(both.shape).sum(axis=2)
-    unmoved = expit(LOG_KNOWN - np.broadcast_to(bent, len(left))[0])
+    unmoved = expit(LOG_KNOWN - np.broadcast_to(bent, both.shape[1:])[0, USUAL])
     counts = 1 - unmoved * norm.cdf(np.log(matters / left[0]) / np.log(LEFT_FACTOR))
     alone[0] += (1 - counts) * beside.sum()
     return np.append(alone, counts * beside.sum())
@@ -119,8 +133,7 @@ def _log_joint(
     usual, unusual = size_priors()
     each = np.array([w.by_size for w in worth]) + np.log(prior)[:, None]
     known = each + usual + left_alone(left, matters, seen)[:, None]
-    strange = each + unusual - LOG_KNOWN
-    strange += np.broadcast_to(bent, len(each))[:, None]
+    strange = each + unusual + bent - LOG_KNOWN
     return np.array([known, strange])
 
 

@@ -13,10 +13,11 @@ from scipy.stats import norm
 
 from planner.diagnosis.effects.combined import Both
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.discrepancy import multiples
+from planner.diagnosis.linear.evidence import stated_springs
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
 from planner.diagnosis.linear.problem import Problem
-from planner.diagnosis.linear.stated_values import pulled
-from planner.diagnosis.thresholds import LEFT_FACTOR
+from planner.diagnosis.thresholds import DISCREPANCY_USUAL, LEFT_FACTOR
 
 FOLLOWED = 1e-3  # shares below it are left where they are
 
@@ -26,18 +27,21 @@ def without_slight(
     told: Sequence[Sequence[Effect]],
     shares: np.ndarray,
     prior: Sequence[float],
+    bent: np.ndarray,
     matters: float,
 ) -> np.ndarray:
     """Shares (k,) of fits on the same lines, those of effects that do not matter given on.
 
     The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
-    weights before any data. A fit gives as much as FRFs say that one of its effects changes less
-    than `matters` of them once the rest is refitted; the fit without it takes it. FRFs that are
+    weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`. A fit
+    gives as much as FRFs say that one of its effects changes less than `matters` of them, and than
+    what every robot has, once the rest is refitted; the fit without it takes it. FRFs that are
     nearly the same leave it to what was known before which of both it is: the farther the rest had
     to go, the likelier is an effect that pulls at it.
     """
+    matters = float(np.hypot(matters, usual(fits[0])))
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
-    shares, bent = np.array(shares, dtype=float), [pulled(f, fits[0]) for f in fits]
+    shares = np.array(shares, dtype=float)
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
         if shares[i] < FOLLOWED:
             continue
@@ -66,6 +70,16 @@ def _slight(without: Fit, whole: Fit, part: Effect, matters: float) -> float:
     """Probability that an effect of `whole` does not matter."""
     size = removal(without, whole, part) if part.absorbed else change(without, whole)
     return float(norm.cdf(np.log(matters / max(size, 1e-12)) / np.log(LEFT_FACTOR)))
+
+
+def usual(fit: Fit) -> float:
+    """As `change`, by springs and dampers that differ from pose to pose as those of any robot."""
+    misfit = fit.misfit
+    size = DISCREPANCY_USUAL * multiples(misfit, stated_springs(fit))
+    moved = misfit.parts(fit.x)[1][:, : len(size)] * size[:, None, None, None]
+    used = misfit.weight > 0
+    measured = np.sum(np.abs(misfit.measured.accelerance[used]) ** 2)
+    return float(np.sqrt(np.sum(np.sum(np.abs(moved) ** 2, axis=1)[used]) / measured))
 
 
 def removal(without: Fit, whole: Fit, part: Effect) -> float:

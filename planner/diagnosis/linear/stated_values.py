@@ -11,17 +11,17 @@ from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import PULLED, PULLED_FACTOR, SPRING_STRAYED
 
 
-def away(fit: Fit, plain: Fit) -> dict[str, float]:
-    """By name, in prior sds, of what the simulation has without any effect: the fit `plain`.
+def away(fit: Fit, x: np.ndarray, plain: Fit) -> dict[str, float]:
+    """By name, in prior sds at x (D,), of what the simulation of `plain`, without effects, has.
 
-    Without springs that an effect of the fit is about and bodies that it divides: of their parts
+    Not of springs that an effect of the fit is about and bodies that it divides: of their parts
     nothing is stated.
     """
     misfit, bodies = fit.misfit, _bodies(plain)
     own = {name for part in fit.effect.parts() for name in part.springs(misfit.setting.simulation)}
     whole = {b for b, values in _bodies(fit).items() if np.array_equal(values, bodies.get(b, ()))}
     springs, inertias = misfit.split
-    far = (fit.x - misfit.mean) / misfit.sd
+    far = (x - misfit.mean) / misfit.sd
     return {
         name: float(far[i])
         for i, name in enumerate(misfit.names[:inertias])
@@ -35,13 +35,13 @@ def _bodies(fit: Fit) -> dict[str, np.ndarray]:
     return dict(zip(elastic.bodies, elastic.inertia, strict=True))
 
 
-def pulled(fit: Fit, plain: Fit) -> float:
-    """ln of how much likelier these values are where something unknown pulls at some of them.
+def pulled(fit: Fit, x: np.ndarray, plain: Fit) -> float:
+    """ln of how much likelier the values at x (D,) are where something unknown pulls at some.
 
     What a simulation lacks is made up for by what is free in it: each may then have, with
     probability PULLED, an sd of PULLED_FACTOR times its prior's.
     """
-    squares = np.array(list(away(fit, plain).values())) ** 2
+    squares = np.array(list(away(fit, x, plain).values())) ** 2
     wider = np.log(PULLED / PULLED_FACTOR) + squares * (1 - PULLED_FACTOR**-2) / 2
     return float(np.sum(np.logaddexp(np.log1p(-PULLED), wider)))
 
