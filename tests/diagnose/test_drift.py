@@ -36,6 +36,8 @@ def test_no_drift_where_only_the_fit_without_it_went_wrong(simulation, monkeypat
     plain, *_ = stuck(still, simulation)
     assert plain.per_value > 3 * min(f.per_value for f in drift.fits(still, simulation))
     assert screen(still, simulation) == ()
+    monkeypatch.setattr(drift, "DRIFT_MOVED", 0.0)  # a change that is sure, and next to none
+    assert screen(still, simulation) == ()
 
 
 def test_drift_that_is_there_is_found(simulation):

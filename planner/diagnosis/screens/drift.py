@@ -15,7 +15,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
 from planner.diagnosis.linear.drift_fit import DriftProblem, problem_of
-from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
     ALIKE,
@@ -60,10 +60,13 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     if len(recorded.visits) < 4 or _unchanged(recorded, nominal):
         return ()
     plain, *found = fits(recorded, nominal)
-    best = settle(problem_of(recorded, nominal), min(found, key=lambda f: f.per_value))
+    problem = problem_of(recorded, nominal)
+    best = settle(problem, min(found, key=lambda f: f.per_value))
+    # A fit that drift led out of a wrong minimum gains by that alone: it does without drift too.
+    back = carried_on(problem, best, Effect(""))
+    plain = min((plain, back), key=lambda f: f.per_value)
     finding = evaluate(plain, best)
     explained = plain.per_value > DRIFT_GAINS * best.per_value
-    # A fit that drift led out of a wrong minimum gains by that alone.
     change, sd, _ = finding.parameters["change"]
     there = explained and abs(change) > DRIFT_MOVED * sd
     return (finding,) if there and finding.log_evidence > CLEAR else ()
