@@ -114,4 +114,5 @@ def cost_of(cell: Cell) -> Cost:
     # A URDF may leave a speed out: a slow one is assumed, in rad/s or m/s.
     slow = np.where(cell.robot.joints.slides, 0.1, 0.5)
     speed = np.where(np.isfinite(speed) & (speed > 0), speed, slow)
-    return Cost(speed, table.minutes_per_pose, table.minutes_per_hit, table.hits_per_axis)
+    per_hit, per_sensor = table.minutes_per_hit, table.minutes_per_sensor
+    return Cost(speed, table.minutes_per_pose, per_hit, table.hits_per_axis, per_sensor)

@@ -44,7 +44,7 @@ def build(
         q = joints.internal([m.joints_deg for m in used])
         low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
-        noise = FrfNoise.of(frfs, table.band_hz, misfit)
+        noise = FrfNoise.of(whole, table.band_hz, misfit)
         if hits is not None and low.learned is not None:
             visits = visits_of(joints, used, hits, frfs)
             told = tell(visits, low.learned, cell.tolerances, table.band_hz)

@@ -5,13 +5,19 @@ from itertools import count as counted
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import cost_of, informed_candidates
+from planner.campaign.acquisition_inputs import (
+    cost_of,
+    informed_candidates,
+    open_parameters,
+    poses_at,
+)
 from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.design.hit_axes import axis_shares
 from planner.design.propose import INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
+from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
 
@@ -91,6 +97,26 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
         allowed=allowed[asked],
     )
     return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
+
+
+def places_for(model: Model, state: CampaignState, proposal: Proposal) -> BetterPlaces | None:
+    """Where one more sensor, or another point to hit, would tell more at a proposed pose.
+
+    None where nothing would, or the simulation does not learn.
+    """
+    cell = model.cell
+    # Before the first hits nobody knows what will be open.
+    open_ = open_parameters(cell, model.low, model.frf_noise) if model.labelled else None
+    if open_ is None or not cell.robot.points.axes:
+        return None
+    joints = cell.robot.joints
+    q = joints.internal([proposal.joints_deg])
+    at, _ = poses_at(cell, model.low, model.surrogate, open_, q)
+    cost, taken = cost_of(cell), [m.joints_deg for m in state.measurements.values()]
+    travel = cost.travel(q, joints.internal(taken[-1]) if taken else None)
+    pose = proposal.pose, at, q[0]
+    target = cell.config.stop.frequency_sd_percent
+    return better_places(open_, model.outlook[0], pose, cost, float(travel[0]), target)
 
 
 def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:

@@ -9,6 +9,8 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
+from planner.campaign.proposals import places_for
+from planner.design.sensor_places import BetterPlaces
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.report.answer import Answer, plain
@@ -69,13 +71,14 @@ class RepeatedPose:
 
 @dataclass(frozen=True)
 class ProposalsReport(Answer):
-    """Answer of `next`."""
+    """Answer of `next`; `places` is where to put a sensor, or to hit, at the first pose."""
 
     proposals: tuple[ProposedPose, ...]
     joint_names: tuple[str, ...]
     forecast: Forecast
     repeat: RepeatedPose | None
     remarks: tuple[str, ...] = ()
+    places: BetterPlaces | None = None
     joint_units: Any = msgspec.UNSET
 
     @property
@@ -91,6 +94,7 @@ class ProposalsReport(Answer):
         """Each pose, then what one more measurement is worth."""
         parts = [part for one in self.proposals for part in one.parts(self.joints)]
         said = [self.forecast.text, self.repeat.text if self.repeat else ""]
+        said += [self.places.sentence if self.places else ""]
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks)
 
@@ -110,5 +114,6 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         model.forecast,
         RepeatedPose.of(model),
         tuple(campaign.cell.remarks),
+        places_for(model, campaign.state, found[0]),
         campaign.cell.robot.joints.declared,
     )
