@@ -153,7 +153,8 @@ def survey(
         simulated |= any(v.simulated for v in measured.verdicts)
         found.append(measured.modal.modes if measured.modal else ())
         if robot_toml is not None and measured.frf is not None:
-            visited.append(_visited(name, rows, measured))
+            q = table.joints.internal(rows[0].joints_deg)
+            visited.append(_visited(name, q, measured))
     if not any(found):
         raise RefusedError(
             f"{folder}: no pose gives a mode between {band[0]:g} and "
@@ -185,12 +186,12 @@ def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
     return tuple(Source.of(r) for r in rows if r.file)
 
 
-def _visited(pose: str, rows: list[PoseRow], measured: MeasuredPose) -> Visited:
+def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> Visited:
     """A pose whose FRF is known, with what each accepted hit says."""
     sources = tuple(v.source for v in measured.verdicts if v.accepted)
     hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
-    files, q = tuple(source.name for source in sources), np.deg2rad(rows[0].joints_deg)
     assert measured.frf is not None
+    files = tuple(source.name for source in sources)
     return Visited(pose, files, q, hits, measured.frf)
 
 
