@@ -83,7 +83,7 @@ class Campaign(CampaignReads):
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(
-                paths, self.cell.robot.joint_names, self.cell.robot.points, pose, default
+                paths, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in paths if path.is_file())
@@ -187,7 +187,8 @@ class Campaign(CampaignReads):
         if (configured.config, configured.robot) != (logged.config, logged.robot):
             refuse_errors(self.cell.examined)  # before it is believed
             store.keep_robot_files(self.directory, configured.robot)
-            self._append(configured)
+            units = self.cell.robot.joints.declared
+            self._append(msgspec.structs.replace(configured, joint_units=units))
 
     def _held(self, pose: str) -> tuple[Entry, Imported]:
         """The import that is held at a pose; InputError if none is."""
@@ -264,7 +265,7 @@ class Campaign(CampaignReads):
                 *measured.remarks,
                 *told,
                 *taken_after_all(state, kept.fresh),
-                *displacement(state, delivery, stood),
+                *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),
                 *model.remarks,
             ),
@@ -283,9 +284,11 @@ def _first_entry(directory: Path) -> bytes:
     from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)
-    refuse_errors(Cell.load(directory / config.robot, config).examined)
+    cell = Cell.load(directory / config.robot, config)
+    refuse_errors(cell.examined)
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(as_logged(config), hashes, __version__, True, True, True)
+    units = cell.robot.joints.declared
+    event = Configured(as_logged(config), hashes, __version__, True, True, True, units)
     return encode_line("", Entry(1, now, event))[0]

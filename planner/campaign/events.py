@@ -20,6 +20,8 @@ class Configured(Event, frozen=True, tag="configured"):
     with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned; and
     with `hits_err`: whether the simulation is identified from hits at all points that err, as
     hits and measuring chains do, or from the tool's sensor as if they did not.
+    `joint_units` are those of all `joints_deg` that follow, "deg" or "mm" of each joint; unset
+    where all are degrees.
     """
 
     config: dict
@@ -28,6 +30,7 @@ class Configured(Event, frozen=True, tag="configured"):
     geometric_stiffness: bool = False
     visit_scatter: bool = False
     hits_err: bool = False
+    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class Proposal(msgspec.Struct, frozen=True):

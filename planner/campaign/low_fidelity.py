@@ -84,7 +84,7 @@ class Learned:
         told = [e for e in springs if e.log_sd < KNOWN and e.value < MATTERS * e.prior_median]
         told.sort(key=lambda e: e.value / e.prior_median)
         return tuple(
-            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} N·m/rad"
+            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} {e.unit}"
             for e in told
         )
 

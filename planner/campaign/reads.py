@@ -157,7 +157,9 @@ class CampaignReads:
 
         kept = self.recordings
         found = [
-            Recording(measurement.pose, np.deg2rad(measurement.joints_deg), source)
+            Recording(
+                measurement.pose, self.cell.robot.joints.internal(measurement.joints_deg), source
+            )
             for measurement in self.state.used
             for source in kept.sources(measurement)
         ]
@@ -225,14 +227,14 @@ class CampaignReads:
         """All measured modes, one row each: what pandas.DataFrame takes."""
         from planner.campaign.records import measured_records
 
-        return measured_records(self.cell.robot.joint_names, self.state.measurements.values())
+        return measured_records(self.cell.robot.joints, self.state.measurements.values())
 
     def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
         from planner.campaign.records import predicted_records
 
         q = np.atleast_2d(q_rad)
-        return predicted_records(self.cell.robot.joint_names, q, self.predict(q))
+        return predicted_records(self.cell.robot.joints, q, self.predict(q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

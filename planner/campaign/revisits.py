@@ -50,11 +50,11 @@ def suspected(
     if not one_sided or np.any(here.in_sd[near] < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
         return ()
     first = state.used[0]
-    angles = ", ".join(f"{angle:.3f}" for angle in first.joints_deg)
+    stands = model.cell.robot.joints.listed(first.joints_deg, 3)
     return (
         f"All modes at {pose} lie to one side of what is expected, by {100 * np.mean(off):+.2f} % "
         f"on average: the robot may have drifted (warmth, load, clamping). Hit {first.pose}, the "
-        f"first pose, again ({angles}°) and import with --pose {first.pose}: it says whether.",
+        f"first pose, again ({stands}) and import with --pose {first.pose}: it says whether.",
     )
 
 

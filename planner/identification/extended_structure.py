@@ -36,14 +36,17 @@ class Structure:
 
 def extended(simulation: Simulation, priors: Priors) -> Structure:
     """Three rotations at every joint that has any, and two tilts of the floor."""
-    config = simulation.robot.config
+    config, slides = simulation.robot.config, simulation.robot.slides_along
+    # The own springs of joints that slide say nothing of rotations there.
     stated = config.compliance
-    stiffest = max(block.stiffness for block in stated)
+    turning = [block for block in stated if not slides(block)]
+    largest = max(simulation.robot.turning_stiffness())
+    stiffest = max((block.stiffness for block in turning), default=largest)
     joints = dict.fromkeys([*(block.joint for block in stated), FLOOR])
     added: list[Compliance] = []
     bounds = dict(priors.bounds)
     for joint in joints:
-        mine = [block for block in stated if block.joint == joint]
+        mine = [block for block in turning if block.joint == joint]
         scale = max((block.stiffness for block in mine), default=stiffest)
         for axis in np.eye(3)[: 2 if joint == FLOOR else 3]:
             if any(abs(float(np.dot(axis, block.axis))) > ALONG for block in mine):

@@ -16,7 +16,8 @@ from planner.identification.measurement_model import Tolerances, chain_basis, hi
 from planner.identification.parameters import Parametrisation
 from planner.modal.residues import Lines, unit, unit_slope
 
-READBACK_DEG = 0.05  # of each joint: what a robot's encoders and its geometry leave
+# Of each joint: what a robot's encoders and its geometry leave.
+READBACK_DEG, READBACK_M = 0.05, 5e-4
 REACH = 1.5  # highest lines: modes up to there may each be off, those above only together
 # Relative error of a simulated pole, where modal shapes are off by 1: frequencies are fitted far
 # better than shapes (on simulated cells shapes err by 0.1 to 1 %, poles by 0.01 to 0.1 %).
@@ -106,7 +107,8 @@ def simulated_visit(
     chain: np.ndarray,
 ) -> SimulatedVisit:
     """Of a pose q (dof,) in rad, at lines of the s-plane, where the chain errs by `chain` (14,)."""
-    off = np.deg2rad(READBACK_DEG) * np.eye(len(q))
+    slides = simulation.robot.joints.slides
+    off = np.diag(np.where(slides, READBACK_M, np.deg2rad(READBACK_DEG)))
     solved = SolvedPoses.of(simulation, np.concatenate([q[None], q + off]))
     whole = solved.response(0, lines)
     h, moment, turning = whole[:3, :3], whole[:3, 3:], whole[3:, :3]

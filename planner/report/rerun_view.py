@@ -109,7 +109,7 @@ class RerunView:
     def proposal(self, number: int, proposal: Proposal) -> None:
         """The robot at a proposed pose, and what is expected there."""
         self._at(number)
-        q = np.deg2rad(proposal.joints_deg)
+        q = self._cell.robot.joints.internal(proposal.joints_deg)
         self._move(q)
         self._stream.log(
             "cell/proposed",

@@ -22,8 +22,8 @@ def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Fi
     lines = robot_lines(robot, q, links)
     figure = Figure(figsize=(15.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
-    angles = ", ".join(f"{v:.0f}" for v in np.rad2deg(q))
-    title = f"{plain_text(robot.name)} at joint angles ({angles})°"
+    stands = robot.joints.listed(robot.joints.shown(q), 0)
+    title = f"{plain_text(robot.name)} at joint angles ({stands})"
     figure.suptitle(title, fontsize=12)
     grid = figure.add_gridspec(1, 3)
     for column, (name, pair) in enumerate(VIEWS):

@@ -160,7 +160,7 @@ def survey(
             f"{band[1]:g} Hz; see `planner modes` of one pose's files."
         )
     first = {row.pose: row for row in reversed(table.rows)}
-    q = np.deg2rad(np.array([first[name].joints_deg for name in names]))
+    q = table.joints.internal([first[name].joints_deg for name in names])
     misses = _misses(visited, robot_toml, band)
     found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
     tracks, expected = _labelled(found, q, robot_toml)
@@ -178,7 +178,7 @@ def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
     from planner.robot.robot import Robot
 
     robot = Robot.load(robot_toml)
-    return read_recordings(folder, robot.joint_names, robot.points)
+    return read_recordings(folder, robot.joints, robot.points)
 
 
 def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
@@ -204,7 +204,7 @@ def _misses(
     from planner.robot.robot import Robot
 
     robot = Robot.load(robot_toml)
-    tolerances = Tolerances.of(robot.config)
+    tolerances = Tolerances.of(robot.config, robot.joints.slides)
     return told_by(Simulation(robot), visited, tolerances, band)
 
 

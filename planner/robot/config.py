@@ -1,8 +1,23 @@
 """robot.toml: what URDF cannot say."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import msgspec
+
+SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
+STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}
+
+
+def _unstated() -> Any:
+    """Of a stiffness or damping that stands under another name, or is missing."""
+    return msgspec.UNSET
+
+
+def entry_of(kind: str, block: Mapping[str, Any]) -> str:
+    """Under which name a [[compliance]] of robot.toml states its "stiffness" or "damping"."""
+    stated = STATED_OF_SLIDE.get(kind, kind)
+    return stated if stated in block else kind
 
 
 class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -11,19 +26,40 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `joint` may be "base": between floor and robot, about an axis of the world, through the URDF's
     origin. It may be a link: the rotation is half-way to the joint that this carries, and gives
     with what lies beyond (the link's own mass does not). With `slide` it is no rotation but a
-    shift along the axis (N/m, N·s/m). `loss_factor` η makes the stiffness K(1+iη) (structural
+    shift along the axis (N/m, N·s/m): so it is where `stiffness_n_m` and `damping_n_s_m` are given
+    instead of `stiffness` and `damping`, as for the own spring of a joint that slides.
+    `loss_factor` η makes the stiffness K(1+iη) (structural
     damping). Blocks with the same `tie` share their stiffness, damping and loss factor, also when
     those are identified.
     """
 
     joint: str
     axis: tuple[float, float, float]
-    stiffness: float
-    damping: float
+    stiffness: float = msgspec.field(default_factory=_unstated)
+    damping: float = msgspec.field(default_factory=_unstated)
     loss_factor: float = 0.0
     tie: str = ""
     slide: bool = False
     stiffness_sd_percent: float | None = None
+    stiffness_n_m: float | None = None
+    damping_n_s_m: float | None = None
+
+    def __post_init__(self) -> None:
+        """Once read, a shift is a block with `slide`, whose stiffness is in N/m."""
+        if self.stiffness_n_m is not None or self.damping_n_s_m is not None:
+            if any(getattr(self, kind) is not msgspec.UNSET for kind in STATED_OF_SLIDE):
+                raise ValueError(
+                    "give stiffness and damping, or stiffness_n_m and damping_n_s_m, not both"
+                )
+            msgspec.structs.force_setattr(self, "slide", True)
+            for kind, stated in STATED_OF_SLIDE.items():
+                value = getattr(self, stated)
+                msgspec.structs.force_setattr(self, kind, msgspec.UNSET if value is None else value)
+                msgspec.structs.force_setattr(self, stated, None)
+        for kind, stated in STATED_OF_SLIDE.items():
+            if getattr(self, kind) is msgspec.UNSET:
+                missing = stated if self.slide else kind
+                raise ValueError(f"Object missing required field `{missing}`")
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -137,9 +173,19 @@ class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How well the joint angles of a measurement are known: sd of each joint's readback."""
+    """How well the joint angles of a measurement are known: sd of each joint's readback.
+
+    `joint_sd_mm` is that of joints that slide, 0.5 if left out.
+    """
 
     joint_sd_deg: float = 0.05
+    joint_sd_mm: float | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def slide_sd_m(self) -> float:
+        """Of joints that slide, in m."""
+        stated = self.joint_sd_mm
+        return 1e-3 * (SLIDE_SD_MM if isinstance(stated, msgspec.UnsetType) else stated)
 
 
 class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
