@@ -9,14 +9,16 @@ pose; what is common remains: parameters and chain are linearised again where th
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg.lapack import dtrtri
 
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Parametrisation
-from planner.identification.simulated_visit import SimulatedVisit, simulated_visit
+from planner.identification.simulated_visit import SimulatedPoses, SimulatedVisit
 from planner.modal.residues import laplace
 
 # An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
@@ -129,7 +131,7 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
             break
     size = max(SIZES, key=lambda s: best.solved(s).evidence)
     solved = best.solved(size)
-    others = [common.visit(best.simulation, best.chain, visits[i], lines) for i in range(few.start)]
+    others = common.visits(best.simulation, best.chain, visits[: few.start], lines)
     told = [solved.misses(one) for one in (*others, *best.visits)]
     scale = np.repeat([t.angle_rad, t.offset_m], 2)
     found = tuple(_in_units(mean, covariance, scale, size) for mean, covariance in told)
@@ -162,13 +164,24 @@ class _Visit:
     def local(self) -> int:
         return len(self.sized)
 
-    def eliminated(self, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Cholesky factor of the pose's own block, in prior sds; L⁻¹ times the rest; the sds."""
+    def eliminated(self, size: float) -> "_Eliminated":
+        """Of a discrepancy of that size."""
         scale, a = np.where(self.sized, size, 1.0), self.local
         own = scale[:, None] * self.normal[:a, :a] * scale
         factor = np.linalg.cholesky(own + np.eye(a))
+        inverse = dtrtri(factor, lower=True)[0]
         rest = np.concatenate([self.normal[:a, a:], self.right[:a, None]], axis=1)
-        return factor, np.linalg.solve(factor, scale[:, None] * rest), scale
+        volume = float(np.sum(np.log(np.diagonal(factor))))
+        return _Eliminated(inverse, inverse @ (scale[:, None] * rest), volume)
+
+
+@dataclass(frozen=True, eq=False)
+class _Eliminated:
+    """A visit's own block in prior sds, L Lᵀ: L⁻¹, L⁻¹ times the rest, ln|L|."""
+
+    inverse: np.ndarray
+    rest: np.ndarray
+    volume: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,26 +195,30 @@ class _Common:
         self, x: np.ndarray, chain: np.ndarray, visits: Sequence[VisitHits], lines: int
     ) -> "_Point":
         simulation = self.known.simulation(x)
-        made = tuple(self.visit(simulation, chain, visit, lines) for visit in visits)
+        made = self.visits(simulation, chain, visits, lines)
         mean = np.concatenate([np.zeros(AIMED), -chain, self.known.mean - x])
         sd = np.concatenate([np.ones(AIMED + CHAIN), self.known.sd])
         return _Point(x, chain, simulation, made, mean, sd)
 
-    def visit(
-        self, simulation: Simulation, chain: np.ndarray, visit: VisitHits, most: int
-    ) -> _Visit:
-        columns = visit.columns
-        count = len(columns.frequency_hz)
-        kept = np.arange(count)
-        if count > most:
-            kept = np.linspace(0, count - 1, most).round().astype(int)
-        lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
-        made = simulated_visit(
-            simulation, self.known.parametrisation, visit.q, lines, self.t, chain
-        )
-        return _normal_equations(
-            columns.axis, columns.accelerance[:, :, kept], columns.variance[:, :, kept], made
-        )
+    def visits(
+        self, simulation: Simulation, chain: np.ndarray, visits: Sequence[VisitHits], most: int
+    ) -> tuple[_Visit, ...]:
+        if not visits:
+            return ()
+        q = np.array([visit.q for visit in visits])
+        poses = SimulatedPoses.of(simulation, self.known.parametrisation, q)
+        found = []
+        for i, visit in enumerate(visits):
+            columns = visit.columns
+            count = len(columns.frequency_hz)
+            kept = np.arange(count)
+            if count > most:
+                kept = np.linspace(0, count - 1, most).round().astype(int)
+            lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
+            h, variance = columns.accelerance[:, :, kept], columns.variance[:, :, kept]
+            made = poses.visit(i, lines, self.t, chain)
+            found.append(_normal_equations(columns.axis, h, variance, made))
+        return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,12 +240,11 @@ class _Point:
         normal, right = np.diag(1 / self.sd**2), self.mean / self.sd**2
         evidence = -float(np.sum(np.log(self.sd)) + np.sum((self.mean / self.sd) ** 2) / 2)
         for visit in self.visits:
-            factor, rest, _ = visit.eliminated(size)
-            onto, own = rest[:, :-1], rest[:, -1]
+            eliminated = visit.eliminated(size)
+            onto, own = eliminated.rest[:, :-1], eliminated.rest[:, -1]
             normal = normal + visit.normal[visit.local :, visit.local :] - onto.T @ onto
             right = right + visit.right[visit.local :] - onto.T @ own
-            volume = float(np.sum(np.log(np.diagonal(factor))))
-            evidence += float(own @ own) / 2 - volume - visit.chi2 / 2
+            evidence += float(own @ own) / 2 - eliminated.volume - visit.chi2 / 2
         return _Solved(normal, right, evidence, size)
 
 
@@ -263,19 +279,23 @@ class _Solved:
         moved = np.linalg.solve(self.normal + np.diag(damping), self.right)[AIMED:]
         return moved[:CHAIN], moved[CHAIN:]
 
+    @cached_property
+    def _common(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of what is common to all visits."""
+        return np.linalg.solve(self.normal, self.right), np.linalg.inv(self.normal)
+
     def misses(self, visit: _Visit) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4n,) and covariance (4n, 4n) of the hits' whole misses, in prior sds."""
-        common, covariance = np.linalg.solve(self.normal, self.right), np.linalg.inv(self.normal)
-        factor, rest, scale = visit.eliminated(self.size)
-        n = OWN * len(visit.axis)
-        own = np.linalg.solve(factor.T, rest[:, -1] - rest[:, :-1] @ common)
-        inverse = np.linalg.solve(factor, np.eye(len(scale))[:, :n])
-        by_common = -np.linalg.solve(factor.T, rest[:, :-1])[:n]
+        common, covariance = self._common
+        eliminated, n = visit.eliminated(self.size), OWN * len(visit.axis)
+        inverse, onto = eliminated.inverse[:, :n], eliminated.rest[:, :-1]
+        own = inverse.T @ (eliminated.rest[:, -1] - onto @ common)
+        by_common = -inverse.T @ onto
         for hit, axis in enumerate(visit.axis):
             at, aim = OWN * hit + np.arange(OWN), OWN * axis + np.arange(OWN)
             by_common[at, aim] += AIM
             own[at] += AIM * common[aim]
-        return own[:n], inverse.T @ inverse + by_common @ covariance @ by_common.T
+        return own, inverse.T @ inverse + by_common @ covariance @ by_common.T
 
 
 def _normal_equations(
@@ -297,7 +317,8 @@ def _normal_equations(
             continue
         w, columns, own = weight[group], _real(shared[:, :, axis]), _real(made.misses[axis])
         off = _real(h[group] - made.accelerance[:, axis])
-        normal[n:, n:] += (columns * w.sum(axis=0)) @ columns.T
+        half = columns * np.sqrt(w.sum(axis=0))
+        normal[n:, n:] += half @ half.T
         right[n:] += columns @ np.sum(w * off, axis=0)
         chi2 += float(np.sum(w * off**2))
         for k, hit in enumerate(group):
