@@ -14,8 +14,6 @@ from planner.dataset.hit_columns import HitColumns, PoseHits
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.hit_misses import (
-    AIMED,
-    OWN,
     Known,
     Misses,
     VisitHits,
@@ -25,6 +23,7 @@ from planner.identification.hit_misses import (
 from planner.identification.measurement_model import ACROSS, Tolerances
 from planner.identification.parameters import parametrise
 from planner.identification.simulated_visit import SolvedPoses
+from planner.identification.visit_equations import AIMED, OWN
 from planner.modal.modes import Mode
 from planner.modal.residue_change import residue_changes
 from planner.modal.residues import laplace

@@ -12,20 +12,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg.lapack import dtrtri
 
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Parametrisation
-from planner.identification.simulated_visit import SimulatedPoses, SimulatedVisit
+from planner.identification.simulated_visit import SimulatedPoses
+from planner.identification.visit_equations import (
+    AIM,
+    AIMED,
+    OWN,
+    VisitEquations,
+    normal_equations,
+)
 from planner.modal.residues import laplace
 
-# An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
-AIM = 0.5
-# Of an FRF: what no column describes, such as terms of second order. On generated cells (708 hits)
-# intervals of 95 % then cover 97 % of tilts and 95 % of offsets.
-RELATIVE = 0.005
 SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # of the discrepancy, relative to modal shapes
 FEWEST_LINES, LINES = 16, 192  # a pose, and of all poses that tell the common numbers together
 STEPS = 4  # linearisations
@@ -35,7 +36,7 @@ SHORTER = 0.3  # of the stride, after a step that led uphill
 # identified with hits and chain left open, one of 35 to 56 moved no hit by 0.2 of its sd, the
 # next none by 0.03.
 SETTLED = 100.0
-OWN, AIMED, CHAIN = 4, 12, 14  # numbers of a hit, of all aims, of the chain
+CHAIN = 14  # numbers of the measuring chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,43 +149,6 @@ def _in_units(
 
 
 @dataclass(frozen=True, eq=False)
-class _Visit:
-    """Normal equations of a visit: the hits' own numbers, the pose's, then those of all.
-
-    `sized` marks the discrepancy's among the first `local`; χ² is that without any of them.
-    """
-
-    axis: np.ndarray
-    normal: np.ndarray
-    right: np.ndarray
-    chi2: float
-    sized: np.ndarray
-
-    @property
-    def local(self) -> int:
-        return len(self.sized)
-
-    def eliminated(self, size: float) -> "_Eliminated":
-        """Of a discrepancy of that size."""
-        scale, a = np.where(self.sized, size, 1.0), self.local
-        own = scale[:, None] * self.normal[:a, :a] * scale
-        factor = np.linalg.cholesky(own + np.eye(a))
-        inverse = dtrtri(factor, lower=True)[0]
-        rest = np.concatenate([self.normal[:a, a:], self.right[:a, None]], axis=1)
-        volume = float(np.sum(np.log(np.diagonal(factor))))
-        return _Eliminated(inverse, inverse @ (scale[:, None] * rest), volume)
-
-
-@dataclass(frozen=True, eq=False)
-class _Eliminated:
-    """A visit's own block in prior sds, L Lᵀ: L⁻¹, L⁻¹ times the rest, ln|L|."""
-
-    inverse: np.ndarray
-    rest: np.ndarray
-    volume: float
-
-
-@dataclass(frozen=True, eq=False)
 class _Common:
     """What stays the same from linearisation to linearisation."""
 
@@ -202,7 +166,7 @@ class _Common:
 
     def visits(
         self, simulation: Simulation, chain: np.ndarray, visits: Sequence[VisitHits], most: int
-    ) -> tuple[_Visit, ...]:
+    ) -> tuple[VisitEquations, ...]:
         if not visits:
             return ()
         q = np.array([visit.q for visit in visits])
@@ -217,7 +181,7 @@ class _Common:
             lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
             h, variance = columns.accelerance[:, :, kept], columns.variance[:, :, kept]
             made = poses.visit(i, lines, self.t, chain)
-            found.append(_normal_equations(columns.axis, h, variance, made))
+            found.append(normal_equations(columns.axis, h, variance, made))
         return tuple(found)
 
 
@@ -231,7 +195,7 @@ class _Point:
     x: np.ndarray
     chain: np.ndarray
     simulation: Simulation
-    visits: tuple[_Visit, ...]
+    visits: tuple[VisitEquations, ...]
     mean: np.ndarray
     sd: np.ndarray
 
@@ -284,7 +248,7 @@ class _Solved:
         """Mean and covariance of what is common to all visits."""
         return np.linalg.solve(self.normal, self.right), np.linalg.inv(self.normal)
 
-    def misses(self, visit: _Visit) -> tuple[np.ndarray, np.ndarray]:
+    def misses(self, visit: VisitEquations) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4n,) and covariance (4n, 4n) of the hits' whole misses, in prior sds."""
         common, covariance = self._common
         eliminated, n = visit.eliminated(self.size), OWN * len(visit.axis)
@@ -296,42 +260,3 @@ class _Solved:
             by_common[at, aim] += AIM
             own[at] += AIM * common[aim]
         return own, inverse.T @ inverse + by_common @ covariance @ by_common.T
-
-
-def _normal_equations(
-    axes: np.ndarray, h: np.ndarray, variance: np.ndarray, made: SimulatedVisit
-) -> _Visit:
-    """Of hits (n, 3, F); the real and imaginary part of each value has half the variance."""
-    weight = 2 / (variance + (RELATIVE * np.abs(h)) ** 2)
-    weight = np.concatenate([weight, weight], axis=-1).reshape(len(h), -1)
-    aims = np.zeros((AIMED, *made.accelerance.shape), dtype=complex)
-    for axis in range(3):
-        aims[OWN * axis : OWN * axis + OWN, :, axis] = AIM * made.misses[axis]
-    pose = np.concatenate([made.discrepancy, made.readback])
-    shared = np.concatenate([pose, aims, made.chain, made.slope])
-    n, size = OWN * len(h), OWN * len(h) + len(shared)
-    normal, right, chi2 = np.zeros((size, size)), np.zeros(size), 0.0
-    for axis in range(3):
-        group = np.flatnonzero(axes == axis)
-        if not len(group):
-            continue
-        w, columns, own = weight[group], _real(shared[:, :, axis]), _real(made.misses[axis])
-        off = _real(h[group] - made.accelerance[:, axis])
-        half = columns * np.sqrt(w.sum(axis=0))
-        normal[n:, n:] += half @ half.T
-        right[n:] += columns @ np.sum(w * off, axis=0)
-        chi2 += float(np.sum(w * off**2))
-        for k, hit in enumerate(group):
-            at, weighed = slice(OWN * hit, OWN * hit + OWN), own * w[k]
-            normal[at, at] = weighed @ own.T
-            normal[at, n:] = weighed @ columns.T
-            normal[n:, at] = normal[at, n:].T
-            right[at] = weighed @ off[k]
-    sized = np.zeros(n + len(pose), dtype=bool)
-    sized[n : n + len(made.discrepancy)] = True
-    return _Visit(axes, normal, right, chi2, sized)
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    """(k, 3, F) complex as (k, 6F): real parts, then imaginary ones, channel by channel."""
-    return np.concatenate([values.real, values.imag], axis=-1).reshape(len(values), -1)
