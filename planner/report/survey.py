@@ -14,6 +14,7 @@ from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import RefusedError
+from planner.frf.frf import Frf
 from planner.identification.measurement_model import Tolerances
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
@@ -142,7 +143,7 @@ def survey(
     table = _table(folder, robot_toml)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
     found, refused, simulated = [], [], False
-    visited: list[Visited] = []
+    visited: list[tuple[Visited, Frf]] = []
     for number, name in enumerate(names):
         progress(f"pose {name}, {number} of {len(names)} done")
         rows = [row for row in table.rows if row.pose == name]
@@ -186,17 +187,17 @@ def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
     return tuple(Source.of(r) for r in rows if r.file)
 
 
-def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> Visited:
-    """A pose whose FRF is known, with what each accepted hit says."""
+def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited, Frf]:
+    """A pose whose FRF is known, with what each accepted hit says; its FRFs at all points."""
     sources = tuple(v.source for v in measured.verdicts if v.accepted)
     hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
     assert measured.frf is not None
     files = tuple(source.name for source in sources)
-    return Visited(pose, files, q, hits, measured.frf)
+    return Visited(pose, files, q, hits.columns, measured.frf), hits.whole
 
 
 def _misses(
-    visited: list[Visited], robot_toml: Path | None, band: tuple[float, float]
+    visited: list[tuple[Visited, Frf]], robot_toml: Path | None, band: tuple[float, float]
 ) -> CampaignMisses:
     """By the robot's simulation, identified from these recordings; none without a robot."""
     if robot_toml is None or not visited:
@@ -206,7 +207,8 @@ def _misses(
 
     robot = Robot.load(robot_toml)
     tolerances = Tolerances.of(robot.config, robot.joints.slides)
-    return told_by(Simulation(robot), visited, tolerances, band)
+    visits, whole = zip(*visited, strict=True)
+    return told_by(Simulation(robot), visits, whole, tolerances, band)
 
 
 def _labelled(
