@@ -16,10 +16,10 @@ BEST = 0.95  # misfit below which no springs that are added can bring it
 # fits. Of twelve generated campaigns three ended beside the best minimum from the first alone.
 SOFTER = 1.0, 7.0, 0.15
 # Of a suspect misfit, how much makes one look for a mass that swings; of that, how much makes one
-# look at length; and by what a mass must divide the misfit, which it must bring below what is looked
-# at besides: one that is not there has a mode too, which no hit shows, and modes would be
-# miscounted. Of generated campaigns masses that were there divided it by 3 and more, to 2.4 or less;
-# one that took the place of a link that bends to 6.8.
+# look at length; and by what a mass must divide the misfit, which it must bring below what makes
+# one look: one that is not there has a mode too, which no hit shows, so that modes would be
+# miscounted. Of generated campaigns masses that were there divided it by 3 and more, to 2.4 or
+# less; one that took the place of a link that bends left 6.8.
 SWINGS, FAR_OFF, PAYS = 1.25, 5.0, 2.0
 
 

@@ -10,6 +10,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import MeasuredMode
 from planner.campaign.revisits import hit_again, suspected
 from planner.campaign.state import CampaignState, Measurement
+from planner.recording.joints import JointUnits
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support.outside import record, told
@@ -31,6 +32,7 @@ def model(scatter: float, poses: int = 5) -> Any:
         labelled=(None,) * poses, predict=lambda q: expected,
         frequencies=lambda q: (expected.frequency_hz, expected.frequency_sd_hz),
         low=SimpleNamespace(simulation=None, simulate=lambda q, more: None),
+        cell=SimpleNamespace(robot=SimpleNamespace(joints=JointUnits.of(("a", "b")))),
     )  # fmt: skip
 
 
