@@ -32,6 +32,7 @@ KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
 RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
 LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
+FEWEST = 12  # of them a pose
 
 
 def _effort(frfs: Sequence[Frf]) -> Effort:
@@ -41,9 +42,10 @@ def _effort(frfs: Sequence[Frf]) -> Effort:
     lines, log_lines, last = (int(n // of_all) for n in (LINES, LOG_LINES, LAST_LINES))
     return replace(
         QUICK,
-        lines=max(12, min(QUICK.lines, lines)),
-        log_lines=min(QUICK.log_lines, max(12, log_lines)),
+        lines=max(FEWEST, min(QUICK.lines, lines)),
+        log_lines=min(QUICK.log_lines, max(FEWEST, log_lines)),
         last_lines=max(20, min(QUICK.last_lines, last)),
+        searched=LINES // FEWEST,
     )
 
 
