@@ -35,7 +35,7 @@ def build(
     which is asked only where the simulation learns. Without it nothing is told of single hits.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise, misses, learns = None, (), cell.config.fidelity.simulation == "updated"
+    noise, told, learns = None, None, cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
@@ -48,7 +48,6 @@ def build(
         if hits is not None and low.learned is not None:
             visits = visits_of(joints, used, hits, frfs)
             told = tell(visits, low.learned, cell.tolerances, table.band_hz)
-            misses, used = told.poses, tuple(map(told.corrected, used))
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:
         # What lacks physics is bent by fitting it: as it stands it may be a better
@@ -65,9 +64,7 @@ def build(
         taught=best.low.taught,
         visits=cell.visit_scatter,
     )
-    model = Model(
-        cell, best.labelled, best.low, best.seen, surrogate, noise, misses, state.used, frf_of
-    )
+    model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, told, used, frf_of)
     if learns:
         _ = model.frfs  # which are at hand, and kept with the model
     return model
@@ -86,7 +83,7 @@ class _Guided:
     @classmethod
     def by(cls, cell: Cell, used: tuple[Measurement, ...], low: LowFidelity) -> "_Guided":
         labelled = label(cell, used, low)
-        seen = observations(cell, labelled, low)
+        seen = observations(cell, labelled)
         known = low.discrepancy(frequencies(labelled)) if labelled else None
         primary = fit_primary(seen, known, low.left_out, low.belief, cell.visit_scatter)
         return cls(low, used, labelled, seen, primary)

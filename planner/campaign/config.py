@@ -12,7 +12,10 @@ from planner.toml_file import load_toml
 
 
 class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the model has to be good: a joint box, or positions with a tool axis."""
+    """Where the model has to be good: a joint box, or positions with a tool axis.
+
+    In `joints_deg`, here and elsewhere, the numbers of joints that slide are millimetres.
+    """
 
     joints_deg: list[tuple[float, float]] | None = None
     position_m: list[tuple[float, float]] | None = None

@@ -37,7 +37,7 @@ def _frf_model(model: "Model") -> FrfModel:
         measured = stack(model.frfs, seen, grade.lines, grade.model_error)
 
     def modes() -> ModalPrediction:
-        return left_out_modes(model.with_residues, model.seen)
+        return left_out_modes(model.with_residues, model.seen_exactly)
 
     def above(pose: int, frequency_hz: np.ndarray) -> np.ndarray:
         return model.low.above(q[[pose]], frequency_hz)[0]

@@ -20,14 +20,22 @@ ABOVE = 2
 
 @dataclass(frozen=True, eq=False)
 class LabelledPose:
-    """A measured pose with its modes by label (None: not found there) and the simulation's."""
+    """A measured pose with its modes by label (None: not found there).
+
+    `simulated` are the simulation's (1, count), NaN where it has no such mode.
+    """
 
     pose: str
     joints_deg: tuple[float, ...]
     q: np.ndarray
     modes: tuple[Mode | None, ...]
     probability: np.ndarray  # (count,) that the label is right
-    simulated_hz: np.ndarray  # (count,), NaN where the simulation has no such mode
+    simulated: SimulatedModes
+
+    @property
+    def simulated_hz(self) -> np.ndarray:
+        """Natural frequencies (count,) by the simulation."""
+        return self.simulated.frequency_hz[0]
 
 
 def label(
@@ -47,6 +55,7 @@ def label(
     guide = Guide(simulated.frequency_hz, simulated.shape)
     if not np.any(np.isfinite(simulated.frequency_hz)):
         guide = Guide.by_example(modes, count + ABOVE)
+    lowest = simulated.lowest(count)
     tracks = track(modes, guide, cell.features(q), ordered=True)
     return tuple(
         LabelledPose(
@@ -55,7 +64,7 @@ def label(
             q[i],
             tracks.modes[i][:count],
             tracks.probability[i, :count],
-            simulated.frequency_hz[i, :count],
+            lowest[i : i + 1],
         )
         for i, m in enumerate(measurements)
     )
@@ -66,9 +75,7 @@ def frequencies(labelled: tuple[LabelledPose, ...]) -> np.ndarray:
     return np.array([[m.frequency_hz if m else np.nan for m in p.modes] for p in labelled])
 
 
-def observations(
-    cell: Cell, labelled: tuple[LabelledPose, ...], low: LowFidelity | None = None
-) -> ModalObservations:
+def observations(cell: Cell, labelled: tuple[LabelledPose, ...]) -> ModalObservations:
     """The labelled modes as arrays, NaN where a mode was not found or a column not hit."""
     count, n = cell.config.modes.count, len(labelled)
     frequency, frequency_sd = np.full((2, n, count), np.nan)
@@ -83,7 +90,7 @@ def observations(
             damping[i, k], damping_sd[i, k] = mode.damping_ratio, mode.damping_sd
             residue[i, k], residue_sd[i, k] = mode.residue, mode.residue_sd
     q = np.array([p.q for p in labelled]).reshape(n, len(cell.robot.joint_names))
-    simulated = (low or cell.frozen).simulate(q) if n else _none(count)
+    simulated = SimulatedModes.joined([p.simulated for p in labelled]) if n else _none(count)
     x = cell.features(q) if n else np.zeros((0, len(cell.workspace.feature_names)))
     return ModalObservations(
         x, frequency, frequency_sd, damping, damping_sd, residue, residue_sd, simulated

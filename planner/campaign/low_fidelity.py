@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.campaign.missing_physics import with_springs, with_swinging_mass
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.errors import InputError
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK, Effort
-from planner.identification.extended_structure import FLOOR, Structure, added_softer, extended
+from planner.identification.extended_structure import FLOOR, Structure
 from planner.identification.frequency_uncertainty import frequency_sd
 from planner.identification.identify import identify
 from planner.identification.measured_frfs import layout_of
@@ -27,16 +27,12 @@ OF_EXACT_HITS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
 # springs that robot.toml does not state do not mend that, what it says of a pose is tested by
 # identifying it without that pose; into so many parts at most.
 SUSPECT, EXACT_SUSPECT, FOLDS = 2.0, 3.0, 2
-BEST = 0.95  # misfit below which no springs that are added can bring it
-# By how much softer than expected springs that are added begin, one after the other while nothing
-# fits; of a suspect misfit, how much makes one look for a mass that swings; and of that, how much
-# makes one look at length.
-SOFTER, SWINGS, FAR_OFF = (1.0, 7.0), 2.0, 5.0
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
 RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
 LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
+FEWEST = 12  # of them a pose
 
 
 def _effort(frfs: Sequence[Frf]) -> Effort:
@@ -46,9 +42,10 @@ def _effort(frfs: Sequence[Frf]) -> Effort:
     lines, log_lines, last = (int(n // of_all) for n in (LINES, LOG_LINES, LAST_LINES))
     return replace(
         QUICK,
-        lines=max(12, min(QUICK.lines, lines)),
-        log_lines=min(QUICK.log_lines, max(12, log_lines)),
+        lines=max(FEWEST, min(QUICK.lines, lines)),
+        log_lines=min(QUICK.log_lines, max(FEWEST, log_lines)),
         last_lines=max(20, min(QUICK.last_lines, last)),
+        searched=LINES // FEWEST,
     )
 
 
@@ -234,11 +231,9 @@ def learn(
     nominal = before.nominal
     if nominal is None or not frfs:
         return before
-    lesson = _Lesson(tuple(frfs), q, band_hz, before.tolerances)
+    lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
     stated = lesson.identified(Structure(nominal, before.priors))
-    learned = _wider(stated, lesson)
-    if learned.identified.misfit > SWINGS * learned.suspect and lesson.tolerances is not None:
-        learned = _swinging(stated, learned, lesson)
+    learned = with_swinging_mass(stated, with_springs(stated, lesson), lesson)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)
@@ -246,7 +241,7 @@ def learn(
 
 
 @dataclass(frozen=True, eq=False)
-class _Lesson:
+class Lesson:
     """FRFs at q (n, dof) in rad, by which a simulation is identified, and how they err."""
 
     frfs: tuple[Frf, ...]
@@ -292,53 +287,7 @@ class _Lesson:
         )
 
 
-def _wider(stated: Learned, lesson: _Lesson) -> Learned:
-    """With springs that robot.toml does not state, where the recordings speak for them.
-
-    That is where χ² falls by more than ln n for each of their parameters (Schwarz 1978).
-    """
-    structure = extended(stated.structure.simulation, stated.structure.priors)
-    structure = replace(structure, swinging=stated.structure.swinging)
-    first = stated.identified
-    penalty = 2 * structure.added * np.log(first.values)
-    if first.values * (first.misfit - BEST) < penalty:
-        return stated
-    found = [stated]
-    for softer in SOFTER if lesson.tolerances is not None else SOFTER[:1]:
-        warm = first if stated.fits else None
-        try:
-            found.append(lesson.identified(structure, warm, added_softer(structure, softer)))
-        except InputError:  # a search that ended where the robot would not stand
-            continue
-        if found[-1].fits:
-            break
-    wider = min(found, key=lambda one: one.identified.misfit)
-    gain = first.values * (first.misfit - wider.identified.misfit)
-    return wider if gain > penalty else stated
-
-
-def _swinging(stated: Learned, learned: Learned, lesson: _Lesson) -> Learned:
-    """With a mass that swings on a link, beside what is stated and what else may be missing."""
-    from planner.campaign.swinging_mass import with_swinging_mass  # of the diagnosis: half a second
-
-    found, enough = [learned], SWINGS * learned.suspect
-    springs = stated if stated.identified.misfit < 2 * learned.identified.misfit else learned
-    ways = [(stated, False), (learned, False)] if learned is not stated else [(stated, False)]
-    for beside, everywhere in (*ways, (springs, True)):
-        best = min(one.identified.misfit for one in found)
-        if best <= (FAR_OFF if everywhere else 1.0) * enough:
-            break
-        structure, starts = with_swinging_mass(
-            beside.structure, beside.identified, lesson.frfs, lesson.q, lesson.band_hz, everywhere
-        )
-        try:
-            found.append(_wider(lesson.identified(structure, starts=starts), lesson))
-        except InputError:
-            continue
-    return min(found, key=lambda one: one.identified.misfit)
-
-
-def _left_out(warm: Learned, lesson: _Lesson, count: int) -> np.ndarray:
+def _left_out(warm: Learned, lesson: Lesson, count: int) -> np.ndarray:
     out = np.full((len(lesson.frfs), count), np.nan)
     folds = min(len(lesson.frfs), FOLDS)
     for fold in range(folds):

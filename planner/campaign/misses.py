@@ -3,19 +3,17 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import msgspec
 import numpy as np
 
 from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
-from planner.campaign.log_conversion import from_mode, to_mode
+from planner.campaign.labels import LabelledPose
+from planner.campaign.log_conversion import to_mode
 from planner.campaign.low_fidelity import Learned, LowFidelity, learn
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns, PoseHits
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.hit_misses import (
-    AIMED,
-    OWN,
     Known,
     Misses,
     VisitHits,
@@ -24,7 +22,8 @@ from planner.identification.hit_misses import (
 )
 from planner.identification.measurement_model import ACROSS, Tolerances
 from planner.identification.parameters import parametrise
-from planner.identification.simulated_visit import SolvedPoses, misses_at
+from planner.identification.simulated_visit import SolvedPoses
+from planner.identification.visit_equations import AIMED, OWN
 from planner.modal.modes import Mode
 from planner.modal.residue_change import residue_changes
 from planner.modal.residues import laplace
@@ -52,13 +51,8 @@ class Visited:
     pose: str
     files: tuple[str, ...]
     q: np.ndarray
-    hits: PoseHits
+    columns: HitColumns
     frf: Frf
-
-    @property
-    def columns(self) -> HitColumns:
-        """What each hit says by itself."""
-        return self.hits.columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +81,12 @@ class CampaignMisses:
         both = zip(self.visited, self.told.visits, strict=True)
         return tuple(_pose(visited, told) for visited, told in both)
 
-    def corrected(self, measurement: Measurement) -> Measurement:
-        """With residues as `without_misses` gives them."""
-        modes = self.without_misses(measurement.pose, [to_mode(m) for m in measurement.modes])
-        kept = [
-            msgspec.structs.replace(old, residue=from_mode(new).residue)
-            for old, new in zip(measurement.modes, modes, strict=True)
-        ]
-        return replace(measurement, modes=tuple(kept))
+    def corrected(self, labelled: LabelledPose, measured: Measurement) -> LabelledPose:
+        """A measured pose's labelled modes with residues as `without_misses` gives them."""
+        modes = [to_mode(mode) for mode in measured.modes]
+        exact = {mode.frequency_hz: mode for mode in self.without_misses(measured.pose, modes)}
+        found = (None if mode is None else exact[mode.frequency_hz] for mode in labelled.modes)
+        return replace(labelled, modes=tuple(found))
 
     def without_misses(self, pose: str, modes: Sequence[Mode]) -> list[Mode]:
         """Modes with residues as hits without a miss would give them.
@@ -114,10 +106,11 @@ class CampaignMisses:
         assert self.told is not None
         frf, simulation = visited.frf, self.told.simulation
         lines = laplace(frf.frequency_hz, frf.exponential_rate_1_s, frf.tail_s)
-        basis = misses_at(simulation, visited.q, lines, UNIT)
+        solved = SolvedPoses.of(simulation, visited.q[None])
+        basis = solved.misses(0, lines, UNIT)
         changes = _changes(visited.columns, told, basis, frf.frequency_hz)
         poles = np.array([mode.pole for mode in modes])
-        outside = _outside(SolvedPoses.of(simulation, visited.q[None]).poles[0], self.band_hz)
+        outside = _outside(solved.poles[0], self.band_hz)
         moved = residue_changes(frf, poles, outside, self.band_hz, changes)
         # Of the real and of the imaginary part each.
         spread = np.sqrt(np.sum(np.abs(moved[1:]) ** 2, axis=0) / 2)
@@ -145,12 +138,15 @@ def tell(
 
 
 def told_by(
-    nominal: Simulation, visited: Sequence[Visited], t: Tolerances, band_hz: tuple[float, float]
+    nominal: Simulation,
+    visited: Sequence[Visited],
+    whole: Sequence[Frf],
+    t: Tolerances,
+    band_hz: tuple[float, float],
 ) -> CampaignMisses:
-    """As `tell`, by a simulation that is identified from the same FRFs first."""
+    """As `tell`, by a simulation that is identified from the FRFs of all points first."""
     q = np.array([one.q for one in visited])
-    before, whole = LowFidelity(1, nominal, t), [one.hits.whole for one in visited]
-    learned = learn(before, whole, q, band_hz).learned
+    learned = learn(LowFidelity(1, nominal, t), whole, q, band_hz).learned
     return tell(visited, learned, t, band_hz)
 
 
@@ -162,7 +158,13 @@ def visits_of(
 ) -> tuple[Visited, ...]:
     """Measurements as visits, with their hits and the tool's FRFs."""
     return tuple(
-        Visited(m.pose, tuple(hit.file for hit in m.accepted), joints.internal(m.joints_deg), h, f)
+        Visited(
+            m.pose,
+            tuple(hit.file for hit in m.accepted),
+            joints.internal(m.joints_deg),
+            h.columns,
+            f,
+        )
         for m, h, f in zip(used, hits, frfs, strict=True)
     )
 

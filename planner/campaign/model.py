@@ -11,8 +11,9 @@ from planner.campaign.acquisition_inputs import open_parameters, outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_habits import PoseMisses
-from planner.campaign.labels import LabelledPose
+from planner.campaign.labels import LabelledPose, observations
 from planner.campaign.low_fidelity import LowFidelity
+from planner.campaign.misses import CampaignMisses
 from planner.campaign.state import Measurement
 from planner.design.frequency_posterior import FrequencyOutputs, Poses
 from planner.design.mixed import mixed
@@ -49,7 +50,7 @@ class Model:
     seen: ModalObservations
     surrogate: Surrogate  # of frequencies and damping
     frf_noise: FrfNoise | None = None  # None: no FRF was looked at
-    misses: tuple[PoseMisses, ...] = ()  # of the hits of each pose, where a simulation tells them
+    told: CampaignMisses | None = None  # None: nothing tells how hits missed
     used: tuple[Measurement, ...] = ()  # of the labelled poses, as they were measured
     frf_of: FrfOf | None = None
 
@@ -82,9 +83,23 @@ class Model:
         return tuple(self.frf_of(m, table).within(table.band_hz) for m in self.used)
 
     @cached_property
+    def misses(self) -> tuple[PoseMisses, ...]:
+        """Of the hits of each pose, where a simulation tells them."""
+        return self.told.poses if self.told else ()
+
+    @cached_property
+    def seen_exactly(self) -> ModalObservations:
+        """`seen` with residues as hits without a miss would give them, which FRFs alone need."""
+        if self.told is None:
+            return self.seen
+        both = zip(self.labelled, self.used, strict=True)
+        exact = tuple(self.told.corrected(pose, measured) for pose, measured in both)
+        return observations(self.cell, exact)
+
+    @cached_property
     def with_residues(self) -> Surrogate:
         """The surrogate of residues too, which FRFs alone need: fitted when asked for."""
-        return self.surrogate.with_residues(self.seen, self.low.taught)
+        return self.surrogate.with_residues(self.seen_exactly, self.low.taught)
 
     @cached_property
     def workspace_prediction(self) -> ModalPrediction:

@@ -25,7 +25,7 @@ from planner.robot.config import Resonator
 LOG_STEPS, FEW = 10, 2
 
 
-def with_swinging_mass(
+def swinging(
     structure: Structure,
     identified: Identification,
     frfs: Sequence[Frf],

@@ -11,6 +11,7 @@ from planner.robot.workspace import Candidates, Workspace, WorkspaceRanges
 
 SPREAD = 8  # poses of the workspace that are looked at
 RADIANS = 6.3  # ranges of joints in degrees that stay below are most likely radians
+FIXED_BY_A_PLACE = 6  # coordinates of a place and a direction
 METRES = 20.0  # ranges of slides in mm that stay below are most likely metres
 NARROW_DEG = 15.0  # unless other joints move by this much
 
@@ -52,7 +53,10 @@ def look_around(
     robot: Robot, table: WorkspaceRanges, file: str
 ) -> tuple[Candidates | None, list[CheckRemark]]:
     """A few poses of the workspace, and what looks wrong in it."""
-    where, found = f"{file}, [workspace]", _units(robot, table, file)
+    where, found = (
+        f"{file}, [workspace]",
+        _units(robot, table, file) + _redundant(robot, table, file),
+    )
     try:
         candidates = Workspace.from_table(table, robot).candidates(robot, SPREAD, 0)
     except NoPoseLeftError as error:
@@ -65,6 +69,19 @@ def look_around(
         text = f"Of {kept + lost} poses looked at the robot can reach {kept} (most often: {most})."
         found.append(CheckRemark("warning", text, where, "Narrow the workspace."))
     return candidates, found
+
+
+def _redundant(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]:
+    """Places of the tool do not say how a robot stands that has more joints than they fix."""
+    count = len(robot.tool_joints)
+    if table.position_m is None or count <= FIXED_BY_A_PLACE:
+        return []
+    text = (
+        f"{count} joints move the tool, and a place of it fixes {FIXED_BY_A_PLACE}: the robot can "
+        f"stand there in many ways, which vibrate differently, but the model knows places only."
+    )
+    remedy = "Give joints_deg, or say in robot.toml's [held] where rails and turntables stay."
+    return [CheckRemark("warning", text, f"{file}, [workspace] position_m", remedy)]
 
 
 def _units(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]:

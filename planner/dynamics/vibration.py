@@ -6,6 +6,7 @@ gravity is stronger than the springs (ω² < 0) a mode does not oscillate either
 damping K is complex; FRFs then hold for positive frequencies, as they are measured.
 """
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -47,6 +48,19 @@ class SimulatedModes:
     def __getitem__(self, poses: np.ndarray | slice) -> "SimulatedModes":
         return SimulatedModes(
             self.frequency_hz[poses], self.damping_ratio[poses], self.residue[poses]
+        )
+
+    @classmethod
+    def joined(cls, parts: "Sequence[SimulatedModes]") -> "SimulatedModes":
+        """Of the poses of all parts, in their order."""
+        both = ("frequency_hz", "damping_ratio", "residue")
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in both))
+
+    def lowest(self, count: int) -> "SimulatedModes":
+        """The `count` lowest of them."""
+        kept = slice(count)
+        return SimulatedModes(
+            self.frequency_hz[:, kept], self.damping_ratio[:, kept], self.residue[:, kept]
         )
 
     @property

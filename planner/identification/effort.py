@@ -27,6 +27,7 @@ class Effort:
     steps: int = 80
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
     openings: int = 4  # rounds at most, in which what hits leave open follows the fit
+    searched: int | None = None  # poses at most, spread over all, by which a start is searched
 
 
 THOROUGH = Effort()

@@ -57,9 +57,11 @@ def log_frequency_slope(
         out[..., number] = some.sum(axis=-1).real
     if parametrisation.nuisances:
         jacobians = simulation.elastic.body_jacobians(q)
-        moved = np.einsum("nbie,nke->nkbi", jacobians, x, optimize=True)
-        change = np.einsum("nkbi,bpij,nkbj->nkbp", moved, parametrisation.basis, moved,
-                           optimize=True)  # fmt: skip
+        bodies, numbers = parametrisation.basis.shape[:2]
+        moved = np.moveaxis(jacobians @ np.swapaxes(x, 1, 2)[:, None], 3, 2)  # (n, b, k, 6)
+        squares = (moved[..., :, None] * moved[..., None, :]).reshape(*moved.shape[:3], -1)
+        basis = parametrisation.basis.reshape(bodies, numbers, -1)
+        change = np.moveaxis(squares @ np.swapaxes(basis, 1, 2), 1, 2)  # (n, k, b, p)
         inertial = (scale * pole**2)[..., None, None] * change
         out[..., own:] = inertial.real.reshape(*hertz.shape, -1)
     return np.where(known[..., None], out, 0.0)

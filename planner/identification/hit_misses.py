@@ -9,6 +9,7 @@ pose; what is common remains: parameters and chain are linearised again where th
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -17,14 +18,16 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Parametrisation
-from planner.identification.simulated_visit import SimulatedVisit, simulated_visit
+from planner.identification.simulated_visit import SimulatedPoses
+from planner.identification.visit_equations import (
+    AIM,
+    AIMED,
+    OWN,
+    VisitEquations,
+    normal_equations,
+)
 from planner.modal.residues import laplace
 
-# An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
-AIM = 0.5
-# Of an FRF: what no column describes, such as terms of second order. On generated cells (708 hits)
-# intervals of 95 % then cover 97 % of tilts and 95 % of offsets.
-RELATIVE = 0.005
 SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # of the discrepancy, relative to modal shapes
 FEWEST_LINES, LINES = 16, 192  # a pose, and of all poses that tell the common numbers together
 STEPS = 4  # linearisations
@@ -34,7 +37,7 @@ SHORTER = 0.3  # of the stride, after a step that led uphill
 # identified with hits and chain left open, one of 35 to 56 moved no hit by 0.2 of its sd, the
 # next none by 0.03.
 SETTLED = 100.0
-OWN, AIMED, CHAIN = 4, 12, 14  # numbers of a hit, of all aims, of the chain
+CHAIN = 14  # numbers of the measuring chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +133,7 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
             break
     size = max(SIZES, key=lambda s: best.solved(s).evidence)
     solved = best.solved(size)
-    others = [common.visit(best.simulation, best.chain, visits[i], lines) for i in range(few.start)]
+    others = common.visits(best.simulation, best.chain, visits[: few.start], lines)
     told = [solved.misses(one) for one in (*others, *best.visits)]
     scale = np.repeat([t.angle_rad, t.offset_m], 2)
     found = tuple(_in_units(mean, covariance, scale, size) for mean, covariance in told)
@@ -147,32 +150,6 @@ def _in_units(
 
 
 @dataclass(frozen=True, eq=False)
-class _Visit:
-    """Normal equations of a visit: the hits' own numbers, the pose's, then those of all.
-
-    `sized` marks the discrepancy's among the first `local`; χ² is that without any of them.
-    """
-
-    axis: np.ndarray
-    normal: np.ndarray
-    right: np.ndarray
-    chi2: float
-    sized: np.ndarray
-
-    @property
-    def local(self) -> int:
-        return len(self.sized)
-
-    def eliminated(self, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Cholesky factor of the pose's own block, in prior sds; L⁻¹ times the rest; the sds."""
-        scale, a = np.where(self.sized, size, 1.0), self.local
-        own = scale[:, None] * self.normal[:a, :a] * scale
-        factor = np.linalg.cholesky(own + np.eye(a))
-        rest = np.concatenate([self.normal[:a, a:], self.right[:a, None]], axis=1)
-        return factor, np.linalg.solve(factor, scale[:, None] * rest), scale
-
-
-@dataclass(frozen=True, eq=False)
 class _Common:
     """What stays the same from linearisation to linearisation."""
 
@@ -183,26 +160,30 @@ class _Common:
         self, x: np.ndarray, chain: np.ndarray, visits: Sequence[VisitHits], lines: int
     ) -> "_Point":
         simulation = self.known.simulation(x)
-        made = tuple(self.visit(simulation, chain, visit, lines) for visit in visits)
+        made = self.visits(simulation, chain, visits, lines)
         mean = np.concatenate([np.zeros(AIMED), -chain, self.known.mean - x])
         sd = np.concatenate([np.ones(AIMED + CHAIN), self.known.sd])
         return _Point(x, chain, simulation, made, mean, sd)
 
-    def visit(
-        self, simulation: Simulation, chain: np.ndarray, visit: VisitHits, most: int
-    ) -> _Visit:
-        columns = visit.columns
-        count = len(columns.frequency_hz)
-        kept = np.arange(count)
-        if count > most:
-            kept = np.linspace(0, count - 1, most).round().astype(int)
-        lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
-        made = simulated_visit(
-            simulation, self.known.parametrisation, visit.q, lines, self.t, chain
-        )
-        return _normal_equations(
-            columns.axis, columns.accelerance[:, :, kept], columns.variance[:, :, kept], made
-        )
+    def visits(
+        self, simulation: Simulation, chain: np.ndarray, visits: Sequence[VisitHits], most: int
+    ) -> tuple[VisitEquations, ...]:
+        if not visits:
+            return ()
+        q = np.array([visit.q for visit in visits])
+        poses = SimulatedPoses.of(simulation, self.known.parametrisation, q)
+        found = []
+        for i, visit in enumerate(visits):
+            columns = visit.columns
+            count = len(columns.frequency_hz)
+            kept = np.arange(count)
+            if count > most:
+                kept = np.linspace(0, count - 1, most).round().astype(int)
+            lines = laplace(columns.frequency_hz[kept], columns.rate_1_s, columns.tail_s)
+            h, variance = columns.accelerance[:, :, kept], columns.variance[:, :, kept]
+            made = poses.visit(i, lines, self.t, chain)
+            found.append(normal_equations(columns.axis, h, variance, made))
+        return tuple(found)
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +196,7 @@ class _Point:
     x: np.ndarray
     chain: np.ndarray
     simulation: Simulation
-    visits: tuple[_Visit, ...]
+    visits: tuple[VisitEquations, ...]
     mean: np.ndarray
     sd: np.ndarray
 
@@ -224,12 +205,11 @@ class _Point:
         normal, right = np.diag(1 / self.sd**2), self.mean / self.sd**2
         evidence = -float(np.sum(np.log(self.sd)) + np.sum((self.mean / self.sd) ** 2) / 2)
         for visit in self.visits:
-            factor, rest, _ = visit.eliminated(size)
-            onto, own = rest[:, :-1], rest[:, -1]
+            eliminated = visit.eliminated(size)
+            onto, own = eliminated.rest[:, :-1], eliminated.rest[:, -1]
             normal = normal + visit.normal[visit.local :, visit.local :] - onto.T @ onto
             right = right + visit.right[visit.local :] - onto.T @ own
-            volume = float(np.sum(np.log(np.diagonal(factor))))
-            evidence += float(own @ own) / 2 - volume - visit.chi2 / 2
+            evidence += float(own @ own) / 2 - eliminated.volume - visit.chi2 / 2
         return _Solved(normal, right, evidence, size)
 
 
@@ -264,54 +244,20 @@ class _Solved:
         moved = np.linalg.solve(self.normal + np.diag(damping), self.right)[AIMED:]
         return moved[:CHAIN], moved[CHAIN:]
 
-    def misses(self, visit: _Visit) -> tuple[np.ndarray, np.ndarray]:
+    @cached_property
+    def _common(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and covariance of what is common to all visits."""
+        return np.linalg.solve(self.normal, self.right), np.linalg.inv(self.normal)
+
+    def misses(self, visit: VisitEquations) -> tuple[np.ndarray, np.ndarray]:
         """Mean (4n,) and covariance (4n, 4n) of the hits' whole misses, in prior sds."""
-        common, covariance = np.linalg.solve(self.normal, self.right), np.linalg.inv(self.normal)
-        factor, rest, scale = visit.eliminated(self.size)
-        n = OWN * len(visit.axis)
-        own = np.linalg.solve(factor.T, rest[:, -1] - rest[:, :-1] @ common)
-        inverse = np.linalg.solve(factor, np.eye(len(scale))[:, :n])
-        by_common = -np.linalg.solve(factor.T, rest[:, :-1])[:n]
+        common, covariance = self._common
+        eliminated, n = visit.eliminated(self.size), OWN * len(visit.axis)
+        inverse, onto = eliminated.inverse[:, :n], eliminated.rest[:, :-1]
+        own = inverse.T @ (eliminated.rest[:, -1] - onto @ common)
+        by_common = -inverse.T @ onto
         for hit, axis in enumerate(visit.axis):
             at, aim = OWN * hit + np.arange(OWN), OWN * axis + np.arange(OWN)
             by_common[at, aim] += AIM
             own[at] += AIM * common[aim]
-        return own[:n], inverse.T @ inverse + by_common @ covariance @ by_common.T
-
-
-def _normal_equations(
-    axes: np.ndarray, h: np.ndarray, variance: np.ndarray, made: SimulatedVisit
-) -> _Visit:
-    """Of hits (n, 3, F); the real and imaginary part of each value has half the variance."""
-    weight = 2 / (variance + (RELATIVE * np.abs(h)) ** 2)
-    weight = np.concatenate([weight, weight], axis=-1).reshape(len(h), -1)
-    aims = np.zeros((AIMED, *made.accelerance.shape), dtype=complex)
-    for axis in range(3):
-        aims[OWN * axis : OWN * axis + OWN, :, axis] = AIM * made.misses[axis]
-    pose = np.concatenate([made.discrepancy, made.readback])
-    shared = np.concatenate([pose, aims, made.chain, made.slope])
-    n, size = OWN * len(h), OWN * len(h) + len(shared)
-    normal, right, chi2 = np.zeros((size, size)), np.zeros(size), 0.0
-    for axis in range(3):
-        group = np.flatnonzero(axes == axis)
-        if not len(group):
-            continue
-        w, columns, own = weight[group], _real(shared[:, :, axis]), _real(made.misses[axis])
-        off = _real(h[group] - made.accelerance[:, axis])
-        normal[n:, n:] += (columns * w.sum(axis=0)) @ columns.T
-        right[n:] += columns @ np.sum(w * off, axis=0)
-        chi2 += float(np.sum(w * off**2))
-        for k, hit in enumerate(group):
-            at, weighed = slice(OWN * hit, OWN * hit + OWN), own * w[k]
-            normal[at, at] = weighed @ own.T
-            normal[at, n:] = weighed @ columns.T
-            normal[n:, at] = normal[at, n:].T
-            right[at] = weighed @ off[k]
-    sized = np.zeros(n + len(pose), dtype=bool)
-    sized[n : n + len(made.discrepancy)] = True
-    return _Visit(axes, normal, right, chi2, sized)
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    """(k, 3, F) complex as (k, 6F): real parts, then imaginary ones, channel by channel."""
-    return np.concatenate([values.real, values.imag], axis=-1).reshape(len(values), -1)
+        return own, inverse.T @ inverse + by_common @ covariance @ by_common.T

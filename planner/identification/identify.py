@@ -10,7 +10,6 @@ from scipy.linalg import block_diag
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.agreement import fit_similarity
 from planner.identification.effort import THOROUGH, Effort
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measured_frfs import common_band, matrices_at
@@ -77,14 +76,14 @@ def identify(
     best = None if warm is None else _warm(problem, warm)
     misfits: tuple[float, ...] = ()
     if best is None:
-        x, misfits = _search(problem, _starting_points(p, starts, seed))
+        x, misfits = _search(problem.to_search(), _starting_points(p, starts, seed))
         best = _refine(*problem.carried(x))
         if not np.isfinite(best.misfit):  # it can't be with the weight that these springs carry
             best = _refine(problem, x)
     if not np.isfinite(best.misfit):
         raise InputError(TOO_SOFT)
     seconds = time.perf_counter() - started
-    return _result(problem, simulation, q, best, misfits, seconds)
+    return _result(problem, simulation, best, misfits, seconds)
 
 
 def _check(frfs: Sequence[Frf], q: np.ndarray, simulation: Simulation) -> None:
@@ -204,7 +203,6 @@ def _warm(problem: StagedProblem, warm: Identification) -> _Refined | None:
 def _result(
     problem: StagedProblem,
     simulation: Simulation,
-    q: np.ndarray,
     best: _Refined,
     starts: tuple[float, ...],
     seconds: float,
@@ -226,7 +224,6 @@ def _result(
         misfit,
         round(end.at.chi2 / misfit),
         best.by_pose,
-        fit_similarity(fitted, problem.frfs, q, problem.band_hz, problem.effort.last_lines),
         undetermined(p, covariance),
         starts,
         end.converged,

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.agreement import Similarity
 from planner.identification.parameters import Parametrisation
 
 # The data have told something of a direction once its sd is half of what it was before.
@@ -73,7 +72,6 @@ class Identification:
     misfit: float
     values: int  # real values that were fitted
     misfit_by_pose: np.ndarray  # (n,)
-    fit: Similarity
     undetermined: tuple[Direction, ...]
     starts: tuple[float, ...]
     converged: bool

@@ -15,6 +15,7 @@ from planner.dynamics.vibration import solve_poles
 from planner.identification.measurement_model import Tolerances, chain_basis, hit_basis
 from planner.identification.parameters import Parametrisation
 from planner.modal.residues import Lines, unit, unit_slope
+from planner.robot.elastic_model import Matrices
 
 # Of each joint: what a robot's encoders and its geometry leave.
 READBACK_DEG, READBACK_M = 0.05, 5e-4
@@ -43,20 +44,26 @@ class SimulatedVisit:
 
 @dataclass(frozen=True, eq=False)
 class SolvedPoses:
-    """Poles (n, 2e) of n poses, residues (n, 2e, 6, 6): forces, moments to motion, turning."""
+    """Poles (n, 2e) of n poses, residues (n, 2e, 6, 6): forces, moments to motion, turning.
 
+    `matrices` are those of the poses.
+    """
+
+    simulation: Simulation
+    matrices: Matrices
     poles: np.ndarray
     residues: np.ndarray
 
     @classmethod
-    def of(cls, simulation: Simulation, q: np.ndarray) -> "SolvedPoses":
-        """At q (n, dof) in rad."""
-        m = simulation.elastic.matrices(q)
+    def of(cls, simulation: Simulation, q: np.ndarray, sloped: bool = False) -> "SolvedPoses":
+        """At q (n, dof) in rad; `sloped`: for visits, whose readbacks may err."""
+        elastic = simulation.elastic
+        m = elastic.with_slopes(q) if sloped else elastic.matrices(q)
         stiffness = simulation.stiffness + m.geometric
         hit = np.concatenate([m.hit, m.hit_turn], axis=1)
         sensor = np.concatenate([m.sensor, m.sensor_turn], axis=1)
         solved = solve_poles(m.mass, simulation.damping, stiffness, hit, sensor)
-        return cls(solved.poles, solved.residues)
+        return cls(simulation, m, solved.poles, solved.residues)
 
     def response(self, pose: int, lines: Lines) -> np.ndarray:
         """(6, 6, F) at one of the poses, as records that end would show it."""
@@ -64,11 +71,58 @@ class SolvedPoses:
         flat = self.residues[pose].reshape(len(columns), -1)
         return (flat.T @ columns).reshape(6, 6, -1)
 
+    def misses(self, pose: int, lines: Lines, t: Tolerances) -> np.ndarray:
+        """(3, 4, 3, F): `SimulatedVisit.misses` alone, of an exact chain."""
+        h = self.response(pose, lines)
+        return hit_basis(h[None, :3, :3], h[None, :3, 3:], t)[0]
 
-def misses_at(simulation: Simulation, q: np.ndarray, lines: Lines, t: Tolerances) -> np.ndarray:
-    """(3, 4, 3, F): `SimulatedVisit.misses` alone, at q (dof,)."""
-    h = SolvedPoses.of(simulation, q[None]).response(0, lines)
-    return hit_basis(h[None, :3, :3], h[None, :3, 3:], t)[0]
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPoses:
+    """All that `visit` needs of n poses."""
+
+    solved: SolvedPoses
+    parametrisation: Parametrisation
+    inertias: Inertias | None
+
+    @classmethod
+    def of(cls, simulation: Simulation, p: Parametrisation, q: np.ndarray) -> "SimulatedPoses":
+        """At q (n, dof) in rad."""
+        bodies = simulation.elastic.body_jacobians(q) if p.nuisances else None
+        inertias = None if bodies is None else p.inertias(bodies)
+        return cls(SolvedPoses.of(simulation, q, sloped=True), p, inertias)
+
+    def visit(self, pose: int, lines: Lines, t: Tolerances, chain: np.ndarray) -> SimulatedVisit:
+        """At lines of the s-plane, where the chain errs by `chain` (14,)."""
+        whole = self.solved.response(pose, lines)
+        h, moment, turning = whole[:3, :3], whole[:3, 3:], whole[3:, :3]
+        poles, residues = self.solved.poles[pose], self.solved.residues[pose, :, :3, :3]
+        slope, by_angle = self._slopes(pose, lines.x)
+        slides = self.solved.simulation.robot.joints.slides
+        off = np.where(slides, READBACK_M, np.deg2rad(READBACK_DEG))
+        exact = SimulatedVisit(
+            h,
+            hit_basis(h[None], moment[None], t)[0],
+            chain_basis(h[None], turning[None], lines.x[None], t)[0],
+            off[:, None, None, None] * by_angle,
+            _discrepancy(poles, residues, lines, h),
+            slope,
+        )
+        return _heard(exact, chain, lines.x, t)
+
+    def _slopes(self, pose: int, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """By the parameters (P + R, 3, 3, F), and by the joint angles (dof, 3, 3, F)."""
+        one, p, bodies = slice(pose, pose + 1), self.parametrisation, self.inertias
+        if bodies is not None:
+            bodies = Inertias(bodies.jacobians[one], bodies.basis)
+        springs = self.solved.simulation.elasticity
+        _, full, turned = response_parts(
+            self.solved.matrices.at(one), springs, s[None], None, bodies
+        )
+        springs_first = full[0].reshape(full.shape[1], -1)
+        by_spring = (p.spread.T @ springs_first[: len(p.held)]).reshape(-1, *full.shape[2:])
+        assert turned.by_angle is not None
+        return np.concatenate([by_spring, full[0, len(p.held) :]]), turned.by_angle[0]
 
 
 def _heard(made: SimulatedVisit, chain: np.ndarray, s: np.ndarray, t: Tolerances) -> SimulatedVisit:
@@ -78,7 +132,8 @@ def _heard(made: SimulatedVisit, chain: np.ndarray, s: np.ndarray, t: Tolerances
     force, late = 1 + t.force_gain * chain[12], np.exp(-t.delay_s * chain[13] * s)
 
     def seen(columns: np.ndarray) -> np.ndarray:
-        return force * late * np.einsum("ik,...kjf->...ijf", matrix, columns)
+        flat = matrix @ columns.reshape(*columns.shape[:-2], -1)
+        return force * late * flat.reshape(columns.shape)
 
     place = made.chain[9:12]
     moved = made.accelerance + np.einsum("k,kijf->ijf", chain[9:12], place)
@@ -96,43 +151,6 @@ def _heard(made: SimulatedVisit, chain: np.ndarray, s: np.ndarray, t: Tolerances
     return SimulatedVisit(
         h, misses, columns, seen(made.readback), seen(made.discrepancy), seen(made.slope)
     )
-
-
-def simulated_visit(
-    simulation: Simulation,
-    parametrisation: Parametrisation,
-    q: np.ndarray,
-    lines: Lines,
-    t: Tolerances,
-    chain: np.ndarray,
-) -> SimulatedVisit:
-    """Of a pose q (dof,) in rad, at lines of the s-plane, where the chain errs by `chain` (14,)."""
-    slides = simulation.robot.joints.slides
-    off = np.diag(np.where(slides, READBACK_M, np.deg2rad(READBACK_DEG)))
-    solved = SolvedPoses.of(simulation, np.concatenate([q[None], q + off]))
-    whole = solved.response(0, lines)
-    h, moment, turning = whole[:3, :3], whole[:3, 3:], whole[3:, :3]
-    moved = [solved.response(1 + k, lines)[:3, :3] - h for k in range(len(q))]
-    exact = SimulatedVisit(
-        h,
-        hit_basis(h[None], moment[None], t)[0],
-        chain_basis(h[None], turning[None], lines.x[None], t)[0],
-        np.array(moved),
-        _discrepancy(solved.poles[0], solved.residues[0, :, :3, :3], lines, h),
-        _slope(simulation, parametrisation, q, lines.x),
-    )
-    return _heard(exact, chain, lines.x, t)
-
-
-def _slope(simulation: Simulation, p: Parametrisation, q: np.ndarray, s: np.ndarray) -> np.ndarray:
-    elastic = simulation.elastic
-    inertias: Inertias | None = None
-    if p.nuisances:
-        inertias = p.inertias(elastic.body_jacobians(q[None]))
-    matrices, springs = elastic.matrices(q[None]), simulation.elasticity
-    full = response_parts(matrices, springs, s[None], None, inertias)[1][0]
-    by_spring = np.einsum("n...,np->p...", full[: len(p.held)], p.spread)
-    return np.concatenate([by_spring, full[len(p.held) :]])
 
 
 def _discrepancy(poles: np.ndarray, residue: np.ndarray, lines: Lines, h: np.ndarray) -> np.ndarray:

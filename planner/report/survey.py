@@ -14,6 +14,7 @@ from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import RefusedError
+from planner.frf.frf import Frf
 from planner.identification.measurement_model import Tolerances
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
@@ -142,7 +143,7 @@ def survey(
     table = _table(folder, robot_toml)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
     found, refused, simulated = [], [], False
-    visited: list[Visited] = []
+    visited: list[tuple[Visited, Frf]] = []
     for number, name in enumerate(names):
         progress(f"pose {name}, {number} of {len(names)} done")
         rows = [row for row in table.rows if row.pose == name]
@@ -153,7 +154,8 @@ def survey(
         simulated |= any(v.simulated for v in measured.verdicts)
         found.append(measured.modal.modes if measured.modal else ())
         if robot_toml is not None and measured.frf is not None:
-            visited.append(_visited(name, rows, measured))
+            q = table.joints.internal(rows[0].joints_deg)
+            visited.append(_visited(name, q, measured))
     if not any(found):
         raise RefusedError(
             f"{folder}: no pose gives a mode between {band[0]:g} and "
@@ -185,17 +187,17 @@ def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
     return tuple(Source.of(r) for r in rows if r.file)
 
 
-def _visited(pose: str, rows: list[PoseRow], measured: MeasuredPose) -> Visited:
-    """A pose whose FRF is known, with what each accepted hit says."""
+def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited, Frf]:
+    """A pose whose FRF is known, with what each accepted hit says; its FRFs at all points."""
     sources = tuple(v.source for v in measured.verdicts if v.accepted)
     hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
-    files, q = tuple(source.name for source in sources), np.deg2rad(rows[0].joints_deg)
     assert measured.frf is not None
-    return Visited(pose, files, q, hits, measured.frf)
+    files = tuple(source.name for source in sources)
+    return Visited(pose, files, q, hits.columns, measured.frf), hits.whole
 
 
 def _misses(
-    visited: list[Visited], robot_toml: Path | None, band: tuple[float, float]
+    visited: list[tuple[Visited, Frf]], robot_toml: Path | None, band: tuple[float, float]
 ) -> CampaignMisses:
     """By the robot's simulation, identified from these recordings; none without a robot."""
     if robot_toml is None or not visited:
@@ -205,7 +207,8 @@ def _misses(
 
     robot = Robot.load(robot_toml)
     tolerances = Tolerances.of(robot.config, robot.joints.slides)
-    return told_by(Simulation(robot), visited, tolerances, band)
+    visits, whole = zip(*visited, strict=True)
+    return told_by(Simulation(robot), visits, whole, tolerances, band)
 
 
 def _labelled(

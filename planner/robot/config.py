@@ -198,7 +198,8 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the robot's controller counts its axes: its angle is sign · the URDF's + offset.
 
     `joints` are the URDF's in the controller's order (none: the URDF's own), `signs` and
-    `offsets_deg` go with it. `external` names those that are no axes of the arm (E1, E2, …).
+    `offsets_deg` go with it; of a joint that slides places and offset are in mm. `external` names
+    those that are no axes of the arm (E1, E2, …), as rails and turntables.
     Programs drive at `speed_percent` of the controller's full speed.
     """
 
@@ -215,8 +216,9 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
     `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
     m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
-    `held` says where joints stay that do not move in the tests, as rails and turntables:
-    NAME_m = 1.2 for a sliding one, NAME_deg = 30 for a turning one.
+    `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for
+    a rail, NAME_deg = 30 for a turntable. Others may slide or turn from pose to pose; wherever
+    joints are listed (`joints_deg`), the number of one that slides (prismatic) is in millimetres.
 
     Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
     gravity's own stiffness, of the size of weight times height, is added.

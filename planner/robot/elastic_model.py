@@ -150,22 +150,24 @@ class ElasticModel:
         ids += [[robot.frame_id("sensor frame", name) for name in sensors] or own[1]]
         # One for each call, so that threads do not meet in it.
         data, weight = self._model.createData(), self._weighed.createData()
-        mass, geometric = np.empty((n, e, e)), np.zeros((n, e, e))
+        whole = np.empty((n, self._model.nv, self._model.nv))
+        geometric, own_axis = np.zeros((n, e, e)), np.arange(e)
         out = [np.empty((n, len(group), 6, e)) for group in ids]
         for i, row in enumerate(q):
             full = self._standing(row, weight)
             if robot.config.geometric_stiffness:
                 geometric[i] = self._gravity_stiffness(full, weight)
-            geometric[i] += np.diag(self._with_angle(row))
-            crba = pin.crba(self._model, data, full)
-            upper = np.triu(crba)
-            mass[i] = (upper + np.triu(crba, 1).T)[self._grid]
+            geometric[i, own_axis, own_axis] += self._with_angle(row)
+            whole[i] = pin.crba(self._model, data, full)
             for group, jacobians in zip(ids, out, strict=True):
                 for k, number in enumerate(group):
                     frame = self._virtual.frames[number]
                     jacobians[i, k] = pin.computeFrameJacobian(
                         self._model, data, full, frame, pin.LOCAL
                     )[:, self._elastic]
+        # Of the mass matrix the upper half is given.
+        whole = np.triu(whole) + np.swapaxes(np.triu(whole, 1), 1, 2)
+        mass = whole[:, *self._grid]
         hit, sensor = (jacobians[:, :, :3].reshape(n, -1, e) for jacobians in out)
         hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)

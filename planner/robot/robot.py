@@ -237,13 +237,18 @@ class Robot:
     @cached_property
     def reach_m(self) -> float:
         """No pose brings the tcp farther from the shoulder than this (arm pulled straight)."""
-        travel, joint = 0.0, self.model.frames[self.tcp_id].parentJoint
+        farthest = np.maximum(np.abs(self.lower_rad), np.abs(self.upper_rad))
+        slides = [k for k in self.tool_joints if self.joints.slides[k]]
+        return self.arm_m + float(np.sum(farthest[slides]))
+
+    @cached_property
+    def tool_joints(self) -> tuple[int, ...]:
+        """Places in q of the joints that move the tcp."""
+        found, joint = [], self.model.frames[self.tcp_id].parentJoint
         while joint != 0:
-            if self.joints.slides[joint - 1]:
-                ends = self.lower_rad[joint - 1], self.upper_rad[joint - 1]
-                travel += float(np.max(np.abs(ends)))
+            found.append(joint - 1)
             joint = self.model.parents[joint]
-        return self.arm_m + travel
+        return tuple(sorted(found))
 
     @cached_property
     def arm_m(self) -> float:

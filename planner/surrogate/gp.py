@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dtrtri
 from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
+from planner.inference import triangular
 from planner.surrogate.data_covariance import data_covariance
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
@@ -23,6 +23,7 @@ from planner.surrogate.predictive import Predictive
 from planner.surrogate.training_data import Padded, thinned
 
 JITTERS = (1e-13, 1e-10, 1e-8, 1e-6)  # relative to the prior variance
+SURELY = 100.0  # times n² ε: noise, relative to the variance, that keeps a covariance regular
 SILENT_JITTER = 1e-10  # of the prior variance; a larger one is reported
 # Points up to which all of them are looked at for every sample of θ. Of more, θ is sampled in
 # stages: as ever by the first number of them, then by more points with half the samples each time,
@@ -116,22 +117,39 @@ class Posterior:
 
     def _whitening(self, j: int, jitter: float) -> np.ndarray:
         """Inverse Cholesky factors (k, c, c); LinAlgError where a covariance is singular."""
-        kept, c = len(self.theta[j]), len(self.x)
-        own = self.low[j], self.mask[j], self.variance[j], self.prior.bias_sd[j]
-        found = np.empty((kept, c, c))
-        few = max(1, BLOCK_ELEMENTS // c**2)
+        kept, rows = len(self.theta[j]), np.flatnonzero(self.mask[j])
+        # What does not count is decoupled: padding at the end is left as it is.
+        found = np.tile(np.eye(len(self.x)), (kept, 1, 1))
+        if not len(rows):
+            return found
+        held = slice(rows[-1] + 1)
+        own = self.low[j, held], self.mask[j, held], self.variance[j, held], self.prior.bias_sd[j]
+        few = max(1, BLOCK_ELEMENTS // held.stop**2)
         for block in (slice(i, i + few) for i in range(0, kept, few)):
             slope_sd = self.slope_sd[j, block, None, None]
             theta = self.theta[j, block]
-            k = data_covariance(np, self.kernel, self.x, *own, slope_sd, jitter, theta)
-            found[block] = [dtrtri(f, lower=True)[0] for f in np.linalg.cholesky(k)]
+            k = data_covariance(np, self.kernel, self.x[held], *own, slope_sd, jitter, theta)
+            found[block, held, held] = [triangular.inverse(f) for f in np.linalg.cholesky(k)]
         return found
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """What went wrong."""
-        jitter = max(self.solved(j).jitter for j in range(len(self.mask)))
+        jitter = max(self._jitter(j) for j in range(len(self.mask)))
         return (SINGULAR_REMARK.format(jitter),) if jitter > SILENT_JITTER else ()
+
+    def _jitter(self, j: int) -> float:
+        """With which the covariances of output j are regular."""
+        known = self.known(j)
+        if j in self._found or self.mask[j].sum() == 0:
+            return self.solved(j).jitter
+        noise = np.exp(2 * self.theta[j, :, 1, None]) + self.variance[j, known]
+        whole = noise + self._own(j, self.x[known], self.low[j, known])
+        # So much more than rounding makes of n points, and a factor has to exist (Demmel 1989).
+        enough = SURELY * noise.shape[1] ** 2 * np.finfo(float).eps
+        if np.all(noise.min(axis=1) > enough * whole.max(axis=1)):
+            return self.jitter
+        return self.solved(j).jitter
 
     def predict(
         self,
@@ -207,7 +225,7 @@ class Posterior:
         """
         known = self.known(j)
         cross = self._prior(j, self.x[known], self.low[j][known], x, low)
-        return cross, self.whitening(j) @ cross
+        return cross, triangular.times(self.whitening(j), cross)
 
     def known(self, j: int) -> slice | np.ndarray:
         """Which of the training points hold a value of output j."""

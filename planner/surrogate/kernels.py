@@ -113,14 +113,14 @@ class Kernel:
 
     def covariance(self, xp: Any, theta: Any, xa: Any, xb: Any) -> Any:
         """(…, a, b) of xa (a, d), xb (b, d) at θ (…, p)."""
-        total = 0.0
+        products = []
         for place, term in zip(self.amplitudes, self.terms, strict=True):
             product = xp.exp(2 * theta[..., place, None, None])
             for f in term:
                 a, b = f.points(xp, theta, xa), f.points(xp, theta, xb)
                 product = product * KERNELS[f.name](xp, a, b)
-            total = total + product
-        return total
+            products.append(product)
+        return products[0] if len(products) == 1 else sum(products)
 
     def variance(self, xp: Any, theta: Any, x: Any) -> Any:
         """Diagonal (…, a) of the covariance of x (a, d)."""

@@ -87,8 +87,9 @@ class Surrogate:
         return np.where(self.primary.uses_low, self.primary.weight, 1 - self.primary.weight)
 
     def with_residues(self, seen: ModalObservations, taught: bool = False) -> "Surrogate":
-        """The same with the residues fitted too, to what `fit_surrogate` was given."""
-        return replace(self, residue=_fit_residues(seen, self.scale, taught))
+        """The same with the residues fitted too, which may be exacter than those it has `seen`."""
+        scale = _scale(seen)
+        return replace(self, residue=_fit_residues(seen, scale, taught), scale=scale)
 
     def frequency_inputs(self, simulated: SimulatedModes) -> np.ndarray:
         """Centred low fidelity (q, k) of the frequency outputs."""

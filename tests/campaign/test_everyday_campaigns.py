@@ -49,9 +49,9 @@ def test_everyday_campaigns_know_frequencies_after_five_poses(tmp_path: Path, ca
 
 
 def line(one: Played) -> str:
-    """A campaign pose by pose: RMSE in %, coverage, and the peer's."""
+    """A campaign pose by pose: RMSE in %, coverage (of a visit), and the peer's."""
     scores = "  ".join(
-        f"{a.rmse:.2f} {a.covered:.2f} ({b.rmse:.1f} {b.covered:.2f})"
+        f"{a.rmse:.2f} {a.covered:.2f} {a.visit:.2f} ({b.rmse:.1f} {b.covered:.2f})"
         for a, b in zip(one.own, one.peer, strict=True)
     )
     what = f"{one.seed} {one.robot}, {one.kind} {one.size:.3f}, {one.modes} modes"
@@ -60,7 +60,9 @@ def line(one: Played) -> str:
 
 def table(played: Sequence[Played]) -> str:
     """By robot and kind, after each pose: median RMSE, share to 1 %, coverage, peer, worse."""
-    lines = ["after 1 to 5 poses: median RMSE %, (peer's), share <= 1 %, covered (peer's)"]
+    lines = [
+        "after 1 to 5 poses: median RMSE % (peer's), share <= 1 %, covered, of visits (peer's)"
+    ]
     groups = [("all", played)]
     groups += [(name, [p for p in played if p.robot == name]) for name in ROBOTS]
     groups += [(kind, [p for p in played if p.kind == kind]) for kind in KINDS]
@@ -79,4 +81,5 @@ def _at(some: Sequence[Played], n: int) -> str:
     median, other = (np.median([s.rmse for s in scores]) for scores in (own, peer))
     within = np.mean([s.rmse <= PERCENT for s in own])
     covered, theirs = (np.mean([s.covered for s in scores]) for scores in (own, peer))
-    return f"{median:.2f} ({other:.1f}) {within:.2f} {covered:.3f} ({theirs:.2f})"
+    visit = np.mean([s.visit for s in own])
+    return f"{median:.2f} ({other:.1f}) {within:.2f} {covered:.3f} {visit:.3f} ({theirs:.2f})"

@@ -9,7 +9,7 @@ from planner.frf.frf import Frf
 from planner.identification.hit_misses import CHAIN, Known, VisitHits, tell_misses
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Priors, parametrise
-from planner.identification.simulated_visit import simulated_visit
+from planner.identification.simulated_visit import SimulatedPoses
 from planner.modal.residue_change import residue_changes
 from planner.modal.residues import Residues, laplace, synthesize
 from planner.robot.robot import Robot
@@ -28,8 +28,8 @@ def known(tmp_path_factory):
 
 
 def made(known, x, chain):
-    q = KR10.poses(1, 5)[0]
-    return simulated_visit(known.simulation(x), known.parametrisation, q, LINES, T, chain)
+    poses = SimulatedPoses.of(known.simulation(x), known.parametrisation, KR10.poses(1, 5))
+    return poses.visit(0, LINES, T, chain)
 
 
 def test_columns_of_chain_and_parameters_are_slopes(known):
@@ -52,8 +52,10 @@ def visits(known, rng, count=3, repeats=2):
     """Hits that miss at `count` poses, with a chain within its tolerance, and the misses."""
     chain, out, true = 0.5 * rng.standard_normal(CHAIN), [], []
     axis = np.repeat([0, 1, 2], repeats)
-    for q in KR10.poses(count, 6):
-        at = simulated_visit(known.simulation(known.x), known.parametrisation, q, LINES, T, chain)
+    q = KR10.poses(count, 6)
+    poses = SimulatedPoses.of(known.simulation(known.x), known.parametrisation, q)
+    for i in range(count):
+        at = poses.visit(i, LINES, T, chain)
         eta = rng.standard_normal((len(axis), 4))
         h = np.array([at.accelerance[:, a] for a in axis])
         h = h + np.einsum("nk,nkif->nif", eta, at.misses[axis])
@@ -64,7 +66,7 @@ def visits(known, rng, count=3, repeats=2):
             np.arange(len(axis)), axis, np.ones(len(axis)), np.linspace(6.0, 60.0, 30), h,
             np.full(h.shape, sd**2), np.full((len(axis), 30), 1 / repeats), 2.0, np.inf,
         )  # fmt: skip
-        out.append(VisitHits(q, columns))
+        out.append(VisitHits(q[i], columns))
         true.append(eta)
     return out, np.array(true)
 

@@ -76,7 +76,6 @@ def test_springs_of_the_other_engine_are_found(found, truth, simulation):
     silent = measured_frfs(truth, other, LINES, 1e-9)
     assert fit_similarity(found.simulation, silent, other).frac > 0.999
     assert fit_similarity(simulation, silent, other).frac < 0.7
-    assert found.fit.frac > 0.99
 
 
 def test_sds_grow_with_the_noise(truth, simulation, found):

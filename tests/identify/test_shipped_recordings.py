@@ -73,8 +73,9 @@ def test_hits_to_springs(tmp_path, recorded):
     for name, (start, priors) in cases.items():
         result = identify(frfs, q, start, priors)
         errors[name], misfits[name] = error(result.simulation), result.misfit
+        fitted = fit_similarity(result.simulation, frfs, q)
         print(
-            f"{name}: {100 * errors[name]:.3f} %, FRAC {result.fit.frac:.4f}, misfit "
+            f"{name}: {100 * errors[name]:.3f} %, FRAC {fitted.frac:.4f}, misfit "
             f"{result.misfit:.2f}, {result.seconds:.1f} s, {len(result.starts)} starts"
         )
     whole = "springs, inertias, elastic base"

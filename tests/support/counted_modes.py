@@ -10,16 +10,32 @@ VISIBLE = 0.1  # of all else in the nine FRFs, at a mode's own frequency: less i
 NOT_COUNTED = 2  # modes that nobody sees, at most, below the highest that is counted
 
 
-def true_modes(truth: Truth, q: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest natural frequencies (most,) in Hz, and which can be seen in the FRFs."""
+def true_modes(
+    truth: Truth, q: np.ndarray, most: int, hose: bool = True
+) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest natural frequencies (most,) in Hz, and which can be seen in the FRFs.
+
+    Unless the robot's `hose` was seen when modes were counted, nobody looks for its mode elsewhere.
+    """
     poles, residues, _ = truth.poles(q)
     order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][:most]
     seen = []
     for k in order:
         parts = residues / (1j * np.abs(poles[k]) - poles)[:, None, None]
         rest = np.linalg.norm(parts.sum(axis=0) - parts[k])
-        seen.append(np.linalg.norm(parts[k]) >= VISIBLE * rest)
+        seen.append(bool(np.linalg.norm(parts[k]) >= VISIBLE * rest))
+    if not hose:
+        seen[own_of_hose(truth, q, most)] = False
     return np.abs(poles[order]) / (2 * np.pi), np.array(seen)
+
+
+def own_of_hose(truth: Truth, q: np.ndarray, most: int) -> int:
+    """Which of the lowest modes is mostly the motion of what hangs on the robot."""
+    poles, shapes, *_ = truth.modal(q)
+    order = [k for k in np.argsort(np.abs(poles)) if poles[k].imag > 1e-6][:most]
+    mass, shapes = truth.matrices(q)[0], shapes[:, order]
+    whole = np.einsum("ek,ef,fk->k", shapes.conj(), mass, shapes).real
+    return int(np.argmax(np.abs(truth.own("resonator 0") @ shapes) ** 2 / whole))
 
 
 def counted(true_hz: np.ndarray, seen: np.ndarray, predicted_hz: np.ndarray) -> np.ndarray:

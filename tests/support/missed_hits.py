@@ -54,15 +54,15 @@ class MissedCell:
         """(m,): of each labelled mode's residues to those that exact hits would give this chain."""
         out = []
         seen = replace(self.truth, sensor_offset_m=self.chain.offset_m)
-        for pose in model.labelled:
+        for pose, residues in zip(model.labelled, model.seen_exactly.residue, strict=True):
             frequency, _, residue = seen.modes(self.q[pose.pose], 8)
             residue = self.chain.matrix @ residue / self.chain.force_gain
-            for mode in pose.modes:
+            for mode, found in zip(pose.modes, residues, strict=True):
                 if mode is None:
                     continue
                 k = int(np.argmin(np.abs(frequency - mode.frequency_hz)))
                 if abs(frequency[k] / mode.frequency_hz - 1) < SAME:
-                    off = np.linalg.norm(mode.residue - residue[k])
+                    off = np.linalg.norm(found - residue[k])
                     out.append(off / np.linalg.norm(residue[k]))
         return np.array(out)
 
