@@ -61,11 +61,16 @@ TARGET = MATERIAL + SEGMENT.format(0.10, 0.063) + CONTACT + SEGMENT.format(0.08,
 
 STATED = Tolerances()
 AS_STATED = Handling(
-    angle_deg=float(np.rad2deg(STATED.angle_rad)), offset_m=STATED.offset_m,
-    readback_deg=float(np.rad2deg(STATED.joint_rad)), gain=STATED.gain, cross_axis=STATED.cross_axis,
-    mounting_deg=float(np.rad2deg(STATED.mounting_rad)), position_m=STATED.position_m,
-    force_gain=STATED.force_gain, delay_s=STATED.delay_s,
-)  # fmt: skip
+    angle_deg=float(np.rad2deg(STATED.angle_rad)),
+    offset_m=STATED.offset_m,
+    readback_deg=float(np.rad2deg(STATED.joint_rad)),
+    gain=STATED.gain,
+    cross_axis=STATED.cross_axis,
+    mounting_deg=float(np.rad2deg(STATED.mounting_rad)),
+    position_m=STATED.position_m,
+    force_gain=STATED.force_gain,
+    delay_s=STATED.delay_s,
+)
 
 
 def concealed(folder: Path, seed: int) -> tuple[Path, Deviation]:
