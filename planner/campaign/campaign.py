@@ -187,8 +187,7 @@ class Campaign(CampaignReads):
         if (configured.config, configured.robot) != (logged.config, logged.robot):
             refuse_errors(self.cell.examined)  # before it is believed
             store.keep_robot_files(self.directory, configured.robot)
-            units = self.cell.robot.joints.declared
-            self._append(msgspec.structs.replace(configured, joint_units=units))
+            self._append(configured)
 
     def _held(self, pose: str) -> tuple[Entry, Imported]:
         """The import that is held at a pose; InputError if none is."""
@@ -216,6 +215,7 @@ class Campaign(CampaignReads):
         )
         from planner.campaign.log_conversion import from_homogeneity, from_modal
         from planner.campaign.question import question
+        from planner.campaign.revisits import suspected
 
         before, state, pose = self.model, self.state, delivery.pose
         known = state.measurements.get(pose)
@@ -234,6 +234,8 @@ class Campaign(CampaignReads):
         if old:  # among earlier hits, wrong ones would not stand out
             alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
+        asked = question(before, state, pose, joints_deg, new_modes)
+        drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
         event = Imported(
             pose=pose,
             joints_deg=joints_deg,
@@ -241,9 +243,10 @@ class Campaign(CampaignReads):
             modes=modes,
             remarks=measured.remarks,
             amplitude=from_homogeneity(measured.homogeneity),
-            question=question(before, state, pose, joints_deg, new_modes),
+            question=asked,
+            again=drift.again if drift else "",
         )
-        told = alerts(before, state, event, measured, new_modes)
+        told = alerts(before, state, event, measured, new_modes, drift)
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]
         # Beside new hits earlier ones may look wrong; they stay accepted all the same.

@@ -131,7 +131,8 @@ class Question(msgspec.Struct, frozen=True):
 class Imported(Event, frozen=True, tag="imported"):
     """Hits at one pose were imported; `modes` are those of all its accepted hits so far.
 
-    With a `question` they are held: not used until a Confirmed follows.
+    With a `question` they are held: not used until a Confirmed follows. `again` names the measured
+    pose that is to be hit again, where these hits hint at drift.
     """
 
     pose: str
@@ -141,6 +142,7 @@ class Imported(Event, frozen=True, tag="imported"):
     remarks: tuple[str, ...] = ()
     amplitude: Amplitude | None = None  # null: all hits of one strength
     question: Question | None = None
+    again: str = ""
 
 
 class Confirmed(Event, frozen=True, tag="confirmed"):

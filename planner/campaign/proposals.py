@@ -28,7 +28,26 @@ AVOIDED = 0.1
 def propose(
     model: Model, state: CampaignState, count: int, acquisition: str
 ) -> tuple[Proposal, ...]:
-    """The next poses to measure; NoPoseLeftError when no candidate is left."""
+    """The next poses to measure; NoPoseLeftError when no candidate is left.
+
+    Where drift is suspected the first of them is a measured pose that tells whether there is any.
+    """
+    if state.doubt is None:
+        return _new_poses(model, state, count, acquisition)
+    again = _repeat(model, state, *state.doubt)
+    return (again, *(_new_poses(model, state, count - 1, acquisition) if count > 1 else ()))
+
+
+def _repeat(model: Model, state: CampaignState, again: str, hint: str) -> Proposal:
+    robot, joints_deg = model.cell.robot, state.measurements[again].joints_deg
+    position_m = robot.forward_batch(robot.joints.internal([joints_deg]))[1][0]
+    reason = f"repeat: {hint} hints at drift, and {again} hit again tells whether the robot changed"
+    return Proposal(again, joints_deg, _xyz(position_m), None, reason)
+
+
+def _new_poses(
+    model: Model, state: CampaignState, count: int, acquisition: str
+) -> tuple[Proposal, ...]:
     cell = model.cell
     candidates = cell.candidates
     picks = _picks(model, state, count, acquisition)
