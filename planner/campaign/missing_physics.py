@@ -22,9 +22,7 @@ SAME = 0.01  # relative difference of the misfits of two starts that met: no mor
 # miscounted. Of generated campaigns masses that were there divided it by 3 and more, to 2.4 or
 # less; one that took the place of a link that bends left 6.8.
 SWINGS, FAR_OFF, PAYS = 1.25, 5.0, 2.0
-HELPS = (
-    0.8  # share of the misfit that a mass must leave less than, for springs beside it to be tried
-)
+HELPS = 0.8  # share of the misfit: where a mass leaves less, springs are tried beside it
 
 
 def with_springs(stated: "Learned", lesson: "Lesson") -> "Learned":
@@ -46,7 +44,8 @@ def with_springs(stated: "Learned", lesson: "Lesson") -> "Learned":
         except InputError:  # a search that ended where the robot would not stand
             continue
         last = [one.identified.misfit for one in found[-2:]]
-        if found[-1].fits or len(found) > 2 and abs(np.log(last[1] / last[0])) < SAME:
+        met = len(found) > 2 and abs(np.log(last[1] / last[0])) < SAME
+        if met or found[-1].fits:
             break
     wider = min(found, key=lambda one: one.identified.misfit)
     gain = first.values * (first.misfit - wider.identified.misfit)
@@ -64,9 +63,8 @@ def with_swinging_mass(stated: "Learned", learned: "Learned", lesson: "Lesson") 
     from planner.campaign.swinging_mass import swinging  # of the diagnosis: half a second
 
     found, enough = [learned], SWINGS * learned.suspect
-    springs = stated if stated.identified.misfit < 2 * learned.identified.misfit else learned
-    ways = [(stated, False), (learned, False)] if learned is not stated else [(stated, False)]
-    for beside, everywhere in (*ways, (springs, True)):
+    beside = stated if stated.identified.misfit < PAYS * learned.identified.misfit else learned
+    for everywhere in (False, True):
         best = min(one.identified.misfit for one in found)
         if best <= (FAR_OFF if everywhere else 1.0) * enough:
             break
