@@ -187,8 +187,7 @@ class Campaign(CampaignReads):
         if (configured.config, configured.robot) != (logged.config, logged.robot):
             refuse_errors(self.cell.examined)  # before it is believed
             store.keep_robot_files(self.directory, configured.robot)
-            units = self.cell.robot.joints.declared
-            self._append(msgspec.structs.replace(configured, joint_units=units))
+            self._append(configured)
 
     def _held(self, pose: str) -> tuple[Entry, Imported]:
         """The import that is held at a pose; InputError if none is."""

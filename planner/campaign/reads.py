@@ -79,13 +79,19 @@ class CampaignReads:
         key = _text(configured)
         if key not in self._cells:
             config = config_from_builtins(configured.config)
-            self._cells[key] = Cell.load(
+            loaded = Cell.load(
                 self.directory / config.robot,
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
                 visit_scatter=configured.visit_scatter,
                 hits_err=configured.hits_err,
             )
+            if loaded.robot.joints.declared != configured.joint_units:
+                raise InputError(
+                    f"{loaded.robot.urdf_path}: other joints slide than when the campaign began, "
+                    f"so that places in its log would be read wrongly; start a new campaign."
+                )
+            self._cells[key] = loaded
         return self._cells[key]
 
     @property
@@ -193,7 +199,7 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err
+        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err, begun.joint_units
         return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------

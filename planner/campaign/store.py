@@ -43,7 +43,7 @@ def recording_path(folder: Path, digest: str, suffix: str) -> Path:
     """Where the recording with this content hash is kept; InputError where that is no hash."""
     if not _is_hash(digest) or "/" in suffix or "\\" in suffix:
         raise InputError(f"{folder / LOG} names a recording {digest + suffix!r}, which is no hash.")
-    return folder / RECORDINGS / f"{digest}{suffix}"
+    return folder.joinpath(RECORDINGS, f"{digest}{suffix}")
 
 
 def read_bytes(path: Path) -> bytes:

@@ -25,7 +25,6 @@ from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
-STILL_DEG = 0.5  # a joint whose angles over the pool differ by less does not move
 OUTSIDE_TOLERANCE = 0.02  # of the workspace's size by which readback may lie beside it
 
 

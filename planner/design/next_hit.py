@@ -47,13 +47,12 @@ def next_hit(explained: Explained, offered: Mapping[str, np.ndarray]) -> NextHit
     None if nothing is tied or no pose is offered.
     """
     recorded = explained.recorded
-    joints = explained.judged.diagnosis.problem.simulation.robot.joints
     if not offered:
         return None
     for finding, _ in explained.whole.established:
         laws = finding.laws and undecided(finding.laws)
         if laws and len(laws.candidates) > 1:
-            return _of_laws(finding.at, laws, recorded.level_n, offered, joints)
+            return _of_laws(finding.at, laws, recorded.level_n, offered)
     found = explained.judged.diagnosis
     tied = [(c.fit, c.probability) for c in found.undecided if c.fit is not None]
     if len(tied) < 2:
@@ -63,7 +62,7 @@ def next_hit(explained: Explained, offered: Mapping[str, np.ndarray]) -> NextHit
     # Linear candidates answer in proportion: the harder, the less noise.
     hardest = [float(recorded.level_n[-1])] if recorded.visits else []
     names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
-    return _at(best, hardest, offered, names, joints)
+    return _at(best, hardest, offered, names, found.problem.simulation.robot.joints)
 
 
 def _of_laws(
@@ -71,11 +70,11 @@ def _of_laws(
     laws: Laws,
     level_n: np.ndarray,
     offered: Mapping[str, np.ndarray],
-    joints: JointUnits,
 ) -> NextHit:
     best = most_telling_forces(laws, float(level_n[0]), float(level_n[-1]), _angles(offered))
     both = zip(laws.candidates, laws.probability, strict=True)
     names = [in_words([(c.law.effect, at)], p) for c, p in both]
+    joints = laws.problem.simulation.robot.joints
     return _at(best.hit, list(best.force_n), offered, names, joints)
 
 

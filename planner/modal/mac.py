@@ -1,5 +1,7 @@
 """Comparing modes: MAC, and the alignment of measured modes with expected ones."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,9 +59,7 @@ def align(
     expected = np.asarray(expected_frequency_hz, float)
     sd = np.broadcast_to(np.asarray(expected_sd, float), expected.shape)
     modes = sorted(measured.modes, key=lambda mode: mode.frequency_hz)
-    cost = _match_cost(modes, expected, expected_shape, sd)
-    spurious = np.array([unexpected_cost(mode) for mode in modes])
-    gain = MISSING_COST + spurious - cost
+    gain = match_gain(modes, expected, expected_shape, sd)
     choice = best(gain, ordered=True)
     chance = chances(gain, ordered=True)
     labelled = tuple(None if j < 0 else modes[j] for j in choice)
@@ -67,8 +67,19 @@ def align(
     return Alignment(labelled, chance[np.arange(len(expected)), column])
 
 
+def match_gain(
+    modes: Sequence[Mode], expected: np.ndarray, shape: np.ndarray | None, sd: np.ndarray
+) -> np.ndarray:
+    """(k, modes): what each match is better than a missing mode and an unexpected one.
+
+    Arguments as of `align`, of modes in any order.
+    """
+    spurious = np.array([unexpected_cost(mode) for mode in modes])
+    return MISSING_COST + spurious - _match_cost(modes, expected, shape, sd)
+
+
 def _match_cost(
-    modes: list[Mode], expected: np.ndarray, shape: np.ndarray | None, sd: np.ndarray
+    modes: Sequence[Mode], expected: np.ndarray, shape: np.ndarray | None, sd: np.ndarray
 ) -> np.ndarray:
     if not modes or not expected.size:
         return np.zeros((expected.size, len(modes)))
@@ -84,5 +95,5 @@ def _match_cost(
 
 
 def unexpected_cost(mode: Mode) -> float:
-    chance = float(np.clip(mode.probability, 1e-3, 1 - 1e-3))
-    return SPURIOUS_COST + 2 * float(np.log(chance / 0.9))
+    chance = min(max(mode.probability, 1e-3), 1 - 1e-3)
+    return SPURIOUS_COST + 2 * math.log(chance / 0.9)

@@ -42,18 +42,20 @@ def chances(gain: np.ndarray, ordered: bool = False) -> np.ndarray:
 
 
 def _best_ordered(gain: np.ndarray) -> np.ndarray:
+    # Lists: of few numbers their elements are at hand several times as fast as an array's.
     k, n = gain.shape
-    total = np.zeros((k + 1, n + 1))
-    for i in range(1, k + 1):
-        for j in range(1, n + 1):
-            match = total[i - 1, j - 1] + gain[i - 1, j - 1]
-            total[i, j] = max(match, total[i - 1, j], total[i, j - 1])
+    total = [[0.0] * (n + 1)]
+    for row in gain.tolist():
+        above, here = total[-1], [0.0]
+        for j, value in enumerate(row):
+            here.append(max(above[j] + value, above[j + 1], here[j]))
+        total.append(here)
     choice = np.full(k, -1)
     i, j = k, n
     while i > 0 and j > 0:
-        if total[i, j] == total[i - 1, j]:
+        if total[i][j] == total[i - 1][j]:
             i -= 1
-        elif total[i, j] == total[i, j - 1]:
+        elif total[i][j] == total[i][j - 1]:
             j -= 1
         else:
             i, j = i - 1, j - 1
@@ -70,14 +72,13 @@ def _chances_ordered(gain: np.ndarray) -> np.ndarray:
 
 def _sums_ordered(odds: np.ndarray) -> np.ndarray:
     """Summed odds of all ordered matchings of leading parts; sets of matches counted once."""
-
-    k, n = odds.shape
-    total = np.ones((k + 1, n + 1))
-    for i in range(1, k + 1):
-        for j in range(1, n + 1):
-            total[i, j] = total[i - 1, j] + total[i, j - 1] - total[i - 1, j - 1]
-            total[i, j] += total[i - 1, j - 1] * odds[i - 1, j - 1]
-    return total
+    total = [[1.0] * (odds.shape[1] + 1)]
+    for row in odds.tolist():
+        above, here = total[-1], [1.0]
+        for j, value in enumerate(row):
+            here.append(above[j + 1] + here[j] - above[j] + above[j] * value)
+        total.append(here)
+    return np.array(total)
 
 
 def _chances_free(gain: np.ndarray) -> np.ndarray:

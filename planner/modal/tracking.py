@@ -17,9 +17,9 @@ import numpy as np
 
 from planner.inference.assignment import least_cost
 from planner.modal.label_permutations import name_chances
-from planner.modal.mac import align, unexpected_cost
+from planner.modal.mac import match_gain, unexpected_cost
 from planner.modal.mode_matching import best, chances
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.modes import Mode
 
 # Log frequency: how far an unfitted guide may be off, by how much its error varies over the
 # workspace, and what is left between neighbours; the distance over which it varies (per √d).
@@ -151,12 +151,11 @@ def _first(modes: Sequence[Mode], expected_hz: np.ndarray, shape: np.ndarray) ->
     chosen = np.full(len(expected_hz), -1)
     if not len(modes) or not len(order):
         return chosen
-    band = modes[0].frequency_hz, modes[-1].frequency_hz
-    model = ModalModel(tuple(modes), band, 0.0, 0)
-    found = align(model, expected_hz[order], shape[order], OFFSET_SD).modes
-    for label, mode in zip(order, found, strict=True):
-        if mode is not None:
-            chosen[label] = next(j for j, m in enumerate(modes) if m is mode)
+    ranked = np.argsort([mode.frequency_hz for mode in modes], kind="stable")
+    sd = np.full(len(order), OFFSET_SD)
+    gain = match_gain([modes[j] for j in ranked], expected_hz[order], shape[order], sd)
+    found = best(gain, ordered=True)
+    chosen[order[found >= 0]] = ranked[found[found >= 0]]
     return chosen
 
 

@@ -9,8 +9,6 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
-from planner.campaign.proposals import places_for
-from planner.design.sensor_places import BetterPlaces
 from planner.design.stopping import Forecast
 from planner.recording.joints import JointUnits
 from planner.report.answer import Answer, plain
@@ -19,6 +17,7 @@ from planner.report.text import table
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
+    from planner.design.sensor_places import BetterPlaces
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ class ProposalsReport(Answer):
     forecast: Forecast
     repeat: RepeatedPose | None
     remarks: tuple[str, ...] = ()
-    places: BetterPlaces | None = None
+    places: "BetterPlaces | None" = None
     joint_units: Any = msgspec.UNSET
 
     @property
@@ -106,6 +105,8 @@ def forecast_json(forecast: Forecast) -> dict[str, Any]:
 
 def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsReport:
     """Of the poses that `Campaign.next` gave."""
+    from planner.campaign.proposals import places_for  # status needs none of what it imports
+
     expected = campaign.predict(campaign.cell.robot.joints.internal([p.joints_deg for p in found]))
     model = campaign.model
     return ProposalsReport(

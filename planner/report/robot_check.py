@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
+import msgspec
 import numpy as np
 from rich.console import Group
 from rich.text import Text
@@ -37,7 +38,7 @@ class CheckedJoint:
     lower_deg: float
     upper_deg: float
     speed_deg_s: float
-    unit: str = "deg"
+    unit: str | msgspec.UnsetType = msgspec.UNSET  # "mm" of a joint that slides
 
 
 @dataclass(frozen=True)
@@ -93,10 +94,8 @@ class RobotCheckReport(Answer):
             band_hz=robot.config.band_hz,
             links=links,
             joints=tuple(
-                CheckedJoint(name, *row, unit=unit)
-                for name, unit, row in zip(
-                    robot.joint_names, robot.joints.units, limits.tolist(), strict=True
-                )
+                CheckedJoint(name, *row, unit="mm" if robot.slides(name) else msgspec.UNSET)
+                for name, row in zip(robot.joint_names, limits.tolist(), strict=True)
             ),
             poses=_poses(found),
             found=found,

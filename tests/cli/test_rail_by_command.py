@@ -1,6 +1,7 @@
 """An arm on a rail, by command: millimetres in and out, modes known where nothing was measured."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -83,3 +84,18 @@ def test_a_pose_beyond_the_rail_is_refused_in_millimetres(cell, capsys):
     assert run(["predict", str(folder), str(table)]) == 2
     said = capsys.readouterr().err
     assert "rail at 2600.00 mm is outside its limits of -200.0 mm to 2000.0 mm" in said
+
+
+def test_other_joints_than_at_the_beginning_must_not_slide(cell, capsys, tmp_path):
+    """Places in the log would be read as angles."""
+    folder, _, _ = cell
+    other = tmp_path / "cell"
+    shutil.copytree(folder, other)
+    urdf = other / "robot" / "robot.urdf"
+    text = urdf.read_text().replace("prismatic", "revolute")
+    urdf.write_text(text.replace('upper="2.0"', 'upper="30"'))
+    toml = other / "robot" / "robot.toml"
+    text = toml.read_text().replace("stiffness_n_m", "stiffness")
+    toml.write_text(text.replace("damping_n_s_m", "damping"))
+    assert run(["next", str(other)]) == 2
+    assert "other joints slide than when the campaign began" in capsys.readouterr().err

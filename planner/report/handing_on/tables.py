@@ -79,7 +79,6 @@ def mat_arrays(found: Collected) -> dict[str, Any]:
         "label": found.label,
         "simulated": found.simulated,
         "joint_names": np.array(found.joints.names, dtype=object),
-        "joint_units": np.array(found.joints.units, dtype=object),
         "predicted_pose": np.array(p.poses, dtype=object),
         "predicted_joints_deg": p.joints_deg,
         "frequency_hz": p.frequency_hz,
@@ -90,6 +89,8 @@ def mat_arrays(found: Collected) -> dict[str, Any]:
         "mode_damping_ratio": modes.damping_ratio,
         "mode_damping_sd": modes.damping_sd,
     }
+    if any(found.joints.slides):
+        made["joint_units"] = np.array(found.joints.units, dtype=object)
     cells = [
         {
             "pose": one.pose,
