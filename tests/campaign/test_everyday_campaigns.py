@@ -74,6 +74,8 @@ def table(played: Sequence[Played]) -> str:
     worse = [own.rmse - peer.rmse for own, peer in pairs if own.rmse > peer.rmse]
     most = max(worse, default=0.0)
     lines.append(f"worse than the peer: {len(worse)} of {len(pairs)}, at most by {most:.2f} %")
+    asked = sum(one.asked for one in played)
+    lines.append(f"hits taken for those of another pose: {asked} of {POSES * len(played)}")
     return "\n".join(lines)
 
 

@@ -118,7 +118,10 @@ class Score:
 
 @dataclass(frozen=True)
 class Played:
-    """A campaign's scores after each pose, and those of its peer that uses no simulation."""
+    """A campaign's scores after each pose, and those of its peer that uses no simulation.
+
+    `asked`: how often the campaign took hits for those of another pose, which none were.
+    """
 
     robot: str
     kind: str
@@ -129,6 +132,7 @@ class Played:
     peer: tuple[Score, ...]
     remarks: tuple[str, ...]
     cpu_s: float
+    asked: int = 0
 
 
 def play(name: str, kind: str, seed: int, folder: Path) -> Played:
@@ -152,17 +156,21 @@ def play(name: str, kind: str, seed: int, folder: Path) -> Played:
     modes = min(MOST_MODES, int(np.sum(seen & (hz > robot.band_hz[0]) & (hz < robot.band_hz[1]))))
     own, peer = both = begun("updated", modes), begun("none", modes)
     models: list[tuple[Model, Model]] = []
+    asked = 0
     for number in range(POSES):
         proposal = own.next()[0]
         said = cell.record(folder / f"hits{number}", proposal.pose, proposal.joints_deg)
         for campaign in both:
-            campaign.import_paths((said,))
+            for report in campaign.import_paths((said,)):
+                if report.question is not None:  # the robot is where it was sent
+                    campaign.confirm(report.pose)
+                    asked += campaign is own
         models.append((own.model, peer.model))
     unseen = _unseen(own, rng)
     scores = [[Score.of(m, cell.truth, unseen, hose) for m in pair] for pair in models]
     return Played(
         name, kind, seed, size, modes, tuple(a for a, _ in scores), tuple(b for _, b in scores),
-        models[-1][0].remarks, time.process_time() - started,
+        models[-1][0].remarks, time.process_time() - started, asked,
     )  # fmt: skip
 
 
