@@ -143,7 +143,7 @@ def identify(
             fitted.priors,
             held_out,
             dataset.frfs,
-            tolerances=Tolerances.of(robot.config),
+            tolerances=Tolerances.of(robot.config, robot.joints.slides),
             band_hz=band,
             starts=starts,
             seed=seed,

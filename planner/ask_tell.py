@@ -40,7 +40,7 @@ TABLES = "the tables of campaign.toml"
 class AskTell:
     """Proposes poses and learns from what is told of them.
 
-    Angles are in degrees here, as controllers show them.
+    Angles are in degrees here, and places of joints that slide in mm, as controllers show them.
     """
 
     def __init__(self, robot: Robot | Path | str, tables: Path | str | Mapping[str, Any]):
@@ -94,7 +94,7 @@ class AskTell:
         """Say what was measured at a pose; a pose told again replaces what was told before.
 
         Args:
-            joints_deg: Joint angles (dof,) in degrees, as read back.
+            joints_deg: Joint angles (dof,) in degrees (mm of joints that slide), as read back.
             modes: A modal analysis, or modes one by one: with the keys frequency_hz,
                 frequency_sd_hz, damping_ratio, damping_sd (the sds may be missing), or numbers in
                 that order.
@@ -170,18 +170,18 @@ class AskTell:
 
     def records(self) -> list[dict[str, Any]]:
         """All modes that were told, one row each: what pandas.DataFrame takes."""
-        return measured_records(self._cell.robot.joint_names, self._state.measurements.values())
+        return measured_records(self._cell.robot.joints, self._state.measurements.values())
 
     def predict_records(self, joints_deg: Sequence[float] | np.ndarray) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
         q = self._poses(joints_deg)
-        return predicted_records(self._cell.robot.joint_names, q, self.model.predict(q))
+        return predicted_records(self._cell.robot.joints, q, self.model.predict(q))
 
     def _poses(self, joints_deg: Sequence[float] | np.ndarray) -> np.ndarray:
         angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))
         for number, row in enumerate(angles, 1):
             self._cell.check_pose(tuple(row), f"joints_deg, pose {number}")
-        return np.deg2rad(angles)
+        return self._cell.robot.joints.internal(angles)
 
 
 def _mode(given: Mode | Mapping[str, float] | Sequence[float]) -> MeasuredMode:

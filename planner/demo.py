@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError, NoPoseLeftError
 from planner.recording.folder import read_recordings
+from planner.recording.joints import JointUnits
 from planner.recording.records import PoseRow
 from planner.report.demonstration import DemonstrationReport, DemonstrationStep
 from planner.report.rerun_story import Story
@@ -41,24 +42,27 @@ class Pool:
     """Recorded poses that the demonstration may draw on."""
 
     folder: Path
+    joints: JointUnits
     rows: dict[str, tuple[PoseRow, ...]]
 
     @classmethod
-    def load(cls, folder: Path, joint_names: tuple[str, ...]) -> "Pool":
+    def load(cls, folder: Path, joints: JointUnits | Sequence[str]) -> "Pool":
         """Read a recordings folder."""
         rows: dict[str, list[PoseRow]] = {}
-        for row in read_recordings(folder, joint_names).rows:
+        for row in read_recordings(folder, joints).rows:
             rows.setdefault(row.pose, []).append(row)
-        return cls(folder, {pose: tuple(group) for pose, group in rows.items()})
+        return cls(
+            folder, JointUnits.of(joints), {pose: tuple(group) for pose, group in rows.items()}
+        )
 
     def q(self, poses: list[str]) -> np.ndarray:
         """Readback angles (n, dof) in rad."""
-        return np.deg2rad(np.array([self.rows[pose][0].joints_deg for pose in poses]))
+        return self.joints.internal([self.rows[pose][0].joints_deg for pose in poses])
 
     def nearest(self, cell: Cell, proposal: Proposal, used: list[str]) -> str:
         """The unused recorded pose that is nearest to a proposal, in model coordinates."""
         left = [pose for pose in self.rows if pose not in used]
-        target = cell.features(np.deg2rad([proposal.joints_deg]))
+        target = cell.features(self.joints.internal([proposal.joints_deg]))
         distance = np.linalg.norm(cell.features(self.q(left)) - target, axis=1)
         return left[int(np.argmin(distance))]
 
@@ -70,7 +74,7 @@ def play(
     source = shipped(NAME)
     directory = directory or Path(tempfile.mkdtemp(prefix="planner-demo-")) / NAME
     campaign = Campaign.new(directory, source / "robot" / "robot.toml", source / "campaign.toml")
-    pool = Pool.load(source / "recordings", campaign.cell.robot.joint_names)
+    pool = Pool.load(source / "recordings", campaign.cell.robot.joints)
     rrd = campaign.directory / "demo.rrd"
     used: list[str] = []
     steps: list[DemonstrationStep] = []

@@ -87,7 +87,7 @@ def _goal(
     table = cell.config.goal
     poses, hertz = workspace.poses, simulated.frequency_hz[: len(workspace.poses)]
     if table.joints_deg is not None:
-        q = np.deg2rad(np.array(table.joints_deg, dtype=float))
+        q = cell.robot.joints.internal(table.joints_deg)
         poses, hertz = poses_at(cell, low, surrogate, open_, q)
     importance = np.tile(workspace.importance.sum(axis=0), (len(poses), 1))
     if table.band_hz is not None:
@@ -111,6 +111,8 @@ def cost_of(cell: Cell) -> Cost:
     """What campaign.toml's [cost] makes of the robot's speeds."""
     table = cell.config.cost
     speed = cell.robot.velocity_rad_s * table.speed_share
-    # A URDF may leave a speed out: a slow one is assumed.
-    speed = np.where(np.isfinite(speed) & (speed > 0), speed, 0.5)
-    return Cost(speed, table.minutes_per_pose, table.minutes_per_hit, table.hits_per_axis)
+    # A URDF may leave a speed out: a slow one is assumed, in rad/s or m/s.
+    slow = np.where(cell.robot.joints.slides, 0.1, 0.5)
+    speed = np.where(np.isfinite(speed) & (speed > 0), speed, slow)
+    per_hit, per_sensor = table.minutes_per_hit, table.minutes_per_sensor
+    return Cost(speed, table.minutes_per_pose, per_hit, table.hits_per_axis, per_sensor)

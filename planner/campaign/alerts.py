@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from planner.campaign.events import Imported, MeasuredMode
 from planner.campaign.model import Model
-from planner.campaign.revisits import hit_again, suspected
+from planner.campaign.revisits import Suspicion, hit_again
 from planner.campaign.state import CampaignState
 from planner.dataset.measure import MeasuredPose
 from planner.frf.reciprocity import unreciprocal
@@ -16,6 +16,7 @@ def alerts(
     event: Imported,
     measured: MeasuredPose,
     modes: Sequence[MeasuredMode],
+    suspicion: Suspicion | None,
 ) -> tuple[str, ...]:
     """Remarks on new hits, their channels, reciprocity and drift.
 
@@ -25,6 +26,7 @@ def alerts(
         event: The import.
         measured: All hits of the pose, the new ones last.
         modes: By the new hits alone.
+        suspicion: Of drift, where they hint at it.
     """
     verdicts = measured.verdicts[-len(event.hits) :]
     told = tuple(dict.fromkeys(text for one in verdicts for text in one.remarks))
@@ -35,4 +37,4 @@ def alerts(
     known = state.measurements.get(event.pose)
     if known is not None:
         return told + hit_again(model, known, modes)
-    return told + suspected(model, state, event.pose, event.joints_deg, modes)
+    return told if suspicion is None else (*told, suspicion.text)

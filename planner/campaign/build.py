@@ -40,12 +40,14 @@ def build(
         frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
         whole = tuple(h.whole for h in hits) if hits is not None and cell.hits_err else frfs
-        q = np.deg2rad(np.array([m.joints_deg for m in used]))
+        joints = cell.robot.joints
+        q = joints.internal([m.joints_deg for m in used])
         low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
-        noise = FrfNoise.of(frfs, table.band_hz, misfit)
+        noise = FrfNoise.of(whole, table.band_hz, misfit)
         if hits is not None and low.learned is not None:
-            told = tell(visits_of(used, hits, frfs), low.learned, cell.tolerances, table.band_hz)
+            visits = visits_of(joints, used, hits, frfs)
+            told = tell(visits, low.learned, cell.tolerances, table.band_hz)
     candidates = [_Guided.by(cell, used, low)]
     if low.learned is not None and not low.learned.fits:
         # What lacks physics is bent by fitting it: as it stands it may be a better

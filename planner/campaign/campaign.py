@@ -83,7 +83,7 @@ class Campaign(CampaignReads):
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(
-                paths, self.cell.robot.joint_names, self.cell.robot.points, pose, default
+                paths, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in paths if path.is_file())
@@ -215,6 +215,7 @@ class Campaign(CampaignReads):
         )
         from planner.campaign.log_conversion import from_homogeneity, from_modal
         from planner.campaign.question import question
+        from planner.campaign.revisits import suspected
 
         before, state, pose = self.model, self.state, delivery.pose
         known = state.measurements.get(pose)
@@ -233,6 +234,8 @@ class Campaign(CampaignReads):
         if old:  # among earlier hits, wrong ones would not stand out
             alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
+        asked = question(before, state, pose, joints_deg, new_modes)
+        drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
         event = Imported(
             pose=pose,
             joints_deg=joints_deg,
@@ -240,9 +243,10 @@ class Campaign(CampaignReads):
             modes=modes,
             remarks=measured.remarks,
             amplitude=from_homogeneity(measured.homogeneity),
-            question=question(before, state, pose, joints_deg, new_modes),
+            question=asked,
+            again=drift.again if drift else "",
         )
-        told = alerts(before, state, event, measured, new_modes)
+        told = alerts(before, state, event, measured, new_modes, drift)
         self._append(event)
         measurement = (self.state.held if event.question else self.state.measurements)[pose]
         # Beside new hits earlier ones may look wrong; they stay accepted all the same.
@@ -264,7 +268,7 @@ class Campaign(CampaignReads):
                 *measured.remarks,
                 *told,
                 *taken_after_all(state, kept.fresh),
-                *displacement(state, delivery, stood),
+                *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),
                 *model.remarks,
             ),
@@ -283,9 +287,11 @@ def _first_entry(directory: Path) -> bytes:
     from planner.campaign.journal import encode_line
 
     config = load_campaign_config(directory / store.CONFIG)
-    refuse_errors(Cell.load(directory / config.robot, config).examined)
+    cell = Cell.load(directory / config.robot, config)
+    refuse_errors(cell.examined)
     hashes = store.robot_hashes(directory)
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    event = Configured(as_logged(config), hashes, __version__, True, True, True)
+    units = cell.robot.joints.declared
+    event = Configured(as_logged(config), hashes, __version__, True, True, True, units)
     return encode_line("", Entry(1, now, event))[0]

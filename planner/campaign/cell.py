@@ -82,7 +82,7 @@ class Cell:
     @property
     def tolerances(self) -> Tolerances:
         """Of hits and measuring chain, as robot.toml or campaign.toml state them."""
-        return Tolerances.of(self.robot.config)
+        return Tolerances.of(self.robot.config, self.robot.joints.slides)
 
     @cached_property
     def candidates(self) -> Candidates:
@@ -133,7 +133,7 @@ class Cell:
         if table.singularity_margin > 0:
             allowed &= self.robot.singularity(found.q) >= table.singularity_margin
         for zone in self.config.forbidden:
-            at = found.position_m if zone.position_m else np.rad2deg(found.q)
+            at = found.position_m if zone.position_m else self.robot.joints.shown(found.q)
             box = np.array(zone.position_m or zone.joints_deg, dtype=float)
             allowed &= ~np.all((at >= box[:, 0]) & (at <= box[:, 1]), axis=1)
         return allowed
@@ -153,26 +153,31 @@ class Cell:
         return self.frozen.simulate(q, more)
 
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
-        """The pose in rad; InputError if the robot cannot stand there."""
+        """The pose in rad (m); InputError if the robot cannot stand there."""
         return _checked_pose(self.robot, joints_deg, where)
 
 
 def _checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:
-    """The pose (dof,) in rad; InputError if the robot cannot stand there."""
+    """The pose (dof,) in rad (m); InputError if the robot cannot stand there."""
+    joints = robot.joints
     if len(joints_deg) != len(robot.joint_names):
         raise InputError(
             f"{where}: {len(joints_deg)} joint angles are given, the robot has "
             f"{len(robot.joint_names)} joints; correct the columns."
         )
-    q = np.deg2rad(np.asarray(joints_deg, dtype=float))
-    tolerance = np.deg2rad(0.5)  # readback of a joint parked at its limit
-    over = np.maximum(robot.lower_rad - q, q - robot.upper_rad)
+    q = joints.internal(joints_deg)
+    tolerance = joints.internal(joints.same())  # readback of a joint parked at its limit
+    over = np.maximum(robot.lower_rad - q, q - robot.upper_rad) / tolerance
     worst = int(np.argmax(over))
-    if over[worst] > tolerance:
-        low, high = np.rad2deg([robot.lower_rad[worst], robot.upper_rad[worst]])
+    if over[worst] > 1:
+        low, high = (
+            joints.text(worst, joints.shown(limits)[worst])
+            for limits in (robot.lower_rad, robot.upper_rad)
+        )
+        unit = "millimetres" if joints.slides[worst] else "degrees"
         raise InputError(
-            f"{where}: {robot.joint_names[worst]} at {joints_deg[worst]:.2f}° is outside "
-            f"its limits of {low:.1f}° to {high:.1f}°; check columns and units (degrees)."
+            f"{where}: {joints.names[worst]} at {joints.text(worst, joints_deg[worst], 2)} is "
+            f"outside its limits of {low} to {high}; check columns and units ({unit})."
         )
     return q
 

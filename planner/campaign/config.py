@@ -12,7 +12,10 @@ from planner.toml_file import load_toml
 
 
 class WorkspaceTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Where the model has to be good: a joint box, or positions with a tool axis."""
+    """Where the model has to be good: a joint box, or positions with a tool axis.
+
+    In `joints_deg`, here and elsewhere, the numbers of joints that slide are millimetres.
+    """
 
     joints_deg: list[tuple[float, float]] | None = None
     position_m: list[tuple[float, float]] | None = None
@@ -66,12 +69,16 @@ class GoalTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CostTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What measuring takes: the share of the URDF's joint speeds at which the robot travels."""
+    """What measuring takes: the share of the URDF's joint speeds at which the robot travels.
+
+    `minutes_per_sensor` is what putting up one more sensor takes, cable and check included.
+    """
 
     speed_share: float = 0.1
     minutes_per_pose: float = 1.0
     minutes_per_hit: float = 0.25
     hits_per_axis: int = 4
+    minutes_per_sensor: float = 3.0
 
 
 class FidelityTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -184,6 +191,7 @@ def check_config(config: CampaignConfig, path: Path) -> None:
         ("[cost] minutes_per_pose", config.cost.minutes_per_pose, 0.0, 1e3),
         ("[cost] minutes_per_hit", config.cost.minutes_per_hit, 1e-3, 1e3),
         ("[cost] hits_per_axis", config.cost.hits_per_axis, 1, 100),
+        ("[cost] minutes_per_sensor", config.cost.minutes_per_sensor, 1e-3, 1e3),
         ("[stop] probability", config.stop.probability, 0.5, 0.999),
         ("[modes] count", config.modes.count, 1, 20),
         ("[modes] window_rate_1_s", config.modes.window_rate_1_s, 0.0, 1000.0),

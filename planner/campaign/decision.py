@@ -74,7 +74,7 @@ def decided(model: "Model") -> Decision | None:
 
 def _poses(model: "Model", table: "CutTable") -> np.ndarray:
     if table.joints_deg is not None:
-        return np.deg2rad(np.array(table.joints_deg, dtype=float))
+        return model.cell.robot.joints.internal(table.joints_deg)
     return model.cell.candidates.q[: min(POSES, model.cell.spread)]
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.folder import TABLE, files_in, read_recordings
+from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import READERS
 from planner.recording.records import PoseRow
@@ -23,7 +24,7 @@ class Delivery:
 
 def sort_paths(
     paths: tuple[Path, ...],
-    joint_names: tuple[str, ...],
+    joints: JointUnits,
     points: PointNames,
     pose: str | None,
     default_pose: str | None,
@@ -39,9 +40,9 @@ def sort_paths(
     for path in paths:
         table = path if path.name == TABLE else path / TABLE
         if table.is_file():
-            deliveries += _from_table(table.parent, joint_names, points, pose)
+            deliveries += _from_table(table.parent, joints, points, pose)
         elif path.is_dir() and (tables := sorted(path.rglob(TABLE))):
-            deliveries += _from_tables(path, tables, joint_names, points, pose)
+            deliveries += _from_tables(path, tables, joints, points, pose)
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
@@ -63,14 +64,14 @@ def sort_paths(
 def _from_tables(
     folder: Path,
     tables: list[Path],
-    joint_names: tuple[str, ...],
+    joints: JointUnits,
     points: PointNames,
     pose: str | None,
 ) -> list[Delivery]:
     """Deliveries of a folder's subfolders, each with a table of its own; `pose` picks one."""
     if len(tables) == 1:
-        return _from_table(tables[0].parent, joint_names, points, pose)
-    every = [d for table in tables for d in _from_table(table.parent, joint_names, points, None)]
+        return _from_table(tables[0].parent, joints, points, pose)
+    every = [d for table in tables for d in _from_table(table.parent, joints, points, None)]
     found = [d for d in every if pose in (None, d.pose)]
     if not found:
         names = ", ".join(dict.fromkeys(d.pose for d in every))
@@ -79,9 +80,9 @@ def _from_tables(
 
 
 def _from_table(
-    folder: Path, joint_names: tuple[str, ...], points: PointNames, pose: str | None
+    folder: Path, joints: JointUnits, points: PointNames, pose: str | None
 ) -> list[Delivery]:
-    recordings = read_recordings(folder, joint_names, points)
+    recordings = read_recordings(folder, joints, points)
     rows: dict[str, list[PoseRow]] = {}
     for row in recordings.rows:
         rows.setdefault(row.pose, []).append(row)

@@ -20,6 +20,8 @@ class Configured(Event, frozen=True, tag="configured"):
     with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned; and
     with `hits_err`: whether the simulation is identified from hits at all points that err, as
     hits and measuring chains do, or from the tool's sensor as if they did not.
+    `joint_units` are those of all `joints_deg` that follow, "deg" or "mm" of each joint; unset
+    where all are degrees.
     """
 
     config: dict
@@ -28,6 +30,7 @@ class Configured(Event, frozen=True, tag="configured"):
     geometric_stiffness: bool = False
     visit_scatter: bool = False
     hits_err: bool = False
+    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
 
 class Proposal(msgspec.Struct, frozen=True):
@@ -128,7 +131,8 @@ class Question(msgspec.Struct, frozen=True):
 class Imported(Event, frozen=True, tag="imported"):
     """Hits at one pose were imported; `modes` are those of all its accepted hits so far.
 
-    With a `question` they are held: not used until a Confirmed follows.
+    With a `question` they are held: not used until a Confirmed follows. `again` names the measured
+    pose that is to be hit again, where these hits hint at drift.
     """
 
     pose: str
@@ -138,6 +142,7 @@ class Imported(Event, frozen=True, tag="imported"):
     remarks: tuple[str, ...] = ()
     amplitude: Amplitude | None = None  # null: all hits of one strength
     question: Question | None = None
+    again: str = ""
 
 
 class Confirmed(Event, frozen=True, tag="confirmed"):

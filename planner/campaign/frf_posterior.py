@@ -41,9 +41,6 @@ from planner.inference.least_squares import (
 MODEL_ERROR = 0.01
 LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
 CHAIN = CHAIN_NUMBERS  # numbers of the chain, which are the same at all poses
-# Of the tolerance of gains, how much is left of it: of generated cases in which physics lacked, the
-# scale of FRFs was off by 4 to 5 % at all poses alike where z left 2 % open.
-COMMON = 0.5
 NEARLY = 0.999  # of the farthest that is possible
 TOLERANCE, MOST_STEPS = 5e-4, 30  # of a fit: least gain of a step, and how many
 FOLDS = 6  # that poses are left out in, at most
@@ -175,15 +172,6 @@ class FrfPosterior:
     def temper(self) -> float:
         """By what χ² is divided: where the simulation is off, its parameters are less certain."""
         return max(self.misfit, 1.0)
-
-    @property
-    def common_error(self) -> float:
-        """Relative sd of the scale of all FRFs beyond what z leaves open.
-
-        A wrong scale is the same at every pose: leaving poses out does not show it.
-        """
-        t = tolerances_of(self.problem.simulation)
-        return COMMON * float(np.hypot(t.gain, t.force_gain))
 
     def precision(self, temper: float) -> np.ndarray:
         """(d, d) of z."""

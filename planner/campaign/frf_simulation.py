@@ -16,6 +16,7 @@ from planner.campaign.low_fidelity import Learned
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.extra_compliance import across, triple
 from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.effects.places import movable
 from planner.diagnosis.linear.fit import Fit, glance
 from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.gradient import laplace
@@ -35,7 +36,6 @@ from planner.identification.measured_frfs import common_band
 from planner.identification.parameters import place_name
 from planner.identification.truncated_decay import cut_off
 from planner.robot.config import Compliance
-from planner.robot.robot import Robot
 
 Spring = tuple[Compliance, dict[str, tuple[float, float]]]  # and its priors' bounds, by name
 
@@ -114,20 +114,23 @@ def widened(structure: Structure) -> Structure:
         structure = extended(structure.simulation, structure.priors)
     robot = structure.simulation.robot
     stated = robot.config.compliance[: len(robot.config.compliance) - structure.added]
-    stiffest = max(block.stiffness for block in stated if not block.slide)
+    turning = [block for block in stated if not block.slide]
+    stiffest = max((b.stiffness for b in turning), default=max(robot.turning_stiffness()))
     ways = _links(structure.simulation)
-    longest = max(float(np.linalg.norm(way)) for _, _, way in ways)
+    longest = max((float(np.linalg.norm(way)) for _, _, way in ways), default=0.0) or robot.reach_m
     listed = {place_name(block) for block in robot.config.compliance}
     springs = [_spring(FLOOR, np.eye(3)[2], stiffest)]
     springs += [_spring(FLOOR, a, stiffest / (2 * longest) ** 2, slide=True) for a in np.eye(3)]
     for link, joint, way in ways:
         length = np.linalg.norm(way)
         if length > SHORT * longest:
-            own = [b.stiffness for b in stated if b.joint == joint] or [stiffest]
+            own = [b.stiffness for b in stated if b.joint == joint and not robot.slides_along(b)]
+            own = own or [stiffest]
             axes = (*across(way / length), way / length)
             springs += [_spring(link, axis, BEND * max(own)) for axis in axes]
     springs = [(b, limits) for b, limits in springs if place_name(b) not in listed]
-    springs = _movable(robot, springs)
+    movables = movable(structure.simulation, [b for b, _ in springs])
+    springs = [(b, limits) for b, limits in springs if b in movables]
     bounds = dict(structure.priors.bounds)
     for _, limits in springs:
         bounds |= limits
@@ -137,20 +140,6 @@ def widened(structure: Structure) -> Structure:
     return Structure(
         simulation, replace(structure.priors, bounds=bounds), structure.added + len(added)
     )
-
-
-def _movable(robot: Robot, springs: list[Spring]) -> list[Spring]:
-    """Those that move an inertia of their own: a base's turn is joint 1's own, where axes agree."""
-    kept: list[Spring] = []
-    for spring in springs:
-        blocks = *robot.config.compliance, *(b for b, _ in kept), spring[0]
-        config = msgspec.structs.replace(robot.config, compliance=blocks)
-        try:
-            _ = Simulation(replace(robot, config=config)).elastic
-        except InputError:
-            continue
-        kept.append(spring)
-    return kept
 
 
 def _links(simulation: Simulation) -> list[tuple[str, str, np.ndarray]]:

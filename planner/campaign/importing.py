@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
 
-import numpy as np
 from msgspec.structs import replace
 
 from planner.campaign import store
@@ -19,9 +18,8 @@ from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
+from planner.recording.joints import JointUnits
 from planner.recording.read import hit_count
-
-SAME_POSE_DEG = 0.5  # more than any readback scatter, less than any useful move
 
 Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
 
@@ -78,11 +76,11 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
         return stated.joints_deg
     cell.check_pose(delivery.joints_deg, delivery.row)
     if known is not None:
-        off = np.max(np.abs(np.subtract(known.joints_deg, delivery.joints_deg)))
-        if off > SAME_POSE_DEG:
+        off = cell.robot.joints.apart(known.joints_deg, delivery.joints_deg)
+        if off:
             raise InputError(
                 f"{delivery.row}: pose {delivery.pose} was imported before at joint angles "
-                f"that differ by {off:.2f}°; give the new measurement another name."
+                f"that differ by {off}; give the new measurement another name."
             )
     return delivery.joints_deg
 
@@ -196,18 +194,17 @@ def measure_files(
 
 
 def displacement(
-    state: CampaignState, delivery: Delivery, joints_deg: tuple[float, ...]
+    joints: JointUnits, state: CampaignState, delivery: Delivery, joints_deg: tuple[float, ...]
 ) -> tuple[str, ...]:
     """A remark if the robot stood elsewhere than proposed."""
     proposal = state.proposals.get(delivery.pose)
     if proposal is None:
         return ()
-    off = float(np.max(np.abs(np.subtract(proposal.joints_deg, joints_deg))))
-    if off <= SAME_POSE_DEG:
+    off = joints.apart(proposal.joints_deg, joints_deg)
+    if not off:
         return ()
     return (
-        f"The readback of {delivery.pose} is up to {off:.2f}° from its setpoint; the readback "
-        f"is used.",
+        f"The readback of {delivery.pose} is up to {off} from its setpoint; the readback is used.",
     )
 
 

@@ -48,7 +48,7 @@ def label(
     """
     if not measurements:
         return ()
-    q = np.deg2rad(np.array([m.joints_deg for m in measurements]))
+    q = cell.robot.joints.internal([m.joints_deg for m in measurements])
     modes = [tuple(to_mode(mode) for mode in m.modes) for m in measurements]
     count = cell.config.modes.count
     simulated = (low or cell.frozen).simulate(q, ABOVE)

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.campaign.missing_physics import with_springs, with_swinging_mass
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
-from planner.errors import InputError
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK, Effort
-from planner.identification.extended_structure import FLOOR, Structure, extended
+from planner.identification.extended_structure import FLOOR, Structure
 from planner.identification.frequency_uncertainty import frequency_sd
 from planner.identification.identify import identify
 from planner.identification.measured_frfs import layout_of
@@ -27,7 +27,6 @@ OF_EXACT_HITS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
 # springs that robot.toml does not state do not mend that, what it says of a pose is tested by
 # identifying it without that pose; into so many parts at most.
 SUSPECT, EXACT_SUSPECT, FOLDS = 2.0, 3.0, 2
-BEST = 0.95  # misfit below which no springs that are added can bring it
 # A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
 KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
@@ -74,16 +73,15 @@ class Learned:
 
         The softest first, in units of the stiffest that is stated at the same place.
         """
-        size = self.structure.simulation.elastic.size
+        stated = len(self.structure.simulation.robot.config.compliance) - self.structure.added
         springs = [
-            e
-            for e in self.identified.estimates
-            if e.kind == "stiffness" and min(e.blocks) >= size - self.structure.added
-        ]
+            e for e in self.identified.estimates
+            if e.kind == "stiffness" and min(e.blocks) >= stated
+        ]  # fmt: skip
         told = [e for e in springs if e.log_sd < KNOWN and e.value < MATTERS * e.prior_median]
         told.sort(key=lambda e: e.value / e.prior_median)
         return tuple(
-            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} N·m/rad"
+            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} {e.unit}"
             for e in told
         )
 
@@ -184,11 +182,13 @@ class LowFidelity:
         learned = self.learned or self.suspect
         if learned is None:
             return ""
+        swinging = learned.structure.swinging
         if learned.fits:
-            return _lacking(learned.found) if learned.structure.added else ""
+            lacking = _lacking(learned.found) if learned.structure.added else ""
+            return " ".join(filter(None, (swinging, lacking)))
         text = (
             f"Identified from the recordings, the simulation still misses them by "
-            f"{np.sqrt(learned.identified.misfit):.0f} times their noise: it lacks physics"
+            f"{np.sqrt(learned.identified.misfit):.2g} times their noise: it lacks physics"
         )
         if self.learned is None:
             return f"{text}, so that it is used as robot.toml states it, or not at all."
@@ -231,8 +231,9 @@ def learn(
     nominal = before.nominal
     if nominal is None or not frfs:
         return before
-    lesson = _Lesson(tuple(frfs), q, band_hz, before.tolerances)
-    learned = _wider(lesson.identified(Structure(nominal, before.priors)), lesson)
+    lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
+    stated = lesson.identified(Structure(nominal, before.priors))
+    learned = with_swinging_mass(stated, with_springs(stated, lesson), lesson)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)
@@ -240,7 +241,7 @@ def learn(
 
 
 @dataclass(frozen=True, eq=False)
-class _Lesson:
+class Lesson:
     """FRFs at q (n, dof) in rad, by which a simulation is identified, and how they err."""
 
     frfs: tuple[Frf, ...]
@@ -248,9 +249,15 @@ class _Lesson:
     band_hz: tuple[float, float]
     tolerances: Tolerances | None
 
-    def identified(self, structure: Structure, warm: Identification | None = None) -> Learned:
+    def identified(
+        self,
+        structure: Structure,
+        warm: Identification | None = None,
+        starts: int | np.ndarray = 1,
+    ) -> Learned:
         suspect = EXACT_SUSPECT if self.tolerances is None else SUSPECT
-        return Learned(structure, self._identify(structure, warm, _effort(self.frfs)), suspect)
+        found = self._identify(structure, warm, _effort(self.frfs), starts)
+        return Learned(structure, found, suspect)
 
     def without(self, away: np.ndarray, warm: Learned) -> Identification:
         """From fewer poses, starting where all of them led; `away` (n,) bool."""
@@ -261,7 +268,11 @@ class _Lesson:
         return fewer._identify(warm.structure, warm.identified, rough)
 
     def _identify(
-        self, structure: Structure, warm: Identification | None, effort: Effort
+        self,
+        structure: Structure,
+        warm: Identification | None,
+        effort: Effort,
+        starts: int | np.ndarray = 1,
     ) -> Identification:
         return identify(
             self.frfs,
@@ -269,32 +280,14 @@ class _Lesson:
             structure.simulation,
             structure.priors,
             band_hz=self.band_hz,
-            starts=1,
+            starts=starts,
             warm=warm,
             effort=effort,
             tolerances=self.tolerances,
         )
 
 
-def _wider(stated: Learned, lesson: _Lesson) -> Learned:
-    """With springs that robot.toml does not state, where the recordings speak for them.
-
-    That is where χ² falls by more than ln n for each of their parameters (Schwarz 1978).
-    """
-    structure = extended(stated.structure.simulation, stated.structure.priors)
-    first = stated.identified
-    penalty = 2 * structure.added * np.log(first.values)
-    if first.values * (first.misfit - BEST) < penalty:
-        return stated
-    try:
-        wider = lesson.identified(structure, first if stated.fits else None)
-    except InputError:  # a search that ended where the robot would not stand
-        return stated
-    gain = first.values * (first.misfit - wider.identified.misfit)
-    return wider if gain > penalty else stated
-
-
-def _left_out(warm: Learned, lesson: _Lesson, count: int) -> np.ndarray:
+def _left_out(warm: Learned, lesson: Lesson, count: int) -> np.ndarray:
     out = np.full((len(lesson.frfs), count), np.nan)
     folds = min(len(lesson.frfs), FOLDS)
     for fold in range(folds):

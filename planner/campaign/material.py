@@ -42,7 +42,7 @@ class Material:
         if self.campaign is None:
             return Dataset.read(
                 self.recordings,
-                robot.joint_names,
+                robot.joints,
                 band_hz,
                 window_rate_1_s=rate,
                 progress=progress,
@@ -54,7 +54,7 @@ class Material:
         """The same with the poses of a table, unless a campaign offers its own."""
         if len(self.offered) or not rows:
             return self
-        q = np.deg2rad(np.array([row.joints_deg for row in rows]))
+        q = self.nominal.joints.internal([row.joints_deg for row in rows])
         names = tuple(row.pose for row in rows)
         return replace(self, offered=q, names=names)
 

@@ -27,6 +27,7 @@ from planner.identification.visit_equations import AIMED, OWN
 from planner.modal.modes import Mode
 from planner.modal.residue_change import residue_changes
 from planner.modal.residues import laplace
+from planner.recording.joints import JointUnits
 from planner.recording.records import AXES
 
 TELL_BY = 8  # poses, the last ones, that tell what is common to all: nobody waits between hits
@@ -150,14 +151,17 @@ def told_by(
 
 
 def visits_of(
-    used: Sequence[Measurement], hits: Sequence[PoseHits], frfs: Sequence[Frf]
+    joints: JointUnits,
+    used: Sequence[Measurement],
+    hits: Sequence[PoseHits],
+    frfs: Sequence[Frf],
 ) -> tuple[Visited, ...]:
     """Measurements as visits, with their hits and the tool's FRFs."""
     return tuple(
         Visited(
             m.pose,
             tuple(hit.file for hit in m.accepted),
-            np.deg2rad(np.array(m.joints_deg)),
+            joints.internal(m.joints_deg),
             h.columns,
             f,
         )

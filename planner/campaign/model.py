@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import outlook
+from planner.campaign.acquisition_inputs import open_parameters, outlook
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.hit_habits import PoseMisses
@@ -157,10 +157,19 @@ class Model:
     @cached_property
     def forecast(self) -> Forecast:
         """Predicted RMSE over the workspace, and what one more measurement would gain."""
-        outputs, poses = self.outlook
-        best = poses.one(int(np.argmax(self._gains)))
+        outputs, _ = self.outlook
+        best = self._informed_pose(int(np.argmax(self._gains)))
         stop = self.cell.config.stop
         return forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
+
+    def _informed_pose(self, index: int) -> Poses:
+        """The candidate (n = 1) of that index, and what hits there tell of open parameters."""
+        pose = self.outlook[1].one(index)
+        open_ = open_parameters(self.cell, self.low, self.frf_noise)
+        if open_ is None:
+            return pose
+        q = self.cell.candidates.q[index : index + 1]
+        return replace(pose, information=open_.information(q))
 
     @property
     def done(self) -> bool:

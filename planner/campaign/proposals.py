@@ -5,13 +5,19 @@ from itertools import count as counted
 
 import numpy as np
 
-from planner.campaign.acquisition_inputs import cost_of, informed_candidates
+from planner.campaign.acquisition_inputs import (
+    cost_of,
+    informed_candidates,
+    open_parameters,
+    poses_at,
+)
 from planner.campaign.events import Proposal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.design.hit_axes import axis_shares
 from planner.design.propose import INFORMED, Pick, Travel
 from planner.design.propose import propose as choose
+from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
 
@@ -22,7 +28,26 @@ AVOIDED = 0.1
 def propose(
     model: Model, state: CampaignState, count: int, acquisition: str
 ) -> tuple[Proposal, ...]:
-    """The next poses to measure; NoPoseLeftError when no candidate is left."""
+    """The next poses to measure; NoPoseLeftError when no candidate is left.
+
+    Where drift is suspected the first of them is a measured pose that tells whether there is any.
+    """
+    if state.doubt is None:
+        return _new_poses(model, state, count, acquisition)
+    again = _repeat(model, state, *state.doubt)
+    return (again, *(_new_poses(model, state, count - 1, acquisition) if count > 1 else ()))
+
+
+def _repeat(model: Model, state: CampaignState, again: str, hint: str) -> Proposal:
+    robot, joints_deg = model.cell.robot, state.measurements[again].joints_deg
+    position_m = robot.forward_batch(robot.joints.internal([joints_deg]))[1][0]
+    reason = f"repeat: {hint} hints at drift, and {again} hit again tells whether the robot changed"
+    return Proposal(again, joints_deg, _xyz(position_m), None, reason)
+
+
+def _new_poses(
+    model: Model, state: CampaignState, count: int, acquisition: str
+) -> tuple[Proposal, ...]:
     cell = model.cell
     candidates = cell.candidates
     picks = _picks(model, state, count, acquisition)
@@ -31,8 +56,9 @@ def propose(
             f"No reachable pose is left among {len(candidates.q)} candidates of the workspace; "
             f"widen [workspace] or raise candidates in campaign.toml."
         )
+    joints = cell.robot.joints
     angles = [
-        tuple(round(float(v), 4) for v in np.rad2deg(candidates.q[pick.index])) for pick in picks
+        tuple(round(float(v), 4) for v in joints.shown(candidates.q[pick.index])) for pick in picks
     ]
     return tuple(
         Proposal(
@@ -58,9 +84,9 @@ def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
 
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
     cell = model.cell
-    x = cell.candidates.features
+    joints, x = cell.robot.joints, cell.candidates.features
     taken = [m.joints_deg for m in state.measurements.values()]
-    at = np.deg2rad(taken[-1]) if taken else None
+    at = joints.internal(taken[-1]) if taken else None
     taken += [m.joints_deg for m in state.held.values()]
     shares = None
     if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
@@ -69,7 +95,7 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
     taken += [state.proposals[pose].joints_deg for pose in state.skipped]
     allowed = cell.allowed
     for pose in state.avoided:
-        there = cell.features(np.deg2rad([state.proposals[pose].joints_deg]))
+        there = cell.features(joints.internal([state.proposals[pose].joints_deg]))
         allowed = allowed & (np.linalg.norm(x - there, axis=1) > AVOIDED * np.sqrt(x.shape[1]))
     asked, seen, said = np.arange(len(x)), None, model.simulated_candidates
     if acquisition in INFORMED:
@@ -83,13 +109,33 @@ def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> 
         x[asked],
         said[asked],
         count=count,
-        exclude=cell.features(np.deg2rad(np.array(taken))) if taken else None,
+        exclude=cell.features(joints.internal(taken)) if taken else None,
         seed=state.events,
         outlook=seen,
         travel=travel.among(asked),
         allowed=allowed[asked],
     )
     return tuple(replace(pick, index=int(asked[pick.index])) for pick in picks)
+
+
+def places_for(model: Model, state: CampaignState, proposal: Proposal) -> BetterPlaces | None:
+    """Where one more sensor, or another point to hit, would tell more at a proposed pose.
+
+    None where nothing would, or the simulation does not learn.
+    """
+    cell = model.cell
+    # Before the first hits nobody knows what will be open.
+    open_ = open_parameters(cell, model.low, model.frf_noise) if model.labelled else None
+    if open_ is None or not cell.robot.points.axes:
+        return None
+    joints = cell.robot.joints
+    q = joints.internal([proposal.joints_deg])
+    at, _ = poses_at(cell, model.low, model.surrogate, open_, q)
+    cost, taken = cost_of(cell), [m.joints_deg for m in state.measurements.values()]
+    travel = cost.travel(q, joints.internal(taken[-1]) if taken else None)
+    pose = proposal.pose, at, q[0]
+    target = cell.config.stop.frequency_sd_percent
+    return better_places(open_, model.outlook[0], pose, cost, float(travel[0]), target)
 
 
 def _xyz(position_m: np.ndarray) -> tuple[float, float, float]:

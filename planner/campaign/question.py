@@ -206,7 +206,7 @@ def _compared(
     limit: float = ANSWERS_OTHERWISE,
 ) -> list[Comparison]:
     """What is expected at each of at least one pose, against the modes that are said to be its."""
-    q = np.deg2rad(poses_deg)
+    q = model.cell.robot.joints.internal(poses_deg)
     (hz, sd), simulated = model.frequencies(q), model.low.simulate(q, ABOVE)
     known = model.low.simulation is not None
     found = []

@@ -79,13 +79,19 @@ class CampaignReads:
         key = _text(configured)
         if key not in self._cells:
             config = config_from_builtins(configured.config)
-            self._cells[key] = Cell.load(
+            loaded = Cell.load(
                 self.directory / config.robot,
                 config,
                 geometric_stiffness=configured.geometric_stiffness,
                 visit_scatter=configured.visit_scatter,
                 hits_err=configured.hits_err,
             )
+            if loaded.robot.joints.declared != configured.joint_units:
+                raise InputError(
+                    f"{loaded.robot.urdf_path}: other joints slide than when the campaign began, "
+                    f"so that places in its log would be read wrongly; start a new campaign."
+                )
+            self._cells[key] = loaded
         return self._cells[key]
 
     @property
@@ -157,7 +163,9 @@ class CampaignReads:
 
         kept = self.recordings
         found = [
-            Recording(measurement.pose, np.deg2rad(measurement.joints_deg), source)
+            Recording(
+                measurement.pose, self.cell.robot.joints.internal(measurement.joints_deg), source
+            )
             for measurement in self.state.used
             for source in kept.sources(measurement)
         ]
@@ -191,7 +199,7 @@ class CampaignReads:
         config = load_campaign_config(self.directory / store.CONFIG)
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
-        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err
+        kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err, begun.joint_units
         return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------
@@ -225,14 +233,14 @@ class CampaignReads:
         """All measured modes, one row each: what pandas.DataFrame takes."""
         from planner.campaign.records import measured_records
 
-        return measured_records(self.cell.robot.joint_names, self.state.measurements.values())
+        return measured_records(self.cell.robot.joints, self.state.measurements.values())
 
     def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
         from planner.campaign.records import predicted_records
 
         q = np.atleast_2d(q_rad)
-        return predicted_records(self.cell.robot.joint_names, q, self.predict(q))
+        return predicted_records(self.cell.robot.joints, q, self.predict(q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

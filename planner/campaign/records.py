@@ -6,19 +6,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.campaign.state import Measurement
+from planner.recording.joints import JointUnits
 
 if TYPE_CHECKING:
     from planner.surrogate.frf_bands import ModalPrediction
 
 
 def measured_records(
-    joint_names: Sequence[str], measurements: Iterable[Measurement]
+    joints: JointUnits, measurements: Iterable[Measurement]
 ) -> list[dict[str, Any]]:
     """One row a measured mode: pose, joint angles in degrees, Hz, ratios, sds, probability."""
     return [
         {
             "pose": m.pose,
-            **_angles(joint_names, m.joints_deg),
+            **_angles(joints, m.joints_deg),
             "mode": k,
             "frequency_hz": mode.frequency_hz,
             "frequency_sd_hz": mode.frequency_sd_hz,
@@ -33,14 +34,14 @@ def measured_records(
 
 
 def predicted_records(
-    joint_names: Sequence[str], q_rad: np.ndarray, prediction: "ModalPrediction"
+    joints: JointUnits, q_rad: np.ndarray, prediction: "ModalPrediction"
 ) -> list[dict[str, Any]]:
     """One row for each mode of each pose q (n, dof) in rad of a prediction."""
     p = prediction
     return [
         {
             "pose": i + 1,
-            **_angles(joint_names, np.rad2deg(row).tolist()),
+            **_angles(joints, joints.shown(row).tolist()),
             "mode": k + 1,
             "frequency_hz": float(p.frequency_hz[i, k]),
             "frequency_sd_hz": float(p.frequency_sd_hz[i, k]),
@@ -52,6 +53,6 @@ def predicted_records(
     ]
 
 
-def _angles(joint_names: Sequence[str], joints_deg: Sequence[float]) -> dict[str, float]:
-    pairs = zip(joint_names, joints_deg, strict=True)
-    return {f"{name}_deg": float(value) for name, value in pairs}
+def _angles(joints: JointUnits, joints_deg: Sequence[float]) -> dict[str, float]:
+    pairs = zip(joints.columns, joints_deg, strict=True)
+    return {column: float(value) for column, value in pairs}

@@ -1,6 +1,7 @@
 """Drift: a pose that was hit again, and hits that all lie to one side of what is expected."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,29 +34,49 @@ def hit_again(model: Model, known: Measurement, modes: Sequence[MeasuredMode]) -
     return (f"{known.pose} was hit again and is as it was (at most {what}).",)
 
 
+@dataclass(frozen=True)
+class Suspicion:
+    """A hint at drift: the measured pose that is to be hit again, and why, in a sentence."""
+
+    again: str
+    text: str
+
+
 def suspected(
     model: Model, state: CampaignState, pose: str, joints_deg: tuple[float, ...],
     modes: Sequence[MeasuredMode],
-) -> tuple[str, ...]:  # fmt: skip
-    """A remark that proposes to hit the first pose again, where a new one hints at drift.
+) -> Suspicion | None:  # fmt: skip
+    """Whether hits at a new pose hint at drift, and which early pose then tells.
 
     `model` and `state` are those before the import; it is a hint only where they expect enough.
     """
     if len(model.labelled) < LEAST or pose in state.measurements:
-        return ()
+        return None
     here = compared(model, joints_deg, tuple(modes))
     near = np.abs(here.off) < SAME_MODE
     off = here.off[near]
     one_sided = abs(np.sum(np.sign(off))) == len(off) >= LEAST_MODES
     if not one_sided or np.any(here.in_sd[near] < SUSPECT_SD) or np.mean(np.abs(off)) < SMALLEST:
-        return ()
-    first = state.used[0]
-    angles = ", ".join(f"{angle:.3f}" for angle in first.joints_deg)
-    return (
+        return None
+    early = _telling(state)
+    joints = model.cell.robot.joints
+    which = "the first pose" if early is state.used[0] else "an early pose"
+    return Suspicion(
+        early.pose,
         f"All modes at {pose} lie to one side of what is expected, by {100 * np.mean(off):+.2f} % "
-        f"on average: the robot may have drifted (warmth, load, clamping). Hit {first.pose}, the "
-        f"first pose, again ({angles}°) and import with --pose {first.pose}: it says whether.",
+        f"on average: the robot may have drifted (warmth, load, clamping). Hit {early.pose}, "
+        f"{which}, again ({joints.listed(early.joints_deg, 3)}) and import with --pose "
+        f"{early.pose}: it says whether. It is proposed next.",
     )
+
+
+def _telling(state: CampaignState) -> Measurement:
+    """Of the earlier half of what was measured, the pose with most modes; of these the first.
+
+    Since then the robot has changed most.
+    """
+    half = state.used[: (len(state.used) + 1) // 2]
+    return max(half, key=lambda m: sum(mode.likely for mode in m.modes))
 
 
 def _scatter(model: Model) -> float:

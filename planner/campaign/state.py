@@ -65,6 +65,7 @@ class CampaignState:
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
+    doubt: tuple[str, str] | None = None  # pose to hit again, and the one whose hits hint at drift
     proposals_made: int = 0  # names given, undone ones too: none is given to another pose
     events: int = 0
     model_version: int = 0  # sequence number of the last event that changed the model
@@ -142,12 +143,14 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             return replace(state, refused={**state.refused, **hits})
         case Withdrawn():
             measurement = replace(state.measurements[event.pose], withdrawn=True)
-            return replace(changed, measurements={**state.measurements, event.pose: measurement})
+            measurements = {**state.measurements, event.pose: measurement}
+            return replace(changed, measurements=measurements, doubt=_doubt(state, event.pose))
         case Skipped():
             left = tuple(pose for pose in state.open if pose != event.pose)
             avoided = state.avoided | ({event.pose} if event.neighbours else set())
             skipped = {**state.skipped, event.pose: event.reason}
-            return replace(changed, open=left, skipped=skipped, avoided=avoided)
+            doubt = _doubt(state, event.pose)
+            return replace(changed, open=left, skipped=skipped, avoided=avoided, doubt=doubt)
         case Starred():
             return replace(state, starred=state.starred | {event.pose})
     return state
@@ -176,4 +179,10 @@ def _imported(
         held = {**state.held, event.pose: measurement}
         return replace(state, open=left, refused=refused, held=held)
     measurements = {**state.measurements, event.pose: measurement}
-    return replace(changed, open=left, refused=refused, measurements=measurements)
+    doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
+    return replace(changed, open=left, refused=refused, measurements=measurements, doubt=doubt)
+
+
+def _doubt(state: CampaignState, pose: str) -> tuple[str, str] | None:
+    """What is left of a doubt after an act at a pose: none where it was about that."""
+    return None if state.doubt is not None and pose in state.doubt else state.doubt

@@ -7,7 +7,6 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import tomlkit
 from tomlkit.exceptions import TOMLKitError
 
@@ -215,7 +214,7 @@ def _default(directory: Path, robot_file: str) -> str:
     from planner.robot.robot import Robot
 
     robot = Robot.load(directory / robot_file)
-    limits = np.rad2deg(np.stack([robot.lower_rad, robot.upper_rad], axis=1)).round(3)
+    limits = robot.joints.shown([robot.lower_rad, robot.upper_rad]).T.round(3)
     document = tomlkit.document()
     document.add(tomlkit.comment("Whole range of every joint: narrow it to where the tool works."))
     document.add("robot", tomlkit.item(robot_file))

@@ -7,6 +7,7 @@ from planner.robot.robot import Robot
 
 WIDEST_RAD = 20.0  # of a limit: three turns; 360 rad are 57
 FASTEST_RAD_S = 20.0  # of industrial arms' joints, small ones included
+LONGEST_M, FASTEST_M_S = 100.0, 10.0  # of a rail; in mm both are a thousand times as much
 PARALLEL_DEG = 1.0
 APART_M = 0.6  # between where the hammer hits and where the sensor sits
 EARTH_M_S2 = 9.81
@@ -20,6 +21,9 @@ def check_joints(robot: Robot) -> list[CheckRemark]:
     )
     for name, low, high, speed in rows:
         where = f"{robot.urdf_path.name}, joint {name}"
+        if robot.slides(name):
+            found += _slide(low, high, speed, where)
+            continue
         if max(abs(low), abs(high)) > WIDEST_RAD:
             turns = (high - low) / 2 / np.pi
             text = f"Its limits are {low:.4g} and {high:.4g} rad, {turns:.0f} turns apart."
@@ -32,6 +36,22 @@ def check_joints(robot: Robot) -> list[CheckRemark]:
             text = f"Its speed limit is {speed:.4g} rad/s, {speed / 2 / np.pi:.0f} turns a second."
             remedy = "A URDF's speeds are in rad/s, not in degrees a second."
             found.append(CheckRemark("warning", text, where, remedy))
+    return found
+
+
+def _slide(low: float, high: float, speed: float, where: str) -> list[CheckRemark]:
+    """What looks wrong in limits (m) and speed (m/s) of a joint that slides."""
+    found = []
+    if max(abs(low), abs(high)) > LONGEST_M:
+        text = f"It slides from {low:.4g} to {high:.4g} m, as if its limits were in millimetres."
+        found.append(CheckRemark("warning", text, where, "Limits of a prismatic joint are in m."))
+    if not 0 < speed < np.inf:
+        text = "It has no speed limit: what it takes to get to a pose cannot be told."
+        found.append(CheckRemark("note", text, where, "Add velocity in m/s to <limit>."))
+    elif speed > FASTEST_M_S:
+        text = f"Its speed limit is {speed:.4g} m/s."
+        remedy = "Speeds of prismatic joints are in m/s, not in millimetres a second."
+        found.append(CheckRemark("warning", text, where, remedy))
     return found
 
 

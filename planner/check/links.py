@@ -28,7 +28,7 @@ def _where(robot: Robot, link: LinkBody) -> str:
 
 
 def _lengths(robot: Robot) -> list[CheckRemark]:
-    reach, where = robot.reach_m, f"{robot.urdf_path.name}, joint origins"
+    reach, where = robot.arm_m, f"{robot.urdf_path.name}, joint origins"
     if SHORTEST_REACH_M <= reach <= LONGEST_REACH_M:
         return []
     unit = "millimetres" if reach > LONGEST_REACH_M else "another unit"

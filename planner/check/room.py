@@ -1,7 +1,5 @@
 """Checks of collision geometry, and of the workspace against the robot."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from planner.check.remark import CheckRemark
@@ -13,6 +11,8 @@ from planner.robot.workspace import Candidates, Workspace, WorkspaceRanges
 
 SPREAD = 8  # poses of the workspace that are looked at
 RADIANS = 6.3  # ranges of joints in degrees that stay below are most likely radians
+FIXED_BY_A_PLACE = 6  # coordinates of a place and a direction
+METRES = 20.0  # ranges of slides in mm that stay below are most likely metres
 NARROW_DEG = 15.0  # unless other joints move by this much
 
 
@@ -28,7 +28,8 @@ def check_collision(
     shaped = {link.joint for link in links if link.shapes}
     bare = [name for name in robot.joint_names if name not in shaped]
     if bare:
-        text = f"What {', '.join(bare)} turns has no collision shape and is not checked."
+        moves = "moves" if any(map(robot.slides, bare)) else "turns"
+        text = f"What {', '.join(bare)} {moves} has no collision shape and is not checked."
         remedy = "Add <collision> boxes or cylinders to these links."
         found.append(CheckRemark("warning", text, f"{urdf}, <collision>", remedy))
     if not robot.config.obstacle:
@@ -52,7 +53,10 @@ def look_around(
     robot: Robot, table: WorkspaceRanges, file: str
 ) -> tuple[Candidates | None, list[CheckRemark]]:
     """A few poses of the workspace, and what looks wrong in it."""
-    where, found = f"{file}, [workspace]", _units(table.joints_deg, table.position_m, file)
+    where, found = (
+        f"{file}, [workspace]",
+        _units(robot, table, file) + _redundant(robot, table, file),
+    )
     try:
         candidates = Workspace.from_table(table, robot).candidates(robot, SPREAD, 0)
     except NoPoseLeftError as error:
@@ -67,13 +71,29 @@ def look_around(
     return candidates, found
 
 
-def _units(
-    joints_deg: Sequence[tuple[float, float]] | None,
-    position_m: Sequence[tuple[float, float]] | None,
-    file: str,
-) -> list[CheckRemark]:
+def _redundant(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]:
+    """Places of the tool do not say how a robot stands that has more joints than they fix."""
+    count = len(robot.tool_joints)
+    if table.position_m is None or count <= FIXED_BY_A_PLACE:
+        return []
+    text = (
+        f"{count} joints move the tool, and a place of it fixes {FIXED_BY_A_PLACE}: the robot can "
+        f"stand there in many ways, which vibrate differently, but the model knows places only."
+    )
+    remedy = "Give joints_deg, or say in robot.toml's [held] where rails and turntables stay."
+    return [CheckRemark("warning", text, f"{file}, [workspace] position_m", remedy)]
+
+
+def _units(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]:
+    joints_deg, position_m = table.joints_deg, table.position_m
     if joints_deg is not None:
-        box = np.array(joints_deg, dtype=float)
+        box, slides = np.array(joints_deg, dtype=float), np.array(robot.joints.slides)
+        if slides.any() and len(box) == len(slides):
+            shifts, box = box[slides], box[~slides]
+            if 0 < np.abs(shifts).max() < METRES:
+                text = f"No joint slides beyond {np.abs(shifts).max():.3g} mm, as if in metres."
+                where = f"{file}, [workspace] joints_deg"
+                return [CheckRemark("warning", text, where, "Give millimetres.")]
         wide = np.ptp(box, axis=1).max() if box.size else 0.0
         if 0 < np.abs(box).max(initial=0.0) < RADIANS and wide < NARROW_DEG:
             text = f"No joint moves by more than {wide:.3g}°, as if the ranges were in radians."

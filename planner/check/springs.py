@@ -10,6 +10,7 @@ from planner.robot.robot import BASE
 # By which a stiffness in another unit is told: each spring alone, with the inertia that it moves.
 # Springs of the arms in campaigns/ lie between 5 and 500 Hz.
 SLOWEST_HZ, FASTEST_HZ = 1.0, 1e4
+SAG_M = 0.02
 SAG_RAD, FALLS_RAD = 0.02, 0.5  # under its own weight: what a spring may give, what none can carry
 RATIO = (
     5.0  # damping ratio of one spring alone; published fits have up to 3.5 at a wrist's last joint
@@ -29,9 +30,12 @@ def check_springs(simulation: Simulation, q: np.ndarray) -> list[CheckRemark]:
     for i, block in enumerate(blocks):
         where = f"{robot.path.name}, [[compliance]] number {i + 1} ({block.joint})"
         found += _spring(block, float(inertia[i]), where)
-        if sag[i] > SAG_RAD and not block.slide:
-            text = f"It gives by {np.rad2deg(sag[i]):.2g}° under the robot's own weight."
+        if sag[i] > (SAG_M if block.slide else SAG_RAD):
+            size = f"{1e3 * sag[i]:.2g} mm" if block.slide else f"{np.rad2deg(sag[i]):.2g}°"
+            text = f"It gives by {size} under the robot's own weight."
             remedy = "Stiffnesses are in N·m/rad, neither in kN·m/rad nor in N·m/degree."
+            if block.slide:
+                remedy = "Stiffnesses along an axis are in N/m, neither in kN/m nor in N/mm."
             found.append(CheckRemark("warning", text, where, remedy))
     return found + _own_axes(simulation)
 
@@ -55,16 +59,18 @@ def _unstable(simulation: Simulation, q: np.ndarray) -> list[CheckRemark]:
     angle = np.nan_to_num(sag[:, worst], nan=np.inf).max()
     if least > 0 and angle < FALLS_RAD:
         return []
-    name, stiffness = (
-        (blocks[worst].joint, blocks[worst].stiffness) if worst < len(blocks) else ("resonator", 0)
-    )
+    name, stiffness, unit = "resonator", 0.0, "N·m/rad"
+    if worst < len(blocks):
+        block = blocks[worst]
+        name, stiffness = block.joint, block.stiffness
+        unit = "N/m" if block.slide else unit
     return [
         CheckRemark(
             "error",
-            f"The robot falls over: the spring of {stiffness:.4g} N·m/rad does not carry the "
+            f"The robot falls over: the spring of {stiffness:.4g} {unit} does not carry the "
             f"weight outboard of it.",
             f"{file}, [[compliance]] number {worst + 1} ({name})",
-            "State the stiffness in N·m/rad, and masses in kg.",
+            f"State the stiffness in {unit}, and masses in kg.",
         )
     ]
 
@@ -86,7 +92,8 @@ def _spring(block: Compliance, inertia: float, where: str) -> list[CheckRemark]:
     ratio = block.damping / (2 * inertia * rate)
     if ratio > RATIO:
         text = f"Its damper of {block.damping:.4g} has a damping ratio of {ratio:.2g}."
-        remedy = "Dampers are in N·m·s/rad; a ratio of 0.01 to 0.1 is usual."
+        unit = "N·s/m" if block.slide else "N·m·s/rad"
+        remedy = f"Dampers are in {unit}; a ratio of 0.01 to 0.1 is usual."
         found.append(CheckRemark("warning", text, where, remedy))
     elif block.damping == 0 and block.loss_factor == 0:
         text = "It has no damping: resonances of simulated FRFs are without bound."
@@ -99,12 +106,13 @@ def _own_axes(simulation: Simulation) -> list[CheckRemark]:
     """Joints whose own axis is rigid, though gears are what gives most."""
     robot, given = simulation.robot, simulation.robot.config.compliance
     rigid = []
-    for name, axis in zip(robot.joint_names, robot.joint_axes, strict=True):
-        own = [b for b in given if b.joint == name and abs(np.dot(b.axis, axis)) > 0.9]
+    for name in robot.joint_names:
+        own = [b for b in given if b.joint == name and robot.is_own(b)]
         rigid += [] if own else [name]
     if not rigid or len(rigid) == len(robot.joint_names):
         return []
-    text = f"Rigid about its own axis: {', '.join(rigid)}."
+    slides = all(robot.slides(name) for name in rigid)
+    text = f"Rigid {'along' if slides else 'about'} its own axis: {', '.join(rigid)}."
     remedy = f'Add a [[compliance]] for each that gives; joint = "{BASE}" is for the floor.'
     return [CheckRemark("note", text, f"{robot.path.name}, [[compliance]]", remedy)]
 

@@ -180,7 +180,9 @@ def watch(
 @app.command()
 def predict(
     directory: Directory,
-    poses: Annotated[Path, typer.Argument(metavar="POSES_CSV", help="pose, joint_…_deg")],
+    poses: Annotated[
+        Path, typer.Argument(metavar="POSES_CSV", help="pose, joint_…_deg, slides: …_mm")
+    ],
     out: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="Where FRFs go.")] = None,
     as_json: AsJson = False,
 ) -> int:
@@ -193,7 +195,7 @@ def predict(
     from planner.report.predictions import predictions
 
     campaign = Campaign(directory)
-    cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joint_names)
+    cell, rows = campaign.cell, read_poses(poses, campaign.cell.robot.joints)
     q = [cell.check_pose(row.joints_deg, f"{poses}, row {row.row}") for row in rows]
     npz = out or campaign.directory / "predictions" / f"{poses.stem}.npz"
     return respond(predictions(campaign, [row.pose for row in rows], q, npz), as_json)

@@ -60,7 +60,7 @@ def compare(
     if simulation not in (None, *SIMULATIONS):
         raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
     loaded = Robot.load(robot)
-    rows = read_recordings(recordings, loaded.joint_names, loaded.points).rows
+    rows = read_recordings(recordings, loaded.joints, loaded.points).rows
     config = decide(loaded, [row.joints_deg for row in rows], campaign, simulation)
     folder = out or _cache_folder()
     with bars(quiet=as_json) as progress:

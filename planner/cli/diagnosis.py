@@ -35,8 +35,6 @@ def diagnose(
 
     Example: planner diagnose cell7 --out found
     """
-    import numpy as np
-
     from planner.api import diagnose_material
     from planner.campaign.material import material
     from planner.cli.progress import counting
@@ -47,13 +45,13 @@ def diagnose(
     check_options(window_rate_1_s=window_rate_1_s)
     given = material(recordings, robot, window_rate_1_s)
     nominal = given.nominal
-    wanted = read_poses(predict, nominal.joint_names) if predict else ()
+    wanted = read_poses(predict, nominal.joints) if predict else ()
     with counting(quiet=as_json) as tell:
         answer = diagnose_material(given.with_poses(wanted), nominal, tell)
         if predict:
-            angles = np.array([row.joints_deg for row in wanted])
+            q = nominal.joints.internal([row.joints_deg for row in wanted])
             npz = _target(out, predict, given.recordings)
-            answer = answer.with_predictions([row.pose for row in wanted], angles, npz)
+            answer = answer.with_predictions([row.pose for row in wanted], q, npz)
         if out is not None:
             answer = answer.write(out)
     answer = replace(answer, seconds=time.perf_counter() - started)

@@ -66,7 +66,7 @@ def identify(
     with reporting("identifying", quiet=as_json) as progress:
         dataset = Dataset.read(
             recordings,
-            nominal.joint_names,
+            nominal.joints,
             band,
             window_rate_1_s=window_rate_1_s,
             progress=progress,

@@ -25,7 +25,6 @@ from planner.frf.frf import Frf
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
-STILL_DEG = 0.5  # a joint whose angles over the pool differ by less does not move
 OUTSIDE_TOLERANCE = 0.02  # of the workspace's size by which readback may lie beside it
 
 
@@ -66,7 +65,7 @@ class Bench:
     @property
     def q(self) -> np.ndarray:
         """Readback angles (n, dof) in rad."""
-        return np.deg2rad([m.joints_deg for m in self.measurements])
+        return self.robot.joints.internal([m.joints_deg for m in self.measurements])
 
 
 @lru_cache(maxsize=2)
@@ -95,9 +94,9 @@ def decide(
 
 def _box(robot: Robot, joints_deg: np.ndarray) -> list[tuple[float, float]]:
     low, high = joints_deg.min(axis=0), joints_deg.max(axis=0)
-    still = high - low < STILL_DEG
+    still = high - low < robot.joints.same()
     middle = (low + high) / 2
-    limits = np.rad2deg([robot.lower_rad, robot.upper_rad])
+    limits = robot.joints.shown([robot.lower_rad, robot.upper_rad])
     low = np.clip(np.where(still, middle, low), *limits)
     high = np.clip(np.where(still, middle, high), *limits)
     return [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
@@ -137,7 +136,7 @@ def _usable(
     found = [p for p in poses if not p.reason]
     if not found:
         raise InputError(f"No recorded pose gives a mode: {remarks[0]}")
-    x = workspace.features(robot, np.deg2rad([p.measurement.joints_deg for p in found]))
+    x = workspace.features(robot, robot.joints.internal([p.measurement.joints_deg for p in found]))
     if not x.shape[1]:
         raise InputError(
             "All poses of the workspace are the same, so there is nothing to choose; record more."

@@ -54,7 +54,7 @@ class PoseFiles:
 def poses_of(folder: Path, robot: Robot, table: ModesTable) -> tuple[PoseFiles, ...]:
     """The poses of a recordings folder in recorded order; InputError where it is wrong."""
     groups: dict[str, list[PoseRow]] = {}
-    for row in read_recordings(folder, robot.joint_names, robot.points).rows:
+    for row in read_recordings(folder, robot.joints, robot.points).rows:
         groups.setdefault(row.pose, []).append(row)
     return tuple(PoseFiles(tuple(rows), table) for rows in groups.values())
 

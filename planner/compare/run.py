@@ -101,5 +101,7 @@ def _judged(bench: Bench, model: Model, used: list[int]) -> Score:
 
 def _chosen(bench: Bench, model: Model, state: CampaignState, acquisition: str) -> int:
     (proposal,) = propose(model, state, 1, acquisition)
-    away = np.abs(np.rad2deg(bench.q) - np.array(proposal.joints_deg)).max(axis=1)
+    joints = bench.robot.joints
+    off = np.abs(joints.shown(bench.q) - np.array(proposal.joints_deg))
+    away = (off / joints.same()).max(axis=1)
     return int(np.argmin(away))

@@ -19,6 +19,7 @@ from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
 from planner.recording.folder import read_recordings
 from planner.recording.force_levels import levels, peak_n
+from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, PointNames, together
 from planner.recording.records import Hit
 
@@ -51,7 +52,7 @@ class Dataset:
     def read(
         cls,
         folder: Path,
-        joint_names: tuple[str, ...],
+        joint_names: JointUnits | Sequence[str],
         band_hz: tuple[float, float],
         *,
         window_rate_1_s: float = 0.0,
@@ -63,7 +64,8 @@ class Dataset:
 
         Args:
             folder: Holds recordings.csv and the files that it names.
-            joint_names: Of the robot, in the order of the angles.
+            joint_names: Of the robot, in the order of the angles; `Robot.joints` where some of
+                them slide.
             band_hz: Which the hits have to excite, and in which FRFs are wanted.
             window_rate_1_s: Of an exponential window that the analyser laid over all channels.
             progress: Is told which pose is read.
@@ -74,13 +76,10 @@ class Dataset:
             InputError: The table is wrong.
             RefusedError: No pose has a hit that can be used.
         """
+        joints = JointUnits.of(joint_names)
         found = [
-            Recording(
-                row.pose,
-                np.deg2rad(row.joints_deg),
-                Source.of(row),
-            )
-            for row in read_recordings(folder, joint_names, points).rows
+            Recording(row.pose, joints.internal(row.joints_deg), Source.of(row))
+            for row in read_recordings(folder, joints, points).rows
             if row.file
         ]
         return cls.of(

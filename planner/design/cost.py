@@ -8,16 +8,17 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Cost:
-    """Joint speeds (dof,) in rad/s at which the robot moves between poses, and minutes.
+    """Joint speeds (dof,) in rad/s (slides: m/s) at which the robot moves to poses, and minutes.
 
     `per_pose` is for brakes, settling and the analyser; `per_hit` for one hit, of which there are
-    `hits_per_axis` along each axis.
+    `hits_per_axis` along each axis; `per_sensor` for putting up one more sensor.
     """
 
     speed_rad_s: np.ndarray
     per_pose: float = 1.0
     per_hit: float = 0.25
     hits_per_axis: int = 4
+    per_sensor: float = 3.0
 
     def travel(self, q: np.ndarray, start: np.ndarray | None) -> np.ndarray:
         """Minutes (n,) from `start` (dof,) to q (n, dof), all joints at once; 0 from nowhere."""

@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from planner.design.discrimination import MOST_CANDIDATES, separation
 from planner.design.next_hit import in_words
 from planner.diagnosis.diagnose import Explained
+from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout
 
 MOST_POSES = 12  # at which the points are compared, evenly taken from those there are
@@ -31,14 +33,16 @@ class ExtraSensor:
     log_odds: float
     log_odds_without: float
     between: tuple[str, ...]
+    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def sentence(self) -> str:
         """For the engineer."""
-        angles = ", ".join(f"{v:.1f}" for v in self.joints_deg)
+        names = [""] * len(self.joints_deg)
+        angles = JointUnits.declared_as(names, self.joint_units).listed(self.joints_deg)
         return (
             f"A sensor at {self.point} would part {' from '.join(self.between)}: hit along "
-            f"{self.hit} at {self.pose} ({angles}°); the odds are expected to become "
+            f"{self.hit} at {self.pose} ({angles}); the odds are expected to become "
             f"e^{self.log_odds:.1f}, without it e^{self.log_odds_without:.1f}."
         )
 
@@ -54,7 +58,7 @@ def extra_sensor(explained: Explained, offered: Mapping[str, np.ndarray]) -> Ext
     tied = [c for c in found.undecided if c.fit is not None][:MOST_CANDIDATES]
     problem = found.problem
     there = tuple(dict.fromkeys((SENSOR, *problem.layout.sensors)))
-    named = problem.simulation.robot.points
+    joints, named = problem.simulation.robot.joints, problem.simulation.robot.points
     places = {named.sensor(name) for name in named.axes} - {*there, TCP}
     if len(tied) < 2 or not places:
         return None
@@ -77,9 +81,10 @@ def extra_sensor(explained: Explained, offered: Mapping[str, np.ndarray]) -> Ext
     return ExtraSensor(
         best,
         names[pose],
-        tuple(round(float(v), 3) for v in np.rad2deg(q[pose])),
+        tuple(round(float(v), 3) for v in joints.shown(q[pose])),
         "xyz"[axis],
         most,
         without,
         tuple(in_words(c.places, c.probability) for c in tied),
+        joints.declared,
     )

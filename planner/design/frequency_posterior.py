@@ -42,6 +42,11 @@ class Poses:
     def __getitem__(self, which: slice | np.ndarray) -> "Poses":
         return Poses(self.x[which], self.low[which], self.slope[which], self.information[which])
 
+    @property
+    def uninformed(self) -> "Poses":
+        """The same without what hits would tell of parameters."""
+        return replace(self, information=np.zeros((len(self), AXES, 0, 0)))
+
     def one(self, index: int) -> "Poses":
         """The pose at `index`, as n = 1."""
         return self[np.array([index])]
@@ -119,7 +124,7 @@ class FrequencyOutputs:
             workspace,
             goal or workspace,
             noise,
-            workspace.poses[:0],
+            workspace.poses[:0].uninformed,
             surrogate.frequency_trust,
             np.linalg.cholesky(open_ + 1e-12 * np.eye(len(open_))),
         )
@@ -141,13 +146,13 @@ class FrequencyOutputs:
 
     def planning(self, pose: Poses, axes: tuple[int, ...] = ALL_AXES) -> "FrequencyOutputs":
         """The same once a pose (n = 1) has been hit along `axes` too."""
-        root = self.covariance_root
+        root, planned = self.covariance_root, self.planned.followed_by(pose.uninformed)
         if not pose.information.shape[-1]:
-            return replace(self, planned=self.planned.followed_by(pose))
+            return replace(self, planned=planned)
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root
         factor = np.linalg.cholesky(np.eye(len(root)) + gained)
         left = np.linalg.solve(factor, root.T).T  # root (I + G)⁻¹ rootᵀ = left leftᵀ
-        return replace(self, planned=self.planned.followed_by(pose), covariance_root=left)
+        return replace(self, planned=planned, covariance_root=left)
 
     def covariance(self, k: int, a: Poses, b: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Of label k's GP: covariance (s, a, b) and variances (s, a), (s, b), per sample s."""

@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import msgspec
 import numpy as np
 
 from planner.design.discrimination import Telling, most_telling
 from planner.design.law_discrimination import most_telling_forces, undecided
 from planner.diagnosis.diagnose import Explained
 from planner.diagnosis.laws.law_at_joints import Laws
+from planner.recording.joints import JointUnits
 
 
 @dataclass(frozen=True)
@@ -24,16 +26,18 @@ class NextHit:
     force_n: tuple[float, ...]
     log_odds: float
     between: tuple[str, ...]
+    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
     @property
     def sentence(self) -> str:
         """For the engineer."""
-        angles = ", ".join(f"{v:.1f}" for v in self.joints_deg)
+        names = [""] * len(self.joints_deg)
+        angles = JointUnits.declared_as(names, self.joint_units).listed(self.joints_deg)
         force = " and ".join(f"{n:g}" for n in self.force_n)
         force = f" with about {force} N" if force else ""
         return (
             f"To tell apart {' from '.join(self.between)}: hit{force} along {self.hit} at "
-            f"{self.pose} ({angles}°); the odds are expected to become e^{self.log_odds:.1f}."
+            f"{self.pose} ({angles}); the odds are expected to become e^{self.log_odds:.1f}."
         )
 
 
@@ -58,16 +62,20 @@ def next_hit(explained: Explained, offered: Mapping[str, np.ndarray]) -> NextHit
     # Linear candidates answer in proportion: the harder, the less noise.
     hardest = [float(recorded.level_n[-1])] if recorded.visits else []
     names = [in_words(c.places, c.probability) for c in found.undecided if c.fit is not None]
-    return _at(best, hardest, offered, names)
+    return _at(best, hardest, offered, names, found.problem.simulation.robot.joints)
 
 
 def _of_laws(
-    at: str | None, laws: Laws, level_n: np.ndarray, offered: Mapping[str, np.ndarray]
+    at: str | None,
+    laws: Laws,
+    level_n: np.ndarray,
+    offered: Mapping[str, np.ndarray],
 ) -> NextHit:
     best = most_telling_forces(laws, float(level_n[0]), float(level_n[-1]), _angles(offered))
     both = zip(laws.candidates, laws.probability, strict=True)
     names = [in_words([(c.law.effect, at)], p) for c, p in both]
-    return _at(best.hit, list(best.force_n), offered, names)
+    joints = laws.problem.simulation.robot.joints
+    return _at(best.hit, list(best.force_n), offered, names, joints)
 
 
 def _angles(offered: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -75,16 +83,21 @@ def _angles(offered: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def _at(
-    best: Telling, force_n: list[float], offered: Mapping[str, np.ndarray], between: list[str]
+    best: Telling,
+    force_n: list[float],
+    offered: Mapping[str, np.ndarray],
+    between: list[str],
+    joints: JointUnits,
 ) -> NextHit:
     name, q = list(offered.items())[best.pose]
     return NextHit(
         pose=name,
-        joints_deg=tuple(round(float(v), 3) for v in np.rad2deg(q)),
+        joints_deg=tuple(round(float(v), 3) for v in joints.shown(q)),
         hit="xyz"[best.axis],
         force_n=tuple(_at_most(force) for force in force_n),
         log_odds=best.log_odds,
         between=tuple(between),
+        joint_units=joints.declared,
     )
 
 

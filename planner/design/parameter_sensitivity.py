@@ -17,6 +17,7 @@ from planner.identification.agreement import MODEL_ERROR
 from planner.identification.frequency_uncertainty import log_frequency_slope
 from planner.identification.measured_frfs import ASSUMED_FLOOR, ASSUMED_RELATIVE, noise_sd
 from planner.identification.parameters import Parametrisation
+from planner.recording.points import TCP, TOOL, Layout
 
 # Lines around each mode at which the information is summed up, in half-widths of its resonance.
 AROUND = np.array([-6.0, -3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0, 6.0])
@@ -29,17 +30,20 @@ class FrfNoise:
     """Sd of an FRF: a share of it and a floor (m/s²/N; None: a share of its rms), a line `step_hz`.
 
     `misfit` is χ² per value of what was identified; above 1 the information is less by that factor.
+    `sensors` are the points that listen.
     """
 
     relative: float
     floor: float | None
     step_hz: float
     misfit: float = 1.0
+    sensors: tuple[str, ...] = TOOL.sensors
 
     @classmethod
     def of(cls, frfs: tuple[Frf, ...], band_hz: tuple[float, float], misfit: float) -> "FrfNoise":
-        """As in the FRFs measured so far; assumed where there are none."""
+        """As in the FRFs measured so far, and the last one's sensors; assumed without any."""
         floors, steps = [], []
+        sensors = frfs[-1].layout.sensors if frfs else TOOL.sensors
         for frf in frfs:
             inside = (frf.frequency_hz >= band_hz[0]) & (frf.frequency_hz <= band_hz[1])
             sd = noise_sd(frf)[..., inside]
@@ -48,8 +52,11 @@ class FrfNoise:
                 floors.append(float(np.median(sd[known])))
                 steps.append(float(frf.frequency_hz[1] - frf.frequency_hz[0]))
         if not floors:
-            return cls(ASSUMED_RELATIVE, None, (band_hz[1] - band_hz[0]) / 200, max(misfit, 1.0))
-        return cls(MODEL_ERROR, float(np.median(floors)), float(np.median(steps)), max(misfit, 1.0))
+            step, floor, share = (band_hz[1] - band_hz[0]) / 200, None, ASSUMED_RELATIVE
+        else:
+            step, floor = float(np.median(steps)), float(np.median(floors))
+            share = MODEL_ERROR
+        return cls(share, floor, step, max(misfit, 1.0), sensors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,24 +87,30 @@ class OpenParameters:
         information = self.information(q) if informed else np.zeros((len(q), AXES, 0, 0))
         return Poses(x, low, np.nan_to_num(slope), information)
 
-    def information(self, q: np.ndarray) -> np.ndarray:
-        """Fisher information (n, 3, p, p) of one hit along each tcp axis at q (n, dof) in rad."""
+    def information(self, q: np.ndarray, layout: Layout | None = None) -> np.ndarray:
+        """Fisher information (n, 3, p, p) of one hit along each axis at q (n, dof) in rad.
+
+        Of the one point that `layout` hits, while its sensors listen; without it the tcp is hit and
+        the sensors of the FRFs so far listen.
+        """
+        layout = layout or Layout((TCP,), self.noise.sensors)
         parts = [
-            self._information(q[i : i + POSES_PER_CHUNK]) for i in range(0, len(q), POSES_PER_CHUNK)
+            self._information(q[i : i + POSES_PER_CHUNK], layout)
+            for i in range(0, len(q), POSES_PER_CHUNK)
         ]
         p = len(self.covariance)
         return np.concatenate(parts) if parts else np.zeros((0, AXES, p, p))
 
-    def _information(self, q: np.ndarray) -> np.ndarray:
+    def _information(self, q: np.ndarray, layout: Layout) -> np.ndarray:
         frequency, count = self._lines(q)
-        matrices = self.simulation.elastic.matrices(q)
+        matrices = self.simulation.elastic.matrices(q, layout=layout)
         inertias = None
         if self.parametrisation.nuisances:
             inertias = self.parametrisation.inertias(self.simulation.elastic.body_jacobians(q))
         springs = self.simulation.elasticity
         h, slope = response_gradient(matrices, springs, laplace(frequency), None, inertias)
         weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / self._sd(h)
-        slope = slope * weight[:, None]
+        slope = (slope * weight[:, None])[:, :, self._channels(layout)]
         spread = self.parametrisation.spread
         n, p = len(q), len(self.covariance)
         out = np.empty((n, AXES, p, p))
@@ -110,8 +123,17 @@ class OpenParameters:
                 out[i, axis] = j @ j.T
         return out
 
+    def _channels(self, layout: Layout) -> list[int]:
+        """Rows of FRFs that the sensors have axes for."""
+        named = self.simulation.robot.points
+        return [
+            3 * place + "xyz".index(axis)
+            for place, name in enumerate(layout.sensors)
+            for axis in named.axes_of(name)
+        ]
+
     def _sd(self, h: np.ndarray) -> np.ndarray:
-        """Root of E|δH|² of one hit's FRF h (n, 3, 3, F)."""
+        """Root of E|δH|² of one hit's FRF h (n, 3 s, 3, F)."""
         floor = self.noise.floor
         if floor is None:
             floor = ASSUMED_FLOOR * np.sqrt(np.mean(np.abs(h) ** 2, axis=(1, 3), keepdims=True))

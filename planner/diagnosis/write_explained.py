@@ -14,7 +14,7 @@ from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
-from planner.robot.config import EffectTable, without_effects
+from planner.robot.config import EffectTable, entry_of, without_effects
 from planner.robot.robot import Robot
 from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
@@ -107,8 +107,9 @@ def _toml(robot: Robot, changes: _Changes, urdf: str) -> str:
     listed: Any = document["compliance"]
     for block, values in zip(listed, changes.springs, strict=True):
         for kind, value in values.items():
-            if value or kind in block:
-                block[kind] = value
+            entry = entry_of(kind, block)
+            if value or entry in block:
+                block[entry] = value
     effects: Any = document.get("effects", tomlkit.aot())
     for values in changes.effects:
         entry = tomlkit.table()

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors, axis_name
+from planner.identification.parameters import Priors, axis_name, parametrise
 from planner.robot.config import Compliance
 
 # Stiffness of what is not stated, in that of the stiffest spring stated at the joint (the floor:
@@ -25,24 +25,28 @@ FLOOR = "base"
 class Structure:
     """A simulation whose parameters can be identified, and what is known of them before.
 
-    Its last `added` elastic degrees of freedom are not in robot.toml.
+    Its last `added` springs are not in robot.toml, nor is what `swinging` tells of.
     """
 
     simulation: Simulation
     priors: Priors
     added: int = 0
+    swinging: str = ""
 
 
 def extended(simulation: Simulation, priors: Priors) -> Structure:
     """Three rotations at every joint that has any, and two tilts of the floor."""
-    config = simulation.robot.config
+    config, slides = simulation.robot.config, simulation.robot.slides_along
+    # The own springs of joints that slide say nothing of rotations there.
     stated = config.compliance
-    stiffest = max(block.stiffness for block in stated)
+    turning = [block for block in stated if not slides(block)]
+    largest = max(simulation.robot.turning_stiffness())
+    stiffest = max((block.stiffness for block in turning), default=largest)
     joints = dict.fromkeys([*(block.joint for block in stated), FLOOR])
     added: list[Compliance] = []
     bounds = dict(priors.bounds)
     for joint in joints:
-        mine = [block for block in stated if block.joint == joint]
+        mine = [block for block in turning if block.joint == joint]
         scale = max((block.stiffness for block in mine), default=stiffest)
         for axis in np.eye(3)[: 2 if joint == FLOOR else 3]:
             if any(abs(float(np.dot(axis, block.axis))) > ALONG for block in mine):
@@ -53,6 +57,17 @@ def extended(simulation: Simulation, priors: Priors) -> Structure:
     wider = msgspec.structs.replace(config, compliance=(*stated, *added))
     robot = replace(simulation.robot, config=wider)
     return Structure(Simulation(robot), replace(priors, bounds=bounds), len(added))
+
+
+def added_softer(structure: Structure, factor: float) -> np.ndarray:
+    """Starts (1, P), in the parameters' units: stated springs as stated, added ones so much softer.
+
+    They keep the relation of damping to stiffness.
+    """
+    p = parametrise(structure.simulation, structure.priors)
+    first = len(structure.simulation.robot.config.compliance) - structure.added
+    added = np.array([min(one.blocks) >= first for one in p.parameters])
+    return np.exp(p.mean - np.log(factor) * added)[None]
 
 
 def _spring(

@@ -15,6 +15,7 @@ import numpy as np
 
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import Parametrisation
 from planner.identification.simulated_visit import SimulatedPoses
@@ -121,7 +122,7 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
         x, heard = known.near(best.x + step), best.chain + chain
         try:
             tried = common.at(x, heard, [visits[i] for i in few], lines)
-        except np.linalg.LinAlgError:
+        except (np.linalg.LinAlgError, InputError):
             tried = None  # no robot can have such inertias
         gain = -np.inf if tried is None else tried.solved(size).here - best.solved(size).here
         if tried is None or gain < 0:

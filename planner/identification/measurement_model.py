@@ -28,7 +28,7 @@ class Tolerances:
 
     `angle_rad`, `offset_m`: of each of two directions of a hit; `gain`, `cross_axis`,
     `mounting_rad`, `position_m`: of the sensor; `force_gain` of the hammer; `delay_s`; `joint_rad`:
-    of each joint's readback.
+    of each joint's readback, (dof,) where some are of joints that slide (m).
     """
 
     angle_rad: float = np.deg2rad(2.0)
@@ -39,17 +39,18 @@ class Tolerances:
     position_m: float = 0.01
     force_gain: float = 0.03
     delay_s: float = 6e-5
-    joint_rad: float = np.deg2rad(0.05)
+    joint_rad: float | tuple[float, ...] = np.deg2rad(0.05)
 
     @classmethod
-    def of(cls, config: RobotConfig) -> "Tolerances":
-        """As robot.toml or campaign.toml state them."""
+    def of(cls, config: RobotConfig, slides: Sequence[bool] = ()) -> "Tolerances":
+        """As robot.toml or campaign.toml state them; `slides` says which joints do."""
         hits, sensor, readback = config.hits, config.sensor, config.readback
+        turns, shifts = float(np.deg2rad(readback.joint_sd_deg)), readback.slide_sd_m
         return cls(
             np.deg2rad(hits.angle_sd_deg), 1e-3 * hits.offset_sd_mm, sensor.gain_sd_percent / 100,
             sensor.cross_axis_sd_percent / 100, np.deg2rad(sensor.mounting_sd_deg),
             1e-3 * sensor.position_sd_mm, sensor.force_gain_sd_percent / 100,
-            joint_rad=np.deg2rad(readback.joint_sd_deg),
+            joint_rad=tuple(np.where(slides, shifts, turns)) if any(slides) else turns,
         )  # fmt: skip
 
     @property
@@ -164,7 +165,8 @@ def _basis(
     hit_basis(h, moment, t, np.einsum("namiaf->namif", by_axis))
     chain_basis(h, turning, s, t, out[:, numbers.hits : numbers.known])
     if by_angle is not None:
-        np.multiply(by_angle, t.joint_rad, out=out[:, numbers.known :])
+        sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
+        np.multiply(by_angle, sd, out=out[:, numbers.known :])
     return out
 
 

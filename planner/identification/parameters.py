@@ -1,7 +1,7 @@
 """What is identified: logarithms of stiffness, damping and loss factor, and inertial nuisances."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +15,7 @@ from planner.robot.virtual_joints import inertia_basis
 NEAR = 6.0
 KINDS = ("stiffness", "damping", "loss_factor")
 UNITS = {"stiffness": "N·m/rad", "damping": "N·m·s/rad", "loss_factor": "1"}
+SLIDE_UNITS = {"stiffness": "N/m", "damping": "N·s/m", "loss_factor": "1"}
 MOMENTS = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of inertia, in Pinocchio's order
 INERTIAL = ("mass", "com_x", "com_y", "com_z", *(f"i_{'xyz'[i]}{'xyz'[j]}" for i, j in MOMENTS))
 
@@ -67,6 +68,12 @@ class Parameter:
     lower: float
     upper: float
     shared: float = 0.0
+    slide: bool = False
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the parameter."""
+        return unit_of(self.kind, self.slide)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +156,8 @@ def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
                 else:
                     factors = _factors(config, kind, blocks[0], priors)
                     parameters.append(_stated(name, kind, tuple(blocks), value, *factors))
+                slide = config.compliance[blocks[0]].slide
+                parameters[-1] = replace(parameters[-1], slide=slide)
                 columns.append(np.isin(np.arange(len(values)), k * e + np.array(blocks)))
     unknown = set(priors.bounds) - {p.name for p in parameters}
     if unknown:
@@ -170,6 +179,11 @@ def _place(simulation: Simulation, tie: str, blocks: list[int]) -> str:
         return tie
     block = simulation.robot.config.compliance[blocks[0]]
     return place_name(block)
+
+
+def unit_of(kind: str, slide: bool) -> str:
+    """Unit of a spring's "stiffness", "damping" or "loss_factor"."""
+    return (SLIDE_UNITS if slide else UNITS)[kind]
 
 
 def place_name(block: Compliance) -> str:

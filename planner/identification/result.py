@@ -28,6 +28,7 @@ class Estimate:
     log_sd: float
     prior_median: float
     prior_log_sd: float
+    unit: str = ""
 
     @property
     def sd(self) -> float:
@@ -96,6 +97,7 @@ def estimates(
             float(sd[i]),
             p.median,
             p.log_sd,
+            p.unit,
         )
         for i, p in enumerate(parametrisation.parameters)
     )

@@ -17,7 +17,8 @@ from planner.identification.parameters import Parametrisation
 from planner.modal.residues import Lines, unit, unit_slope
 from planner.robot.elastic_model import Matrices
 
-READBACK_DEG = 0.05  # of each joint: what a robot's encoders and its geometry leave
+# Of each joint: what a robot's encoders and its geometry leave.
+READBACK_DEG, READBACK_M = 0.05, 5e-4
 REACH = 1.5  # highest lines: modes up to there may each be off, those above only together
 # Relative error of a simulated pole, where modal shapes are off by 1: frequencies are fitted far
 # better than shapes (on simulated cells shapes err by 0.1 to 1 %, poles by 0.01 to 0.1 %).
@@ -97,11 +98,13 @@ class SimulatedPoses:
         h, moment, turning = whole[:3, :3], whole[:3, 3:], whole[3:, :3]
         poles, residues = self.solved.poles[pose], self.solved.residues[pose, :, :3, :3]
         slope, by_angle = self._slopes(pose, lines.x)
+        slides = self.solved.simulation.robot.joints.slides
+        off = np.where(slides, READBACK_M, np.deg2rad(READBACK_DEG))
         exact = SimulatedVisit(
             h,
             hit_basis(h[None], moment[None], t)[0],
             chain_basis(h[None], turning[None], lines.x[None], t)[0],
-            np.deg2rad(READBACK_DEG) * by_angle,
+            off[:, None, None, None] * by_angle,
             _discrepancy(poles, residues, lines, h),
             slope,
         )

@@ -9,7 +9,7 @@ import tomlkit
 
 from planner.errors import InputError
 from planner.identification.result import Identification
-from planner.robot.config import Compliance
+from planner.robot.config import Compliance, entry_of
 from planner.robot.elastic_model import ElasticModel
 from planner.robot.robot import Robot
 from planner.robot.urdf import copy_meshes
@@ -32,11 +32,14 @@ def updated_toml(
     for block in added:
         table = tomlkit.table()
         table.update(joint=block.joint, axis=list(block.axis), stiffness=0.0, damping=0.0)
+        if block.slide:
+            table["slide"] = True
         listed.append(table)
         blocks.append(table)
     for estimate in result.estimates:
         for number in estimate.blocks:
-            blocks[number][estimate.kind] = float(f"{estimate.value:.{DIGITS}g}")
+            at = entry_of(estimate.kind, blocks[number])
+            blocks[number][at] = float(f"{estimate.value:.{DIGITS}g}")
     if urdf is not None:
         document["urdf"] = urdf
     return tomlkit.dumps(document)

@@ -20,6 +20,7 @@ from planner.milling.coupling import TipReceptance
 from planner.milling.rotations import TwoPoints, two_point_receptance
 from planner.milling.smoothing import smoothed
 from planner.milling.tool import Tool
+from planner.recording.joints import JointUnits
 from planner.recording.read import read
 from planner.recording.records import AXES, FrfRecord
 from planner.toml_file import load_toml
@@ -86,8 +87,12 @@ def _npz(path: Path, pose: str | None) -> TipReceptance | TipMotion:
             return TipReceptance.known(frequency[keep], h, spread, kept)
     if not (np.all(np.isfinite(h)) and np.all(np.isfinite(spread))):
         raise InputError(f"{path}: FRFs of {names[row]} are not finite; measure what lacks.")
-    angles = np.deg2rad(stored["joints_deg"][row]) if "joints_deg" in stored else None
-    return TipMotion(names[row], frequency[keep], h, spread, angles)
+    stands = None
+    if "joints_deg" in stored:
+        stated = stored["joints_deg"][row]
+        units = stored.get("joint_units", msgspec.UNSET)
+        stands = JointUnits.declared_as([""] * len(stated), units).internal(stated)
+    return TipMotion(names[row], frequency[keep], h, spread, stands)
 
 
 def _arrays(path: Path) -> dict[str, np.ndarray]:

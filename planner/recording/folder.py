@@ -3,11 +3,12 @@
 import csv
 import io
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
+from planner.recording.joints import JointUnits
 from planner.recording.named_columns import hit_direction
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
@@ -15,26 +16,29 @@ from planner.recording.records import PoseRow, RecordingsFolder
 TABLE = "recordings.csv"
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ROWS = 200_000
-SAME_POSE_DEG = 0.5  # readback of one pose may scatter by less
+ANGLE, SLIDE = "_deg", "_mm"
 
 
-def joint_columns(folder: Path) -> tuple[str, ...]:
-    """Names of the joints in the order of the table's columns `…_deg`, where no robot is named."""
+def joint_columns(folder: Path) -> JointUnits:
+    """The joints as the table's columns `…_deg` and `…_mm` name them, where no robot is named."""
     header, _ = _table(folder / TABLE)
-    return tuple(name.removesuffix("_deg") for name in header if name.endswith("_deg"))
+    columns = [name for name in header if name.endswith((ANGLE, SLIDE))]
+    names = tuple(name.removesuffix(ANGLE).removesuffix(SLIDE) for name in columns)
+    return JointUnits(names, tuple(name.endswith(SLIDE) for name in columns))
 
 
 def read_recordings(
-    folder: Path, joint_names: tuple[str, ...], points: PointNames | None = None
+    folder: Path, joints: JointUnits | Sequence[str], points: PointNames | None = None
 ) -> RecordingsFolder:
-    """The table of a recordings folder; `points` are the robot's.
+    """The table of a recordings folder; `joints` and `points` are the robot's.
 
     Raises InputError naming file, row and remedy.
     """
     points = points or PointNames()
     path = folder / TABLE
     header, lines = _table(path)
-    joints = _joint_columns(path, header, joint_names, {"pose", "hit", "repeat", "file"})
+    units = JointUnits.of(joints)
+    columns = _joint_columns(path, header, units)
     for name in ("pose", "hit", "file"):
         if name not in header:
             raise InputError(f"{path} has no column {name}; add it (see its first row).")
@@ -43,7 +47,7 @@ def read_recordings(
     seen: dict[tuple[object, ...], int] = {}
     for number, values in lines:
         cells = dict(zip(header, values, strict=True))
-        row = _recording_row(path, inside, number, cells, joints)
+        row = _recording_row(path, inside, number, cells, columns)
         row = _with_points(path, row, cells, points)
         stated = row.stated
         key = row.pose, row.hit, stated.hit_point, stated.response_points, row.repeat or 0
@@ -54,15 +58,15 @@ def read_recordings(
             )
         seen[key] = number
         rows.append(row)
-    _same_angles(path, rows)
+    _same_angles(path, rows, units)
     _distinct_files(path, rows)
-    return RecordingsFolder(folder, joint_names, tuple(rows))
+    return RecordingsFolder(folder, units, tuple(rows))
 
 
-def read_poses(path: Path, joint_names: tuple[str, ...]) -> tuple[PoseRow, ...]:
+def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow, ...]:
     """Poses at which a prediction is wanted. Raises InputError naming file, row and remedy."""
     header, lines = _table(path)
-    joints = _joint_columns(path, header, joint_names, {"pose", "peak_force_n"})
+    columns = _joint_columns(path, header, JointUnits.of(joints))
     if "pose" not in header:
         raise InputError(f"{path} has no column pose; add one that names each row.")
     rows: list[PoseRow] = []
@@ -79,7 +83,7 @@ def read_poses(path: Path, joint_names: tuple[str, ...]) -> tuple[PoseRow, ...]:
         force = None
         if cells.get("peak_force_n", "").strip():
             force = _number(path, number, "peak_force_n", cells["peak_force_n"])
-        angles = tuple(_number(path, number, name, cells[name]) for name in joints)
+        angles = tuple(_number(path, number, name, cells[name]) for name in columns)
         rows.append(PoseRow(pose, angles, number, peak_force_n=force))
     return tuple(rows)
 
@@ -146,18 +150,18 @@ def _text(path: Path) -> str:
         raise InputError(f"{path} is not UTF-8 text; save the table as CSV in UTF-8.") from None
 
 
-def _joint_columns(
-    path: Path, header: list[str], joint_names: tuple[str, ...], others: set[str]
-) -> list[str]:
+def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[str, ...]:
     """Names of the joints' columns in the robot's order."""
-    wanted = [f"{name}_deg" for name in joint_names]
+    wanted = joints.columns
     missing = [name for name in wanted if name not in header]
     if missing:
         raise InputError(
             f"{path} has no column {missing[0]}; the robot's joints are "
             f"{', '.join(wanted)}: add what is missing."
         )
-    extra = [n for n in header if n.endswith(("_deg", "_rad")) and n not in wanted]
+    slides = (SLIDE,) if any(joints.slides) else ()
+    ends = (ANGLE, "_rad", *slides)
+    extra = [n for n in header if n.endswith(ends) and n not in wanted]
     if extra:
         raise InputError(
             f"{path} has a column {extra[0]} that is no joint of the robot; remove or rename it."
@@ -180,15 +184,15 @@ def _number(path: Path, number: int, column: str, cell: str) -> float:
     if not math.isfinite(value) or abs(value) > 1e5:
         raise InputError(
             f'{path}, row {number}: {column} is "{cell.strip()}", not a number; correct it '
-            f"(decimal point, degrees)."
+            f"(decimal point, {'millimetres' if column.endswith(SLIDE) else 'degrees'})."
         )
     return value
 
 
 def _recording_row(
-    path: Path, folder: Path, number: int, cells: dict[str, str], joints: list[str]
+    path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[str]
 ) -> PoseRow:
-    angles = tuple(_number(path, number, name, cells[name]) for name in joints)
+    angles = tuple(_number(path, number, name, cells[name]) for name in columns)
     hit = cells["hit"].strip().lower()
     if not hit_direction(hit):
         frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
@@ -251,14 +255,14 @@ def _file(path: Path, folder: Path, number: int, name: str) -> Path:
     return file
 
 
-def _same_angles(path: Path, rows: list[PoseRow]) -> None:
+def _same_angles(path: Path, rows: list[PoseRow], joints: JointUnits) -> None:
     first: dict[str, PoseRow] = {}
     for row in rows:
         known = first.setdefault(row.pose, row)
-        off = max(abs(a - b) for a, b in zip(known.joints_deg, row.joints_deg, strict=True))
-        if off > SAME_POSE_DEG:
+        off = joints.apart(known.joints_deg, row.joints_deg)
+        if off:
             raise InputError(
-                f"{path}, row {row.row}: pose {row.pose} has joint angles {off:.2f}° away from "
+                f"{path}, row {row.row}: pose {row.pose} has joint angles {off} away from "
                 f"those in row {known.row}; give another pose another name."
             )
 

@@ -171,8 +171,16 @@ class StatedPoints:
             known = f"node {node}" if node.isdigit() else f'point "{node}"'
             raise InputError(
                 f"{source}{self.where} has a {what} at {known}, which is none of robot.toml's "
-                f"points ({nodes or ', '.join(self.names.known)}); correct it, or add a [[point]]."
+                f"points ({nodes or ', '.join(self.names.known)}); correct it, or add a [[point]]"
+                f"{self._tools_node(node, what)}."
             ) from None
+
+    def _tools_node(self, node: str, what: str) -> str:
+        """That an unknown node may be the tool's, where robot.toml does not say which that is."""
+        tool, of_tool = (TCP, self.names.hits) if what == "hit" else (SENSOR, self.names.sensors)
+        if not node.isdigit() or set(of_tool) & set(self.names.nodes.values()):
+            return ""
+        return f' (name = "{tool}", node = {node}, if it is the tool\'s)'
 
 
 def _told(node: str, name: str) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.recording.dof import Dof
+from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, StatedPoints
 from planner.recording.pulse import Pulse, find_pulse
 
@@ -160,7 +161,11 @@ class Fault:
 
 @dataclass(frozen=True)
 class PoseRow:
-    """One row of recordings.csv (`file` is absolute) or of predict.csv (`hit`, `file` None)."""
+    """One row of recordings.csv (`file` is absolute) or of predict.csv (`hit`, `file` None).
+
+    `joints_deg` are degrees, of joints that slide millimetres (`joints.JointUnits`): so it is
+    wherever a list of joint values has this name.
+    """
 
     pose: str
     joints_deg: tuple[float, ...]
@@ -177,5 +182,5 @@ class RecordingsFolder:
     """A folder of recordings as recordings.csv lists it, in recording order."""
 
     path: Path
-    joint_names: tuple[str, ...]
+    joints: JointUnits
     rows: tuple[PoseRow, ...] = field(default=())

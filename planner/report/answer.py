@@ -36,7 +36,8 @@ def plain(value: Any) -> Any:
     if isinstance(value, Answer):
         return value.to_json()
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+        items = {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+        return {name: plain(v) for name, v in items.items() if v is not msgspec.UNSET}
     if isinstance(value, msgspec.Struct):
         value = msgspec.to_builtins(value)
     if hasattr(value, "tolist"):

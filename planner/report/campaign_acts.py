@@ -1,6 +1,7 @@
 """Answers of the acts on a campaign: `new`, `undo`, `withdraw`, `skip`, `confirm`."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -26,6 +27,7 @@ class NewCampaign(Answer):
     acquisition: str
     remarks: tuple[str, ...]
     findings: tuple[CheckRemark, ...] = ()
+    joint_units: Any = msgspec.UNSET
 
     @classmethod
     def of(cls, campaign: Campaign) -> "NewCampaign":
@@ -36,6 +38,7 @@ class NewCampaign(Answer):
         return cls(
             str(campaign.directory), robot.name, tuple(robot.joint_names), config.modes.count,
             config.acquisition.name, said, tuple(r for r in warned if r.what not in said),
+            robot.joints.declared,
         )  # fmt: skip
 
     def text(self) -> str:

@@ -57,7 +57,7 @@ def _campaign(directory: Path, pose: str | None) -> tuple[TipReceptance, str]:
             f"{directory}: name one of its poses by --pose ({some}); for another, "
             f"write its FRFs with predict --out and couple that file with --robot."
         )
-    q = np.deg2rad(np.array(stands[pose], float))
+    q = campaign.cell.robot.joints.internal(stands[pose])
     lines = campaign.frequency_lines
     mean, sd = campaign.frf(q[None], lines)
     simulated = any(m.simulated for m in state.recorded)

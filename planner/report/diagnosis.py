@@ -130,10 +130,8 @@ class DiagnosisReport(Answer):
         found = self.diagnosis
         return predicted(found.problem, found.best, q, frequency_hz, found.temper)
 
-    def with_predictions(
-        self, poses: Sequence[str], joints_deg: np.ndarray, npz: Path
-    ) -> "DiagnosisReport":
-        """The same once FRFs at poses with joint angles (n, dof) in degrees are in the npz file.
+    def with_predictions(self, poses: Sequence[str], q: np.ndarray, npz: Path) -> "DiagnosisReport":
+        """The same once FRFs at poses q (n, dof) in rad (m) are in the npz file.
 
         Raises InputError where it cannot be written.
         """
@@ -141,8 +139,9 @@ class DiagnosisReport(Answer):
         from planner.report.predictions import save_frfs
 
         lines = frequency_lines(self.diagnosis.problem.band_hz)
-        mean, sd = self.predict(np.deg2rad(joints_deg), lines)
-        save_frfs(npz, lines, mean, sd, poses, joints_deg)
+        mean, sd = self.predict(q, lines)
+        joints = self.diagnosis.problem.simulation.robot.joints
+        save_frfs(npz, lines, mean, sd, poses, joints, q)
         return replace(self, npz=str(npz))
 
     def write(self, folder: Path) -> "DiagnosisReport":

@@ -37,7 +37,7 @@ class StatedSpring:
 class IdentifiedSpring:
     """A [[compliance]] block with its identified values; `identifiable` is the stiffness's.
 
-    A value whose sd is None was not fitted.
+    A value whose sd is None was not fitted. With `unit` "N/m" it is a shift along the axis.
     """
 
     joint: str
@@ -52,12 +52,14 @@ class IdentifiedSpring:
     loss_factor_sd: float | None
     loss_factor_identifiable: bool
     nominal: StatedSpring
+    unit: str | msgspec.UnsetType = msgspec.UNSET  # of the stiffness of a shift: "N/m"
 
     @property
     def cells(self) -> tuple[str, ...]:
         """A row of the table."""
         letters = [letter for a, letter in zip(self.axis, "xyz", strict=True) if abs(a) == 1]
         axis = letters[0] if letters else " ".join(f"{a:.3g}" for a in self.axis)
+        axis = axis if self.unit is msgspec.UNSET else f"along {axis} (N/m, N·s/m)"
         return (
             f"{self.joint} {axis}",
             _with_sd(self.stiffness, self.stiffness_sd),
@@ -250,7 +252,8 @@ def identified_springs(robot: "Robot", found: "Identification") -> tuple[Identif
             values["identifiable" if kind == "stiffness" else f"{kind}_identifiable"] = told
         stated = StatedSpring(block.stiffness, block.damping)
         axis = tuple(block.axis)
-        springs.append(IdentifiedSpring(block.joint, axis, nominal=stated, **values))
+        unit = "N/m" if block.slide else msgspec.UNSET
+        springs.append(IdentifiedSpring(block.joint, axis, nominal=stated, unit=unit, **values))
     return tuple(springs)
 
 

@@ -194,7 +194,8 @@ def _labelled_modes(report: "ImportReport") -> tuple[ImportedMode, ...]:
     if report.measurement is None:
         return ()
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
-    before = report.model_before.predict(np.deg2rad([report.measurement.joints_deg]))
+    joints = report.model.cell.robot.joints
+    before = report.model_before.predict(joints.internal([report.measurement.joints_deg]))
     expected = ExpectedMode.all_of(before, 0)
     labels = {m.frequency_hz: k for k, m in enumerate(labelled.modes) if m} if labelled else {}
     sure = labelled.probability if labelled else ()

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from planner.campaign.events import Proposal
+from planner.recording.joints import JointUnits
 
 WIDTH = 80  # columns of the smallest terminal
 LAST = 4  # verdicts that are shown
@@ -43,7 +44,7 @@ class PosePage:
 
     proposal: Proposal
     number: int  # of the measurement
-    joint_names: tuple[str, ...]
+    joints: JointUnits
     frame: str  # whose axes the hits are along
     per_axis: int
     hits: tuple[JudgedHit, ...]
@@ -88,9 +89,11 @@ class PosePage:
     def _angles(self) -> Table:
         angles = Table(box=None, header_style="bold", pad_edge=False)
         angles.add_column("joint")
-        angles.add_column("angle (°)", justify="right")
-        for name, value in zip(self.joint_names, self.proposal.joints_deg, strict=True):
-            angles.add_row(name, Text(f"{value:.3f}", style="bold"))
+        slides = any(self.joints.slides)
+        angles.add_column("stands at" if slides else "angle (°)", justify="right")
+        for i, value in enumerate(self.proposal.joints_deg):
+            text = self.joints.text(i, value, 3) if slides else f"{value:.3f}"
+            angles.add_row(self.joints.names[i], Text(text, style="bold"))
         return angles
 
     def _hits(self) -> Table:

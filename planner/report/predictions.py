@@ -11,6 +11,7 @@ from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
+from planner.recording.joints import JointUnits
 from planner.report.answer import Answer
 from planner.report.text import table, with_sd
 
@@ -93,7 +94,7 @@ def predictions(
     """
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.predict(angles), campaign.frf(angles)
-    save_frfs(npz, lines, mean, sd, names, np.rad2deg(angles))
+    save_frfs(npz, lines, mean, sd, names, campaign.cell.robot.joints, angles)
     cell = campaign.cell
     inside = cell.workspace.contains(cell.robot, angles, BESIDE)
     poses = (
@@ -105,18 +106,19 @@ def predictions(
 
 def save_frfs(
     path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray,
-    poses: Sequence[str], joints_deg: np.ndarray,
+    poses: Sequence[str], joints: JointUnits, q: np.ndarray,
 ) -> None:  # fmt: skip
-    """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) to exactly this npz file.
+    """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) and poses q (n, dof) to exactly this file.
 
     Raises InputError where that cannot be done.
     """
+    units = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "wb") as file:
             np.savez_compressed(
                 file, allow_pickle=False, frequency_hz=frequency_hz, frf_mean=mean, frf_sd=sd,
-                pose=np.array(poses), joints_deg=joints_deg,
+                pose=np.array(poses), joints_deg=joints.shown(q), **units,
             )  # fmt: skip
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

@@ -3,19 +3,21 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import msgspec
 from rich.console import Group, RenderableType
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.design.stopping import Forecast
+from planner.recording.joints import JointUnits
 from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import table
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
+    from planner.design.sensor_places import BetterPlaces
 
 
 @dataclass(frozen=True)
@@ -29,10 +31,10 @@ class ProposedPose(Answer):
         """The proposal's own keys, and "expected"."""
         return {**plain(self.proposal), "expected": plain(self.expected)}
 
-    def parts(self, joint_names: tuple[str, ...]) -> list[RenderableType]:
+    def parts(self, joints: JointUnits) -> list[RenderableType]:
         """Angles, place and expected modes as text."""
         proposal = self.proposal
-        angles = table(f"Pose {proposal.pose}", *(f"{name} (°)" for name in joint_names))
+        angles = table(f"Pose {proposal.pose}", *joints.headings)
         angles.add_row(*(f"{value:.3f}" for value in proposal.joints_deg))
         expected = table("expected there", "mode", "frequency (Hz)", "damping (%)")
         for k, mode in enumerate(self.expected):
@@ -68,13 +70,20 @@ class RepeatedPose:
 
 @dataclass(frozen=True)
 class ProposalsReport(Answer):
-    """Answer of `next`."""
+    """Answer of `next`; `places` is where to put a sensor, or to hit, at the first pose."""
 
     proposals: tuple[ProposedPose, ...]
     joint_names: tuple[str, ...]
     forecast: Forecast
     repeat: RepeatedPose | None
     remarks: tuple[str, ...] = ()
+    places: "BetterPlaces | None" = None
+    joint_units: Any = msgspec.UNSET
+
+    @property
+    def joints(self) -> JointUnits:
+        """Their names and units."""
+        return JointUnits.declared_as(self.joint_names, self.joint_units)
 
     def to_json(self) -> dict[str, Any]:
         """With the forecast's sentence."""
@@ -82,8 +91,9 @@ class ProposalsReport(Answer):
 
     def text(self) -> Group:
         """Each pose, then what one more measurement is worth."""
-        parts = [part for one in self.proposals for part in one.parts(self.joint_names)]
+        parts = [part for one in self.proposals for part in one.parts(self.joints)]
         said = [self.forecast.text, self.repeat.text if self.repeat else ""]
+        said += [self.places.sentence if self.places else ""]
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks)
 
@@ -95,7 +105,9 @@ def forecast_json(forecast: Forecast) -> dict[str, Any]:
 
 def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsReport:
     """Of the poses that `Campaign.next` gave."""
-    expected = campaign.predict(np.deg2rad(np.array([p.joints_deg for p in found])))
+    from planner.campaign.proposals import places_for  # status needs none of what it imports
+
+    expected = campaign.predict(campaign.cell.robot.joints.internal([p.joints_deg for p in found]))
     model = campaign.model
     return ProposalsReport(
         tuple(ProposedPose(p, ExpectedMode.all_of(expected, i)) for i, p in enumerate(found)),
@@ -103,4 +115,6 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         model.forecast,
         RepeatedPose.of(model),
         tuple(campaign.cell.remarks),
+        places=places_for(model, campaign.state, found[0]),
+        joint_units=campaign.cell.robot.joints.declared,
     )

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -95,11 +96,13 @@ class ReplayReport(Answer):
     rrd: str | None
     frequency_sd_percent: np.ndarray | None
     otherwise: OtherAcquisition | None
+    joint_units: Any = msgspec.UNSET
 
     def text(self) -> Group:
         """The steps, the verdict, and what another acquisition would have saved."""
         asked = any(step.instead for step in self.steps)
-        more = ["instead (deg)"] if asked else []
+        units = "deg" if self.joint_units is msgspec.UNSET else ", ".join(self.joint_units)
+        more = [f"instead ({units})"] if asked else []
         made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
         for step in self.steps:
             sd = "  ".join(f"{v:.2f}" for v in step.frequency_sd_percent)
@@ -154,4 +157,5 @@ def replayed(
         rrd=str(rrd.resolve()) if rrd else None,
         frequency_sd_percent=steps[-1].frequency_sd_percent if steps else None,
         otherwise=OtherAcquisition.of(campaign, acquisition) if acquisition else None,
+        joint_units=campaign.cell.robot.joints.declared,
     )

@@ -27,9 +27,9 @@ from planner.robot.skeleton import Skeleton, skeleton
 
 VIBRATION = "vibration"
 FRAMES, FRAME_MS = 24, 100  # of one period on the screen
-LARGEST = 0.12  # of the robot's reach: how far the point moves that moves most
+LARGEST = 0.12  # of the arm's length: how far the point moves that moves most
 PIECES = 6  # a line is drawn in, each in the colour of its motion
-THICK, THIN, BALL = 0.02, 0.004, 0.03  # radii in units of the reach
+THICK, THIN, BALL = 0.02, 0.004, 0.03  # radii in units of the same
 MEASURED, REST = (255, 255, 255), (85, 88, 92)
 
 
@@ -65,11 +65,11 @@ class ModeDrawing:
             seen = matched(seen, there)
         for k in range(len(pose.modes)):
             path = f"modes/mode_{k + 1}"
-            self._still(path, drawn, _title(pose, k), robot.reach_m)
-            size = LARGEST * robot.reach_m
+            self._still(path, drawn, _title(pose, k), robot.arm_m)
+            size = LARGEST * robot.arm_m
             if whole is not None and np.all(np.isfinite(whole.motion[k])):
-                self._moving(f"{path}/simulated", drawn, size * whole.motion[k], robot.reach_m)
-            self._points(f"{path}/measured", seen, k, size, robot.reach_m)
+                self._moving(f"{path}/simulated", drawn, size * whole.motion[k], robot.arm_m)
+            self._points(f"{path}/measured", seen, k, size, robot.arm_m)
 
     def _still(self, path: str, drawn: Skeleton, title: str, reach_m: float) -> None:
         lines = [drawn.place_m[list(pair)] for pair in drawn.lines]

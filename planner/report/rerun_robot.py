@@ -15,7 +15,7 @@ from planner.robot.urdf import find_mesh
 
 WORLD = "tf#/"  # Rerun's frame of the root entity, in which entities lie that name no frame
 GREY = (150, 150, 155)
-RADIUS = 0.025  # of a capsule, in units of the robot's reach
+RADIUS = 0.025  # of a capsule, in units of the arm's length
 NOT_SHAPES = ("rerun.controls", "CoordinateFrame", "InstancePoses3D", "Transform3D")
 
 
@@ -38,7 +38,7 @@ class RobotDrawing:
         stream.log("robot/world", world, static=True)
 
     def move(self, q: np.ndarray) -> None:
-        """Bring the robot to joint angles q (dof,) in rad, at the recording's current time."""
+        """Bring the robot to q (dof,) in rad (slides: m), at the recording's current time."""
         for name, angle in zip(self._robot.joint_names, q, strict=True):
             joint = self._tree.get_joint_by_name(name)
             if joint is not None:
@@ -68,7 +68,7 @@ class RobotDrawing:
         self._stream.log(path, rr.CoordinateFrame(self._frame(body.link)), static=True)
         capsules = rr.Capsules3D(
             lengths=np.linalg.norm(body.ends_m, axis=1),
-            radii=RADIUS * self._robot.reach_m,
+            radii=RADIUS * self._robot.arm_m,
             quaternions=[_turn_from_z(end) for end in body.ends_m],
             colors=GREY,
             fill_mode="solid",

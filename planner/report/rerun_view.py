@@ -34,7 +34,7 @@ COLOURS = {
 SCALE = "0.1 % dark to 10 % yellow"
 BEFORE_US = -1000  # measurements lie so long before the vibration, 1 µs apart
 NEAR = 0.75  # modes are seen from nearer than the cell
-ARROW = 0.18  # length of a hit's arrow, in units of the robot's reach
+ARROW = 0.18  # length of a hit's arrow, in units of the arm's length
 NOTE = """\
 Timeline `measurement` counts the measured poses: drag it, or play it.
 Choose the timeline `vibration` at the bottom and press play: the modes move as at the pose
@@ -109,7 +109,7 @@ class RerunView:
     def proposal(self, number: int, proposal: Proposal) -> None:
         """The robot at a proposed pose, and what is expected there."""
         self._at(number)
-        q = np.deg2rad(proposal.joints_deg)
+        q = self._cell.robot.joints.internal(proposal.joints_deg)
         self._move(q)
         self._stream.log(
             "cell/proposed",
@@ -144,7 +144,7 @@ class RerunView:
     def _hits(self, pose: LabelledPose, measured: MeasuredPose) -> None:
         rotation, position = self._cell.robot.forward(pose.q)
         axes = sorted({hit.axis for hit in measured.hits})
-        size = ARROW * self._cell.robot.reach_m
+        size = ARROW * self._cell.robot.arm_m
         vectors = [size * hit_sign(a) * rotation[:, "xyz".index(a[1])] for a in axes]
         if axes:
             self._stream.log(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
+import msgspec
 import numpy as np
 from rich.console import Group
 from rich.text import Text
@@ -31,12 +32,13 @@ class CheckedLink:
 
 @dataclass(frozen=True)
 class CheckedJoint:
-    """A joint's limits in degrees and its speed."""
+    """A joint's limits and its speed, in degrees and degrees a second; a slide's in mm and mm/s."""
 
     joint: str
     lower_deg: float
     upper_deg: float
     speed_deg_s: float
+    unit: str | msgspec.UnsetType = msgspec.UNSET  # "mm" of a joint that slides
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,7 @@ class RobotCheckReport(Answer):
             )
             for b in found.links
         )  # fmt: skip
-        limits = np.rad2deg([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
+        limits = robot.joints.shown([robot.lower_rad, robot.upper_rad, robot.velocity_rad_s]).T
         return cls(
             robot=robot.name,
             robot_toml=str(robot.path.absolute()),
@@ -92,7 +94,7 @@ class RobotCheckReport(Answer):
             band_hz=robot.config.band_hz,
             links=links,
             joints=tuple(
-                CheckedJoint(name, *row)
+                CheckedJoint(name, *row, unit="mm" if robot.slides(name) else msgspec.UNSET)
                 for name, row in zip(robot.joint_names, limits.tolist(), strict=True)
             ),
             poses=_poses(found),
@@ -112,7 +114,7 @@ class RobotCheckReport(Answer):
         """Masses, modes, then what was found, worst first."""
         masses = table(
             f"{self.robot}: {self.moving_mass_kg:.4g} kg move, reach at most {self.reach_m:.3g} m",
-            *("link", "turned by", "mass (kg)", "centre of mass (m)", "collision shapes"),
+            *("link", "moved by", "mass (kg)", "centre of mass (m)", "collision shapes"),
         )
         for link in self.links:
             if link.inertial or link.collision_shapes:
@@ -139,7 +141,7 @@ def _poses(found: Examination) -> tuple[CheckedPose, ...]:
         made.append(
             CheckedPose(
                 name,
-                tuple(np.rad2deg(found.q[i]).round(4).tolist()),
+                tuple(found.robot.joints.shown(found.q[i]).round(4).tolist()),
                 tuple(places[i].tolist()),
                 tuple(found.frequency_hz[i][known].tolist()),
                 tuple(found.damping_ratio[i][known].tolist()),

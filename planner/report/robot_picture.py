@@ -13,7 +13,7 @@ from planner.robot.robot import Robot
 LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
 AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them
 VIEWS = (("seen from the side", (0, 2)), ("seen from above", (0, 1)))
-FRAME = 0.14  # length of a drawn frame, in units of the reach
+FRAME = 0.14  # length of a drawn frame, in units of the arm's length
 AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the whole
 
 
@@ -22,15 +22,15 @@ def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Fi
     lines = robot_lines(robot, q, links)
     figure = Figure(figsize=(15.0, 6.0), layout="constrained")
     FigureCanvasAgg(figure)
-    angles = ", ".join(f"{v:.0f}" for v in np.rad2deg(q))
-    title = f"{plain_text(robot.name)} at joint angles ({angles})°"
+    stands = robot.joints.listed(robot.joints.shown(q), 0)
+    title = f"{plain_text(robot.name)} at joint angles ({stands})"
     figure.suptitle(title, fontsize=12)
     grid = figure.add_gridspec(1, 3)
     for column, (name, pair) in enumerate(VIEWS):
         panel = figure.add_subplot(grid[0, column])
-        _flat(panel, lines, pair, FRAME * robot.reach_m)
+        _flat(panel, lines, pair, FRAME * robot.arm_m)
         panel.set(title=name, xlabel=f"{'xyz'[pair[0]]} (m)", ylabel=f"{'xyz'[pair[1]]} (m)")
-    _space(figure.add_subplot(grid[0, 2], projection="3d"), lines, FRAME * robot.reach_m)
+    _space(figure.add_subplot(grid[0, 2], projection="3d"), lines, FRAME * robot.arm_m)
     return figure
 
 

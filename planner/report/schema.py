@@ -139,6 +139,8 @@ def _default(field: types.Field) -> str:
     value = field.default
     if value is msgspec.NODEFAULT:
         value = field.default_factory() if callable(field.default_factory) else None
+        if value is msgspec.UNSET:
+            return REQUIRED  # unless the same is stated in another unit
     if value is None or value is msgspec.UNSET:
         return "not used"
     if isinstance(value, bool):

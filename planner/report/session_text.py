@@ -37,7 +37,7 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     )
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
     if labelled is not None:
-        before = report.model_before.predict(np.deg2rad([labelled.joints_deg]))
+        before = report.model_before.predict(labelled.q[None])
         for k, mode in enumerate(labelled.modes):
             expected, sd = before.frequency_hz[0, k], before.frequency_sd_hz[0, k]
             certain = labelled.probability[k]
@@ -107,7 +107,7 @@ def result_line(report: ImportReport) -> str:
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
     if labelled is None:
         return f"{said}; no modes"
-    before = report.model_before.predict(np.deg2rad([labelled.joints_deg]))
+    before = report.model_before.predict(labelled.q[None])
     each = []
     for k, mode in enumerate(labelled.modes):
         if mode is None:

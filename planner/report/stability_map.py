@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+import msgspec
 import numpy as np
 from rich.console import Group
 from rich.text import Text
@@ -45,6 +46,7 @@ class MapReport(Answer):
     simulated: bool = False
     plots: tuple[str, ...] = ()
     rrd: str | None = None
+    joint_units: Any = msgspec.UNSET
 
     def text(self) -> Group:
         """The tightest poses, then what the whole workspace allows."""
@@ -94,12 +96,14 @@ def map_report(
     rpm = wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, within(tell, 0.0, 0.5))
     found, robust = at_speed(poses, cut, rpm, asked.samples, within(tell, 0.5, 1.0))
     share = None if wanted is None else float(np.mean(robust > wanted[1]))
+    joints = campaign.cell.robot.joints
     answer = MapReport(
-        rpm, names, np.rad2deg(q), candidates.position_m[:count], found, robust,
+        rpm, names, joints.shown(q), candidates.position_m[:count], found, robust,
         names[int(np.argmin(robust))],
         wanted_depth_m=wanted[1] if wanted else None,
         wanted_share=share,
         simulated=any(m.simulated for m in campaign.state.recorded),
+        joint_units=joints.declared,
     )  # fmt: skip
     if not pictures.wanted:
         return answer

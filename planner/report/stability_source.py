@@ -168,7 +168,7 @@ def _stands(directory: Path, pose: str | None) -> "tuple[Campaign, np.ndarray]":
         raise InputError(
             f"{directory} {given} one of {', '.join(known) or 'none yet'} with --pose."
         )
-    return campaign, np.deg2rad(np.array(known[pose], float))
+    return campaign, campaign.cell.robot.joints.internal(known[pose])
 
 
 def at_poses(

@@ -81,7 +81,7 @@ class Travelled:
         if way.origin is not None:
             raise InputError(f"{way.path} holds joint angles; --origin goes with a program.")
         cell = campaign.cell
-        rows = read_poses(way.path, cell.robot.joint_names)
+        rows = read_poses(way.path, cell.robot.joints)
         q = [cell.check_pose(row.joints_deg, f"{way.path}, row {row.row}") for row in rows]
         if not q:
             raise InputError(f"{way.path} holds no pose; give one a row.")

@@ -120,9 +120,9 @@ class DecisionStatus:
         if decision is None:
             return None
         probability = model.cell.config.stop.probability
-        sure = decision.sure(probability)
+        sure, q = decision.sure(probability), model.cell.robot.joints.shown(decision.q)
         return cls(
-            table.speed_rpm, table.depth_m, np.rad2deg(decision.q), decision.probability, sure,
+            table.speed_rpm, table.depth_m, q, decision.probability, sure,
             measurements_left(model), probability,
         )  # fmt: skip
 
@@ -159,6 +159,7 @@ class ModelStatus:
     remarks: tuple[str, ...]
     leave_one_out: LeftOutValues
     decision: DecisionStatus | None = None
+    joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -174,6 +175,7 @@ class ModelStatus:
             remarks=model.remarks,
             leave_one_out=left_out(model),
             decision=DecisionStatus.of(model),
+            joint_units=cell.robot.joints.declared,
         )
 
 
@@ -209,6 +211,7 @@ class StatusReport(Answer):
     rrd: str | None = None
     held: tuple["HeldPose", ...] = ()
     decision: Any = msgspec.UNSET
+    joint_units: Any = msgspec.UNSET
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -292,5 +295,6 @@ def status(campaign: Campaign) -> StatusReport:
         leave_one_out=believed.leave_one_out,
         held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
         decision=msgspec.UNSET if believed.decision is None else believed.decision,
+        joint_units=believed.joint_units,
         model=lambda: campaign.model,
     )

@@ -154,14 +154,15 @@ def survey(
         simulated |= any(v.simulated for v in measured.verdicts)
         found.append(measured.modal.modes if measured.modal else ())
         if robot_toml is not None and measured.frf is not None:
-            visited.append(_visited(name, rows, measured))
+            q = table.joints.internal(rows[0].joints_deg)
+            visited.append(_visited(name, q, measured))
     if not any(found):
         raise RefusedError(
             f"{folder}: no pose gives a mode between {band[0]:g} and "
             f"{band[1]:g} Hz; see `planner modes` of one pose's files."
         )
     first = {row.pose: row for row in reversed(table.rows)}
-    q = np.deg2rad(np.array([first[name].joints_deg for name in names]))
+    q = table.joints.internal([first[name].joints_deg for name in names])
     misses = _misses(visited, robot_toml, band)
     found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
     tracks, expected = _labelled(found, q, robot_toml)
@@ -179,19 +180,19 @@ def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
     from planner.robot.robot import Robot
 
     robot = Robot.load(robot_toml)
-    return read_recordings(folder, robot.joint_names, robot.points)
+    return read_recordings(folder, robot.joints, robot.points)
 
 
 def _sources(rows: list[PoseRow]) -> tuple[Source, ...]:
     return tuple(Source.of(r) for r in rows if r.file)
 
 
-def _visited(pose: str, rows: list[PoseRow], measured: MeasuredPose) -> tuple[Visited, Frf]:
+def _visited(pose: str, q: np.ndarray, measured: MeasuredPose) -> tuple[Visited, Frf]:
     """A pose whose FRF is known, with what each accepted hit says; its FRFs at all points."""
     sources = tuple(v.source for v in measured.verdicts if v.accepted)
     hits = hits_of(sources, measured.band_hz, measured.window_rate_1_s)
-    files, q = tuple(source.name for source in sources), np.deg2rad(rows[0].joints_deg)
     assert measured.frf is not None
+    files = tuple(source.name for source in sources)
     return Visited(pose, files, q, hits.columns, measured.frf), hits.whole
 
 
@@ -205,7 +206,7 @@ def _misses(
     from planner.robot.robot import Robot
 
     robot = Robot.load(robot_toml)
-    tolerances = Tolerances.of(robot.config)
+    tolerances = Tolerances.of(robot.config, robot.joints.slides)
     visits, whole = zip(*visited, strict=True)
     return told_by(Simulation(robot), visits, whole, tolerances, band)
 

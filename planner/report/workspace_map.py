@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 
 from planner.report.plot_text import plain_text
 
@@ -49,7 +50,11 @@ def _fill(
     flat: bool,
 ) -> None:  # fmt: skip
     if flat:
-        image = panel.tricontourf(x[:, 0], x[:, 1], values, levels=14, cmap=colours)
+        # Neighbours are found in shares of the ranges: millimetres and degrees make slivers.
+        shares = (x - x.min(axis=0)) / np.maximum(np.ptp(x, axis=0), 1e-12)
+        triangles = Triangulation(shares[:, 0], shares[:, 1]).triangles
+        both = Triangulation(x[:, 0], x[:, 1], triangles)
+        image = panel.tricontourf(both, values, levels=14, cmap=colours)
     else:
         image = panel.hexbin(x[:, 0], x[:, 1], values, gridsize=BINS, cmap=colours, mincnt=1)
     figure.colorbar(image, ax=panel, label=label, pad=0.02)

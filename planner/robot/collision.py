@@ -10,7 +10,7 @@ from planner.errors import InputError
 from planner.robot.robot import Robot
 from planner.robot.urdf import mesh_folders, quiet
 
-LIMIT_TOLERANCE_RAD = 1e-9
+LIMIT_TOLERANCE = 1e-9  # rad or m
 ALWAYS = 24  # poses at which a pair must touch to be taken for overlapping geometry
 
 
@@ -113,16 +113,18 @@ class Collisions:
     def limits(self, q: np.ndarray) -> tuple[str, ...]:
         """Violated joint limits, one phrase each."""
         robot, found = self.robot, []
-        for name, value, low, high in zip(
-            robot.joint_names, q, robot.lower_rad, robot.upper_rad, strict=True
+        joints, given = robot.joints, robot.joints.shown(q)
+        for i, (name, value, low, high) in enumerate(
+            zip(robot.joint_names, q, robot.lower_rad, robot.upper_rad, strict=True)
         ):
             if np.isnan(value):
-                found.append(f"{name} has no angle")
-            elif not low - LIMIT_TOLERANCE_RAD <= value <= high + LIMIT_TOLERANCE_RAD:
-                side, limit = ("below", low) if value < low else ("above", high)
+                found.append(f"{name} has no {'place' if joints.slides[i] else 'angle'}")
+            elif not low - LIMIT_TOLERANCE <= value <= high + LIMIT_TOLERANCE:
+                below = value < low
+                limit = joints.shown(robot.lower_rad if below else robot.upper_rad)[i]
                 found.append(
-                    f"{name} at {np.rad2deg(value):.1f}° is {side} its limit of "
-                    f"{np.rad2deg(limit):.1f}°"
+                    f"{name} at {joints.text(i, given[i])} is {'below' if below else 'above'} its "
+                    f"limit of {joints.text(i, limit)}"
                 )
         return tuple(found)
 

@@ -1,8 +1,23 @@
 """robot.toml: what URDF cannot say."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import msgspec
+
+SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
+STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}
+
+
+def _unstated() -> Any:
+    """Of a stiffness or damping that stands under another name, or is missing."""
+    return msgspec.UNSET
+
+
+def entry_of(kind: str, block: Mapping[str, Any]) -> str:
+    """Under which name a [[compliance]] of robot.toml states its "stiffness" or "damping"."""
+    stated = STATED_OF_SLIDE.get(kind, kind)
+    return stated if stated in block else kind
 
 
 class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -11,19 +26,40 @@ class Compliance(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `joint` may be "base": between floor and robot, about an axis of the world, through the URDF's
     origin. It may be a link: the rotation is half-way to the joint that this carries, and gives
     with what lies beyond (the link's own mass does not). With `slide` it is no rotation but a
-    shift along the axis (N/m, N·s/m). `loss_factor` η makes the stiffness K(1+iη) (structural
+    shift along the axis (N/m, N·s/m): so it is where `stiffness_n_m` and `damping_n_s_m` are given
+    instead of `stiffness` and `damping`, as for the own spring of a joint that slides.
+    `loss_factor` η makes the stiffness K(1+iη) (structural
     damping). Blocks with the same `tie` share their stiffness, damping and loss factor, also when
     those are identified.
     """
 
     joint: str
     axis: tuple[float, float, float]
-    stiffness: float
-    damping: float
+    stiffness: float = msgspec.field(default_factory=_unstated)
+    damping: float = msgspec.field(default_factory=_unstated)
     loss_factor: float = 0.0
     tie: str = ""
     slide: bool = False
     stiffness_sd_percent: float | None = None
+    stiffness_n_m: float | None = None
+    damping_n_s_m: float | None = None
+
+    def __post_init__(self) -> None:
+        """Once read, a shift is a block with `slide`, whose stiffness is in N/m."""
+        if self.stiffness_n_m is not None or self.damping_n_s_m is not None:
+            if any(getattr(self, kind) is not msgspec.UNSET for kind in STATED_OF_SLIDE):
+                raise ValueError(
+                    "give stiffness and damping, or stiffness_n_m and damping_n_s_m, not both"
+                )
+            msgspec.structs.force_setattr(self, "slide", True)
+            for kind, stated in STATED_OF_SLIDE.items():
+                value = getattr(self, stated)
+                msgspec.structs.force_setattr(self, kind, msgspec.UNSET if value is None else value)
+                msgspec.structs.force_setattr(self, stated, None)
+        for kind, stated in STATED_OF_SLIDE.items():
+            if getattr(self, kind) is msgspec.UNSET:
+                missing = stated if self.slide else kind
+                raise ValueError(f"Object missing required field `{missing}`")
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -137,9 +173,19 @@ class SensorTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How well the joint angles of a measurement are known: sd of each joint's readback."""
+    """How well the joint angles of a measurement are known: sd of each joint's readback.
+
+    `joint_sd_mm` is that of joints that slide, 0.5 if left out.
+    """
 
     joint_sd_deg: float = 0.05
+    joint_sd_mm: float | msgspec.UnsetType = msgspec.UNSET
+
+    @property
+    def slide_sd_m(self) -> float:
+        """Of joints that slide, in m."""
+        stated = self.joint_sd_mm
+        return 1e-3 * (SLIDE_SD_MM if isinstance(stated, msgspec.UnsetType) else stated)
 
 
 class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -152,7 +198,8 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the robot's controller counts its axes: its angle is sign · the URDF's + offset.
 
     `joints` are the URDF's in the controller's order (none: the URDF's own), `signs` and
-    `offsets_deg` go with it. `external` names those that are no axes of the arm (E1, E2, …).
+    `offsets_deg` go with it; of a joint that slides places and offset are in mm. `external` names
+    those that are no axes of the arm (E1, E2, …), as rails and turntables.
     Programs drive at `speed_percent` of the controller's full speed.
     """
 
@@ -169,8 +216,9 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
     `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
     m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
-    `held` says where joints stay that do not move in the tests, as rails and turntables:
-    NAME_m = 1.2 for a sliding one, NAME_deg = 30 for a turning one.
+    `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for
+    a rail, NAME_deg = 30 for a turntable. Others may slide or turn from pose to pose; wherever
+    joints are listed (`joints_deg`), the number of one that slides (prismatic) is in millimetres.
 
     Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
     gravity's own stiffness, of the size of weight times height, is added.

@@ -1,11 +1,13 @@
 """robot.toml read and checked: what is wrong is said in one sentence."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from planner.errors import InputError
+from planner.recording.joints import JointUnits
 from planner.robot.config import (
     LISTS,
     Compliance,
@@ -55,7 +57,7 @@ def check_sds(table: HitsTable | SensorTable | ReadbackTable | DiagnoseTable, wh
     """Raise InputError where an sd of a table is no number from 0 to 100."""
     for name in table.__struct_fields__:
         value = getattr(table, name)
-        if not 0 <= value <= 100:
+        if value is not msgspec.UNSET and not 0 <= value <= 100:
             raise InputError(f"{where} {name} is {value}; it must lie between 0 and 100.")
 
 
@@ -97,14 +99,15 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
     first: dict[str, Compliance] = {}
     for number, block in enumerate(config.compliance, 1):
         entry = f"{path}: [[compliance]] number {number} ({block.joint})"
+        k, c = ("N/m", "N·s/m") if block.slide else ("N·m/rad", "N·m·s/rad")
         if not 0 < block.stiffness <= LARGEST_STIFFNESS:
             raise InputError(
-                f"{entry} has stiffness {block.stiffness}; it must be above 0 N·m/rad and at most "
+                f"{entry} has stiffness {block.stiffness}; it must be above 0 {k} and at most "
                 f"{LARGEST_STIFFNESS:g} (leave out what does not give)."
             )
         if not 0 <= block.damping <= LARGEST_STIFFNESS:
             raise InputError(
-                f"{entry} has damping {block.damping}; it must be 0 N·m·s/rad or more, and at most "
+                f"{entry} has damping {block.damping}; it must be 0 {c} or more, and at most "
                 f"{LARGEST_STIFFNESS:g}."
             )
         length = sum(a * a for a in block.axis) ** 0.5
@@ -122,6 +125,24 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
                     f'{entry} is tied to "{block.tie}" but has another {key} '
                     f"({getattr(block, key)}, not {getattr(same, key)}); give tied blocks the same."
                 )
+
+
+def check_own_springs(
+    config: RobotConfig, joints: JointUnits, axes: Sequence[np.ndarray], path: Path
+) -> None:
+    """A joint that slides gives along its axis, in N/m; InputError where it is told to turn only.
+
+    Beside its own spring its carriage may roll about that axis.
+    """
+    for name, slides, axis in zip(joints.names, joints.slides, axes, strict=True):
+        blocks = [b for b in config.compliance if b.joint == name and slides]
+        own = [b.slide for b in blocks if abs(np.array(b.axis) @ axis) > 0.9]
+        if own and not any(own):
+            raise InputError(
+                f"{path}: joint {name} slides, but its [[compliance]] turns about its axis, in "
+                f"N·m/rad; state its own spring along that axis with stiffness_n_m (N/m) and "
+                f"damping_n_s_m (N·s/m)."
+            )
 
 
 def _check_payloads(config: RobotConfig, path: Path) -> None:

@@ -99,9 +99,8 @@ class ElasticModel:
 
     def _own(self, joint: str) -> int:
         """Number of the block about a joint's own axis; InputError if there is none."""
-        axis = self.robot.joint_axes[self.robot.joint_names.index(joint)]
         for number, block in enumerate(self.robot.config.compliance):
-            if block.joint == joint and not block.slide and abs(np.array(block.axis) @ axis) > 0.9:
+            if block.joint == joint and self.robot.is_own(block):
                 return number
         raise InputError(
             f"{self.robot.path}: [[effects]] has a harmonic of {joint}, which has no "

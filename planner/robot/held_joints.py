@@ -14,11 +14,12 @@ import pinocchio as pin
 from planner.errors import InputError
 
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
-UNITS = {"_deg": TURNING, "_m": SLIDING}
+UNITS = {"_deg": TURNING, "_m": SLIDING, "_mm": SLIDING}
+IN_SI = {"_deg": np.pi / 180, "_m": 1.0, "_mm": 1e-3}
 
 
 def hold(root: ElementTree.Element, held: Mapping[str, float], urdf: Path) -> None:
-    """Make the joints of `held` fixed ones; its keys end in _deg (turning) or _m (sliding).
+    """Make the joints of `held` fixed ones; its keys end in _deg (turning) or _m, _mm (sliding).
 
     Raises InputError where a key names no such joint, or a place beyond its limits.
     """
@@ -39,12 +40,12 @@ def hold(root: ElementTree.Element, held: Mapping[str, float], urdf: Path) -> No
                 f"{urdf}: joint {joint.get('name')} is {joint.get('type')}; give [held] "
                 f"{joint.get('name')}{other}."
             )
-        _fix(joint, np.deg2rad(value) if unit == "_deg" else value, key, urdf)
+        _fix(joint, value * IN_SI[unit], unit, key, urdf)
 
 
-def _fix(joint: ElementTree.Element, value: float, key: str, urdf: Path) -> None:
+def _fix(joint: ElementTree.Element, value: float, unit: str, key: str, urdf: Path) -> None:
     """Make a joint fixed at its coordinate `value`, in rad or m."""
-    _check_limits(joint, value, key, urdf)
+    _check_limits(joint, value, 1 / IN_SI[unit], key, urdf)
     origin, axis = joint.find("origin"), joint.find("axis")
     if origin is None:
         origin = ElementTree.SubElement(joint, "origin")
@@ -69,7 +70,10 @@ def _fix(joint: ElementTree.Element, value: float, key: str, urdf: Path) -> None
             joint.remove(child)
 
 
-def _check_limits(joint: ElementTree.Element, value: float, key: str, urdf: Path) -> None:
+def _check_limits(
+    joint: ElementTree.Element, value: float, factor: float, key: str, urdf: Path
+) -> None:
+    """`factor` is how many of the key's units are a rad or a metre."""
     limit = joint.find("limit")
     if limit is None or joint.get("type") == "continuous":
         return
@@ -78,7 +82,6 @@ def _check_limits(joint: ElementTree.Element, value: float, key: str, urdf: Path
     except ValueError:
         return
     if value < low - 1e-9 or value > high + 1e-9:
-        factor = 180 / np.pi if key.endswith("_deg") else 1.0
         raise InputError(
             f"{urdf}: [held] {key} lies outside the joint's limits of {low * factor:.4g} to "
             f"{high * factor:.4g}; correct it."

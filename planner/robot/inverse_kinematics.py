@@ -16,7 +16,7 @@ OUT_OF_REACH = "out of reach"
 
 @dataclass(frozen=True, eq=False)
 class InverseResult:
-    """Joint angles (dof,) in rad, or None with the reason in words and its kind.
+    """Joint angles (dof,) in rad (slides: m), or None with the reason in words and its kind.
 
     `kind` holds no figures, so that kinds can be counted: "out of reach", "limit of joint_3" or
     "link_4 touches table".
@@ -89,7 +89,8 @@ def _beyond_limits(
     if q is None:
         return None, ""
     middle = (robot.lower_rad + robot.upper_rad) / 2
-    q = q - 2 * np.pi * np.round((q - middle) / (2 * np.pi))
+    whole = 2 * np.pi * np.round((q - middle) / (2 * np.pi))
+    q = q - np.where(robot.joints.slides, 0.0, whole)
     broken = Collisions(robot).limits(q)
     return (None, broken[0]) if broken else (q, "")
 

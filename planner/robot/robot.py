@@ -9,12 +9,14 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
-from planner.robot.config import PointTable, RobotConfig
-from planner.robot.config_file import load_config, with_effects
+from planner.robot.config import Compliance, PointTable, RobotConfig
+from planner.robot.config_file import check_own_springs, load_config, with_effects
 from planner.robot.points import PREFIX, check_points, names_of, with_points
-from planner.robot.urdf import build_model, joint_axes, parse_urdf, read_urdf
+from planner.robot.urdf import build_model, joint_axes, joint_slides, parse_urdf, read_urdf
 
+LEVER_M = 0.3  # half the length of a carriage, chosen
 BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 # A link and the joint that carries it may share a name; the link is meant.
 FRAME_TYPES = (
@@ -27,7 +29,11 @@ FRAME_TYPES = (
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """Immutable; angles in rad, lengths in m, joints in the URDF's actuated order."""
+    """Immutable; angles in rad, lengths in m, joints in the URDF's actuated order.
+
+    Joint coordinates q are in rad, of joints that slide in m; `joints` converts them from and to
+    the degrees and millimetres of files and answers.
+    """
 
     config: RobotConfig
     path: Path  # robot.toml
@@ -35,6 +41,7 @@ class Robot:
     urdf_text: str  # with continuous joints given limits of ±180°
     model: pin.Model
     joint_axes: tuple[np.ndarray, ...]  # unit vectors in the joints' own frames
+    joints: JointUnits
 
     @classmethod
     def load(cls, robot_toml: Path, geometric_stiffness: bool = True) -> "Robot":
@@ -60,9 +67,11 @@ class Robot:
     ) -> "Robot":
         text = ElementTree.tostring(root, encoding="unicode")
         model = build_model(text, urdf)
-        axes = joint_axes(root, tuple(model.names)[1:])
-        robot = cls(config, robot_toml, urdf, text, model, axes)
+        names = tuple(model.names)[1:]
+        axes, joints = joint_axes(root, names), JointUnits(names, joint_slides(root, names))
+        robot = cls(config, robot_toml, urdf, text, model, axes, joints)
         robot._check()
+        check_own_springs(config, joints, axes, robot_toml)
         check_points(config.point, robot_toml)
         with_points(model, config.point, [robot._link_of_point(p) for p in config.point])
         _ = robot.points
@@ -104,7 +113,7 @@ class Robot:
         if bad.size:
             raise InputError(
                 f"{self.urdf_path}: {self.joint_names[bad[0]]} has no range between its limits; "
-                f"give lower and upper in rad."
+                f"give lower and upper in {'m' if self.joints.slides[bad[0]] else 'rad'}."
             )
 
     @property
@@ -125,6 +134,32 @@ class Robot:
                 return frame.name
         raise KeyError(joint)
 
+    def slides(self, joint: str) -> bool:
+        """Whether a joint slides along its axis."""
+        return self.joints.slides[self.joint_names.index(joint)]
+
+    def is_own(self, block: Compliance) -> bool:
+        """Whether an elastic degree of freedom is its joint's own: about its axis, or along it."""
+        if block.joint not in self.joint_names:
+            return False
+        joint = self.joint_names.index(block.joint)
+        along = abs(np.array(block.axis) @ self.joint_axes[joint]) > 0.9
+        return bool(along) and block.slide == self.slides(block.joint)
+
+    def slides_along(self, block: Compliance) -> bool:
+        """Whether an elastic degree of freedom is a shift of a joint that slides."""
+        return block.slide and block.joint in self.joint_names and self.slides(block.joint)
+
+    def turning_stiffness(self, joint: str = "") -> tuple[float, ...]:
+        """Stated stiffnesses (N·m/rad) of rotations at a joint, where it has any, or of all.
+
+        Where all springs slide: what they are worth at a lever of LEVER_M.
+        """
+        turning = [b for b in self.config.compliance if not b.slide]
+        sliding = [b.stiffness * LEVER_M**2 for b in self.config.compliance]
+        at = [b.stiffness for b in turning if b.joint == joint]
+        return tuple(at or [b.stiffness for b in turning] or sliding)
+
     def carries(self, link: str) -> tuple[int, int] | None:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""
         for joint, name in enumerate(self.joint_names, 1):
@@ -135,17 +170,17 @@ class Robot:
 
     @cached_property
     def lower_rad(self) -> np.ndarray:
-        """Lower joint limits (dof,)."""
+        """Lower joint limits (dof,) in rad, of joints that slide in m."""
         return np.array(self.model.lowerPositionLimit)
 
     @cached_property
     def upper_rad(self) -> np.ndarray:
-        """Upper joint limits (dof,)."""
+        """Upper joint limits (dof,) in rad, of joints that slide in m."""
         return np.array(self.model.upperPositionLimit)
 
     @cached_property
     def velocity_rad_s(self) -> np.ndarray:
-        """Joint speeds (dof,) of the URDF."""
+        """Joint speeds (dof,) of the URDF in rad/s, of joints that slide in m/s."""
         return np.array(self.model.velocityLimit)
 
     @cached_property
@@ -202,6 +237,22 @@ class Robot:
     @cached_property
     def reach_m(self) -> float:
         """No pose brings the tcp farther from the shoulder than this (arm pulled straight)."""
+        farthest = np.maximum(np.abs(self.lower_rad), np.abs(self.upper_rad))
+        slides = [k for k in self.tool_joints if self.joints.slides[k]]
+        return self.arm_m + float(np.sum(farthest[slides]))
+
+    @cached_property
+    def tool_joints(self) -> tuple[int, ...]:
+        """Places in q of the joints that move the tcp."""
+        found, joint = [], self.model.frames[self.tcp_id].parentJoint
+        while joint != 0:
+            found.append(joint - 1)
+            joint = self.model.parents[joint]
+        return tuple(sorted(found))
+
+    @cached_property
+    def arm_m(self) -> float:
+        """Length of the arm pulled straight, joints that slide at their zeros."""
         frame = self.model.frames[self.tcp_id]
         length, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
         while self.model.parents[joint] != 0:
@@ -231,8 +282,10 @@ class Robot:
     def singularity(self, q: np.ndarray) -> np.ndarray:
         """Distance (n,) from singular poses of q (n, dof) in rad; 0 at one.
 
-        Least singular value of the tcp's Jacobian, its linear part in units of the reach.
+        Least singular value of the tcp's Jacobian, its linear part, and what slides, in units of
+        the arm's length.
         """
-        scale = np.repeat([1 / self.reach_m, 1.0], 3)[:, None]
+        arm = self.arm_m or 1.0  # of a gantry whose joints all meet in one point
+        scale = np.repeat([1 / arm, 1.0], 3)[:, None] * np.where(self.joints.slides, arm, 1.0)
         both = [np.linalg.svd(scale * self.jacobian(row), compute_uv=False)[-1] for row in q]
         return np.array(both)

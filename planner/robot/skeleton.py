@@ -16,7 +16,7 @@ class BodyShape:
     """What turns with one joint: a link, and all that hang on it by fixed joints.
 
     `ends_m` (n, 3) says where, in the frame of `link`, the next joints and the tcp are; its own
-    origin where they are nowhere else.
+    origin where they are nowhere else. Of joints that slide both ends of their way are among them.
     """
 
     link: str  # the one that the joint moves; the root of the URDF for the base
@@ -32,11 +32,20 @@ def bodies(robot: Robot) -> tuple[BodyShape, ...]:
 def _body(robot: Robot, number: int) -> BodyShape:
     model, tcp = robot.model, robot.model.frames[robot.tcp_id]
     frames = [f for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint == number]
-    ends = [model.jointPlacements[k].translation for k in model.children[number]]
+    ends = [end for k in model.children[number] for end in _ends(robot, int(k))]
     ends += [tcp.placement.translation] if tcp.parentJoint == number else []
     apart = [np.array(end) for end in ends if np.linalg.norm(end) > APART_M]
     links = tuple(frame.name for frame in frames)
     return BodyShape(links[0], links, np.array(apart or [np.zeros(3)]))
+
+
+def _ends(robot: Robot, joint: int) -> list[np.ndarray]:
+    """Where a joint is on what carries it, (3,) each: of one that slides, both ends of its way."""
+    place = robot.model.jointPlacements[joint]
+    if not robot.joints.slides[joint - 1]:
+        return [place.translation]
+    way = robot.lower_rad[joint - 1], robot.upper_rad[joint - 1]
+    return [place.translation + place.rotation @ (v * robot.joint_axes[joint - 1]) for v in way]
 
 
 @dataclass(frozen=True, eq=False)

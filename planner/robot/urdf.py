@@ -14,10 +14,10 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.held_joints import hold
+from planner.robot.held_joints import SLIDING, TURNING, hold
 
 LARGEST, FARTHEST_M = 1e7, 1e3  # kg, kg·m, kg·m² of what turns; between joints: no robot has it
-FIXED, TURNING = ("fixed",), ("revolute", "continuous")
+FIXED = ("fixed",)
 
 
 def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> ElementTree.Element:
@@ -48,11 +48,11 @@ def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> Elem
     if root.tag != "robot":
         raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
     hold(root, held, urdf)
-    turning = [joint for joint in root.findall("joint") if joint.get("type") not in FIXED]
-    for joint in turning:
+    moving = [joint for joint in root.findall("joint") if joint.get("type") not in FIXED]
+    for joint in moving:
         _complete(joint, urdf)
-    if not turning:
-        raise InputError(f"{urdf} has no turning joint; name the URDF of a robot arm.")
+    if not moving:
+        raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
     _check_tree(root, urdf)
     _check_shapes(root, urdf)
     return root
@@ -78,6 +78,12 @@ def joint_axes(root: ElementTree.Element, names: tuple[str, ...]) -> tuple[np.nd
     joints = {joint.get("name"): joint for joint in root.findall("joint")}
     axes = [_numbers(_axis_text(joints[name])) for name in names]
     return tuple(axis / np.linalg.norm(axis) for axis in axes)
+
+
+def joint_slides(root: ElementTree.Element, names: tuple[str, ...]) -> tuple[bool, ...]:
+    """Which of the named joints slide along their axes instead of turning about them."""
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    return tuple(joints[name].get("type") in SLIDING for name in names)
 
 
 def mesh_folders(urdf: Path) -> list[str]:
@@ -167,15 +173,10 @@ def _numbers(text: str) -> np.ndarray:
 def _complete(joint: ElementTree.Element, urdf: Path) -> None:
     """Check a moving joint's type, axis and limits; give a continuous one limits of ±180°."""
     name, kind, limit = joint.get("name", "?"), joint.get("type"), joint.find("limit")
-    if kind not in TURNING:
-        unit = "_m" if kind == "prismatic" else ""
-        remedy = (
-            f"give [held] {name}{unit} in robot.toml, where it stands in the tests"
-            if unit
-            else "make it a fixed joint"
-        )
+    if kind not in (*TURNING, *SLIDING):
         raise InputError(
-            f"{urdf}: joint {name} is of type {kind}, but only turning joints move here; {remedy}."
+            f"{urdf}: joint {name} is of type {kind}, but only revolute, continuous and prismatic "
+            f"joints move here; make it a fixed joint."
         )
     axis = _numbers(_axis_text(joint))
     if axis.shape != (3,) or not 1e-6 < np.linalg.norm(axis) < np.inf:
@@ -185,8 +186,8 @@ def _complete(joint: ElementTree.Element, urdf: Path) -> None:
     if joint.find("mimic") is not None:
         raise InputError(
             f"{urdf}: joint {name} follows another joint (<mimic>), which is not simulated; give "
-            f"[held] {name}_deg in robot.toml if it stands still in the tests, or leave <mimic> "
-            f"out and state its angle in every pose."
+            f"[held] {name}{'_m' if kind in SLIDING else '_deg'} in robot.toml if it stands still "
+            f"in the tests, or leave <mimic> out and state where it stands in every pose."
         )
     if kind == "continuous":
         speed = "3.14" if limit is None else limit.get("velocity", "3.14")
@@ -197,7 +198,8 @@ def _complete(joint: ElementTree.Element, urdf: Path) -> None:
             joint, "limit", lower=str(-np.pi), upper=str(np.pi), velocity=speed, effort="0"
         )
     elif limit is None:
-        raise InputError(f"{urdf}: revolute joint {name} has no <limit>; add its range.")
+        unit = "m" if kind in SLIDING else "rad"
+        raise InputError(f"{urdf}: {kind} joint {name} has no <limit>; add its range in {unit}.")
 
 
 def _check_tree(root: ElementTree.Element, urdf: Path) -> None:

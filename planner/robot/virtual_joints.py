@@ -1,4 +1,4 @@
-"""Virtual joints: a robot's model with one more revolute joint for each elastic rotation."""
+"""Virtual joints: a robot's model with one more joint for each elastic rotation or shift."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -161,7 +161,7 @@ def _add_joints(
         if joint:
             parent, back = ends[source.parents[joint]]
             axis, place = robot.joint_axes[joint - 1], back * source.jointPlacements[joint]
-            outer = _add_joint(model, parent, axis, place, name)
+            outer = _add_joint(model, parent, axis, place, name, robot.joints.slides[joint - 1])
             rigid.append(model.joints[outer].idx_q)
         if joint or BASE not in robot.joint_names:
             outer = give(outer, pin.SE3.Identity(), name)

@@ -39,7 +39,7 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Workspace:
-    """A box in joint angles (rad), or in tcp position (m) and rotation about the tool axis (rad).
+    """A box of joints (rad; m of slides), or of tcp position (m), rotation about its axis (rad).
 
     Model coordinates are the box's own, scaled to [0, 1], without those that do not vary.
     """
@@ -205,15 +205,18 @@ def _joint_box(cls, ranges: list[tuple[float, float]], robot: Robot) -> Workspac
             f"[workspace] joints_deg has {len(ranges)} ranges, the robot {len(names)} joints; "
             f"give one range a joint."
         )
-    box = np.deg2rad(np.array(ranges, dtype=float))
+    box = robot.joints.internal(np.array(ranges, dtype=float).T).T
     slack = 1e-6
     for i, name in enumerate(names):
         if box[i, 0] < robot.lower_rad[i] - slack or box[i, 1] > robot.upper_rad[i] + slack:
-            low, high = np.rad2deg([robot.lower_rad[i], robot.upper_rad[i]])
+            low, high = (
+                robot.joints.text(i, robot.joints.shown(limits)[i])
+                for limits in (robot.lower_rad, robot.upper_rad)
+            )
             raise InputError(
                 f"[workspace] joints_deg of {name} is {list(ranges[i])}, its limits are "
-                f"{low:.1f}° to {high:.1f}°; narrow the range."
+                f"{low} to {high}; narrow the range."
             )
     lower = np.maximum(box[:, 0], robot.lower_rad)
     upper = np.minimum(box[:, 1], robot.upper_rad)
-    return cls(lower, upper, tuple(f"{name}_deg" for name in names))
+    return cls(lower, upper, robot.joints.columns)

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
@@ -18,9 +16,9 @@ def page_without_hits(
 ) -> PosePage:
     """What the screen says of a pose before anything was hit there."""
     model, robot = campaign.model, campaign.cell.robot
-    expected = model.predict(np.deg2rad([proposal.joints_deg]))
+    expected = model.predict(robot.joints.internal([proposal.joints_deg]))
     return PosePage(
-        proposal, len(model.labelled) + 1, robot.joint_names, robot.config.tcp_frame,
+        proposal, len(model.labelled) + 1, robot.joints, robot.config.tcp_frame,
         max(1, hits_per_pose // len(proposal.hits)), (),
         tuple(expected.frequency_hz[0].tolist()), tuple(expected.frequency_sd_hz[0].tolist()),
         folder, progress=course.progress, pose_before=course.before.pose,

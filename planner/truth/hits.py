@@ -24,6 +24,11 @@ class TrueRobot(Protocol):
         ...
 
     @property
+    def slides(self) -> tuple[bool, ...]:
+        """Which joints slide (m) and do not turn (rad); none where it is empty."""
+        ...
+
+    @property
     def description(self) -> str:
         """Engine and seed, for the header of every file."""
         ...
@@ -38,7 +43,8 @@ class Hammer:
     """What the person, the hammer, the analyser and the floor are like.
 
     Noise is relative: of the responses to the hit's largest response (rms), of the force to its
-    peak. Readback angles scatter by `readback_deg` around the setpoint.
+    peak. Readback angles scatter by `readback_deg` (`readback_mm`)
+    around the setpoint.
     """
 
     peak_n: float = 1200.0
@@ -49,6 +55,7 @@ class Hammer:
     noise: float = 0.02
     force_noise: float = 5e-4
     readback_deg: float = 0.01
+    readback_mm: float = 0.1  # of joints that slide
     oversampling: int = OVERSAMPLING
     rumble_m_s2: float = 0.0  # rms of the floor's slow vibration, in every channel
     rumble_hz: float = 4.0  # where most of it is
@@ -206,16 +213,30 @@ def record_poses(
     Angles in recordings.csv are the readback, and it is there that the truth is evaluated.
     """
     hammer = hammer or Hammer()
-    rows = []
+    rows, slides = [], truth.slides
     for number, (pose, q) in enumerate(poses):
         rng = np.random.default_rng([seed, number])
-        readback = np.rad2deg(q) + hammer.readback_deg * rng.uniform(-1, 1, len(q))
+        scatter = np.where(np.array(slides or False), hammer.readback_mm, hammer.readback_deg)
+        readback = stated(q, slides) + scatter * rng.uniform(-1, 1, len(q))
         readback = np.round(readback, 4)
+        there = np.where(np.array(slides or False), 1e-3 * readback, np.deg2rad(readback))
         for axis in hits:
             for repeat in range(1, repeats + 1):
-                hit = simulate_hit(truth, np.deg2rad(readback), axis, hammer, rng)
+                hit = simulate_hit(truth, there, axis, hammer, rng)
                 rows.append((pose, readback, repeat, hit))
-    return write_recordings(folder, truth.joint_names, rows, hammer, truth.description)
+    return write_recordings(
+        folder, truth.joint_names, rows, hammer, truth.description, slides=slides
+    )
+
+
+def stated(q: np.ndarray, slides: Sequence[bool]) -> np.ndarray:
+    """As tables of recordings state q (dof,): degrees, millimetres of joints that slide."""
+    return np.where(np.array(slides or False), 1e3 * q, np.rad2deg(q))
+
+
+def _columns(joint_names: Sequence[str], slides: Sequence[bool]) -> list[str]:
+    units = ["mm" if slide else "deg" for slide in slides or [False] * len(joint_names)]
+    return [f"{name}_{unit}" for name, unit in zip(joint_names, units, strict=True)]
 
 
 def write_recordings(
@@ -225,8 +246,9 @@ def write_recordings(
     hammer: Hammer,
     description: str,
     nodes: Mapping[str, int] | None = None,
+    slides: Sequence[bool] = (),
 ) -> Path:
-    """recordings.csv and one UFF file a hit: pose, readback (dof,) in °, repeat, hit.
+    """recordings.csv and one UFF file a hit: pose, readback (dof,) in ° (mm), repeat, hit.
 
     Where other points than the tool's are hit or heard, the table names them.
     """
@@ -243,7 +265,7 @@ def write_recordings(
         rows.append([pose, *(f"{v:.4f}" for v in readback), hit.axis, repeat, name, *points])
     with open(folder / "recordings.csv", "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        joints = [f"{name}_deg" for name in joint_names]
+        joints = _columns(joint_names, slides)
         points = ["hit_point", "response_points"] if elsewhere else []
         writer.writerow(["pose", *joints, "hit", "repeat", "file", *points])
         writer.writerows(rows)
@@ -255,14 +277,15 @@ def write_predict(
     joint_names: Sequence[str],
     poses: Sequence[tuple[str, np.ndarray]],
     peak_force_n: float | None = None,
+    slides: Sequence[bool] = (),
 ) -> Path:
     """`predict.csv`: poses (name, q in rad) of which the FRF is wanted."""
     path = folder / "predict.csv"
     force = [] if peak_force_n is None else [f"{peak_force_n:g}"]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        joints = [f"{name}_deg" for name in joint_names]
+        joints = _columns(joint_names, slides)
         writer.writerow(["pose", *joints, *(["peak_force_n"] if force else [])])
         for pose, q in poses:
-            writer.writerow([pose, *(f"{v:.4f}" for v in np.rad2deg(q)), *force])
+            writer.writerow([pose, *(f"{v:.4f}" for v in stated(q, slides)), *force])
     return path

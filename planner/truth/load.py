@@ -52,6 +52,7 @@ def load_truth(robot_toml: Path, deviation: Deviation | None = None) -> Truth:
         own,
         bool(table.get("geometric_stiffness", True)),
         len(table["compliance"]),
+        slides=tuple(builder.slides),
         sensor_mass_kg={p["name"]: p["mass_kg"] for p in table.get("point", ()) if "mass_kg" in p},
     )
 

@@ -1,4 +1,4 @@
-"""From URDF and robot.toml to a MuJoCo model with one hinge per joint and one per spring.
+"""From URDF and robot.toml to a MuJoCo model: a joint for each of the robot's and each spring.
 
 Neither URDF reader nor rotations are shared with the planner: an error there would hide itself.
 """
@@ -16,7 +16,7 @@ THICK = 0.05  # radius of a beam over its length, for the inertia of its pieces
 
 
 class Builder:
-    """URDF to MJCF; `joint_names` and `limits` are known once `xml` has been called."""
+    """URDF to MJCF; `joint_names`, `slides` and `limits` are known once `xml` has been called."""
 
     def __init__(
         self,
@@ -35,6 +35,7 @@ class Builder:
         self._table, self._springs = table, springs
         self._deviation, self._rng = deviation, rng
         self.joint_names: list[str] = []
+        self.slides: list[bool] = []
         self.limits: list[tuple[float, float]] = []
 
     def xml(self) -> str:
@@ -72,8 +73,11 @@ class Builder:
             if joint.get("type") != "fixed":
                 axis = joint.find("axis")
                 xyz = "1 0 0" if axis is None else axis.get("xyz")
-                ElementTree.SubElement(body, "joint", name=name, type="hinge", axis=xyz)
+                slides = joint.get("type") == "prismatic"
+                kind = "slide" if slides else "hinge"
+                ElementTree.SubElement(body, "joint", name=name, type=kind, axis=xyz)
                 self.joint_names.append(name)
+                self.slides.append(slides)
                 self.limits.append(_limits(joint))
                 self._hinges(body, name)
             self._lumps(body, child)

@@ -26,7 +26,7 @@ TURN = 1e-4  # rad (or m), of the differences that give gravity's stiffness: exa
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """A linear vibrating robot at any pose; angles in rad."""
+    """A linear vibrating robot at any pose; angles in rad, joints that slide in m."""
 
     name: str
     joint_names: tuple[str, ...]
@@ -47,6 +47,7 @@ class Truth:
     sensors: tuple[str, ...] = ("sensor",)
     offsets_m: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)  # of others
     sensor_mass_kg: Mapping[str, float] = field(default_factory=dict)
+    slides: tuple[bool, ...] = ()  # which joints do; none where it is empty
 
     def matrices(
         self, q: np.ndarray

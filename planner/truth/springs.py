@@ -16,6 +16,8 @@ from planner.truth.deviation import (
 )
 from planner.truth.loss_factors import mixed
 
+STATED = ("stiffness", "n_m"), ("damping", "n_s_m")  # entries of a shift, with their units
+
 ANGLE_STEP = 1e-4  # rad, for the change of a gas spring's torque
 
 OF_TOOL = "tcp", "sensor"  # points that need no link: robot.toml names their frames
@@ -51,10 +53,7 @@ def springs(
 
     Names of others are "extra K" and "resonator K", K counting in the deviation.
     """
-    nominal = [
-        Spring(c["joint"], tuple(c["axis"]), c["stiffness"], c["damping"])
-        for c in table["compliance"]
-    ]
+    nominal = [_stated(c) for c in table["compliance"]]
     own_axes = _own_axes(root)
     factors = {change.joint: change.factor for change in deviation.scaled}
     scattered = [
@@ -90,26 +89,37 @@ def compensation(spring: Compensator, angle_rad: float) -> float:
     return (torque(angle_rad + ANGLE_STEP) - torque(angle_rad - ANGLE_STEP)) / (2 * ANGLE_STEP)
 
 
+def _stated(block: dict) -> Spring:
+    """Of a [[compliance]]: a shift where it says so, or is stated in N/m."""
+    slide = bool(block.get("slide", False)) or "stiffness_n_m" in block
+    k, c = (block[f"{n}_{u}" if f"{n}_{u}" in block else n] for n, u in STATED)
+    return Spring(block["joint"], tuple(block["axis"]), k, c, slide)
+
+
 def _deviating(spring: Spring, deviation: Deviation, rng: np.random.Generator) -> Spring:
     k = spring.stiffness * np.exp(deviation.stiffness * rng.standard_normal())
     c = spring.damping * np.exp(deviation.damping * rng.standard_normal())
-    return Spring(spring.joint, spring.axis, float(k), float(c * k / spring.stiffness))
+    return replace(spring, stiffness=float(k), damping=float(c * k / spring.stiffness))
 
 
-def _own_axes(root: ElementTree.Element) -> dict[str, np.ndarray]:
+def _own_axes(root: ElementTree.Element) -> dict[str, tuple[np.ndarray, bool]]:
+    """Axes (3,) of the joints, and whether they slide along them."""
     axes = {}
     for joint in root.findall("joint"):
         axis = joint.find("axis")
         text = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
         if joint.get("type") != "fixed":
-            axes[joint.get("name", "")] = np.array([float(v) for v in text.split()])
+            along = np.array([float(v) for v in text.split()])
+            axes[joint.get("name", "")] = along, joint.get("type") == "prismatic"
     return axes
 
 
-def _parallel(spring: Spring, own_axes: dict[str, np.ndarray]) -> bool:
-    """Whether a spring turns about the axis of its joint."""
-    own = own_axes.get(spring.joint)
-    return own is not None and bool(np.allclose(np.cross(own, spring.axis), 0, atol=1e-9))
+def _parallel(spring: Spring, own_axes: dict[str, tuple[np.ndarray, bool]]) -> bool:
+    """Whether a spring turns about the axis of its joint, or shifts along that of one that does."""
+    own, slides = own_axes.get(spring.joint, (None, False))
+    if own is None or spring.slide != slides:
+        return False
+    return bool(np.allclose(np.cross(own, spring.axis), 0, atol=1e-9))
 
 
 def _times(spring: Spring, factor: float) -> Spring:

@@ -12,11 +12,13 @@ from planner.identification.frequency_uncertainty import (
     frequency_sensitivity,
     log_frequency_slope,
 )
+from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import parametrise
 from planner.robot.robot import Robot
 from planner.truth.deviation import AttachedResonator, Deviation
 from planner.truth.hits import Hammer
 from planner.truth.load import load_truth
+from tests.support.arm_with_points import poses, write_arm
 from tests.support.robots import BAND_HZ, JOINTS_DEG, make_arm
 from tests.support.true_modes import hits_at
 
@@ -130,6 +132,22 @@ def test_physics_that_no_joint_has_is_noticed_and_said(tmp_path):
     assert after.simulation is not None
     body = pseudo_inertia(after.simulation.elastic.inertia)
     assert np.all(np.linalg.eigvalsh(body[after.simulation.elastic.inertia[:, 0] > 0]) > 0)
+
+
+def test_a_mass_that_swings_on_a_link_is_found_and_named(tmp_path):
+    hose = AttachedResonator("l4", (0.15, 0.01, 0.0), (-0.8, 0.3, 0.5), 2.3, 59.8, 0.03)
+    path, band, count = write_arm(tmp_path), (4.0, 90.0), 4
+    truth = load_truth(path, Deviation(7, 0.15, 0.15, 0.03, 0.003, resonators=(hose,)))
+    q, other = poses(2), poses(12, seed=2)
+    hammer = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0)
+    rng = np.random.default_rng(3)
+    frfs = [estimate(hits_at(truth, one, hammer, rng), band) for one in q]
+    before = LowFidelity(count, Simulation(Robot.load(path)), Tolerances())
+    after = learn(before, frfs, q, band)
+    assert after.taught
+    true_hz = np.array([truth.modes(one, count)[0] for one in other])
+    assert rmse(after, other, true_hz) < 0.01 < 0.1 < rmse(before, other, true_hz)
+    assert "on link_4 swings on its own at 59.8 Hz" in after.remark
 
 
 def test_a_joint_that_only_creeps_is_no_modes_stiffness(right):

@@ -10,6 +10,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import MeasuredMode
 from planner.campaign.revisits import hit_again, suspected
 from planner.campaign.state import CampaignState, Measurement
+from planner.recording.joints import JointUnits
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support.outside import record, told
@@ -31,6 +32,7 @@ def model(scatter: float, poses: int = 5) -> Any:
         labelled=(None,) * poses, predict=lambda q: expected,
         frequencies=lambda q: (expected.frequency_hz, expected.frequency_sd_hz),
         low=SimpleNamespace(simulation=None, simulate=lambda q, more: None),
+        cell=SimpleNamespace(robot=SimpleNamespace(joints=JointUnits.of(("a", "b")))),
     )  # fmt: skip
 
 
@@ -64,9 +66,11 @@ def test_modes_that_are_found_nowhere_again_say_nothing():
 )  # fmt: skip
 def test_modes_to_one_side_ask_for_the_first_pose_again(hertz, hinted):
     state = CampaignState(measurements={"P001": KNOWN})
-    said = suspected(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
-    assert bool(said) == hinted
-    assert not said or "Hit P001, the first pose, again (0.000, 0.000°)" in said[0]
+    found = suspected(model(1e-3), state, "P004", (1.0, 1.0), modes(*hertz))
+    assert (found is not None) == hinted
+    if found is not None:
+        assert found.again == "P001"
+        assert "Hit P001, the first pose, again (0.000, 0.000°)" in found.text
 
 
 def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
@@ -80,11 +84,18 @@ def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
         folder = record(truth, tmp_path / f"day{day}", proposal["pose"], proposal["joints_deg"])
         last = told("import", cell, folder)
     assert any("Hit P001, the first pose, again" in text for text in last["remarks"])
+    (asked,) = told("next", cell)["proposals"]
+    assert asked["pose"] == "P001"
+    assert "P001 hit again tells whether the robot changed" in asked["reason"]
     first = Campaign(cell).state.used[0]
+    assert asked["joints_deg"] == list(first.joints_deg)
     same = load_truth(robot, Deviation(seed=3, stiffness=0.1))
     for now, word in ((same, "is as it was"), (truth, "differs from the hits before")):
         folder = record(now, tmp_path / word, "P001", list(first.joints_deg), seed=8)
         again = told("import", cell, folder)
         (said,) = (text for text in again["remarks"] if "P001 was hit again" in text)
         assert word in said
+        assert told("next", cell)["proposals"][0]["pose"] != "P001"
         told("undo", cell)
+        told("undo", cell)
+        assert told("next", cell)["proposals"][0]["pose"] == "P001"

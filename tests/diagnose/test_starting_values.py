@@ -22,7 +22,8 @@ def begun(law, share):
         nothing, nothing, nothing,
     )  # fmt: skip
     springs = SimpleNamespace(stiffness=np.array([SCALE]))
-    system = SimpleNamespace(elasticity=springs, blocks=np.array([0]), ports=("joint_1",))
+    ports = {"ports": ("joint_1",), "slides": ()}
+    system = SimpleNamespace(elasticity=springs, blocks=np.array([0]), **ports)
     return starts(found, cast(Any, system), 0, np.array([np.log(SCALE)]), 0)
 
 

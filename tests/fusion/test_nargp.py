@@ -4,7 +4,12 @@ import numpy as np
 from scipy.stats import multivariate_normal
 
 from planner.studies.models.fidelity_levels import Exact, Samples
-from planner.studies.models.likelihood_gp import Normalisation, fit_likelihood
+from planner.studies.models.likelihood_gp import (
+    Normalisation,
+    at_hyperparameters,
+    fit_growing,
+    fit_likelihood,
+)
 from planner.studies.models.nargp import fit_low, fit_nargp
 from planner.surrogate.kernels import parse
 
@@ -22,6 +27,18 @@ def test_the_likelihood_is_that_of_one_normal_distribution():
     mean = np.full(9, fitted.units.centre)
     direct = multivariate_normal(mean, k, allow_singular=True).logpdf(s.y)
     np.testing.assert_allclose(fitted.log_likelihood, direct, rtol=1e-4)
+
+
+def test_many_points_are_fitted_as_likely_as_if_all_were_climbed_from_afar():
+    rng = np.random.default_rng(4)
+    x = rng.random((150, 2))
+    s = Samples.of(x, np.sin(9 * x[:, 0]) * x[:, 1] + 0.05 * rng.standard_normal(150))
+    grown, whole = fit_growing(s, (30, 70)), fit_likelihood(s)
+    assert grown.log_likelihood > whole.log_likelihood - 0.1
+    # The peak of a few points is not theirs.
+    few = fit_likelihood(Samples.of(x[:30], s.y[:30]))
+    there = at_hyperparameters(s, "rbf", few.theta, grown.units)
+    assert grown.log_likelihood > there.log_likelihood + 1
 
 
 def test_no_neighbour_of_the_hyperparameters_is_likelier():

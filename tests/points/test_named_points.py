@@ -94,6 +94,17 @@ def test_what_is_no_point_or_another_is_refused(
     assert told in str(refused.value)
 
 
+def test_an_unknown_node_that_may_be_the_tools_is_told_how_to_say_so() -> None:
+    nodes = PointNames({"elbow": "xyz"}, {"3": "elbow"})
+    with pytest.raises(InputError, match=r'\[\[point\]\] \(name = "tcp", node = 1, if it is the'):
+        hits_from([record(("3", 1), hit_node="1")], "+x", StatedPoints(names=nodes))
+    with pytest.raises(InputError, match=r'\(name = "sensor", node = 1, if it is the'):
+        hits_from([record(("1", 1), hit_node="3")], "+x", StatedPoints(names=nodes))
+    said = PointNames({"tcp": "xyz"}, {"2": "tcp"})
+    with pytest.raises(InputError, match=r"add a \[\[point\]\]\.$"):
+        hits_from([record(("2", 1), hit_node="1")], "+x", StatedPoints(names=said))
+
+
 def test_columns_name_points() -> None:
     time = np.arange(16) / 100
     columns = {"time_s": time, "force_n": time, "acceleration_elbow_y_m_s2": time}

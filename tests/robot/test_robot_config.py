@@ -88,8 +88,8 @@ WRONG_TOML = {
 WRONG_URDF = {
     "cut off": ("</robot>", "", ["not a readable URDF"]),
     "no robot at the top": (None, "<mujoco/>", ["<mujoco>", "<robot>"]),
-    "no turning joint": (None, '<robot name="x"><link name="a"/></robot>', ["no turning joint"]),
-    "a sliding joint": ('type="revolute"', 'type="prismatic"', ["joint_a1", "prismatic"]),
+    "no turning joint": (None, '<robot name="x"><link name="a"/></robot>', ["no joint that moves"]),
+    "a joint of a table": ('type="revolute"', 'type="planar"', ["joint_a1", "planar"]),
     "an axis in words": ('<axis xyz="0 1 0"/>', '<axis xyz="up"/>', ["joint_a2", '"up"']),
     "an axis of two numbers": ('<axis xyz="0 1 0"/>', '<axis xyz="0 1"/>', ["arm.urdf"]),
     "limits in words": ('lower="', 'lower="about ', ["not a usable URDF"]),

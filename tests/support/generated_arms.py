@@ -30,6 +30,10 @@ class Tilting:
         return self.truth.joint_names
 
     @property
+    def slides(self) -> tuple[bool, ...]:
+        return self.truth.slides
+
+    @property
     def description(self) -> str:
         return self.truth.description
 

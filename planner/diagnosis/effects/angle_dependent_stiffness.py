@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting
-from planner.diagnosis.effects.places import joint_of, joints, own_axis
+from planner.diagnosis.effects.places import joint_of, joints
 from planner.diagnosis.thresholds import ANGLE_DEPENDENCE_SD
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
@@ -79,8 +79,8 @@ class AngleDependentStiffness(Effect):
 
 
 def _block(simulation: Simulation, joint: str) -> int | None:
-    axis = own_axis(simulation, joint)
-    for number, block in enumerate(simulation.robot.config.compliance):
-        if block.joint == joint and abs(np.array(block.axis) @ axis) > 0.9:
+    robot = simulation.robot
+    for number, block in enumerate(robot.config.compliance):
+        if block.joint == joint and robot.is_own(block) and not block.slide:
             return number
     return None

@@ -32,7 +32,8 @@ class BaseCompliance(ExtraCompliance):
             lever = link_size(simulation) ** 2
             shifts = tuple(Give(triple(a), low / lever, high / lever, True) for a in np.eye(3))
             turn = Give(triple(axes[2]), low, high)
-            found.append(cls("base", (), BASE, (*two, turn, *shifts)))
+            every = cls("base", (), BASE, (*two, turn, *shifts))
+            found.append(every._movable(simulation))
         return tuple(found)
 
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
@@ -45,5 +46,5 @@ class BaseCompliance(ExtraCompliance):
 
 def _largest(simulation: Simulation) -> float:
     """Of the stiffnesses about the joints' own axes, roughly: the median of the largest three."""
-    sizes = sorted(b.stiffness for b in simulation.robot.config.compliance if not b.slide)
+    sizes = sorted(simulation.robot.turning_stiffness())
     return float(np.median(sizes[-3:]))

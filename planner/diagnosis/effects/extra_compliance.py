@@ -1,12 +1,12 @@
 """Elastic degrees of freedom that the simulation lacks: what base, bearings and links share."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.effects.places import damping_time, with_blocks
+from planner.diagnosis.effects.places import damping_time, movable, with_blocks
 from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors, place_name
@@ -45,6 +45,13 @@ class ExtraCompliance(Effect):
             Compliance(self.joint, g.axis, g.median, time * g.median, slide=g.slide)
             for g in self.gives
         )
+
+    def _movable(self, simulation: Simulation) -> Self:
+        """Without what moves nothing that springs of robot.toml do not move already."""
+        blocks = self.blocks(damping_time(simulation))
+        kept = movable(simulation, blocks)
+        gives = (g for g, b in zip(self.gives, blocks, strict=True) if b in kept)
+        return replace(self, gives=tuple(gives))
 
     def priors(self, simulation: Simulation, priors: Priors) -> Priors:
         """Log-uniform ones of the new springs' stiffness and damping."""

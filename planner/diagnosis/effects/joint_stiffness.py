@@ -2,10 +2,8 @@
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.effects.places import joint_of, joints, own_axis
+from planner.diagnosis.effects.places import joint_of, joints
 from planner.diagnosis.thresholds import FAR_SPRING_FACTOR
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors, place_name
@@ -35,10 +33,9 @@ class JointStiffness(Effect):
         return tuple(found)
 
     def _blocks(self, simulation: Simulation) -> list[Compliance]:
-        joint = joint_of(simulation, self.at)
-        axis = own_axis(simulation, joint)
-        there = [b for b in simulation.robot.config.compliance if b.joint == joint]
-        return [b for b in there if not self.only_own or abs(np.array(b.axis) @ axis) > 0.9]
+        robot, joint = simulation.robot, joint_of(simulation, self.at)
+        there = [b for b in robot.config.compliance if b.joint == joint]
+        return [b for b in there if not self.only_own or robot.is_own(b)]
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
         """Names of the joint's stiffnesses."""
@@ -57,4 +54,9 @@ class JointStiffness(Effect):
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
         told = ", ".join(f"{v:.3g} ± {sd:.1g} {u}" for v, sd, u in values.values())
-        return f"{self.at} is far from its stated stiffness ({told}): check gear, belt and brake."
+        parts = "drive, belt and brake" if _slides(values) else "gear, belt and brake"
+        return f"{self.at} is far from its stated stiffness ({told}): check {parts}."
+
+
+def _slides(values: dict[str, tuple[float, float, str]]) -> bool:
+    return all(unit.endswith("/m") for _, _, unit in values.values())

@@ -72,9 +72,11 @@ class LinkFlexibility(ExtraCompliance):
 
 
 def _own(simulation: Simulation, joint: str) -> float:
-    """Stiffness about a joint's own axis, or the least that it has."""
-    axis = own_axis(simulation, joint)
-    blocks = simulation.robot.config.compliance
+    """Stiffness about a joint's own axis, or the least that it has, in N·m/rad."""
+    robot = simulation.robot
+    if robot.slides(joint):
+        return min(robot.turning_stiffness(joint))
+    axis, blocks = own_axis(simulation, joint), robot.config.compliance
     there = [b for b in blocks if b.joint == joint] or list(blocks)
     own = [b.stiffness for b in there if abs(np.array(b.axis) @ axis) > 0.9]
     return float(min(own or [b.stiffness for b in there]))

@@ -1,11 +1,13 @@
 """Places of a robot, and simulations with more elastic rotations."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import msgspec
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.robot.config import Compliance
 
 
@@ -54,11 +56,24 @@ def with_blocks(simulation: Simulation, blocks: tuple[Compliance, ...]) -> Simul
     return Simulation(replace(robot, config=config))
 
 
+def movable(simulation: Simulation, blocks: Sequence[Compliance]) -> tuple[Compliance, ...]:
+    """Those that, one after the other, move an inertia of their own beside what is listed.
+
+    A base without mass that shifts along a rail does what the rail's own spring does.
+    """
+    kept: tuple[Compliance, ...] = ()
+    for block in blocks:
+        try:
+            _ = with_blocks(simulation, (*kept, block)).elastic
+        except InputError:
+            continue
+        kept = (*kept, block)
+    return kept
+
+
 def stiffest(simulation: Simulation, joint: str) -> float:
     """Largest stiffness listed at a joint (N·m/rad), of the robot where it lists none."""
-    blocks = [b for b in simulation.robot.config.compliance if not b.slide]
-    own = [b.stiffness for b in blocks if b.joint == joint]
-    return max(own or [b.stiffness for b in blocks])
+    return max(simulation.robot.turning_stiffness(joint))
 
 
 def damping_time(simulation: Simulation) -> float:

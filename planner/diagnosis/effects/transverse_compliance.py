@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, across, told, triple
 from planner.diagnosis.effects.places import joints, missing_axes, own_axis, stiffest
 from planner.diagnosis.thresholds import ACROSS_STIFFNESS
@@ -10,7 +12,7 @@ from planner.dynamics.simulation import Simulation
 
 @dataclass(frozen=True)
 class TransverseCompliance(ExtraCompliance):
-    """Tilts about two axes across the joint's own."""
+    """Tilts about two axes across the joint's own; of a carriage that slides about all three."""
 
     name = "transverse_compliance"
 
@@ -19,7 +21,11 @@ class TransverseCompliance(ExtraCompliance):
         """At every joint whose tilts robot.toml does not list."""
         found = []
         for place, joint in joints(simulation):
-            axes = missing_axes(simulation, joint, across(own_axis(simulation, joint)))
+            axis, slides = own_axis(simulation, joint), simulation.robot.slides(joint)
+            tilts = across(axis)
+            # A carriage may roll about its rail, too.
+            wanted = np.concatenate([tilts, axis[None]]) if slides else tilts
+            axes = missing_axes(simulation, joint, wanted)
             if len(axes):
                 low, high = (float(r * stiffest(simulation, joint)) for r in ACROSS_STIFFNESS)
                 found.append(cls(place, (), joint, tuple(Give(triple(a), low, high) for a in axes)))

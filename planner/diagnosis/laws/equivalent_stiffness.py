@@ -27,7 +27,8 @@ LEAST, MOST = -0.95, 5.0  # of Δ, times the joint's stiffness
 class System:
     """The refitted simulation at the visits: M (n, e, e), C and K (e,), Jacobians (n, 3, e).
 
-    `ports` are the joints with a spring about their own axis, `blocks` (J,) those springs.
+    `ports` are the joints with a spring about (or along) their own axis, `blocks` (J,) those
+    springs; `slides` (J,) says which shift, none where it is empty.
     """
 
     mass: np.ndarray
@@ -37,6 +38,7 @@ class System:
     elasticity: Elasticity
     ports: tuple[str, ...]
     blocks: np.ndarray
+    slides: tuple[bool, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,18 +68,18 @@ def system_of(plain: Fit, x: np.ndarray | None = None) -> System:
     mass = misfit.matrices.mass + misfit.inertias.mass_change(x[a:b])
     m, simulation = misfit.matrices, misfit.setting.simulation
     ports, blocks = own_springs(simulation)
-    return System(
-        mass, m.geometric, m.hit, m.sensor, misfit.parametrisation.elasticity(x[:a]), ports, blocks
-    )
+    slides = tuple(simulation.robot.config.compliance[block].slide for block in blocks)
+    springs = misfit.parametrisation.elasticity(x[:a])
+    return System(mass, m.geometric, m.hit, m.sensor, springs, ports, blocks, slides)
 
 
 def own_springs(simulation: Simulation) -> tuple[tuple[str, ...], np.ndarray]:
-    """Places joint_1, … that have a spring about their own axis, and its number (J,)."""
+    """Places joint_1, … that have a spring about (along) their own axis, and its number (J,)."""
     robot, ports, blocks = simulation.robot, [], []
     for number, (joint, axis) in enumerate(zip(robot.joint_names, robot.joint_axes, strict=True)):
         for block, compliance in enumerate(robot.config.compliance):
             own = abs(np.array(compliance.axis) @ axis) > 0.99 * np.linalg.norm(compliance.axis)
-            if compliance.joint == joint and own:
+            if compliance.joint == joint and own and robot.is_own(compliance):
                 ports.append(f"joint_{number + 1}")
                 blocks.append(block)
                 break

@@ -26,7 +26,8 @@ class LawAtJoints:
 
     k is the share times the joints' stiffness `scale` (m,) in N·m/rad, ln a is `middle` (m,) + ν.
     With `sign` 0 ν holds the share itself, which may change its sign; otherwise its logarithm.
-    `ports` (m,) are the joints, as numbered by `System.ports`.
+    `ports` (m,) are the joints, as numbered by `System.ports`; of those that `slides` (m,) says,
+    k is in N/m and a in m.
     """
 
     kind: Law
@@ -36,6 +37,7 @@ class LawAtJoints:
     middle: np.ndarray
     x: np.ndarray
     nu: np.ndarray
+    slides: tuple[bool, ...] = ()
 
     @property
     def effect(self) -> str:
@@ -66,7 +68,8 @@ class LawAtJoints:
         if self.effect == "friction":
             values, slopes = (k, k * a), (by_k, by_k + slopes[1])
         out = {}
-        for (name, unit), value, slope in zip(self.kind.names, values, slopes, strict=True):
+        names = self.kind.names_at(bool(self.slides) and self.slides[joint])
+        for (name, unit), value, slope in zip(names, values, slopes, strict=True):
             relative = np.hypot(np.sqrt(slope @ spread @ slope), inexact)
             out[name] = (value, float(relative * abs(value)), unit)
         return out

@@ -48,7 +48,7 @@ def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> LawAt
     for j, block in enumerate(system.blocks):
         own = own_parameter(plain, int(block))
         x[own], *nu[:, j] = begin(refits, law, sign, float(scale[j]), j, float(middle[j]))
-    return LawAtJoints(law, sign, np.arange(len(scale)), scale, middle, x, nu)
+    return LawAtJoints(law, sign, np.arange(len(scale)), scale, middle, x, nu, system.slides)
 
 
 def softened(data: LevelData, share: float) -> LevelData:

@@ -45,7 +45,7 @@ def starts(
                     out.append(
                         LawAtJoints(
                             law, 0 if law.signed else 1, np.array([port]), np.array([scale]),
-                            np.log([middle]), moved, nu,
+                            np.log([middle]), moved, nu, system.slides[port : port + 1],
                         )
                     )  # fmt: skip
     return out

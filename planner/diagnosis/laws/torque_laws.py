@@ -14,6 +14,16 @@ import numpy as np
 LEAST_SHARE = 1e-3  # of k in the joint's linear stiffness where its logarithm is fitted
 PHASES = 2 * np.pi * (np.arange(64) + 0.5) / 64
 
+# Names and units of the laws' numbers at joints that slide.
+SLIDING = {
+    ("stiffness_change", "N·m/rad"): ("stiffness_change", "N/m"),
+    ("presliding_stiffness", "N·m/rad"): ("presliding_stiffness", "N/m"),
+    ("lost_stiffness", "N·m/rad"): ("lost_stiffness", "N/m"),
+    ("coulomb_torque", "N·m"): ("coulomb_force", "N"),
+    ("angle", "rad"): ("shift", "m"),
+    ("half_gap", "rad"): ("half_gap", "m"),
+}
+
 Torque = tuple[Any, Any, Any]  # torque, its slope, new state
 Step = Callable[[Any, Any, Any, Any, Any, Any], Torque]
 
@@ -33,6 +43,10 @@ class Law:
     least_share: float
     most_share: float
     names: tuple[tuple[str, str], tuple[str, str]]
+
+    def names_at(self, slides: bool) -> tuple[tuple[str, str], ...]:
+        """Names and units of the two numbers, at a joint that `slides` in N and m."""
+        return tuple(SLIDING.get(pair, pair) for pair in self.names) if slides else self.names
 
     @property
     def remembers(self) -> bool:

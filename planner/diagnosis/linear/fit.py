@@ -11,7 +11,6 @@ from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, ow
 from planner.diagnosis.linear.problem import CLOSE, COARSE, FINE, GLANCE, Grade, Problem
 from planner.identification.effort import QUICK, STAGES, Effort
 from planner.identification.identify import identify
-from planner.identification.parameters import UNITS
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
@@ -76,10 +75,8 @@ class Fit:
         out = {}
         for i, s in enumerate(p.parameters):
             if s.name in chosen:
-                value, unit = float(np.exp(self.x[i])), UNITS[s.kind]
-                if " along " in s.name:
-                    unit = unit.replace("·m", "", 1).replace("rad", "m")
-                out[s.name] = (value, value * float(sd[i]), unit)
+                value = float(np.exp(self.x[i]))
+                out[s.name] = (value, value * float(sd[i]), s.unit)
         for q, name in zip(part.quantities, own_names(part), strict=True):
             i = names.index(name)
             psi = float(self.x[i])

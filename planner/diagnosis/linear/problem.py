@@ -54,7 +54,8 @@ SHARED_WORK, LEAST_LINES = -0.35, 28
 
 def tolerances_of(simulation: Simulation) -> Tolerances:
     """What the simulation's robot.toml says of hits, sensor and readback."""
-    return Tolerances.of(simulation.robot.config)
+    robot = simulation.robot
+    return Tolerances.of(robot.config, robot.joints.slides)
 
 
 @dataclass(frozen=True, eq=False)

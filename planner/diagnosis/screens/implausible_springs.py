@@ -32,7 +32,7 @@ def strayed(
         places = [names.index(name) for name in far]
         value = np.exp(x[places])
         told = {
-            name: (float(v), float(v * sd[i]), "N·m/rad")
+            name: (float(v), float(v * sd[i]), misfit.parametrisation.parameters[i].unit)
             for name, v, i in zip(far, value, places, strict=True)
         }
         evidence = float(np.max(away[places] ** 2)) / 2

@@ -9,12 +9,13 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import MeasuredMode
 from planner.campaign.state import Measurement
 from planner.frf.frf import Frf
+from planner.recording.joints import JointUnits
 from planner.surrogate.frf_bands import ModalPrediction
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredOf:
-    """A measured pose: joint angles in degrees, FRFs, likely modes."""
+    """A measured pose: joint angles in degrees (mm of slides), FRFs, likely modes."""
 
     pose: str
     joints_deg: tuple[float, ...]
@@ -24,7 +25,7 @@ class MeasuredOf:
 
 @dataclass(frozen=True, eq=False)
 class PredictedOf:
-    """The model at n poses: joint angles (n, dof) in degrees, modes, FRFs (n, 3, 3, F) with sd."""
+    """The model at n poses: joints (n, dof) in degrees or mm, modes, FRFs (n, 3, 3, F) with sd."""
 
     poses: tuple[str, ...]
     joints_deg: np.ndarray
@@ -39,7 +40,7 @@ class Collected:
     """All of a campaign that other programs can use."""
 
     name: str
-    joint_names: tuple[str, ...]
+    joints: JointUnits
     simulated: bool
     measured: tuple[MeasuredOf, ...]
     predicted: PredictedOf
@@ -63,7 +64,7 @@ def collect(
         angles = np.array([m.joints_deg for m in measured])
     angles = angles.reshape(len(names), len(cell.robot.joint_names))
     lines = campaign.frequency_lines
-    q = np.deg2rad(angles)
+    q = cell.robot.joints.internal(angles)
     count = table.count
     if names:
         mean, sd = campaign.frf(q, lines)
@@ -74,7 +75,7 @@ def collect(
         modes = ModalPrediction(none, none, none, none, np.empty((0, count, 3, 3)), none)
     return Collected(
         campaign.directory.name,
-        tuple(cell.robot.joint_names),
+        cell.robot.joints,
         any(m.simulated for m in state.recorded),
         tuple(measured),
         PredictedOf(names, angles, lines, mean, sd, modes),

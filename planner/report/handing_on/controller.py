@@ -18,7 +18,7 @@ WARNING = (
 
 @dataclass(frozen=True)
 class PoseToDrive:
-    """A pose in the URDF's joints (degrees), and what is to be hit there."""
+    """A pose in the URDF's joints (degrees, mm of slides), and what is to be hit there."""
 
     pose: str
     joints_deg: tuple[float, ...]
@@ -32,12 +32,16 @@ class PoseToDrive:
 
 @dataclass(frozen=True)
 class DrivenPose:
-    """A pose in the controller's axes, in degrees: those of the arm, and external ones."""
+    """A pose in the controller's axes: those of the arm, and external ones.
+
+    In `units`, "deg" or "mm" of each axis in that order.
+    """
 
     name: str  # an identifier
     note: str
     arm: tuple[float, ...]
     external: tuple[float, ...]
+    units: tuple[str, ...]
 
 
 def plain(text: str) -> str:
@@ -67,13 +71,20 @@ def program(kind: str, robot: Robot, name: str, poses: Sequence[PoseToDrive]) ->
         )
     if kind == "urscript" and (external or len(arm) != ARM_AXES):
         raise InputError(f"{robot.path}: urscript drives {ARM_AXES} joints; export poses instead.")
+    slides = [name for name, *_ in arm if robot.slides(name)]
+    if kind != "poses" and slides:
+        raise InputError(
+            f"{robot.path}: joint {slides[0]} slides, and axes of the arm turn in {kind}; name it "
+            f"in [controller] external, or export poses."
+        )
+    units = tuple("mm" if robot.slides(name) else "deg" for name, *_ in (*arm, *external))
     used: set[str] = set()
     driven = []
     for pose in poses:
         values = dict(zip(robot.joint_names, pose.joints_deg, strict=True))
         one = unique(identifier(pose.pose), used)
         turned = [tuple(s * values[n] + o for n, s, o in group) for group in (arm, external)]
-        driven.append(DrivenPose(one, pose.note, *turned))
+        driven.append(DrivenPose(one, pose.note, turned[0], turned[1], units))
     return PROGRAMS[kind](identifier(name, "C_"), driven, table)
 
 
@@ -87,7 +98,7 @@ def unique(name: str, used: set[str]) -> str:
 
 
 def axes_of(robot: Robot) -> list[tuple[str, float, float]]:
-    """The controller's axes in order: joint of the URDF, sign, offset in degrees."""
+    """The controller's axes in order: joint of the URDF, sign, offset in degrees (slides: mm)."""
     table, joints = robot.config.controller, robot.joint_names
     order = table.joints or joints
     if sorted(order) != sorted(joints):
@@ -155,11 +166,13 @@ FASTEST_UR_RAD_S = 3.14  # joint speed of which `speed_percent` is a share, as U
 
 
 def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
-    """A table: axes as the controller counts them, in degrees."""
-    first = poses[0] if poses else None
-    arm = [f"A{k}_deg" for k in range(1, len(first.arm) + 1)] if first else []
-    arm += [f"E{k}_deg" for k in range(1, len(first.external) + 1)] if first else []
-    rows = [",".join(["pose", *arm, "note"])]
+    """A table: axes as the controller counts them, in degrees, those that slide in mm."""
+    axes: list[str] = []
+    if poses:
+        axes = [f"A{k}" for k in range(1, len(poses[0].arm) + 1)]
+        axes += [f"E{k}" for k in range(1, len(poses[0].external) + 1)]
+        axes = [f"{axis}_{unit}" for axis, unit in zip(axes, poses[0].units, strict=True)]
+    rows = [",".join(["pose", *axes, "note"])]
     for pose in poses:
         numbers = [f"{v:.4f}" for v in (*pose.arm, *pose.external)]
         rows.append(",".join([pose.name, *numbers, f'"{pose.note}"']))

@@ -67,7 +67,7 @@ def export(
     """
     if kind not in KINDS:
         raise InputError(f"{kind} is no format; give one of {', '.join(KINDS)}.")
-    rows = read_poses(poses_csv, campaign.cell.robot.joint_names) if poses_csv else ()
+    rows = read_poses(poses_csv, campaign.cell.robot.joints) if poses_csv else ()
     for row in rows:
         campaign.cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}")
     folder = (out or campaign.directory / "export").absolute()

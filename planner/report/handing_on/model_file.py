@@ -5,6 +5,7 @@ from scipy.interpolate import RBFInterpolator
 
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
+from planner.recording.joints import SCALES
 from planner.report.handing_on.collected import Collected
 
 # Points of a workspace of up to two coordinates, and of more: 3 and 9 s, 0.1 and 0.6 MB.
@@ -50,8 +51,8 @@ def model_arrays(campaign: Campaign, found: Collected) -> dict[str, np.ndarray]:
             f"Only {len(x)} poses of the workspace can be reached: too few to interpolate; "
             f"export csv."
         )
-    turned = np.array([name.endswith("_deg") for name in cell.workspace.feature_names])
-    scale = np.where(turned, 180 / np.pi, 1.0)
+    ends = [name.rsplit("_", 1)[-1] for name in cell.workspace.feature_names]
+    scale = np.array([SCALES.get(end, 1.0) for end in ends])
     varying = cell.workspace.varying
     lower = cell.workspace.lower[varying] * scale
     span = (cell.workspace.upper - cell.workspace.lower)[varying] * scale

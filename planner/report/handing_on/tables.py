@@ -14,8 +14,7 @@ AXES = "xyz"
 
 def modes_csv(found: Collected) -> str:
     """Measured and predicted modes, one a row: Hz, ratios, and their standard deviations."""
-    angles = [f"{name}_deg" for name in found.joint_names]
-    header = ["source", "pose", *angles, "mode", "frequency_hz", "frequency_sd_hz",
+    header = ["source", "pose", *found.joints.columns, "mode", "frequency_hz", "frequency_sd_hz",
               "damping_ratio", "damping_sd"]  # fmt: skip
     header += [f"shape_{a}_{part}" for a in AXES for part in ("re", "im")]
     return _text(found, header, _mode_rows(found))
@@ -79,7 +78,7 @@ def mat_arrays(found: Collected) -> dict[str, Any]:
     made: dict[str, Any] = {
         "label": found.label,
         "simulated": found.simulated,
-        "joint_names": np.array(found.joint_names, dtype=object),
+        "joint_names": np.array(found.joints.names, dtype=object),
         "predicted_pose": np.array(p.poses, dtype=object),
         "predicted_joints_deg": p.joints_deg,
         "frequency_hz": p.frequency_hz,
@@ -90,6 +89,8 @@ def mat_arrays(found: Collected) -> dict[str, Any]:
         "mode_damping_ratio": modes.damping_ratio,
         "mode_damping_sd": modes.damping_sd,
     }
+    if any(found.joints.slides):
+        made["joint_units"] = np.array(found.joints.units, dtype=object)
     cells = [
         {
             "pose": one.pose,

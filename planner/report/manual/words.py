@@ -16,7 +16,9 @@ TUTORIAL = (
         "planner schema robot",
         "One [[compliance]] for each elastic rotation, at least one about each gear's axis. "
         "Starting values may be off by a factor of two. For a robot of 6 axes that carries 200 kg "
-        "joint stiffnesses are 1e6 to 1e7 N·m/rad, for one that carries 10 kg 1e4 to 1e5.",
+        "joint stiffnesses are 1e6 to 1e7 N·m/rad, for one that carries 10 kg 1e4 to 1e5. A joint "
+        "that slides (prismatic: a rail, a gantry) gives along its axis: stiffness_n_m in N/m and "
+        "damping_n_s_m.",
     ),
     (
         "Check it.",
@@ -129,7 +131,9 @@ def recordings() -> Markup:
     text = (
         "A recordings folder has a table, recordings.csv, with one hit a row, and the files that "
         "it names. Joint angles are those read back from the controller, in degrees, one column "
-        "for each joint of the URDF, named as the joint. A hit is a signed axis of the tcp frame."
+        "for each joint of the URDF, named as the joint: joint_1_deg. Of a joint that slides it is "
+        "the place in millimetres, in a column such as rail_mm; so it is in every list of joint "
+        "values, and answers then say joint_units. A hit is a signed axis of the tcp frame."
     )
     return section(
         "Recordings",
@@ -194,10 +198,11 @@ def paragraphs_of_python() -> tuple[Markup, ...]:
     """Beside the code."""
     return (
         paragraphs(
-            "Angles in names that end in _deg are degrees, in _rad (and q) radians. "
+            "Angles in names that end in _deg are degrees, in _rad (and q) radians; the places of "
+            "joints that slide are millimetres there, metres in q (robot.joints converts). "
             "campaign.records() and predict_records(q) give rows that pandas.DataFrame takes.",
             "Where a script measures by itself and has modes or FRFs instead of files, AskTell "
-            "proposes and learns in memory (angles in degrees throughout):",
+            "proposes and learns in memory (degrees throughout, millimetres of slides):",
         ),
         tag("pre", ASK_TELL),
     )

@@ -8,6 +8,7 @@ from planner.campaign.config import CampaignConfig
 from planner.campaign.events import Undone
 from planner.campaign.state import Measurement
 from planner.check.remark import CheckRemark
+from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP
 from planner.report.log_words import act
 from planner.report.page.facts import Facts
@@ -36,7 +37,7 @@ def asked(facts: Facts) -> Markup:
         ("Simulation", _simulation(config, len(robot.config.compliance))),
         ("Hit point and sensor", f"{robot.config.tcp_frame}, {robot.config.sensor_frame}"),
         *_points(facts),
-        *_workspace(config, robot.joint_names),
+        *_workspace(config, robot.joints),
         ("Modes", f"the {config.modes.count} lowest in {_range(config.modes.band_hz)} Hz"),
         ("Poses chosen by", config.acquisition.name),
         ("Target", _target(config)),
@@ -69,11 +70,12 @@ def _simulation(config: CampaignConfig, springs: int) -> str:
     return said if kind == "none" else f"{springs} elastic degrees of freedom, {said}"
 
 
-def _workspace(config: CampaignConfig, joints: tuple[str, ...]) -> list[tuple[str, str]]:
+def _workspace(config: CampaignConfig, joints: JointUnits) -> list[tuple[str, str]]:
     w = config.workspace
     if w.joints_deg is not None:
-        pairs = zip(joints, w.joints_deg, strict=True)
-        return [("Workspace", "; ".join(f"{name} {_range(r)}°" for name, r in pairs))]
+        rows = zip(joints.names, w.joints_deg, joints.slides, strict=True)
+        said = (f"{name} {_range(r)}{' mm' if slide else '°'}" for name, r, slide in rows)
+        return [("Workspace", "; ".join(said))]
     axes = ", ".join(f"{v:g}" for v in w.tool_axis or ())
     pairs = zip("xyz", w.position_m or [], strict=True)
     place = "; ".join(f"{name} {_range(r)} m" for name, r in pairs)
@@ -101,14 +103,14 @@ def findings(remarks: Iterable[CheckRemark]) -> Markup:
 
 def measured(facts: Facts) -> Markup:
     """What was measured and refused, and why."""
-    state, joints = facts.state, facts.campaign.cell.robot.joint_names
+    state, joints = facts.state, facts.campaign.cell.robot.joints
     header = ("pose", "hits used", "refused", "natural frequencies (Hz)", "damping ratios (%)",
               "time (UTC)")  # fmt: skip
     rows = [_pose(m, m.pose in state.starred) for m in state.measurements.values()]
     angles = [(m.pose, *(f"{v:.2f}" for v in m.joints_deg)) for m in state.measurements.values()]
     parts: list[object] = [tag("p", "Nothing has been measured yet.")]
     if rows:
-        readback = table(("pose", *joints), angles, "Joint angles (°) as read back")
+        readback = table(("pose", *joints.headings), angles, "Joints as read back")
         parts = [table(header, rows), readback]
     refused = [(r.pose, r.file, r.reason) for r in facts.status.refused]
     if refused:

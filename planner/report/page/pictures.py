@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from planner.recording.joints import SCALES
 from planner.report.frf_plots import png
 from planner.report.frf_sheet import frf_sheet
 from planner.report.leave_one_out import found_without
@@ -59,9 +60,8 @@ def _errors(facts: Facts) -> Markup:
 def maps(facts: Facts) -> Markup:
     """Frequencies and their uncertainty over the workspace."""
     cell, model = facts.campaign.cell, facts.model
-    q = np.array([np.deg2rad(m.joints_deg) for m in facts.used]).reshape(
-        -1, len(cell.robot.joint_names)
-    )
+    joints = cell.robot.joints
+    q = joints.internal([m.joints_deg for m in facts.used]).reshape(-1, len(joints.names))
     x, measured, names, flat = _coordinates(facts, q)
     found = model.workspace_prediction
     poses = tuple(m.pose for m in facts.used)
@@ -89,8 +89,9 @@ def _coordinates(facts: Facts, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, t
     candidates, space = cell.candidates, cell.workspace
     if int(space.varying.sum()) == 2:
         lower, span = space.lower[space.varying], (space.upper - space.lower)[space.varying]
+        units = [name.rsplit("_", 1)[-1] for name in space.feature_names]
+        scale = np.array([SCALES.get(unit, 1.0) for unit in units])
         names = [_axis_name(name) for name in space.feature_names]
-        scale = np.array([180 / np.pi if name.endswith("(°)") else 1.0 for name in names])
 
         def shown(features: np.ndarray) -> np.ndarray:
             return (lower + features * span) * scale
@@ -106,6 +107,8 @@ def _coordinates(facts: Facts, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, t
 def _axis_name(name: str) -> str:
     if name.endswith("_deg"):
         return f"{name.removesuffix('_deg')} (°)"
+    if name.endswith("_mm"):
+        return f"{name.removesuffix('_mm')} (mm)"
     return f"{name.removesuffix('_m')} of the tcp (m)"
 
 
@@ -119,8 +122,9 @@ def frfs(facts: Facts) -> Markup:
     order = [*worst, *(m.pose for m in used if m.pose not in worst)][:SHOWN_FRFS]
     shown = [m for m in used if m.pose in order]
     lines = campaign.frequency_lines
-    mean, sd = campaign.frf(np.deg2rad(np.array([m.joints_deg for m in shown])), lines)
-    expected = facts.model.predict(np.deg2rad(np.array([m.joints_deg for m in shown])))
+    q = campaign.cell.robot.joints.internal([m.joints_deg for m in shown])
+    mean, sd = campaign.frf(q, lines)
+    expected = facts.model.predict(q)
     drawn = []
     for i, m in enumerate(shown):
         modes = expected.frequency_hz[i]

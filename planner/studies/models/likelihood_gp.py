@@ -6,6 +6,7 @@ Predictions are eqs. 2.23 and 2.24 there. With few points this is over-confident
 averages instead): it is here because the papers do so.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,8 +31,10 @@ NOISES = (0.5, 0.1, 0.01)
 # Steps, and the relative gain after which a climb ends: of every start at first; the LAST likeliest
 # of them go on to the end.
 ROUGHLY, LAST = (60, 1e-5), 2
-MOST_STEPS, FEW_STEPS = 200, 30  # of a climb to the end; of one that begins near the peak
-FTOL = 1e-7  # of one that begins near the peak: less of the log-likelihood changes no prediction
+MOST_STEPS, FEW_STEPS = 200, 60  # of a climb to the end; of one that begins at fewer points' peak
+FTOL = 1e-7  # of the latter: less of the log-likelihood changes no prediction
+# Log-densities further apart are those of different peaks; so many are followed to more points.
+SAME_PEAK, MOST_PEAKS = 0.5, 4
 STARTS = 5  # "five optimization runs" (Busch et al. 2022, section 2.3.1)
 
 
@@ -77,7 +80,6 @@ def fit_likelihood(
     units: Normalisation | None = None,
     starts: int = STARTS,
     seed: int = 0,
-    begin: np.ndarray | None = None,
     isotropic: bool = False,
 ) -> LikelihoodGP:
     """Maximum-likelihood GP of `samples`.
@@ -89,23 +91,50 @@ def fit_likelihood(
         units: by what y is normalised; None: its own mean and sd.
         starts: how many; the first is in the middle, the others random around it.
         seed: of the random starts.
-        begin: log θ (p,) near the peak, such as that of fewer points: the only start then.
         isotropic: one length scale for all columns of a factor (Busch et al. 2022, eqs. 4 to 7).
     """
     units = units or Normalisation.of(samples.y)
     hill = _Hill.of(samples, kernel, noise, units, isotropic)
-    if begin is not None:
-        best = hill.climb(begin[hill.kept], FEW_STEPS, FTOL)
-    else:
-        levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
-        ends = []
-        for i, z in enumerate(hill.starts(starts, seed)):
-            for held in levels[i % (len(levels) + 1) :]:
-                z = hill.climb(z, *ROUGHLY, held).x
-            ends.append(hill.climb(z, *ROUGHLY))
-        ends = sorted(ends, key=lambda peak: -peak.log_density)[:LAST]
-        best = max((hill.climb(e.x) for e in ends), key=lambda peak: peak.log_density)
+    ends = sorted(hill.roughly(starts, seed, noise), key=lambda peak: -peak.log_density)[:LAST]
+    best = max((hill.climb(e.x) for e in ends), key=lambda peak: peak.log_density)
     return at_hyperparameters(samples, kernel, best.x[hill.own], units)
+
+
+def fit_growing(
+    samples: Samples, counts: Sequence[int], kernel: str = "rbf", starts: int = STARTS
+) -> LikelihoodGP:
+    """Maximum-likelihood GP of many samples, over all of which a climb from afar takes minutes.
+
+    Climbs begin with some of the points, which costs next to nothing; every peak found there leads
+    to one of more points, for the likeliest of few need not lead to the likeliest of all.
+
+    Args:
+        samples: as of `fit_likelihood`.
+        counts: so many points, drawn at random, before all of them.
+        kernel: an expression over the columns of x.
+        starts: of the climbs over the first.
+    """
+    order, units = np.random.default_rng(0).permutation(len(samples.y)), Normalisation.of(samples.y)
+    peaks: list[Peak] = []
+    for count in (*counts, len(order)):
+        some = order[:count]
+        part = Samples(samples.x[some], samples.y[some], samples.sd[some])
+        hill = _Hill.of(part, kernel, None, units, isotropic=False)
+        if not peaks:
+            ends = hill.roughly(starts, seed=0)
+        else:
+            ends = [hill.climb(peak.x, FEW_STEPS, FTOL) for peak in peaks[:MOST_PEAKS]]
+        peaks = _likeliest(ends)
+    return at_hyperparameters(samples, kernel, peaks[0].x, units)
+
+
+def _likeliest(ends: Sequence[Peak]) -> list[Peak]:
+    """Those of different density, the likeliest first."""
+    found: list[Peak] = []
+    for end in sorted(ends, key=lambda peak: -peak.log_density):
+        if not found or found[-1].log_density - end.log_density > SAME_PEAK:
+            found.append(end)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +168,16 @@ class _Hill:
         """The middle, and normal around it (count, …)."""
         normal = np.random.default_rng(seed).standard_normal((count - 1, len(self.kept)))
         return self.middle + np.vstack([np.zeros(len(self.kept)), normal])
+
+    def roughly(self, starts: int, seed: int, noise: float | None = None) -> list[Peak]:
+        """Where climbs from several starts end roughly."""
+        levels = NOISES[:1] if noise is None else [level for level in NOISES if level > noise]
+        ends = []
+        for i, z in enumerate(self.starts(starts, seed)):
+            for held in levels[i % (len(levels) + 1) :]:
+                z = self.climb(z, *ROUGHLY, held).x
+            ends.append(self.climb(z, *ROUGHLY))
+        return ends
 
     def density(self, z: np.ndarray) -> tuple[float, np.ndarray]:
         """log p(y) and its slope in z."""

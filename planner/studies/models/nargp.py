@@ -37,7 +37,7 @@ class NARGP:
         """Mean and sd (q,) of the noise-free expensive output at x (q, d)."""
         below, unsure = self.low.predict(x)
         nodes = below[None, :] + NODES[:, None] * unsure[None, :]
-        wide = _widened(np.tile(x, (NODE_COUNT, 1)), nodes.reshape(-1), self.low_units)
+        wide = widened(np.tile(x, (NODE_COUNT, 1)), nodes.reshape(-1), self.low_units)
         mean, sd = (part.reshape(NODE_COUNT, len(x)) for part in self.high.predict(wide))
         middle = WEIGHTS @ mean
         return middle, np.sqrt(WEIGHTS @ (sd**2 + (mean - middle) ** 2))
@@ -67,7 +67,7 @@ def fit_nargp(
         noise, units, starts, seed, isotropic: as of `fit_likelihood`.
     """
     below, _ = low.predict(measured.x)
-    wide = Samples(_widened(measured.x, below, low_units), measured.y, measured.sd)
+    wide = Samples(widened(measured.x, below, low_units), measured.y, measured.sd)
     kernel = perdikaris(measured.x.shape[1])
     high = fit_likelihood(wide, kernel, noise, units, starts, seed, isotropic=isotropic)
     return NARGP(low, high, low_units)
@@ -83,5 +83,6 @@ def fit_low(
     return fit_likelihood(samples, "rbf", noise, starts=starts, seed=seed)
 
 
-def _widened(x: np.ndarray, below: np.ndarray, units: Normalisation) -> np.ndarray:
+def widened(x: np.ndarray, below: np.ndarray, units: Normalisation) -> np.ndarray:
+    """x (n, d), and the value (n,) of the level below in its own units: (n, d + 1)."""
     return np.column_stack([x, (below - units.centre) / units.scale])

@@ -18,13 +18,13 @@ from planner.errors import InputError
 from planner.studies.models.fidelity_levels import FidelityLevel, Samples
 from planner.studies.models.frf_surface import Frame, Grid, frame_of
 from planner.studies.models.grid_gp import GridGP, fit_grid
-from planner.studies.models.likelihood_gp import Normalisation, fit_likelihood
+from planner.studies.models.likelihood_gp import Normalisation, fit_growing
 from planner.studies.models.mfdgp import Training, fit_mfdgp
-from planner.studies.models.nargp import NARGP, fit_nargp, perdikaris
+from planner.studies.models.nargp import NARGP, perdikaris, widened
 
 # NARGP's climb begins with so many of the measured points, which costs next to nothing, goes on
 # with more, and ends with all.
-FIRST_POINTS, MORE_POINTS = 250, 900
+SOME_POINTS, STARTS = (250, 900), 8
 SURFACE_TRAINING = Training(4000, 4000, inducing=200)
 
 
@@ -67,14 +67,8 @@ def _gp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> Gr
 def _nargp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> NARGP:
     low, s = _grid(frame, simulated), _samples(frame, measured)
     units = Normalisation.of(simulated.amplitude.ravel())
-    order = np.random.default_rng(0).permutation(len(s.y))
-    some = order[:FIRST_POINTS]
-    high = fit_nargp(Samples(s.x[some], s.y[some], s.sd[some]), low, units, starts=3).high
-    wide = np.column_stack([s.x, (low.predict(s.x)[0] - units.centre) / units.scale])
-    for some in (order[:MORE_POINTS], order):
-        samples = Samples(wide[some], s.y[some], s.sd[some])
-        high = fit_likelihood(samples, perdikaris(2), begin=high.theta)
-    return NARGP(low, high, units)
+    wide = Samples(widened(s.x, low.predict(s.x)[0], units), s.y, s.sd)
+    return NARGP(low, fit_growing(wide, SOME_POINTS, perdikaris(2), STARTS), units)
 
 
 def _mfdgp(frame: Frame, measured: Grid, simulated: Grid, training: Training) -> FidelityLevel:
