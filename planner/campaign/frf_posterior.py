@@ -14,11 +14,11 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Grade, Problem, tolerances_of
-from planner.dynamics.gradient import Turned
 from planner.identification.measurement_model import (
     CHAIN_NUMBERS,
     HIT_NUMBERS,
     OPEN,
+    Tolerances,
     basis,
     marginal,
 )
@@ -26,6 +26,7 @@ from planner.identification.objective import FARTHEST
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import (
     LONGEST,
+    Damping,
     Limits,
     Quadratic,
     accept,
@@ -42,7 +43,9 @@ MODEL_ERROR = 0.01
 LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
 CHAIN = CHAIN_NUMBERS  # numbers of the chain, which are the same at all poses
 NEARLY = 0.999  # of the farthest that is possible
-TOLERANCE, MOST_STEPS = 5e-4, 30  # of a fit: least gain of a step, and how many
+TOLERANCE, MOST_STEPS = 5e-5, 30  # of a fit: least gain of a step, and how many
+# Of a fit's first step: a scale that mass and chain share has eigenvalues of 1e-5 of the diagonal.
+LIGHT = Damping(first=1e-5)
 FOLDS = 6  # that poses are left out in, at most
 LEFT_STEPS = 3  # of a fit without a pose, from one with it
 
@@ -81,17 +84,18 @@ class ChainMisfit:
         return np.append(self.misfit.sd, np.ones(CHAIN))
 
     def parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The robot's FRFs (n, 3, 3, F), derivatives by z, and what poses leave open (n, 18, …)."""
-        x = z[:-CHAIN]
-        h, slope, turned = self.misfit.parts(x)
-        open_ = self._open(h, turned)
+        """The robot's FRFs (n, 3, 3, F), derivatives by z, and what poses leave open (n, 18, …).
+
+        Derivatives and misses are as the chain shows them: else the lighter robot under a lower
+        gain would not look the same, and a fit would end where it began.
+        """
+        h, slope, turned = self.misfit.parts(z[:-CHAIN])
+        s, tolerances = self.misfit.setting.s, tolerances_of(self.misfit.setting.simulation)
+        open_ = basis(h, turned, s, tolerances)
         chain = open_[:, HIT_NUMBERS:OPEN]
         own = np.concatenate([open_[:, :HIT_NUMBERS], open_[:, OPEN:]], axis=1)
+        own, slope = (v + through_chain(v, z[-CHAIN:], s, tolerances) for v in (own, slope))
         return h, np.concatenate([slope, chain], axis=1), own
-
-    def _open(self, h: np.ndarray, turned: Turned) -> np.ndarray:
-        s, simulation = self.misfit.setting.s, self.misfit.setting.simulation
-        return basis(h, turned, s, tolerances_of(simulation))
 
     def __call__(self, z: np.ndarray) -> FrfEvidence:
         """∞ where z cannot be."""
@@ -134,6 +138,15 @@ class ChainMisfit:
 def shown(h: np.ndarray, slope: np.ndarray, z: np.ndarray) -> np.ndarray:
     """FRFs (3, 3, F) as the chain shows them; `slope` (d, 3, 3, F) by z, the chain's last."""
     return h + np.tensordot(z[-CHAIN:], slope[-CHAIN:], axes=1)
+
+
+def through_chain(
+    values: np.ndarray, chain: np.ndarray, s: np.ndarray, t: Tolerances
+) -> np.ndarray:
+    """What a chain (CHAIN,) in sds adds to accelerations (n, k, 3, c, F); its place aside."""
+    by_axis = chain[:9].reshape(3, 3) * np.where(np.eye(3) > 0, t.gain, t.across)
+    alike = t.force_gain * chain[-2] - t.delay_s * chain[-1] * s
+    return np.einsum("ij,nkjcf->nkicf", by_axis, values) + alike[:, None, None, None] * values
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +263,7 @@ def least(objective: ChainMisfit, z: np.ndarray, most: int) -> tuple[np.ndarray,
     longest = np.append(objective.misfit.longest, np.full(CHAIN, LONGEST))
     limits = Limits(longest, objective.mean - reach, objective.mean + reach)
     z = np.clip(z, limits.lower, limits.upper)
-    state = begin(z, objective(z), limits=limits)
+    state = begin(z, objective(z), LIGHT, limits)
     for _ in range(most):
         trial = propose(state)
         if expected(state, trial) <= TOLERANCE * state.at.value or state.stuck:

@@ -15,12 +15,14 @@ BEST = 0.95  # misfit below which no springs that are added can bring it
 # By how much softer than expected springs that are added begin, one after the other while nothing
 # fits. Of twelve generated campaigns three ended beside the best minimum from the first alone.
 SOFTER = 1.0, 7.0, 0.15
+SAME = 0.01  # relative difference of the misfits of two starts that met: no more are tried
 # Of a suspect misfit, how much makes one look for a mass that swings; of that, how much makes one
 # look at length; and by what a mass must divide the misfit, which it must bring below what makes
 # one look: one that is not there has a mode too, which no hit shows, so that modes would be
 # miscounted. Of generated campaigns masses that were there divided it by 3 and more, to 2.4 or
 # less; one that took the place of a link that bends left 6.8.
 SWINGS, FAR_OFF, PAYS = 1.25, 5.0, 2.0
+HELPS = 0.8  # share of the misfit: where a mass leaves less, springs are tried beside it
 
 
 def with_springs(stated: "Learned", lesson: "Lesson") -> "Learned":
@@ -41,7 +43,9 @@ def with_springs(stated: "Learned", lesson: "Lesson") -> "Learned":
             found.append(lesson.identified(structure, warm, added_softer(structure, softer)))
         except InputError:  # a search that ended where the robot would not stand
             continue
-        if found[-1].fits:
+        last = [one.identified.misfit for one in found[-2:]]
+        met = len(found) > 2 and abs(np.log(last[1] / last[0])) < SAME
+        if met or found[-1].fits:
             break
     wider = min(found, key=lambda one: one.identified.misfit)
     gain = first.values * (first.misfit - wider.identified.misfit)
@@ -59,9 +63,8 @@ def with_swinging_mass(stated: "Learned", learned: "Learned", lesson: "Lesson") 
     from planner.campaign.swinging_mass import swinging  # of the diagnosis: half a second
 
     found, enough = [learned], SWINGS * learned.suspect
-    springs = stated if stated.identified.misfit < 2 * learned.identified.misfit else learned
-    ways = [(stated, False), (learned, False)] if learned is not stated else [(stated, False)]
-    for beside, everywhere in (*ways, (springs, True)):
+    beside = stated if stated.identified.misfit < PAYS * learned.identified.misfit else learned
+    for everywhere in (False, True):
         best = min(one.identified.misfit for one in found)
         if best <= (FAR_OFF if everywhere else 1.0) * enough:
             break
@@ -72,9 +75,11 @@ def with_swinging_mass(stated: "Learned", learned: "Learned", lesson: "Lesson") 
         if not lesson.band_hz[0] < mass.frequency_hz < lesson.band_hz[1]:
             continue
         try:
-            found.append(with_springs(lesson.identified(structure, starts=starts), lesson))
+            found.append(lesson.identified(structure, starts=starts))
         except InputError:
             continue
+        if enough < found[-1].identified.misfit < HELPS * learned.identified.misfit:
+            found.append(with_springs(found[-1], lesson))
     best = min(found, key=lambda one: one.identified.misfit)
     needed = min(enough, learned.identified.misfit / PAYS)
     return best if best.identified.misfit < needed else learned

@@ -23,6 +23,7 @@ from planner.robot.config import Resonator
 # Steps by logarithms, on so many poses, in which every start at every link is followed where that
 # is asked for: fewer poses have fewer wrong minima.
 LOG_STEPS, FEW = 10, 2
+FOLLOWED = 2  # links that are followed after a glance at all
 
 
 def swinging(
@@ -52,12 +53,17 @@ def swinging(
         best = settle(problem, _best([_from_everywhere(few, e) for e in effects]), CLOSE)
     else:
         none = approached(problem.misfit(Effect(""), CLOSE), [identified.mean], steps=0)
-        best = _best([settle(problem, glance(problem, e, none), CLOSE) for e in effects])
+        rough = sorted([glance(problem, e, none) for e in effects], key=_value)
+        best = _best([settle(problem, f, CLOSE) for f in rough[:FOLLOWED]])
     return _with(structure, best), np.exp(best.x[None, : best.misfit.split[0]])
 
 
 def _best(fits: Sequence[Fit]) -> Fit:
-    return min(fits, key=lambda f: f.misfit(f.x).value)
+    return min(fits, key=_value)
+
+
+def _value(fit: Fit) -> float:
+    return fit.misfit(fit.x).value
 
 
 def _from_everywhere(problem: Problem, effect: LocalResonator) -> Fit:

@@ -20,6 +20,10 @@ SAMPLES = 200
 SEED = 11  # of samples: the same answer for the same question
 
 
+class OutOfBandError(InputError):
+    """The cut would chatter where the FRFs have no lines."""
+
+
 @dataclass(frozen=True, eq=False)
 class Structure:
     """Modes in the cut's plane, how uncertain they are, and the FRFs that they are from, if any."""
@@ -84,7 +88,7 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
 
 
 def check_band(frf: PlaneFrf, cut: Cut) -> None:
-    """InputError where chatter would be at the end of the FRFs' lines, or beyond."""
+    """OutOfBandError where chatter would be at the end of the FRFs' lines, or beyond."""
     found = curves(
         frf.frequency_hz, frf.receptance.transpose(2, 0, 1),
         mean_matrix(cut, Coefficients.of(cut)),
@@ -96,7 +100,7 @@ def check_band(frf: PlaneFrf, cut: Cut) -> None:
         where = "at their very end or beyond"
     else:
         return
-    raise InputError(
+    raise OutOfBandError(
         f"{frf.name}: the FRFs reach from {ends[0]:g} to {ends[1]:g} Hz and the cut would chatter "
         f"{where}; measure over the band of the modes that chatter."
     )

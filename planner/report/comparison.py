@@ -151,7 +151,7 @@ class ComparisonReport(Answer):
             from planner.report.rerun_learning import write
 
             shown = replace(shown, rrd=str(rrd.absolute()))
-            write(learned, figure, rrd, key, title)
+            write(learned, rrd, key, self.robot, title)
         return shown
 
     def write(self, folder: Path) -> None:

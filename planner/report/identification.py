@@ -117,7 +117,11 @@ class IdentificationReport(Answer):
         """The same once FRFs before and after are drawn, where that is wanted."""
         if not pictures.wanted or self.basis is None:
             return self
-        from planner.report.identification_plots import ShownPose, identification_figures
+        from planner.report.identification_plots import (
+            DirectFrfs,
+            ShownPose,
+            identification_figures,
+        )
 
         dataset, judged = self.basis.dataset, self.basis.judged
         poses = []
@@ -130,7 +134,14 @@ class IdentificationReport(Answer):
         mark = SIMULATED_TITLE if self.simulated else ""
         nominal = self.basis.nominal
         figures = identification_figures(poses, nominal, self.band_hz, mark)
-        return replace(self, **pictures.write(figures, nominal.robot.name))
+        name = nominal.robot.name
+
+        def recorded(rrd: Path) -> None:
+            from planner.report.rerun_identification import record
+
+            record(poses, DirectFrfs.of(poses, nominal, self.band_hz), name, mark, rrd)
+
+        return replace(self, **pictures.write(figures, name, recorded if poses else None))
 
     def write(self, robot_toml: Path) -> "IdentificationReport":
         """Write the identified robot, read it again, and say how well that one agrees.

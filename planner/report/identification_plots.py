@@ -28,6 +28,28 @@ class ShownPose:
     held_out: bool
 
 
+@dataclass(frozen=True, eq=False)
+class DirectFrfs:
+    """Magnitudes (n, 3, F) in m/s²/N of xx, yy, zz at n poses on lines (F,); NaN: not measured."""
+
+    frequency_hz: np.ndarray
+    measured: np.ndarray
+    nominal: np.ndarray
+    identified: np.ndarray
+
+    @classmethod
+    def of(
+        cls, poses: Sequence[ShownPose], nominal: Simulation, band_hz: tuple[float, float]
+    ) -> "DirectFrfs":
+        """On the lines of the first pose."""
+        lines = _inside(poses[0].frf, band_hz)
+        before = np.concatenate([nominal.accelerance(p.q, lines) for p in poses])
+        after = np.concatenate([p.identified.accelerance(p.q, lines) for p in poses])
+        measured = np.array([_resampled(p.frf, lines) for p in poses])
+        direct = [np.abs(h[:, range(3), range(3)]) for h in (measured, before, after)]
+        return cls(lines, *direct)
+
+
 def identification_figures(
     poses: Sequence[ShownPose],
     nominal: Simulation,
@@ -41,18 +63,15 @@ def identification_figures(
     """
     if not poses:
         return {}
-    lines = _inside(poses[0].frf, band_hz)
-    before = np.concatenate([nominal.accelerance(p.q, lines) for p in poses])
-    after = np.concatenate([p.identified.accelerance(p.q, lines) for p in poses])
-    measured = np.array([_resampled(p.frf, lines) for p in poses])
+    shown = DirectFrfs.of(poses, nominal, band_hz)
     number, figures = np.arange(1.0, len(poses) + 1), {}
     for i, axis in enumerate(AXES):
-        for when, simulated in (("before", before), ("after", after)):
+        for when, simulated in (("before", shown.nominal), ("after", shown.identified)):
             figures[f"map_{axis}{axis}_{when}"] = frf_map(
                 number,
-                measured[:, i, i],
-                simulated[:, i, i],
-                lines,
+                shown.measured[:, i],
+                simulated[:, i],
+                shown.frequency_hz,
                 "pose, in recorded order",
                 f"{mark}Map of H {axis}{axis}, {when} identification",
                 names=[pose.name for pose in poses],

@@ -12,10 +12,11 @@ from planner.campaign.campaign import Campaign
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.path import at_speed, best_speed_of
+from planner.milling.structure import OutOfBandError, Structure
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.plot_files import Pictures
-from planner.report.stability_source import Asked, ToolChange, at_poses
+from planner.report.stability_source import Asked, ToolChange, at_poses_in_band
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class MapReport(Answer):
 
     Depths in m, null where every depth asked for is stable; `depth_limit_m_at_95` with 95 %
     probability. `wanted_share`: of the poses that allow the wanted depth with it, if one is named.
+    `left_out`: poses where the cut would chatter outside the FRFs' lines; they are in no list else.
     """
 
     spindle_rpm: float
@@ -42,6 +44,7 @@ class MapReport(Answer):
     tightest_pose: str
     wanted_depth_m: float | None = None
     wanted_share: float | None = None
+    left_out: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     simulated: bool = False
     plots: tuple[str, ...] = ()
@@ -90,27 +93,47 @@ def map_report(
     change, campaign = ToolChange.of(asked, cut), Campaign(asked.source)
     candidates = campaign.cell.candidates
     count = min(count, campaign.cell.spread)
-    q, names = candidates.q[:count], tuple(f"W{i + 1:03d}" for i in range(count))
-    poses = list(zip(names, at_poses(campaign, names, q, cut, change), strict=True))
+    asked_of = tuple(f"W{i + 1:03d}" for i in range(count))
+    at = at_poses_in_band(campaign, asked_of, candidates.q[:count], cut, change)
+    poses = [(n, s) for n, s in zip(asked_of, at, strict=True) if isinstance(s, Structure)]
+    names = tuple(name for name, _ in poses)
+    left_out = tuple(name for name in asked_of if name not in names)
+    if not names:
+        raise next(s for s in at if isinstance(s, OutOfBandError))
+    kept = np.array([i for i, s in enumerate(at) if isinstance(s, Structure)])
+    q = candidates.q[kept]
     wanted = asked.wanted
     rpm = wanted[0] if wanted else best_speed_of(poses, cut, MOST_SPEEDS, within(tell, 0.0, 0.5))
     found, robust = at_speed(poses, cut, rpm, asked.samples, within(tell, 0.5, 1.0))
     share = None if wanted is None else float(np.mean(robust > wanted[1]))
     joints = campaign.cell.robot.joints
     answer = MapReport(
-        rpm, names, joints.shown(q), candidates.position_m[:count], found, robust,
+        rpm, names, joints.shown(q), candidates.position_m[kept], found, robust,
         names[int(np.argmin(robust))],
         wanted_depth_m=wanted[1] if wanted else None,
         wanted_share=share,
+        left_out=left_out,
+        remarks=_left_out(left_out, campaign.frequency_lines),
         simulated=any(m.simulated for m in campaign.state.recorded),
         joint_units=joints.declared,
     )  # fmt: skip
     if not pictures.wanted:
         return answer
     coordinates = _coordinates(campaign)
-    figure = _figure(answer, candidates.features[:count], coordinates, cut)
+    figure = _figure(answer, candidates.features[kept], coordinates, cut)
     written = pictures.write({"stability_map": figure}, asked.source.name)
     return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
+
+
+def _left_out(names: tuple[str, ...], lines: np.ndarray) -> tuple[str, ...]:
+    if not names:
+        return ()
+    one = len(names) == 1
+    return (
+        f"{', '.join(names)} {'is' if one else 'are'} left out: the cut would chatter there "
+        f"outside the {lines[0]:g} to {lines[-1]:g} Hz of the FRFs; widen band_hz in "
+        f"campaign.toml and measure over the band of the modes that chatter.",
+    )
 
 
 def _coordinates(campaign: Campaign) -> tuple[str, ...]:

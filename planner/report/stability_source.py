@@ -12,7 +12,7 @@ from planner.milling.cut import Cut
 from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
 from planner.milling.feed import cuts_at, no_pose, turned_to
 from planner.milling.mode_file import load_mode_file
-from planner.milling.structure import SAMPLES, Structure, of_frf, of_modes
+from planner.milling.structure import SAMPLES, OutOfBandError, Structure, of_frf, of_modes
 
 if TYPE_CHECKING:
     from planner.campaign.campaign import Campaign
@@ -178,7 +178,20 @@ def at_poses(
     """What a campaign predicts at poses q (p, dof) in rad, in the plane of the cut there.
 
     `feeds` (p, 3) in the base frame, where a program gives them; else as the cut says.
+    Raises OutOfBandError where the cut would chatter outside the lines at one of them.
     """
+    found = at_poses_in_band(campaign, names, q, cut, change, feeds)
+    for one in found:
+        if isinstance(one, OutOfBandError):
+            raise one
+    return [one for one in found if isinstance(one, Structure)]
+
+
+def at_poses_in_band(
+    campaign: "Campaign", names: Sequence[str], q: np.ndarray, cut: Cut,
+    change: ToolChange | None, feeds: np.ndarray | None = None,
+) -> list[Structure | OutOfBandError]:  # fmt: skip
+    """As `at_poses`, but for poses where the cut would chatter outside the lines: they say so."""
     lines = campaign.frequency_lines
     rotation, position = campaign.cell.robot.forward_batch(q)
     if feeds is not None and cut.feed_in == "path":
@@ -187,7 +200,7 @@ def at_poses(
         cuts = cuts_at(cut, rotation, position, names)
     simulated = any(m.simulated for m in campaign.state.recorded)
     mean, sd = campaign.frf(q, lines)
-    found = []
+    found: list[Structure | OutOfBandError] = []
     for i, name in enumerate(names):
         where = f"{campaign.directory}, pose {name}"
         remarks: tuple[str, ...] = ()
@@ -198,7 +211,10 @@ def at_poses(
 
             tip = tip_at(campaign, name, q[i], lines, mean[i], sd[i])
             frf, remarks = change.coupled(tip, where)
-        found.append(_with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks))
+        try:
+            found.append(_with(of_frf(replace(frf, simulated=simulated), cuts[i]), remarks))
+        except OutOfBandError as error:
+            found.append(error)
     return found
 
 

@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from planner.errors import InputError
 from planner.inference import triangular
-from planner.surrogate.data_covariance import data_covariance
+from planner.surrogate.data_covariance import lower_half, prior_covariance
 from planner.surrogate.importance import Gaussians, Score, Stage, normal_points, sample
 from planner.surrogate.kernels import Kernel, parse
 from planner.surrogate.likelihood import log_likelihoods
@@ -31,7 +31,7 @@ SILENT_JITTER = 1e-10  # of the prior variance; a larger one is reported
 # evidence is that of so many points.
 AT_ONCE = 64
 STAGES = 32, 64, 128
-BLOCK_ELEMENTS = 2**18  # of covariances that are worked out side by side
+BLOCK_ELEMENTS = 2**18  # of covariances that are factorised together
 MOST_FEWER = 4  # θ is the better known the more points there are: samples kept, by this at most
 NO_FIT = (
     "No Gaussian process fits the measured modes; set aside poses that are measured twice "
@@ -118,18 +118,18 @@ class Posterior:
     def _whitening(self, j: int, jitter: float) -> np.ndarray:
         """Inverse Cholesky factors (k, c, c); LinAlgError where a covariance is singular."""
         kept, rows = len(self.theta[j]), np.flatnonzero(self.mask[j])
+        held = slice(rows[-1] + 1 if len(rows) else 0)
+        found = np.zeros((kept, len(self.x), len(self.x)))
         # What does not count is decoupled: padding at the end is left as it is.
-        found = np.tile(np.eye(len(self.x)), (kept, 1, 1))
-        if not len(rows):
-            return found
-        held = slice(rows[-1] + 1)
+        np.einsum("kii->ki", found)[:, held.stop :] = 1.0
         own = self.low[j, held], self.mask[j, held], self.variance[j, held], self.prior.bias_sd[j]
-        few = max(1, BLOCK_ELEMENTS // held.stop**2)
-        for block in (slice(i, i + few) for i in range(0, kept, few)):
-            slope_sd = self.slope_sd[j, block, None, None]
-            theta = self.theta[j, block]
-            k = data_covariance(np, self.kernel, self.x[held], *own, slope_sd, jitter, theta)
-            found[block, held, held] = [triangular.inverse(f) for f in np.linalg.cholesky(k)]
+        few = max(1, BLOCK_ELEMENTS // max(held.stop, 1) ** 2)
+        for start in range(0, kept if len(rows) else 0, few):
+            block = slice(start, start + few)
+            slope_sd, theta = self.slope_sd[j, block], self.theta[j, block]
+            k = lower_half(self.kernel, self.x[held], *own, slope_sd, jitter, theta)
+            for i, factor in enumerate(np.linalg.cholesky(k), start):
+                found[i, held, held] = triangular.inverse(factor)
         return found
 
     @property
@@ -203,10 +203,8 @@ class Posterior:
     def _prior(
         self, j: int, xa: np.ndarray, la: np.ndarray, xb: np.ndarray, lb: np.ndarray
     ) -> np.ndarray:
-        prior = self.prior
-        slope = self.slope_sd[j][:, None, None]
-        linear = prior.bias_sd[j] ** 2 + slope**2 * np.outer(la, lb)
-        return self._delta.covariance(np, self.theta[j], xa, xb) + linear
+        bias = float(self.prior.bias_sd[j])
+        return prior_covariance(self.kernel, self.theta[j], self.slope_sd[j], bias, xa, la, xb, lb)
 
     @property
     def _delta(self) -> Kernel:

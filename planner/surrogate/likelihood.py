@@ -6,7 +6,7 @@ gain nothing. Which of the two it is follows from the sizes alone, so that it is
 
 import numpy as np
 
-from planner.surrogate.data_covariance import data_covariance
+from planner.surrogate.data_covariance import lower_half
 from planner.surrogate.training_data import Padded
 
 # Elements of all covariances together up to which NumPy is as fast: 4 outputs, 256 samples and 64
@@ -41,7 +41,8 @@ def _of_an_output(
     """(s,) at θ (s, p)."""
     # A sample whose covariance overflows or is singular has no likelihood.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        k = data_covariance(np, kernel, x, low, mask, variance, bias, slope, jitter, theta)
+        slopes = np.full(len(theta), slope)
+        k = lower_half(kernel, x, low, mask, variance, bias, slopes, jitter, theta)
         factor = _factors(k)
         white = np.tile(y, (len(theta), 1))
         for i in range(len(y)):  # forward substitution, all samples side by side

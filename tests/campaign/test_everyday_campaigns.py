@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from tests.support.counted_modes import counted
-from tests.support.everyday_campaigns import KINDS, POSES, ROBOTS, Played, campaigns
+from tests.support.everyday_campaigns import POSES, Played, campaigns
+from tests.support.lacking_robots import KINDS, ROBOTS
 
 FIRST = 71_001
 PERCENT, WORSE_PERCENT = 1.0, 0.1  # RMSE asked for; by how much a peer is better that is no matter
@@ -73,6 +74,8 @@ def table(played: Sequence[Played]) -> str:
     worse = [own.rmse - peer.rmse for own, peer in pairs if own.rmse > peer.rmse]
     most = max(worse, default=0.0)
     lines.append(f"worse than the peer: {len(worse)} of {len(pairs)}, at most by {most:.2f} %")
+    asked = sum(one.asked for one in played)
+    lines.append(f"hits taken for those of another pose: {asked} of {POSES * len(played)}")
     return "\n".join(lines)
 
 

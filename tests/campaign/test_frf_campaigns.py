@@ -1,6 +1,14 @@
-"""Fifty campaigns on true robots hit as people hit: FRFs get better with every measured pose."""
+"""Fifty campaigns on true robots hit as people hit: FRFs get better with every measured pose.
 
+`pytest -m slow -s` prints the figures. PROOF=FOLDER keeps each campaign's scores and goes on where
+it was stopped; SEED and CAMPAIGNS say of which campaigns and how many.
+"""
+
+import json
+import os
+from dataclasses import asdict
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,20 +16,31 @@ import pytest
 from planner.truth.arms import ARMS
 from tests.support.frf_campaigns import LACKING, FrfScore, make
 
-CAMPAIGNS, POSES, FIRST_SEED = 50, 5, 300
+CAMPAIGNS, POSES = int(os.environ.get("CAMPAIGNS", "50")), 5
+FIRST_SEED = int(os.environ.get("SEED", "300"))
 CASES = list(product(LACKING, ARMS))
+
+
+def scores_of(number: int, folder: Path) -> list[FrfScore]:
+    """Of one campaign after each pose; kept in the folder."""
+    kept = folder / f"{FIRST_SEED}_{number}.json"
+    if not kept.exists():
+        lacking, robot = CASES[number % len(CASES)]
+        case = make(robot, lacking, FIRST_SEED + number, folder / str(number), poses=POSES)
+        found = [asdict(FrfScore.of(case, model)) for model in case.models()]
+        kept.write_text(json.dumps(found))
+    return [FrfScore(**score) for score in json.loads(kept.read_text())]
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
-def test_frfs_get_better_with_every_measured_pose(tmp_path):
-    scores = []
+def test_frfs_get_better_with_every_measured_pose(tmp_path: Path):
+    scores, folder = [], Path(os.environ.get("PROOF", tmp_path))
+    folder.mkdir(parents=True, exist_ok=True)
     for number in range(CAMPAIGNS):
-        lacking, robot = CASES[number % len(CASES)]
-        folder = tmp_path / str(number)
-        case = make(robot, lacking, FIRST_SEED + number, folder, poses=POSES)
-        scores.append([FrfScore.of(case, model) for model in case.models()])
-        print(robot, lacking, [f"{s.frac:.4f} {s.covered:.2f}" for s in scores[-1]], flush=True)
+        scores.append(scores_of(number, folder))
+        said = [f"{s.frac:.4f} {s.alone:.4f} {s.covered:.2f}" for s in scores[-1]]
+        print(*CASES[number % len(CASES)], said, flush=True)
     frac = np.array([[s.frac for s in run] for run in scores])
     alone = np.array([[s.alone for s in run] for run in scores])
     covered = np.array([[s.covered for s in run] for run in scores])

@@ -126,7 +126,7 @@ def test_frfs_of_a_soft_base_get_better_with_the_second_pose(base):
     print(first, second)
     assert second.frac > 0.995
     assert second.frac > first.frac - 0.002
-    assert second.frac > second.alone - 1e-5  # both agree in four digits or more
+    assert second.frac > second.alone - 1e-4  # both are 0.9999…
     assert second.covered > 0.9
     assert min(second.covered_low, second.covered_high) > 0.85
 

@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import MeasuredMode
+from planner.campaign.events import (
+    Entry,
+    Imported,
+    MeasuredMode,
+    Skipped,
+    Starred,
+    Undone,
+    Withdrawn,
+)
 from planner.campaign.revisits import hit_again, suspected
-from planner.campaign.state import CampaignState, Measurement
+from planner.campaign.state import CampaignState, Measurement, fold
 from planner.recording.joints import JointUnits
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
@@ -71,6 +79,20 @@ def test_modes_to_one_side_ask_for_the_first_pose_again(hertz, hinted):
     if found is not None:
         assert found.again == "P001"
         assert "Hit P001, the first pose, again (0.000, 0.000°)" in found.text
+
+
+def hits(pose: str, again: str = "") -> Imported:
+    return Imported(pose, (0.0, 0.0), (), modes(10.0, 20.0), again=again)
+
+
+@pytest.mark.parametrize(
+    ("act", "left"),
+    [(hits("P001"), None), (hits("P004"), ("P001", "P003")), (Skipped("P001"), None),
+     (Withdrawn("P003"), None), (Undone(3), None), (Starred("P001"), ("P001", "P003"))],
+)  # fmt: skip
+def test_drift_is_suspected_until_it_was_looked_at_or_its_hint_is_gone(act, left):
+    acts = [hits("P001"), hits("P002"), hits("P003", again="P001"), act]
+    assert fold([Entry(n, "", one) for n, one in enumerate(acts, 1)]).doubt == left
 
 
 def test_a_robot_that_softened_is_told_by_the_command(tmp_path):

@@ -1,9 +1,12 @@
-"""From hits with one tool to the lobes of another, at poses never measured, on a concealed KR210.
+"""From hits with one tool to the lobes of another, at poses never measured, on concealed KR210s.
+
+Hands and measuring chains err as much as robot.toml's defaults say. What they leave open is the
+same at every pose of a robot, so limits are covered or not robot by robot: there are ten.
 
 Hits with the reference rod → modes → fusion → coupling to a longer, heavier tool → lobes, beside
 the same coupling of the truth's own six by six receptances (MuJoCo); limits by the zeroth order,
-which takes both FRFs as they are. `pytest -m slow -s` prints the figures; SEED and POSES say of
-which robot and at how many poses.
+which takes both FRFs as they are. `pytest -m slow -s` prints the figures; SEED and ROBOTS say of
+which robots and how many.
 """
 
 import os
@@ -13,19 +16,22 @@ import numpy as np
 import pytest
 
 from planner.campaign.campaign import Campaign
+from planner.identification.measurement_model import Tolerances
 from planner.milling.coupling import TipReceptance, couple
 from planner.milling.tool_file import load_tool
 from planner.report.coupling_source import tip_at
 from planner.truth.arms import KR210
 from planner.truth.deviation import Deviation, Spring
-from planner.truth.hits import Hammer, record_poses
+from planner.truth.handling import Handling
+from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
+from planner.truth.secret import HitVisit, Secret, hit_poses
 from tests.support.milling_cases import cut
-from tests.support.true_limits import limit_pair
+from tests.support.true_limits import LimitPair, limit_pair
 
-SEED, POSES = int(os.environ.get("SEED", "401")), int(os.environ.get("POSES", "50"))
-MEASURED, SAMPLES, NEAR = 5, 48, 0.10
+SEED, ROBOTS = int(os.environ.get("SEED", "401")), int(os.environ.get("ROBOTS", "10"))
+POSES, MEASURED, REPEATS, SAMPLES, NEAR = 5, 5, 2, 48, 0.10  # of each robot
 BAND_HZ = (4.0, 60.0)
 HAMMER = Hammer(peak_n=800, duration_s=0.004, sampling_rate_hz=640, record_s=2.4)
 TRUE_LINES = np.arange(2.0, 100.01, 0.1)  # of the truth, beyond the band that is measured
@@ -53,14 +59,45 @@ REFERENCE = MATERIAL + SEGMENT.format(0.05, 0.02) + CONTACT
 TARGET = MATERIAL + SEGMENT.format(0.10, 0.063) + CONTACT + SEGMENT.format(0.08, 0.025)
 
 
-def concealed(folder: Path) -> tuple[Path, Truth]:
+STATED = Tolerances()
+AS_STATED = Handling(
+    angle_deg=float(np.rad2deg(STATED.angle_rad)),
+    offset_m=STATED.offset_m,
+    readback_deg=float(np.rad2deg(STATED.joint_rad)),
+    gain=STATED.gain,
+    cross_axis=STATED.cross_axis,
+    mounting_deg=float(np.rad2deg(STATED.mounting_rad)),
+    position_m=STATED.position_m,
+    force_gain=STATED.force_gain,
+    delay_s=STATED.delay_s,
+)
+
+
+def concealed(folder: Path, seed: int) -> tuple[Path, Deviation]:
     """robot.toml with two springs a joint; the truth is off in all numbers, on a soft floor."""
     robot = KR210.write(folder / "robot", 2)
     stiffness = 25 * max(KR210.torsion)
     floor = tuple(
         Spring("base", axis, stiffness, 3e-4 * stiffness) for axis in ((1.0, 0, 0), (0, 1.0, 0))
     )
-    return robot, load_truth(robot, Deviation(SEED, 0.2, 0.2, 0.05, 0.005, extra=floor))
+    return robot, Deviation(seed, 0.2, 0.2, 0.05, 0.005, extra=floor)
+
+
+def hit(truth: Truth, deviation: Deviation, q: np.ndarray, folder: Path, seed: int) -> None:
+    """Recordings of REPEATS hits an axis at poses P0, P1, … (n, 6)."""
+    rng, axes = np.random.default_rng(seed), [axis for axis in range(3) for _ in range(REPEATS)]
+    secret = Secret(deviation, chain=AS_STATED.chain(rng))
+    shots = [(f"+{'xyz'[axis]}", HAMMER.peak_n) for axis in axes]
+    visits = []
+    for one in q:
+        there = one + np.deg2rad(AS_STATED.readback_deg) * rng.standard_normal(len(one))
+        visits.append(HitVisit(there, shots, aims=AS_STATED.aims(axes, rng)))
+    found = hit_poses(truth, secret, visits, HAMMER, rng)
+    rows = [
+        (f"P{i}", np.rad2deg(q[i]), 1 + number % REPEATS, one)
+        for i, hits in enumerate(found) for number, one in enumerate(hits)
+    ]  # fmt: skip
+    write_recordings(folder, truth.joint_names, rows, HAMMER, truth.description)
 
 
 def six_by_six(truth: Truth, q: np.ndarray, lines: np.ndarray) -> np.ndarray:
@@ -72,22 +109,21 @@ def six_by_six(truth: Truth, q: np.ndarray, lines: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(found), 0, -1)
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(3600)
-def test_limits_of_another_tool_at_poses_never_measured(tmp_path: Path):
-    robot, truth = concealed(tmp_path)
+def pairs_of(folder: Path, seed: int) -> tuple[list[LimitPair], list[float]]:
+    """Limits at POSES poses of a robot, and by how much the tools' FRFs differ at each."""
+    robot, deviation = concealed(folder, seed)
+    truth = load_truth(robot, deviation)
     text = KR210.campaign(str(robot)).replace(str(list(KR210.band_hz)), str(list(BAND_HZ)))
-    (tmp_path / "campaign.toml").write_text(text)
+    (folder / "campaign.toml").write_text(text)
     tools = []
     for name, said in (("reference", REFERENCE), ("target", TARGET)):
-        (tmp_path / f"{name}.toml").write_text(said)
-        tools.append(load_tool(tmp_path / f"{name}.toml"))
+        (folder / f"{name}.toml").write_text(said)
+        tools.append(load_tool(folder / f"{name}.toml"))
     reference, target = tools
-    campaign = Campaign.new(tmp_path / "cell", robot, tmp_path / "campaign.toml")
+    campaign = Campaign.new(folder / "cell", robot, folder / "campaign.toml")
     offered = campaign.cell.candidates.q[: MEASURED + POSES]
-    named = [(f"P{i}", q) for i, q in enumerate(offered[:MEASURED])]
-    record_poses(truth, named, tmp_path / "hits", repeats=2, hammer=HAMMER, seed=SEED)
-    campaign.import_paths((tmp_path / "hits",))
+    hit(truth, deviation, offered[:MEASURED], folder / "hits", seed)
+    campaign.import_paths((folder / "hits",))
     q, lines = offered[MEASURED:], campaign.frequency_lines
     mean, sd = campaign.frf(q)
     given = cut(
@@ -102,20 +138,34 @@ def test_limits_of_another_tool_at_poses_never_measured(tmp_path: Path):
         exact = TipReceptance.known(TRUE_LINES, six_by_six(truth, one, TRUE_LINES))
         true = couple(exact, target, reference).accelerance[:3, :3]
         own = exact.receptance[:, :3, :3].transpose(1, 2, 0) * (2j * np.pi * TRUE_LINES) ** 2
-        untouched.append(np.linalg.norm(own - true) / np.linalg.norm(true))
+        untouched.append(float(np.linalg.norm(own - true) / np.linalg.norm(true)))
         pair = limit_pair(
             given, lines, told.accelerance[:3, :3], told.accelerance_sd[:3, :3], true, SAMPLES,
             TRUE_LINES,
         )  # fmt: skip
         pairs.append(pair)
-        print(i, (100 * pair.off).round(1), pair.inside.astype(int), flush=True)
+        width = 50 * (pair.band[1] - pair.band[0]) / pair.predicted
+        error = (100 * (pair.predicted / pair.true - 1)).round(1)
+        print(seed, i, error, "±", width.round(1), pair.inside.astype(int), flush=True)
+    return pairs, untouched
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_limits_of_another_tool_at_poses_never_measured(tmp_path: Path):
+    pairs, untouched = [], []
+    for number in range(ROBOTS):
+        (tmp_path / str(number)).mkdir()
+        found = pairs_of(tmp_path / str(number), 100 * SEED + number)
+        pairs += found[0]
+        untouched += found[1]
     off, inside = np.array([p.off for p in pairs]), np.array([p.inside for p in pairs])
     print(
-        f"seed {SEED}, {len(off)} poses × 6 speeds: within 10 % {100 * np.mean(off < NEAR):.1f} %, "
-        f"median off {100 * np.median(off):.2f} %, all speeds within 10 % at "
-        f"{100 * np.mean(np.all(off < NEAR, axis=1)):.0f} % of the poses; the true limit inside "
-        f"the 90 % band {100 * np.mean(inside):.1f} %; the tools differ by "
+        f"seed {SEED}, {ROBOTS} robots × {POSES} poses × 6 speeds: within 10 % "
+        f"{100 * np.mean(off < NEAR):.1f} %, median off {100 * np.median(off):.2f} %, all speeds "
+        f"within 10 % at {100 * np.mean(np.all(off < NEAR, axis=1)):.0f} % of the poses; the true "
+        f"limit inside the 90 % band {100 * np.mean(inside):.1f} %; the tools differ by "
         f"{100 * np.median(untouched):.0f} % of the FRFs"
     )
-    assert np.mean(off < NEAR) >= 0.9
-    assert np.mean(inside) >= 0.85
+    assert np.mean(np.all(off < NEAR, axis=1)) >= 0.9
+    assert 0.85 <= np.mean(inside) <= 0.95

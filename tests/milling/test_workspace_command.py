@@ -39,10 +39,13 @@ diameter_m = 0.02
 
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
+    return made(tmp_path_factory.mktemp("cell"), "[5.0, 80.0]")
+
+
+def made(root, band):
     """A campaign in which nothing is measured yet: its simulation predicts."""
-    root = tmp_path_factory.mktemp("cell")
     robot = KR10.write(root / "robot", 2)
-    campaign = KR10.campaign(str(robot)).replace("[5.0, 150.0]", "[5.0, 80.0]")
+    campaign = KR10.campaign(str(robot)).replace("[5.0, 150.0]", band)
     (root / "campaign.toml").write_text(campaign + "candidates = 20\n")
     for name, text in (("cut.toml", CUT), ("part.nc", PROGRAM), ("tool.toml", TOOL)):
         (root / name).write_text(text)
@@ -73,6 +76,18 @@ def test_map_of_the_workspace(cell, tmp_path, capsys):
     assert said["wanted_share"] == np.mean(robust > 2e-4)
     assert np.array(said["position_m"]).shape == (4, 3)
     assert (tmp_path / "stability_map.png").stat().st_size > 10_000
+
+
+def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path, capsys):
+    said = asked(made(tmp_path, "[5.0, 16.0]"), capsys, "--map", "--poses", 4)
+    assert said["left_out"] == ["W002"]
+    assert said["poses"] == ["W001", "W003", "W004"]
+    assert np.array(said["position_m"]).shape == (3, 3)
+    (why,) = said["remarks"]
+    assert why.startswith("W002 is left out: the cut would chatter there outside the 5 to 16 Hz")
+    assert "chatter" in asked(
+        made(tmp_path / "narrow", "[5.0, 6.0]"), capsys, "--map", "--poses", 2, code=2
+    )
 
 
 def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):

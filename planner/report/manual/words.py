@@ -112,7 +112,8 @@ TRUST = (
     "A simulation that lacks physics is noticed, and the model then trusts it less; planner "
     "diagnose says what is missing.",
     "Where all modes of a pose lie to one side of what was expected the robot may have drifted: "
-    "import and session name the pose to hit again, and say then whether it is as it was.",
+    "import and session name the pose to hit again, which is proposed next, and say then whether "
+    "it is as it was.",
     "Brakes on, one temperature, one payload: what was tested is what is known. A tool of another "
     "mass is another campaign.",
 )
