@@ -14,44 +14,44 @@ EARTH_M_S2 = 9.81
 
 
 def check_joints(robot: Robot) -> list[CheckRemark]:
-    """What looks wrong in limits and speeds."""
+    """What looks wrong in limits (rad, m of those that slide) and speeds (rad/s, m/s)."""
     found = []
     rows = zip(
         robot.joint_names, robot.lower_rad, robot.upper_rad, robot.velocity_rad_s, strict=True
     )
     for name, low, high, speed in rows:
         where = f"{robot.urdf_path.name}, joint {name}"
-        if robot.slides(name):
-            found += _slide(low, high, speed, where)
-            continue
-        if max(abs(low), abs(high)) > WIDEST_RAD:
-            turns = (high - low) / 2 / np.pi
-            text = f"Its limits are {low:.4g} and {high:.4g} rad, {turns:.0f} turns apart."
-            remedy = "A URDF's limits are in rad: 360 degrees are 6.283."
-            found.append(CheckRemark("warning", text, where, remedy))
+        wrong = (_shifts if robot.slides(name) else _turns)(float(low), float(high), float(speed))
+        found += [CheckRemark("warning", text, where, remedy) for text, remedy in wrong]
         if not 0 < speed < np.inf:
             text = "It has no speed limit: what it takes to get to a pose cannot be told."
-            found.append(CheckRemark("note", text, where, "Add velocity in rad/s to <limit>."))
-        elif speed > FASTEST_RAD_S:
-            text = f"Its speed limit is {speed:.4g} rad/s, {speed / 2 / np.pi:.0f} turns a second."
-            remedy = "A URDF's speeds are in rad/s, not in degrees a second."
-            found.append(CheckRemark("warning", text, where, remedy))
+            unit = "m/s" if robot.slides(name) else "rad/s"
+            found.append(CheckRemark("note", text, where, f"Add velocity in {unit} to <limit>."))
     return found
 
 
-def _slide(low: float, high: float, speed: float, where: str) -> list[CheckRemark]:
-    """What looks wrong in limits (m) and speed (m/s) of a joint that slides."""
+def _turns(low: float, high: float, speed: float) -> list[tuple[str, str]]:
+    """What looks wrong, and its remedy, in limits (rad) and speed (rad/s)."""
+    found = []
+    if max(abs(low), abs(high)) > WIDEST_RAD:
+        turns = (high - low) / 2 / np.pi
+        text = f"Its limits are {low:.4g} and {high:.4g} rad, {turns:.0f} turns apart."
+        found.append((text, "A URDF's limits are in rad: 360 degrees are 6.283."))
+    if FASTEST_RAD_S < speed < np.inf:
+        text = f"Its speed limit is {speed:.4g} rad/s, {speed / 2 / np.pi:.0f} turns a second."
+        found.append((text, "A URDF's speeds are in rad/s, not in degrees a second."))
+    return found
+
+
+def _shifts(low: float, high: float, speed: float) -> list[tuple[str, str]]:
+    """The same of a joint that slides: limits (m) and speed (m/s)."""
     found = []
     if max(abs(low), abs(high)) > LONGEST_M:
         text = f"It slides from {low:.4g} to {high:.4g} m, as if its limits were in millimetres."
-        found.append(CheckRemark("warning", text, where, "Limits of a prismatic joint are in m."))
-    if not 0 < speed < np.inf:
-        text = "It has no speed limit: what it takes to get to a pose cannot be told."
-        found.append(CheckRemark("note", text, where, "Add velocity in m/s to <limit>."))
-    elif speed > FASTEST_M_S:
-        text = f"Its speed limit is {speed:.4g} m/s."
+        found.append((text, "Limits of a prismatic joint are in m."))
+    if FASTEST_M_S < speed < np.inf:
         remedy = "Speeds of prismatic joints are in m/s, not in millimetres a second."
-        found.append(CheckRemark("warning", text, where, remedy))
+        found.append((f"Its speed limit is {speed:.4g} m/s.", remedy))
     return found
 
 

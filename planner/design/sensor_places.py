@@ -1,4 +1,7 @@
-"""Where another sensor, or hits at another point too, tell most of the simulation per minute."""
+"""Where another sensor, or hits at another point too, tell most of the simulation per minute.
+
+I-optimal in the linearised model (Chaloner & Verdinelli 1995), as `parameter_information` is.
+"""
 
 from dataclasses import dataclass
 
@@ -88,9 +91,11 @@ def better_places(
         return max(now - gain, TINY * now), minutes + (cost.per_sensor if added else 0.0)
 
     plain = "", ""
-    if 100 * np.sqrt(left(*plain)[0]) <= target_percent:
+    each = {plain: left(*plain)}
+    if 100 * np.sqrt(each[plain][0]) <= target_percent:
         return None
-    each = {(point, added): left(point, added) for point in points for added in free}
+    others = [(point, added) for point in points for added in free if point or added]
+    each |= {place: left(*place) for place in others}
     rate = {key: np.log(now / rest) / minutes for key, (rest, minutes) in each.items()}
     best = max(rate, key=rate.__getitem__)
     if best == plain:

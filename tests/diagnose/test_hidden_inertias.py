@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from planner.diagnosis.effects.effect import Effect
@@ -10,23 +9,12 @@ from planner.diagnosis.hidden_inertias import hidden_inertias
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import COARSE, Problem
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
-from planner.dynamics.simulation import Simulation
-from planner.frf.frf import Frf
-from planner.robot.robot import Robot
-from tests.support.known_robots import KR10
-
-LINES = np.linspace(6.0, 60.0, 20)
+from tests.support.exact_problem import exact_problem
 
 
 @pytest.fixture(scope="module")
 def fitted(tmp_path_factory) -> tuple[Problem, Fit]:
-    simulation = Simulation(Robot.load(KR10.write(tmp_path_factory.mktemp("robot"))))
-    q, nothing = KR10.poses(2, 5), np.full((3, 3, len(LINES)), np.nan)
-    frfs = tuple(
-        Frf(LINES, h, 1e-4 * np.abs(h) ** 2, nothing, (3, 3, 3), (6.0, 60.0))
-        for h in simulation.accelerance(q, LINES)
-    )
-    problem = Problem(frfs, q, simulation, (6.0, 60.0))
+    problem = exact_problem(tmp_path_factory.mktemp("robot"))
     misfit = problem.misfit(Effect(""), COARSE)
     return problem, Fit(Effect(""), misfit, misfit.mean, misfit.by_pose(misfit.mean))
 

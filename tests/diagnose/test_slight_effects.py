@@ -8,15 +8,11 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.linear.problem import COARSE, Problem
+from planner.diagnosis.linear.problem import COARSE
 from planner.diagnosis.linear.slightness import without_slight
 from planner.diagnosis.linear.stated_values import away, pulled
-from planner.dynamics.simulation import Simulation
-from planner.frf.frf import Frf
-from planner.robot.robot import Robot
-from tests.support.known_robots import KR10
+from tests.support.exact_problem import exact_problem
 
-LINES = np.linspace(6.0, 60.0, 20)
 STIFF, HEAVY = 12.0, 40.0  # ln of how much stiffer than likely; kg
 Moved = dict[str, float]
 
@@ -24,14 +20,8 @@ Moved = dict[str, float]
 @pytest.fixture(scope="module")
 def at(tmp_path_factory) -> Callable[[str, str, Moved], Fit]:
     """A fit with one effect, some of its entries moved by so much from their priors' means."""
-    simulation = Simulation(Robot.load(KR10.write(tmp_path_factory.mktemp("robot"))))
-    q, nothing = KR10.poses(2, 5), np.full((3, 3, len(LINES)), np.nan)
-    frfs = tuple(
-        Frf(LINES, h, 1e-4 * np.abs(h) ** 2, nothing, (3, 3, 3), (6.0, 60.0))
-        for h in simulation.accelerance(q, LINES)
-    )
-    problem = Problem(frfs, q, simulation, (6.0, 60.0))
-    every = {(e.name, e.at): e for e in library(simulation)} | {("none", ""): Effect("")}
+    problem = exact_problem(tmp_path_factory.mktemp("robot"))
+    every = {(e.name, e.at): e for e in library(problem.simulation)} | {("none", ""): Effect("")}
 
     def made(name: str, place: str, moved: Moved) -> Fit:
         effect = every[name, place]

@@ -16,7 +16,8 @@ from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
 
 ROUGH_STEPS, PROMISE_STEPS, LAST_STEPS = 8, 2, 12
-AFRESH_STEPS = 24  # of one effect from its prior's median: valleys of inertias are long
+# Of one effect from its prior's median: valleys of inertias are long. Chosen on one generated cell.
+AFRESH_STEPS = 24
 LOOSE = 1e-3  # of the value, that a step must gain while all candidates are looked at
 SETTLED = 1e-6, 60  # the same, and most steps, of those that are still in question
 # The way home from afar: all bands, and every step that logarithms need.
