@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.dynamics.gradient import Turned
+from planner.dynamics.motion import Turned
 from planner.identification.measurement_model import (
     OF_HIT,
     OpenNumbers,

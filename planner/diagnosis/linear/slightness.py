@@ -16,6 +16,8 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import multiples
 from planner.diagnosis.linear.evidence import stated_springs
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
+from planner.diagnosis.linear.mismatch import residuals
+from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.thresholds import DISCREPANCY_USUAL, LEFT_FACTOR
 
@@ -77,9 +79,13 @@ def usual(fit: Fit) -> float:
     misfit = fit.misfit
     size = DISCREPANCY_USUAL * multiples(misfit, stated_springs(fit))
     moved = misfit.parts(fit.x)[1][:, : len(size)] * size[:, None, None, None]
-    used = misfit.weight > 0
-    measured = np.sum(np.abs(misfit.measured.accelerance[used]) ** 2)
-    return float(np.sqrt(np.sum(np.sum(np.abs(moved) ** 2, axis=1)[used]) / measured))
+    if misfit.tolerances is not None:
+        around = misfit.around_misses(fit.x)
+        assert around.slope is not None
+        moved = around.net(around.slope[:, : len(size)] * size[:, None, None, None])
+        moved = moved * _noise(misfit)[:, None]
+    squares = np.sum(np.abs(moved) ** 2, axis=1)
+    return _relative(squares, misfit)
 
 
 def removal(without: Fit, whole: Fit, part: Effect) -> float:
@@ -90,7 +96,7 @@ def removal(without: Fit, whole: Fit, part: Effect) -> float:
         x[misfit.names.index(name)] = stated[name]
     for name in part.vanishing:
         x[misfit.names.index(f"{name} of {part.name} at {part.at}")] = 0.0
-    return _apart(misfit.parts(x)[0], whole)
+    return _apart(residuals(misfit, x)[1], whole)
 
 
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -124,12 +130,28 @@ def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:
 
 
 def change(without: Fit, whole: Fit) -> float:
-    """Root mean square by which two fits' FRFs differ, relative to those that were measured."""
-    return _apart(without.misfit.parts(without.x)[0], whole)
+    """Root mean square by which two fits' FRFs differ, relative to those that were measured.
+
+    Of what they say of the recordings, each with the misses that it takes to be likeliest: by what
+    a tilted hit or a gain can be, no effect is seen.
+    """
+    return _apart(residuals(without.misfit, without.x)[1], whole)
 
 
-def _apart(frfs: np.ndarray, whole: Fit) -> float:
-    used = whole.misfit.weight > 0
-    difference = (whole.misfit.parts(whole.x)[0] - frfs)[used]
-    measured = whole.misfit.measured.accelerance[used]
-    return float(np.sqrt(np.sum(np.abs(difference) ** 2) / np.sum(np.abs(measured) ** 2)))
+def _apart(left: np.ndarray, whole: Fit) -> float:
+    misfit = whole.misfit
+    difference = residuals(misfit, whole.x)[1] - left
+    return _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
+
+
+def _noise(misfit: Misfit) -> np.ndarray:
+    """(n, r, c, F) in m/s²/N, √2 of which is usual; 0 where nothing was measured."""
+    weight = misfit.weight
+    return np.divide(1.0, weight, where=weight > 0, out=np.zeros_like(weight))
+
+
+def _relative(squares: np.ndarray, misfit: Misfit) -> float:
+    """Root of the sum of squares (n, r, c, F) over that of what was measured."""
+    used = misfit.weight > 0
+    measured = np.sum(np.abs(misfit.measured.accelerance[used]) ** 2)
+    return float(np.sqrt(np.sum(squares[used]) / measured))
