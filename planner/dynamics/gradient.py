@@ -150,7 +150,8 @@ def motion_slopes(
     added: Sequence[Impedance] = (),
 ) -> np.ndarray:
     """Derivatives (n, P, 3s, 3h, F) of a motion's accelerance: see `response_parts`."""
-    x_hit, x_sensor, s = motion.x_hit, motion.x_sensor, motion.s
+    # All derivatives are products with the sensors' motions, by which the chain shows them.
+    x_hit, x_sensor, s = motion.x_hit, motion.scaled(motion.x_sensor), motion.s
     e, lossy = x_hit.shape[1], bool(elasticity.loss_factor.any())
     springs = (3 if lossy else 2) * e
     extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
@@ -176,7 +177,7 @@ def motion_slopes(
         part = out[:, place : place + len(one.slope)]
         one.gradient(x_hit * minus[:, 0], x_sensor, part)
         place += len(one.slope)
-    return motion.scaled(out)
+    return out
 
 
 def _solutions(

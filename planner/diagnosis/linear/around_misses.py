@@ -55,7 +55,10 @@ class AroundMisses:
         eta: np.ndarray | None = None,
         loose: np.ndarray | None = None,
     ) -> "AroundMisses":
-        """Of accelerances h (n, r, c, F) at s (n, F) that are `off` what was measured."""
+        """Of accelerances h (n, r, c, F) at s (n, F) that are `off` what was measured.
+
+        `slope` is written over.
+        """
         open_ = blocks(h, turned, s, tolerances)
         for one in open_:
             one.basis[:] *= weight[:, None, one.rows, one.columns]
@@ -68,7 +71,7 @@ class AroundMisses:
                 part = residual[:, one.rows, one.columns]
                 part -= np.einsum("nl,nlijf->nijf", eta[:, one.numbers], one.basis)
         if slope is not None:
-            slope = slope * weight[:, None]
+            slope *= weight[:, None]
         loose = np.zeros(0) if loose is None or slope is None else loose
         return cls(residual, slope, open_, weight, eta, loose)
 

@@ -19,7 +19,12 @@ from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
 from planner.diagnosis.linear.mismatch import residuals
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Problem
-from planner.diagnosis.thresholds import DISCREPANCY_USUAL, LEFT_FACTOR
+from planner.diagnosis.thresholds import (
+    CLEARLY_MATTERS,
+    DISCREPANCY_USUAL,
+    GOOD_PART,
+    LEFT_FACTOR,
+)
 
 FOLLOWED = 1e-3  # shares below it are left where they are
 
@@ -30,18 +35,26 @@ def without_slight(
     shares: np.ndarray,
     prior: Sequence[float],
     bent: np.ndarray,
+    left: np.ndarray,
     matters: float,
 ) -> np.ndarray:
     """Shares (k,) of fits on the same lines, those of effects that do not matter given on.
 
     The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
-    weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`. A fit
-    gives as much as FRFs say that one of its effects changes less than `matters` of them, and than
-    what every robot has, once the rest is refitted; the fit without it takes it. FRFs that are
-    nearly the same leave it to what was known before which of both it is: the farther the rest had
-    to go, the likelier is an effect that pulls at it.
+    weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`; `left`
+    (k,) is what each leaves of the recordings, relative, see `Mismatch`. A fit gives as much as
+    FRFs say that one of its effects changes less than `matters` of them, and than what every robot
+    has, once the rest is refitted; the fit without it takes it. An effect that takes a good part of
+    all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
+    known before which of both it is: the farther the rest had to go, the likelier is an effect that
+    pulls at it.
     """
+    enough = matters * CLEARLY_MATTERS
     matters = float(np.hypot(matters, usual(fits[0])))
+
+    def taken(i: int, j: int) -> float:
+        return max(left[j] ** 2 - left[i] ** 2, 0.0) / max(left[0] ** 2, 1e-300)
+
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
     shares = np.array(shares, dtype=float)
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
@@ -54,7 +67,7 @@ def without_slight(
         if not fewer:
             continue
         given = [
-            _slight(fits[j], fits[i], _only(told[i], called[j]), matters)
+            _slight(fits[j], fits[i], _only(told[i], called[j]), matters, enough, taken(i, j))
             * expit(np.log(prior[j] / prior[i]) + bent[i] - bent[j])
             for j in fewer
         ]
@@ -68,10 +81,21 @@ def _only(told: Sequence[Effect], others: frozenset) -> Effect:
     return next(e for e in told if e.at and (e.name, e.at) not in others)
 
 
-def _slight(without: Fit, whole: Fit, part: Effect, matters: float) -> float:
-    """Probability that an effect of `whole` does not matter."""
+def _slight(
+    without: Fit, whole: Fit, part: Effect, matters: float, enough: float, taken: float
+) -> float:
+    """Probability that an effect of `whole` does not matter.
+
+    It has `taken` so large a share of the squares of all that refitting leaves.
+    """
     size = removal(without, whole, part) if part.absorbed else change(without, whole)
-    return float(norm.cdf(np.log(matters / max(size, 1e-12)) / np.log(LEFT_FACTOR)))
+    good = _above(taken, GOOD_PART) * _above(size, enough)
+    return (1 - _above(size, matters)) * (1 - good)
+
+
+def _above(size: float, limit: float) -> float:
+    """Probability that a size counts as above a limit: neither is known better than by a factor."""
+    return float(norm.cdf(np.log(max(size, 1e-12) / limit) / np.log(LEFT_FACTOR)))
 
 
 def usual(fit: Fit) -> float:
