@@ -76,7 +76,7 @@ CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose
 LEFT_SHARE = 0.15
 # Of the squares of what refitting leaves: an effect that takes so much of it is no part of what
 # every robot has a little of, and is named from this share of what matters on. Chosen.
-GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.1
+GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.25
 LEFT_FACTOR = 1.5
 SOMETHING_UNKNOWN = 0.05  # probability, before any data, that something of no library is there
 # Where it is, each stated stiffness and inertia is with this probability pulled away by so many of

@@ -24,6 +24,7 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_USUAL,
     GOOD_PART,
     LEFT_FACTOR,
+    SOMETHING_UNKNOWN,
 )
 
 FOLLOWED = 1e-3  # shares below it are left where they are
@@ -49,6 +50,7 @@ def without_slight(
     known before which of both it is: the farther the rest had to go, the likelier is an effect that
     pulls at it.
     """
+    pull = np.logaddexp(np.log1p(-SOMETHING_UNKNOWN), np.log(SOMETHING_UNKNOWN) + bent)
     enough = matters * CLEARLY_MATTERS
     matters = float(np.hypot(matters, usual(fits[0])))
 
@@ -67,8 +69,10 @@ def without_slight(
         if not fewer:
             continue
         given = [
-            _slight(fits[j], fits[i], _only(told[i], called[j]), matters, enough, taken(i, j))
-            * expit(np.log(prior[j] / prior[i]) + bent[i] - bent[j])
+            _slight(
+                _size(fits[j], fits[i], _only(told[i], called[j])), matters, enough, taken(i, j)
+            )
+            * expit(np.log(prior[j] / prior[i]) + pull[i] - pull[j])
             for j in fewer
         ]
         most = int(np.argmax(given))
@@ -81,14 +85,22 @@ def _only(told: Sequence[Effect], others: frozenset) -> Effect:
     return next(e for e in told if e.at and (e.name, e.at) not in others)
 
 
-def _slight(
-    without: Fit, whole: Fit, part: Effect, matters: float, enough: float, taken: float
-) -> float:
-    """Probability that an effect of `whole` does not matter.
+def _size(without: Fit, whole: Fit, part: Effect) -> float:
+    """`change`; of what is a stated spring's own value, by that."""
+    if not (part.absorbed and part.springs(whole.misfit.setting.simulation)):
+        return change(without, whole)
+    misfit, x = whole.misfit, whole.x.copy()
+    stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
+    for name in part.springs(misfit.setting.simulation):
+        x[misfit.names.index(name)] = stated[name]
+    return _apart(residuals(misfit, x)[1], whole)
+
+
+def _slight(size: float, matters: float, enough: float, taken: float) -> float:
+    """Probability that an effect does not matter that changes FRFs by a relative `size`.
 
     It has `taken` so large a share of the squares of all that refitting leaves.
     """
-    size = removal(without, whole, part) if part.absorbed else change(without, whole)
     good = _above(taken, GOOD_PART) * _above(size, enough)
     return (1 - _above(size, matters)) * (1 - good)
 
@@ -110,17 +122,6 @@ def usual(fit: Fit) -> float:
         moved = moved * _noise(misfit)[:, None]
     squares = np.sum(np.abs(moved) ** 2, axis=1)
     return _relative(squares, misfit)
-
-
-def removal(without: Fit, whole: Fit, part: Effect) -> float:
-    """As `change`, where an effect is taken from `whole` and nothing is refitted."""
-    misfit, x = whole.misfit, whole.x.copy()
-    stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
-    for name in part.springs(misfit.setting.simulation):
-        x[misfit.names.index(name)] = stated[name]
-    for name in part.vanishing:
-        x[misfit.names.index(f"{name} of {part.name} at {part.at}")] = 0.0
-    return _apart(residuals(misfit, x)[1], whole)
 
 
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
