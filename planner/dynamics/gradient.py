@@ -83,12 +83,8 @@ def response_turned(
     matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
 ) -> tuple[np.ndarray, Turned]:
     """Accelerance (n, 3s, 3h, F) at s (n, F), and what goes with it."""
-    points = matrices.hit.shape[1]
-    rows = np.concatenate([matrices.hit, matrices.sensor, matrices.hit_turn], axis=1)
-    x = _solutions(matrices, elasticity, s, mass, rows)
-    x_hit, x_sensor, x_turn = x[:, :, :points], x[:, :, points:-points], x[:, :, -points:]
-    turned = Turned((Motion(matrices, x_hit, x_sensor, s, x_turn),))
-    return synthesis(matrices.sensor, x_hit, s), turned
+    motion = moved(matrices, elasticity, s, mass)
+    return motion.accelerance, Turned((motion,))
 
 
 def response_gradient(

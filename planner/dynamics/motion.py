@@ -79,15 +79,13 @@ class ActualPorts:
 class Motion:
     """Of e elastic degrees of freedom: X (n, e, points, F) in rad/N at s (n, F).
 
-    `x_turn`, in rad per N·m at the hit point, is there where that was asked for. Where `actual`
-    ports are known, X are the motions of those.
+    Where `actual` ports are known, X are the motions of those.
     """
 
     matrices: Matrices
     x_hit: np.ndarray
     x_sensor: np.ndarray
     s: np.ndarray
-    x_turn: np.ndarray | None = None
     actual: ActualPorts | None = None
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
@@ -161,12 +159,6 @@ class Turned:
     def turning(self) -> np.ndarray:
         """(n, 3s, 3h, F) in rad/s² per N: how the sensor turns."""
         return self._joined(lambda m: m.moving(m.matrices.sensor_turn))
-
-    @cached_property
-    def twisting(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in rad/s² per N·m: how the sensor turns with moments at the hit point."""
-        turns = [(m.matrices.sensor_turn, m.x_turn, m.s) for m in self.motions]
-        return np.concatenate([synthesis(rows, x, s) for rows, x, s in turns if x is not None])
 
     @cached_property
     def by_angle(self) -> np.ndarray | None:

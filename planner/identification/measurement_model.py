@@ -59,6 +59,7 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
+MISSED_MOST = 4.0  # prior sds, that a guess of a miss is kept within while a simulation is far off
 OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
 
 

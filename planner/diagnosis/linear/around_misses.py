@@ -23,8 +23,6 @@ from planner.identification.measurement_model import (
     real_rows,
 )
 
-MISSED_MOST = 4.0  # prior sds, that a guess of a miss is kept within while a simulation is far off
-
 
 @dataclass(frozen=True, eq=False)
 class AroundMisses:

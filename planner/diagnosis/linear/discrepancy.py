@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.diagnosis.linear.around_misses import MISSED_MOST, AroundMisses
+from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, approached
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.thresholds import (
@@ -24,7 +24,7 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_UNKNOWN,
     DISCREPANCY_USUAL,
 )
-from planner.identification.measurement_model import OpenNumbers
+from planner.identification.measurement_model import MISSED_MOST, OpenNumbers
 from planner.identification.objective import FARTHEST
 
 

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.diagnosis.linear.around_misses import MISSED_MOST, AroundMisses
+from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Turned, recorded
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Tolerances, actual_ports
+from planner.identification.measurement_model import MISSED_MOST, Tolerances, actual_ports
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
