@@ -54,3 +54,12 @@ def test_what_predicts_worse_is_given_up(found, monkeypatch):
     assert sum(shares) == pytest.approx(1.0)
     assert judged.diagnosis.candidates[0].places == (("unknown", None),)
     assert shares[0] >= 0.95
+
+
+def test_refitting_alone_is_not_given_up(found, monkeypatch):
+    aside, agreed = module.held_out(found.problem, found.refitted, found.best)
+    assert agreed is not None
+    bad = replace(agreed, explained=replace(agreed.explained, frac=agreed.refitted.frac - 0.01))
+    monkeypatch.setattr(module, "held_out", lambda *_: (aside, bad))
+    consistent = replace(found, verdict="consistent", best=found.refitted)
+    assert judge(consistent).diagnosis is consistent
