@@ -20,7 +20,7 @@ LINES = np.linspace(6.0, 60.0, 96)
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """A mass on link 5 in simulated recordings of four poses, and its diagnosis."""
+    """A mass on link 5 said to explain simulated recordings of four poses, of a robot without."""
     simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("robot"))))
     q, rng = KR210.poses(4, 5), np.random.default_rng(0)
     frfs = []
@@ -30,7 +30,12 @@ def found(tmp_path_factory):
         nothing = np.full(h.shape, np.nan)
         frfs.append(Frf(LINES, h + noise, np.full(h.shape, sd**2), nothing, (3, 3, 3), (6.0, 60.0)))
     chosen = [e for e in library(simulation) if (e.name, e.at) == ("added_mass", "link_5")]
-    return diagnose(frfs, q, simulation, effects=chosen)
+    found = diagnose(frfs, q, simulation, effects=chosen)
+    mass = next(c for c in found.candidates if c.fit is not None and c.fit.effect.at)
+    named, others = replace(mass, probability=0.9), [c for c in found.candidates if c is not mass]
+    share = 0.1 / sum(c.probability for c in others)
+    rest = (replace(c, probability=share * c.probability) for c in others)
+    return replace(found, verdict="explained", candidates=(named, *rest), best=mass.fit)
 
 
 def test_what_predicts_as_well_is_kept(found):
