@@ -146,6 +146,9 @@ TONE_STANDS_OUT, TONE_BESIDE_HZ = 3.0, 1.5  # power there over that beside it
 DRIFT_COURSE = 0.01  # relative sd of the change: no course is quite one of these
 DRIFT_GAINS = 3.0  # by which the misfit has to fall: physics that goes with the pose gains less
 DRIFT_MOVED = 3.0  # sds that the change has to be away from none
+DRIFT_CRUDE = (
+    2.0  # χ² per value of the fit with drift, from which what goes with the pose may be it
+)
 DRIFT_STILL = 2.0  # χ² per value: a pose that answers alike when visited again has not drifted
 
 # The measuring chain
