@@ -14,7 +14,7 @@ from planner.diagnosis.misses_again import abstained, asked_again
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.thresholds import ARTEFACTS, NOTHING, SECOND_EFFECT
+from planner.diagnosis.thresholds import ARTEFACTS, DRIFT_CRUDE, NOTHING, PAYS, SECOND_EFFECT
 from planner.diagnosis.verdict import Together, linear_effects_apply, together
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, within
@@ -110,7 +110,8 @@ def _looked_at(
     if screened:
         early = within(tell, 0.0, 0.2)
         recorded, missed, findings = _screened(recorded, simulation, early, chain)
-    linear = linear_effects_apply(findings)
+    crude = [f for f in findings if f.effect == "drift" and f.misfit > DRIFT_CRUDE]
+    linear = linear_effects_apply([f for f in findings if f not in crude])
     found = diagnose(
         recorded.ended_frfs,
         recorded.q,
@@ -119,6 +120,9 @@ def _looked_at(
         bent=bool(of_levels(findings)),
         tell=within(tell, 0.2, 1.0),
     )
+    if found.verdict == "explained" and all(f.misfit > PAYS * found.best.per_value for f in crude):
+        # Poses that were visited one after the other differ, and so do times.
+        findings = tuple(f for f in findings if f not in crude)
     if any(f.effect in ARTEFACTS for f in findings):
         found = beside_another(found)
     return _Looked(recorded, missed, findings, found)

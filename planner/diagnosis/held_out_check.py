@@ -26,7 +26,8 @@ def judge(found: Diagnosis) -> JudgedDiagnosis:
     does, and the refitted simulation takes its place.
     """
     aside, judged = held_out(found.problem, found.refitted, found.best)
-    if judged is not None and _fails(judged):
+    # Refitting alone explains nothing that could be given up.
+    if judged is not None and found.best.effect.at and _fails(judged):
         for lesser in _lesser(found)[:LESSER]:
             _, other = held_out(found.problem, found.refitted, lesser.best)
             if other is not None and not _fails(other):

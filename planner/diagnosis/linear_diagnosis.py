@@ -15,6 +15,7 @@ from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.linear.search import Found, distinct, search
 from planner.diagnosis.linear.slightness import thinned, without_slight
+from planner.diagnosis.linear.sluggish import sluggish
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -191,6 +192,9 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     own = weights.probabilities[:-1], prior, weights.bent, left
     shares = list(without_slight(fits, named, *own, matters / 100))
     unknown = float(weights.probabilities[-1])
+    for i, one in enumerate(fits):
+        if shares[i] > TIED / len(fits) and sluggish(one, weights.temper):
+            unknown, shares[i] = unknown + shares[i], 0.0
     leader = int(np.argmax(shares))
     lead = prior[leader]
     before = _priors([effect for effect, _, _ in found.left], all_)

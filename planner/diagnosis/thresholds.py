@@ -78,6 +78,9 @@ LEFT_SHARE = 0.15
 # every robot has a little of, and is named from this share of what matters on. Chosen.
 GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.25
 LEFT_FACTOR = 1.5
+# c·ω/k mid-band from which a spring that gives is no bearing, link or foot (welded frames: 0.01,
+# rubber feet: 0.3), where the FRFs tell ln k to within the second. Chosen.
+LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN = 1.0, 0.3
 SOMETHING_UNKNOWN = 0.05  # probability, before any data, that something of no library is there
 # Where it is, each stated stiffness and inertia is with this probability pulled away by so many of
 # its tolerances. Chosen, looking at concealed cases of seeds 52001 to 52015.
@@ -143,6 +146,9 @@ TONE_STANDS_OUT, TONE_BESIDE_HZ = 3.0, 1.5  # power there over that beside it
 DRIFT_COURSE = 0.01  # relative sd of the change: no course is quite one of these
 DRIFT_GAINS = 3.0  # by which the misfit has to fall: physics that goes with the pose gains less
 DRIFT_MOVED = 3.0  # sds that the change has to be away from none
+DRIFT_CRUDE = (
+    2.0  # χ² per value of the fit with drift, from which what goes with the pose may be it
+)
 DRIFT_STILL = 2.0  # χ² per value: a pose that answers alike when visited again has not drifted
 
 # The measuring chain

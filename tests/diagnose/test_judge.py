@@ -20,11 +20,15 @@ LINES = np.linspace(6.0, 60.0, 96)
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """A mass on link 5 in simulated recordings of four poses, and its diagnosis."""
-    simulation = Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("robot"))))
+    """Twelve kilograms on link 5 in simulated recordings of four poses, and their diagnosis."""
+    folder = tmp_path_factory.mktemp("robot")
+    toml = KR210.write(folder)
+    simulation = Simulation(Robot.load(toml))
+    heavy = '\n[[payload]]\nlink = "link_5"\nmass = 12.0\ncom_m = [0.1, 0.05, 0.1]\n'
+    toml.write_text(toml.read_text() + heavy)
     q, rng = KR210.poses(4, 5), np.random.default_rng(0)
     frfs = []
-    for h in simulation.accelerance(q, LINES):
+    for h in Simulation(Robot.load(toml)).accelerance(q, LINES):
         sd = 1e-3 * np.abs(h).max()
         noise = sd / np.sqrt(2) * (rng.standard_normal(h.shape) + 1j * rng.standard_normal(h.shape))
         nothing = np.full(h.shape, np.nan)
@@ -54,3 +58,12 @@ def test_what_predicts_worse_is_given_up(found, monkeypatch):
     assert sum(shares) == pytest.approx(1.0)
     assert judged.diagnosis.candidates[0].places == (("unknown", None),)
     assert shares[0] >= 0.95
+
+
+def test_refitting_alone_is_not_given_up(found, monkeypatch):
+    aside, agreed = module.held_out(found.problem, found.refitted, found.best)
+    assert agreed is not None
+    bad = replace(agreed, explained=replace(agreed.explained, frac=agreed.refitted.frac - 0.01))
+    monkeypatch.setattr(module, "held_out", lambda *_: (aside, bad))
+    consistent = replace(found, verdict="consistent", best=found.refitted)
+    assert judge(consistent).diagnosis is consistent

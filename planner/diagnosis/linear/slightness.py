@@ -134,16 +134,23 @@ def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
     made: list[Fit] = []
     while len(parts := whole.effect.parts()) > 1:
         # What refitting takes the place of changes nothing, and says nothing of the others.
-        sets = [[p for p in parts if p is not part] for part in parts if not part.absorbed]
-        if not sets:
-            break
+        lasting = [part for part in parts if not part.absorbed] or parts
+        sets = [[p for p in parts if p is not part] for part in lasting]
         for kept in sets:
-            again, key = _carried_on(problem, whole, kept), frozenset(kept)
+            again, key = _fitted_without(problem, whole, fits[0], kept), frozenset(kept)
             if key not in known or _value(again) < _value(known[key]):
                 known[key] = again
                 made.append(again)
         whole = min((known[frozenset(kept)] for kept in sets), key=partial(change, whole=whole))
     return made
+
+
+def _fitted_without(problem: Problem, whole: Fit, none: Fit, kept: Sequence[Effect]) -> Fit:
+    """Of what is `kept` of a whole; from no effect at all where the whole leads nowhere."""
+    again = _carried_on(problem, whole, kept)
+    if _value(again) <= _value(none):
+        return again
+    return min((again, _carried_on(problem, none, kept)), key=_value)
 
 
 def _value(fit: Fit) -> float:

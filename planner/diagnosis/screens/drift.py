@@ -80,7 +80,8 @@ def evaluate(plain: Fit, best: Fit) -> Finding:
     change = float(np.expm1(size))
     told = {"change": (change, float(np.hypot((1 + change) * sd, DRIFT_COURSE * change)), "1")}
     evidence = best.log_evidence(t) - plain.log_evidence(t)
-    return Finding("drift", "campaign", evidence, told, best.effect.text(told))
+    misfit = best.per_value
+    return Finding("drift", "campaign", evidence, told, best.effect.text(told), misfit)
 
 
 def _unchanged(recorded: Dataset, nominal: Simulation) -> bool:
