@@ -133,8 +133,7 @@ class CampaignReads:
         from planner.campaign.build import build
 
         kept = self.recordings
-        for measurement in state.used:  # a damaged one is told now, whoever reads it later
-            kept.sources(measurement)
+        kept.look_through(state.used, self._kept)  # a damaged one is told now
         model = build(self.cell, state, kept.frf, kept.hits)
         _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
