@@ -5,11 +5,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.robot.inverse_kinematics import solve
-from planner.robot.robot import Robot
-
 if TYPE_CHECKING:
     from planner.campaign.cell import Cell
+    from planner.robot.robot import Robot
 
 BESIDE = 0.01  # rad or m beyond the workspace that a readback may be: still inside
 # A pose of a workspace of positions is reached as planned if inverse kinematics from one of the
@@ -51,6 +49,8 @@ def outside_remark(names: Sequence[str]) -> str:
 
 def _reached_as_planned(cell: "Cell", q: np.ndarray, features: np.ndarray) -> bool:
     """Whether q (dof,) in rad, at features (d,), is on the branch of the poses planned there."""
+    from planner.robot.inverse_kinematics import solve  # 0.1 s, which sentences do not need
+
     robot, spread = cell.robot, slice(cell.spread)
     away = np.linalg.norm(cell.candidates.features[spread] - features, axis=1)
     near = cell.candidates.q[np.argsort(away, kind="stable")[:NEIGHBOURS]]
@@ -65,7 +65,7 @@ def _reached_as_planned(cell: "Cell", q: np.ndarray, features: np.ndarray) -> bo
     return False
 
 
-def _apart(poses: np.ndarray, q: np.ndarray, robot: Robot) -> np.ndarray:
+def _apart(poses: np.ndarray, q: np.ndarray, robot: "Robot") -> np.ndarray:
     """(n,) by how much any joint differs from q (dof,) at poses (n, dof); whole turns are none."""
     off = poses - q
     turned = np.abs((off + np.pi) % (2 * np.pi) - np.pi)

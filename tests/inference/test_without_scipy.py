@@ -46,3 +46,10 @@ def test_commands_between_hits_do_not_import_it():
     code += "print([m for m in sys.modules if m.startswith(('scipy', 'jax', 'matplotlib'))])"
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
+
+
+def test_status_of_what_is_kept_does_not_load_the_robot():
+    code = "import sys, planner.cli.app, planner.campaign.campaign, planner.report.status\n"
+    code += "print([m for m in sys.modules if m.startswith(('scipy', 'jax', 'pinocchio'))])"
+    said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert said.stdout.strip() == "[]"
