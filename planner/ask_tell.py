@@ -20,6 +20,7 @@ from planner.campaign.config import CampaignConfig, check_config, load_campaign_
 from planner.campaign.events import MeasuredMode, Proposal
 from planner.campaign.log_conversion import from_modal, from_mode
 from planner.campaign.model import Model
+from planner.campaign.planned import inside
 from planner.campaign.proposals import propose
 from planner.campaign.records import measured_records, predicted_records
 from planner.campaign.state import CampaignState, Measurement
@@ -175,7 +176,8 @@ class AskTell:
     def predict_records(self, joints_deg: Sequence[float] | np.ndarray) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose."""
         q = self._poses(joints_deg)
-        return predicted_records(self._cell.robot.joints, q, self.model.predict(q))
+        there = inside(self._cell, q)
+        return predicted_records(self._cell.robot.joints, q, self.model.predict(q), there)
 
     def _poses(self, joints_deg: Sequence[float] | np.ndarray) -> np.ndarray:
         angles = np.atleast_2d(np.asarray(joints_deg, dtype=float))

@@ -1,7 +1,6 @@
 """A campaign's model as acquisitions see it: what is open, what matters, what measuring costs."""
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from planner.campaign.cell import Cell
 from planner.campaign.low_fidelity import LowFidelity
@@ -11,6 +10,7 @@ from planner.design.parameter_sensitivity import FrfNoise, OpenParameters
 from planner.design.propose import WORKSPACE_POSES
 from planner.dynamics.vibration import SimulatedModes
 from planner.identification.parameters import parametrise
+from planner.inference.block_diagonal import block_diagonal
 from planner.surrogate.modal_surrogate import Surrogate
 
 # The first of the candidates, evenly spread, whose information about parameters is worked out.
@@ -27,7 +27,7 @@ def open_parameters(cell: Cell, low: LowFidelity, noise: FrfNoise | None) -> Ope
     noise = noise or FrfNoise.of((), band, 1.0)
     if learned is None:
         p = parametrise(nominal, low.priors)
-        known = np.asarray(block_diag(p.covariance, np.eye(len(p.nuisances))))
+        known = block_diagonal(p.covariance, np.eye(len(p.nuisances)))
         return OpenParameters(nominal, p, known, noise, band)
     p, found = parametrise(learned.structure.simulation, learned.priors), learned.identified
     return OpenParameters(found.simulation, p, found.covariance, noise, band)

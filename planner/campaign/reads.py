@@ -133,8 +133,7 @@ class CampaignReads:
         from planner.campaign.build import build
 
         kept = self.recordings
-        for measurement in state.used:  # a damaged one is told now, whoever reads it later
-            kept.sources(measurement)
+        kept.look_through(state.used, self._kept)  # a damaged one is told now
         model = build(self.cell, state, kept.frf, kept.hits)
         _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
@@ -237,10 +236,11 @@ class CampaignReads:
 
     def predict_records(self, q_rad: np.ndarray) -> list[dict[str, Any]]:
         """`predict` as rows, one for each mode of each pose q (n, dof) in rad."""
+        from planner.campaign.planned import inside
         from planner.campaign.records import predicted_records
 
         q = np.atleast_2d(q_rad)
-        return predicted_records(self.cell.robot.joints, q, self.predict(q))
+        return predicted_records(self.cell.robot.joints, q, self.predict(q), inside(self.cell, q))
 
     @property
     def frequency_lines(self) -> np.ndarray:

@@ -34,9 +34,12 @@ def measured_records(
 
 
 def predicted_records(
-    joints: JointUnits, q_rad: np.ndarray, prediction: "ModalPrediction"
+    joints: JointUnits, q_rad: np.ndarray, prediction: "ModalPrediction", inside: np.ndarray
 ) -> list[dict[str, Any]]:
-    """One row for each mode of each pose q (n, dof) in rad of a prediction."""
+    """One row for each mode of each pose q (n, dof) in rad of a prediction.
+
+    `inside` (n,) says which of them lie in the workspace.
+    """
     p = prediction
     return [
         {
@@ -47,6 +50,7 @@ def predicted_records(
             "frequency_sd_hz": float(p.frequency_sd_hz[i, k]),
             "damping_ratio": float(p.damping_ratio[i, k]),
             "damping_sd": float(p.damping_sd[i, k]),
+            "outside": not inside[i],
         }
         for i, row in enumerate(q_rad)
         for k in range(p.frequency_hz.shape[1])

@@ -14,7 +14,6 @@ from functools import partial
 from itertools import permutations
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from planner.design.frequency_posterior import AXES
 from planner.design.parameter_sensitivity import FrfNoise
@@ -23,6 +22,7 @@ from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.frf.frf import Frf
 from planner.identification.measurement_model import OpenNumbers, basis
+from planner.inference.block_diagonal import block_diagonal
 from planner.inference.parallel import side_by_side
 from planner.recording.points import TOOL, Layout
 
@@ -149,7 +149,7 @@ def separation(
     each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
     numbers = OpenNumbers.of(np.empty((*layout.shape, 0)))
     open_ = 0 if problem.exact else numbers.known + problem.q.shape[1]
-    known = [np.asarray(block_diag(fit.precision(temper), np.eye(open_))) for fit in fits]
+    known = [block_diagonal(fit.precision(temper), np.eye(open_)) for fit in fits]
     rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):
         predicted = [_predicted(problem, f, row, lines, rate, layout) for f in fits]

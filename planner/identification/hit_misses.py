@@ -116,23 +116,25 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
     lines = int(np.clip(LINES // max(len(few), 1), FEWEST_LINES, LINES))
     common, stride = _Common(known, t), STRIDE
     best = common.at(known.x, np.zeros(CHAIN), [visits[i] for i in few], lines)
-    size = max(SIZES, key=lambda s: best.solved(s).evidence)
+    solved = best.likeliest()
+    size = solved.size
     for _ in range(STEPS - 1):
-        chain, step = best.solved(size).step(stride)
+        chain, step = solved.step(stride)
         x, heard = known.near(best.x + step), best.chain + chain
         try:
             tried = common.at(x, heard, [visits[i] for i in few], lines)
         except (np.linalg.LinAlgError, InputError):
             tried = None  # no robot can have such inertias
-        gain = -np.inf if tried is None else tried.solved(size).here - best.solved(size).here
-        if tried is None or gain < 0:
+        there = None if tried is None else tried.solved(size)
+        gain = -np.inf if there is None else there.here - solved.here
+        if tried is None or there is None or gain < 0:
             stride *= SHORTER
             continue
-        best = tried
+        best, solved = tried, there
         if gain < SETTLED:
             break
-    size = max(SIZES, key=lambda s: best.solved(s).evidence)
-    solved = best.solved(size)
+    solved = best.likeliest()
+    size = solved.size
     others = common.visits(best.simulation, best.chain, visits[: few.start], lines)
     told = [solved.misses(one) for one in (*others, *best.visits)]
     scale = np.repeat([t.angle_rad, t.offset_m], 2)
@@ -199,6 +201,10 @@ class _Point:
     visits: tuple[VisitEquations, ...]
     mean: np.ndarray
     sd: np.ndarray
+
+    def likeliest(self) -> "_Solved":
+        """With a discrepancy of the likeliest size."""
+        return max(map(self.solved, SIZES), key=lambda solved: solved.evidence)
 
     def solved(self, size: float) -> "_Solved":
         """With a discrepancy of that size."""

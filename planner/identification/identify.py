@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -18,6 +17,7 @@ from planner.identification.objective import TOO_SOFT, Objective
 from planner.identification.parameters import Parametrisation, Priors, parametrise
 from planner.identification.result import Identification, estimates, undetermined
 from planner.identification.staged_problem import Progress, StagedProblem
+from planner.inference.block_diagonal import block_diagonal
 from planner.inference.least_squares import Minimum, inverse
 
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
@@ -209,7 +209,7 @@ def _result(
 ) -> Identification:
     end, misfit = best.end, best.misfit
     p, count = problem.parametrisation, len(problem.parametrisation.parameters)
-    prior = np.asarray(block_diag(p.precision, np.eye(len(p.nuisances))))
+    prior = block_diagonal(p.precision, np.eye(len(p.nuisances)))
     # Where the misfit is above the noise, the noise is at least as large as the misfit.
     data = (end.at.normal - prior) / max(misfit, 1.0)
     covariance = inverse(data + prior)

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from planner.dynamics.motion import ActualPorts, Turned
+from planner.inference.block_diagonal import block_diagonal
 from planner.robot.config import RobotConfig
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
@@ -255,7 +255,7 @@ class ChainTransfer:
         """Of all its numbers in sds, in the order of `chain_basis`, at s (n, F) in rad/s."""
         each = numbers[:-OF_HAMMER].reshape(-1, OF_SENSOR)
         within = np.where(np.eye(3), t.gain, t.across) * each[:, :9].reshape(-1, 3, 3)
-        matrix = np.asarray(block_diag(*(np.eye(3) + within)))
+        matrix = block_diagonal(*(np.eye(3) + within))
         scale = (1 + t.force_gain * numbers[-2]) * np.exp(-t.delay_s * numbers[-1] * s)
         return cls(matrix, scale, t.position_m * each[:, 9:])
 

@@ -9,7 +9,6 @@ end.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from planner.dynamics.gradient import Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Motion, Turned
@@ -19,6 +18,7 @@ from planner.identification.measured_frfs import Measured
 from planner.identification.measurement_model import MISSED_MOST, Tolerances, actual_ports
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
+from planner.inference.block_diagonal import block_diagonal
 from planner.inference.least_squares import Quadratic
 from planner.robot.elastic_model import Matrices
 
@@ -170,7 +170,7 @@ class Objective:
         """How far x is from the prior's mean, and the prior's precision."""
         p = self.parametrisation
         weight = LOG_PRIOR if self.logarithmic else 1.0
-        precision = weight * np.asarray(block_diag(p.precision, np.eye(len(phi))))
+        precision = weight * block_diagonal(p.precision, np.eye(len(phi)))
         return np.concatenate([theta - p.mean, phi]), precision
 
     def _beyond(self, phi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-import scipy.linalg
+
+from planner.inference import triangular
 
 LONGEST = 1.5  # no parameter moves farther in one step: a factor of 4.5 for a logarithm
 
@@ -131,8 +132,7 @@ def propose(state: Iterate[Q]) -> np.ndarray:
     damped = state.at.normal * np.outer(unit, unit) + state.damping * np.eye(len(unit))
     downhill = -unit * state.at.gradient
     try:
-        factor = scipy.linalg.cho_factor(damped, check_finite=False)
-        step = unit * scipy.linalg.cho_solve(factor, downhill, check_finite=False)
+        step = unit * triangular.solve(np.linalg.cholesky(damped), downhill)
     except np.linalg.LinAlgError:  # rounding has left a direction without curvature
         step = unit * np.linalg.lstsq(damped, downhill, rcond=None)[0]
     return state.limits.within(state.x, step)
@@ -218,6 +218,6 @@ def inverse(precision: np.ndarray) -> np.ndarray:
     Where a barrier stands close, entries differ by so many decades that a plain inverse loses it.
     """
     unit = 1 / np.sqrt(np.diagonal(precision))
-    values, vectors = scipy.linalg.eigh(precision * np.outer(unit, unit))
+    values, vectors = np.linalg.eigh(precision * np.outer(unit, unit))
     values = np.maximum(values, np.finfo(float).eps * len(unit) * values[-1])
     return np.outer(unit, unit) * ((vectors / values) @ vectors.T)

@@ -9,7 +9,6 @@ and drop out (Cauberghe, PhD thesis, VUB 2004, ch. 3).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, solve, solve_triangular
 
 from planner.modal.refine import proportional
 
@@ -123,11 +122,9 @@ def _normal(
         t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
         gram = r[np.abs(lag)]
         gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
-        factor = cholesky(gram + RIDGE * r[0] * np.eye(order + 1), lower=True)
+        factor = np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(order + 1))
         coupled = -s[lag + order].reshape(order + 1, -1)
-        reduced[o] = solve_triangular(factor, coupled, lower=True).reshape(
-            order + 1, order + 1, inputs
-        )
+        reduced[o] = np.linalg.solve(factor, coupled).reshape(order + 1, order + 1, inputs)
         total += t[lag + order].transpose(0, 2, 1, 3)
     return total, reduced
 
@@ -143,11 +140,11 @@ def _normal_of_one_profile(
     r = (lags @ weight).real
     gram = r[np.abs(lag)]
     gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
-    factor = cholesky(gram + RIDGE * r[0] * np.eye(order + 1), lower=True)
+    factor = np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(order + 1))
     weighted = (weight * frf).reshape(-1, lines)
     s = _two_sided(lags, weighted.T).real.reshape(-1, outputs, inputs)
     coupled = -s[lag + order].reshape(order + 1, -1)  # rows, then columns × outputs × inputs
-    reduced = solve_triangular(factor, coupled, lower=True)
+    reduced = np.linalg.solve(factor, coupled)
     reduced = reduced.reshape(order + 1, order + 1, outputs, inputs).transpose(2, 0, 1, 3)
     products = np.einsum("oif,ojf->ijf", frf.conj(), weight * frf).reshape(-1, lines)
     t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
@@ -181,7 +178,7 @@ def _denominator(order: int, normal: np.ndarray, coupling: np.ndarray) -> np.nda
     block = block - v.T @ v
     ridge = RIDGE * np.trace(block) / size
     inner = block[inputs:, inputs:] + ridge * np.eye(size - inputs)
-    a = -solve(inner, block[inputs:, :inputs], assume_a="sym", check_finite=False)
+    a = -np.linalg.solve(inner, block[inputs:, :inputs])
     return np.concatenate([np.eye(inputs)[None], a.reshape(order, inputs, inputs)])
 
 

@@ -15,7 +15,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from planner.inference import triangular
 from planner.inference.assignment import least_cost
+from planner.modal.expected_shapes import mixture
 from planner.modal.label_permutations import name_chances
 from planner.modal.mac import match_gain, unexpected_cost
 from planner.modal.mode_matching import best, chances
@@ -27,7 +29,6 @@ OFFSET_SD, VARIATION_SD, LOCAL_SD, LENGTH = 0.25, 0.08, 0.01, 0.4
 TYPICAL_SD = 0.1  # of log frequency, for which the cost of a missing mode was chosen
 DAMPING_SD = 0.6  # of log damping ratio around a label's median
 MISSING_COST, SHAPE_WEIGHT = 9.0, 8.0
-NEIGHBOURS, GUIDE_WEIGHT = 6, 0.5  # shapes that are compared; the guide's weight among them
 MAX_ROUNDS = 8
 
 
@@ -212,7 +213,7 @@ class _Belief:
                 for c, f in zip(damping.T, known.T, strict=True)
             ]
         )
-        return cls(expected + ratio, sd, _mixture(shape, certain, guide.shape, x), middle)
+        return cls(expected + ratio, sd, mixture(shape, certain, guide.shape, x, LENGTH), middle)
 
     def gain(self, i: int, modes: Sequence[Mode]) -> np.ndarray:
         """(k, modes) of pose i: what each match is better than leaving both unmatched."""
@@ -247,55 +248,18 @@ def _kriged(
     prior = OFFSET_SD**2 + VARIATION_SD**2 * np.exp(-(distance**2) / 2)
     mean, variance = np.zeros((n, k)), np.zeros((n, k))
     for label in range(k):
-        known = np.flatnonzero(np.isfinite(ratio[:, label]))
+        measured = np.isfinite(ratio[:, label])
+        known, unknown = np.flatnonzero(measured), np.flatnonzero(~measured)
         noise = LOCAL_SD**2 + np.nan_to_num(own_sd[known, label]) ** 2
         # A label that may be wrong counts less for the others.
         noise = noise / np.maximum(certain[known, label], 1e-3) ** 2
-        inverse = np.linalg.inv(prior[np.ix_(known, known)] + np.diag(noise))
-        y = ratio[known, label]
-        cross = prior[:, known] @ inverse
-        mean[:, label] = cross @ y
-        variance[:, label] = np.diagonal(prior) - np.sum(cross * prior[:, known], axis=1)
-        mean[known, label] = y - (inverse @ y) / np.diagonal(inverse)
-        variance[known, label] = 1 / np.diagonal(inverse) - noise
+        white = triangular.inverse(np.linalg.cholesky(prior[np.ix_(known, known)] + np.diag(noise)))
+        y, precision = ratio[known, label], np.sum(white**2, axis=0)
+        weights = white.T @ (white @ y)
+        mean[known, label] = y - weights / precision
+        variance[known, label] = 1 / precision - noise
+        cross = prior[np.ix_(unknown, known)]
+        mean[unknown, label] = cross @ weights
+        spared = np.sum((white @ cross.T) ** 2, axis=0)
+        variance[unknown, label] = np.diagonal(prior)[unknown] - spared
     return mean, np.sqrt(np.maximum(variance, 0.0) + LOCAL_SD**2)
-
-
-def _mixture(
-    shape: np.ndarray, certain: np.ndarray, guide: np.ndarray, x: np.ndarray
-) -> np.ndarray:
-    """Expected shapes (n, k, 3, 3): the guide's and those of the nearest poses, as Σ w s sᴴ."""
-    n = len(certain)
-    size = np.linalg.norm(x[:, None] - x[None], axis=2) / max(1, x.shape[1]) ** 0.5
-    np.fill_diagonal(size, np.inf)
-    near = np.argsort(size, axis=1, kind="stable")[:, : min(NEIGHBOURS, n - 1)]  # (n, neighbours)
-    nearness = np.exp(-((np.take_along_axis(size, near, axis=1) / LENGTH) ** 2) / 2)
-    filled = np.nan_to_num(guide)
-    turn = _rotations(np.broadcast_to(filled[:, None], filled[near].shape), filled[near])
-    known = np.isfinite(shape[near][..., 0])
-    theirs = np.where(known, certain[near] * nearness[..., None], 0.0)
-    turned = np.nan_to_num(shape[near]) @ np.swapaxes(turn, -1, -2)
-    own = GUIDE_WEIGHT * np.isfinite(guide[..., 0])
-    out = own[..., None, None] * _projector(filled)
-    out = out + np.sum(theirs[..., None, None] * _projector(turned), axis=1)
-    return out / np.maximum(own + np.sum(theirs, axis=1), 1e-12)[..., None, None]
-
-
-def _projector(shape: np.ndarray) -> np.ndarray:
-    """s sᴴ (…, 3, 3) of unit shapes (…, 3)."""
-    size = np.linalg.norm(shape, axis=-1, keepdims=True)
-    unit = np.divide(shape, size, out=np.zeros_like(shape), where=size > 0)
-    return unit[..., :, None] * unit[..., None, :].conj()
-
-
-def _rotations(here: np.ndarray, there: np.ndarray) -> np.ndarray:
-    """Orthogonal (…, 3, 3) that best carry the guide's shapes there (…, k, 3) to those here.
-
-    Signs of shapes are arbitrary, so they are made to agree first (Schönemann 1966).
-    """
-    phase = np.sum(here.conj() * there, axis=-1)
-    phase = np.where(np.abs(phase) > 1e-12, phase / np.maximum(np.abs(phase), 1e-12), 1.0)
-    product = np.swapaxes(here * phase[..., None], -1, -2) @ there.conj()
-    # A little of the identity decides directions in which no guided mode moves.
-    left, _, right = np.linalg.svd(product.real + 1e-3 * np.eye(3))
-    return left @ right

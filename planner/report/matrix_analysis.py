@@ -196,7 +196,13 @@ def _draw(
     from planner.report.shape_motion import animate
 
     name = files[0].name[-LONGEST_NAME:] + (f" and {len(files) - 1} more" if files[1:] else "")
-    drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name)
+
+    def record(rrd: Path) -> None:
+        from planner.report.rerun_matrix import record_matrix
+
+        record_matrix(matrix, found, geometry, name, rrd)
+
+    drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name, record)
     if geometry is not None and pictures.folder is not None:
         moving = animate(found, geometry, pictures.folder.absolute())
         drawn["plots"] = [*drawn["plots"], *map(str, moving)]

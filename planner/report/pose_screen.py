@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from re import split
 
 from rich.console import Group, RenderableType
 from rich.table import Table
@@ -11,8 +12,9 @@ from rich.text import Text
 
 from planner.campaign.events import Proposal
 from planner.recording.joints import JointUnits
+from planner.report.fitted_lines import Said, fitted
 
-WIDTH = 80  # columns of the smallest terminal
+WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
 LAST = 4  # verdicts that are shown
 COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow"}
 
@@ -27,15 +29,25 @@ class JudgedHit:
     text: str
 
     @property
-    def line(self) -> Text:
-        """One line, in colour."""
+    def said(self) -> Text:
+        """In full, what to do before why, in colour."""
+        do, why = remedy_first(self.text)
+        return self._headed(" ".join([do, why]).strip())
+
+    @property
+    def shortly(self) -> Text:
+        """What to do alone."""
+        return self._headed(remedy_first(self.text)[0])
+
+    def _headed(self, text: str) -> Text:
         axis = self.axis or "axis not stated"
         if self.kind == "good":
-            style = COLOURS["late"] if self.text else COLOURS["good"]
-            but = f", but – {self.text}" if self.text else ""
-            return Text(f"hit {self.number} ({axis}): good{but}", style=style)
-        said = "late?" if self.kind == "late" else f"REPEAT HIT {self.number}"
-        return Text(f"hit {self.number} ({axis}): {said} – {self.text}", style=COLOURS[self.kind])
+            but = f"hit {self.number} ({axis}): good, but: {text}"
+            plain = Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
+            return Text(but, style=COLOURS["late"]) if text else plain
+        said = f"hit {self.number} ({axis}), late?"
+        said = f"REPEAT HIT {self.number} ({axis}):" if self.kind == "repeat" else said
+        return Text(f"{said} {text}", style=COLOURS[self.kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +63,8 @@ class PosePage:
     expected_hz: tuple[float, ...]
     expected_sd_hz: tuple[float, ...]
     folder: Path
-    unfinished: tuple[str, ...] = ()  # files that are being written or cannot be read, why
+    # Files that are being written or cannot be read, by name, and what is said of them.
+    unfinished: tuple[tuple[str, str], ...] = ()
     progress: str = ""
     keys: str = ""
     pose_before: str = ""
@@ -66,25 +79,43 @@ class PosePage:
         """Whether each axis has as many good hits as wanted."""
         return all(self.counts[axis] >= self.per_axis for axis in self.proposal.hits)
 
-    def page(self) -> RenderableType:
-        """The renderable."""
+    def page(self, width: int = WIDTH, height: int = HEIGHT) -> RenderableType:
+        """The renderable, of as many lines at most as there is no way to say it in fewer."""
         both = Table.grid(padding=(0, 3))
-        both.add_row(self._angles(), self._hits())
+        angles, hits = self._angles(), self._hits()
+        both.add_row(angles, hits)
+        rows = 1 + max(angles.row_count, hits.row_count)
+        title = f"Measurement {self.number}: go to pose {self.proposal.pose}"
+        parts = [Said([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
+        parts += [_unfinished(*one) for one in self.unfinished[-2:]]
+        parts += [Said([None, _said(self.progress)], 6)] if self.progress else []
+        paths = _end(str(self.folder)), str(self.folder)
+        where = [_said(f"waiting for hits in {path}", "dim") for path in paths]
+        parts.append(Said([None, *where], 4))
+        parts.append(Said([Text(self.keys, style="reverse")]))
+        lines = fitted(parts, width, height - rows)
+        return Group(lines[0], both, *lines[1:])
+
+    def _place(self) -> list[Said]:
+        """Where the tool is, and what is expected there."""
+        x, y, z = self.proposal.position_m
+        place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m"
         each = zip(self.expected_hz, self.expected_sd_hz, strict=True)
         expected = ", ".join(f"{hz:.2f} ± {sd:.2f}" for hz, sd in each)
-        x, y, z = self.proposal.position_m
-        title = f"Measurement {self.number}: go to pose {self.proposal.pose}"
-        parts: list[RenderableType] = [Text(title, style="bold reverse"), both]
-        parts.append(_cut(f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {self.proposal.reason}"))
-        parts.append(_cut(f"expected (Hz): {expected}", "bold"))
-        parts += [_cropped(hit.line) for hit in self.hits[-LAST:-1]]
-        parts += [hit.line for hit in self.hits[-1:]]  # in full: it ends with what to do
-        parts += [_cut(f"not whole yet: {why}", "dim") for why in self.unfinished[-2:]]
-        if self.progress:
-            parts.append(_cut(self.progress))
-        parts.append(_cut(f"waiting for hits in {_end(str(self.folder))}", "dim"))
-        parts.append(Text(self.keys, style="reverse"))
-        return Group(*parts)
+        short = ", ".join(f"{hz:.2f}" for hz in self.expected_hz)
+        return [
+            Said([None, _said(place), _said(f"{place}; {self.proposal.reason}")], 7),
+            Said([_said(f"expected (Hz): {text}", "bold") for text in (short, expected)], 8),
+        ]
+
+    def _verdicts(self) -> list[Said]:
+        """The last hits; the very last one in any case."""
+        *before, last = self.hits[-LAST:] or (None,)
+        parts = [
+            Said([None, hit.shortly, hit.said], len(before) - i)
+            for i, hit in enumerate(before) if hit
+        ]  # fmt: skip
+        return [*parts, Said([last.shortly, last.said])] if last else parts
 
     def _angles(self) -> Table:
         angles = Table(box=None, header_style="bold", pad_edge=False)
@@ -132,10 +163,23 @@ def _end(path: str) -> str:
     return path if len(path) <= most else f"…{path[1 - most :]}"
 
 
-def _cut(text: str, style: str = "") -> Text:
-    return _cropped(Text(text, style=style))
+def remedy_first(text: str) -> tuple[str, str]:
+    """What to do, and why, of sentences that end with what to do after a semicolon."""
+    every = [sentence.rpartition("; ") for sentence in split(r"(?<=\.) (?=[A-Z])", text)]
+    asked = (f"{what[0].upper()}{what[1:]}" for why, _, what in every if why and what)
+    do = " ".join(dict.fromkeys(asked))
+    why = " ".join(f"{why}." if why else what for why, _, what in every)
+    return (do, why) if do else (text, "")
 
 
-def _cropped(text: Text) -> Text:
-    text.no_wrap, text.overflow = True, "ellipsis"
-    return text
+def _unfinished(name: str, said: str) -> Said:
+    """What is the matter with a file; what to do about it, if anything, comes first."""
+    do, why = remedy_first(said)
+    if not why:
+        return Said([None, _said(f"not whole yet: {said}", "dim")], 5)
+    short = f"not whole yet: {name}: {do}"
+    return Said([None, _said(short, "dim"), _said(f"{short} {why}", "dim")], 5)
+
+
+def _said(text: str, style: str = "") -> Text:
+    return Text(text, style=style)

@@ -10,12 +10,11 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.planned import inside, outside_remark
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.report.answer import Answer
 from planner.report.text import table, with_sd
-
-BESIDE = 0.01  # rad or m beyond the workspace that a readback may be: still inside
 
 if TYPE_CHECKING:
     from planner.surrogate.frf_bands import ModalPrediction
@@ -75,13 +74,10 @@ class PredictionReport(Answer):
         )
         for pose in self.poses:
             for k, mode in enumerate(pose.modes):
-                made.add_row(pose.pose if k == 0 else "", str(k + 1), *mode.cells)
-        outside = [pose.pose for pose in self.poses if pose.outside]
-        told = []
-        if outside:
-            lie = "lies" if len(outside) == 1 else "lie"
-            said = f"{', '.join(outside)} {lie} outside the workspace of campaign.toml: sds and "
-            told = [Text(said + "bands are not to be trusted there.", style="yellow")]
+                name = f"{pose.pose} (outside)" if pose.outside else pose.pose
+                made.add_row(name if k == 0 else "", str(k + 1), *mode.cells)
+        said = outside_remark([pose.pose for pose in self.poses if pose.outside])
+        told = [Text(said, style="yellow")] if said else []
         return Group(made, *told, Text(f"FRFs (m/s²/N) with sd: {self.npz}"))
 
 
@@ -94,11 +90,10 @@ def predictions(
     """
     angles, lines = np.array(q), campaign.frequency_lines
     prediction, (mean, sd) = campaign.predict(angles), campaign.frf(angles)
-    save_frfs(npz, lines, mean, sd, names, campaign.cell.robot.joints, angles)
-    cell = campaign.cell
-    inside = cell.workspace.contains(cell.robot, angles, BESIDE)
+    outside = ~inside(campaign.cell, angles)
+    save_frfs(npz, lines, mean, sd, names, campaign.cell.robot.joints, angles, outside)
     poses = (
-        PosePrediction(name, ExpectedMode.all_of(prediction, i), not inside[i])
+        PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]))
         for i, name in enumerate(names)
     )
     return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.model.labelled))
@@ -106,19 +101,22 @@ def predictions(
 
 def save_frfs(
     path: Path, frequency_hz: np.ndarray, mean: np.ndarray, sd: np.ndarray,
-    poses: Sequence[str], joints: JointUnits, q: np.ndarray,
+    poses: Sequence[str], joints: JointUnits, q: np.ndarray, outside: np.ndarray | None = None,
 ) -> None:  # fmt: skip
     """Write FRFs (n, 3, 3, F) in m/s²/N at lines (F,) and poses q (n, dof) to exactly this file.
 
+    With which of them lie `outside` (n,) the workspace, where there is one.
+
     Raises InputError where that cannot be done.
     """
-    units = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
+    more = {"joint_units": np.array(joints.units)} if any(joints.slides) else {}
+    more |= {} if outside is None else {"outside": outside}
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with open(path, "wb") as file:
             np.savez_compressed(
                 file, allow_pickle=False, frequency_hz=frequency_hz, frf_mean=mean, frf_sd=sd,
-                pose=np.array(poses), joints_deg=joints.shown(q), **units,
+                pose=np.array(poses), joints_deg=joints.shown(q), **more,
             )  # fmt: skip
     except OSError as error:
         raise InputError(f"{path} cannot be written ({error.strerror}); name another.") from None

@@ -9,6 +9,8 @@ from matplotlib import colormaps
 
 from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
+from planner.modal.matrix_modes import MatrixModes
+from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
 from planner.modal.modes import ModalModel
 from planner.modal.pole_identification import PoleIdentification
@@ -31,6 +33,7 @@ from planner.report.rerun_stream import open_stream
 FIT, BAND, MODE = (255, 120, 100), (70, 74, 80), (90, 190, 255)
 STABLE, UNSTABLE = (110, 220, 110), (240, 160, 60)
 RESPONSES = ((255, 110, 110), (120, 220, 120), (110, 160, 255))
+MOST_VALUES, WORTH_A_VALUE = 8, 0.1  # modes of whose MAC all values are written; of more, which
 WIDE, WIDER = 2.0, 5.0  # times the height; where charts lie one above the other
 
 
@@ -44,7 +47,10 @@ def record_modes(
     mark = "SIMULATED recordings · " if simulated else ""
     note = f"# {name}\n{mark}Modes are blue; white is measured, with ± 2 sd; red the fit."
     stream.log("note", rr.TextDocument(note, media_type="text/markdown"), static=True)
-    _stabilisation(stream, frf, found, modal, f"{mark}stable and unstable poles, order upwards")
+    singular = np.linalg.svd(np.moveaxis(found.data.response, -1, 0), compute_uv=False)[:, 0]
+    unit = " (m/s²/N)" if frf is not None else ""
+    title = f"{mark}stable and unstable poles, order upwards"
+    draw_stabilisation(stream, found, modal, singular, unit, title)
     if frf is not None:
         fitted = model(found.data, found.fit.refined)
         for k, column in enumerate(columns):
@@ -63,13 +69,18 @@ def draw_mac(
     stream: rr.RecordingStream, path: str, mac: np.ndarray, rows: list[str], columns: list[str],
     note: str,
 ) -> None:  # fmt: skip
-    """Log a MAC matrix (k, l) as cells with values and names; dark where nothing is known."""
+    """Log a MAC matrix (k, l) as cells with values and names; dark where nothing is known.
+
+    Rerun's own view of a tensor has neither names along its sides nor numbers in its cells. Of many
+    modes only values that say something have theirs.
+    """
     cells = (255 * colormaps["viridis"](np.nan_to_num(mac))[..., :3]).astype(np.uint8)
     cells[~np.isfinite(mac)] = 0
     stream.log(f"{path}/cells", rr.Image(cells))
     words = [
         (f"{value:.2f}", (j + 0.5, k + 0.42))
-        for (k, j), value in np.ndenumerate(mac) if np.isfinite(value)
+        for (k, j), value in np.ndenumerate(mac)
+        if np.isfinite(value) and (len(mac) <= MOST_VALUES or value > WORTH_A_VALUE)
     ]  # fmt: skip
     words += [(name, (-0.45, k + 0.42)) for k, name in enumerate(rows)]
     words += [(name, (j + 0.5, -0.3)) for j, name in enumerate(columns)]
@@ -102,20 +113,19 @@ def _blueprint(columns: list[int], modes: int) -> rrb.Blueprint:
     return rrb.Blueprint(rrb.Tabs(*tabs), rrb.TimePanel(state="hidden"), collapse_panels=True)
 
 
-def _modes(modal: ModalModel, bottom: float, top: float) -> Curve:
-    """All modes as lines from bottom to top."""
+def mode_lines(modal: ModalModel | MatrixModes, bottom: float, top: float) -> Curve:
+    """All modes as lines from bottom to top of a chart over frequency."""
     hz = np.array([mode.frequency_hz for mode in modal.modes])
     ends = np.tile([bottom, top, np.nan], len(hz))
     return Curve("mode", np.repeat(hz, 3), ends, MODE, thick=0.5)
 
 
-def _stabilisation(
-    stream: rr.RecordingStream, frf: Frf | None, found: PoleIdentification, modal: ModalModel,
-    title: str,
+def draw_stabilisation(
+    stream: rr.RecordingStream, found: PoleIdentification | MatrixPoles,
+    modal: ModalModel | MatrixModes, singular: np.ndarray, unit: str, title: str,
 ) -> None:  # fmt: skip
-    hz, responses = found.data.frequency_hz, found.data.response
-    singular = np.linalg.svd(np.moveaxis(responses, -1, 0), compute_uv=False)[:, 0]
-    unit = " (m/s²/N)" if frf is not None else ""
+    """Poles of all orders over the largest singular value (F,) of the responses (CMIF)."""
+    hz = found.data.frequency_hz
     y = ChartAxis(*log_range([singular]), f"CMIF{unit}", log=True)
     stable, unstable = poles_by_stability(found)
     orders = max((float(p[1].max()) for p in (stable, unstable) if p.size), default=1.0)
@@ -125,7 +135,7 @@ def _stabilisation(
     ]
     draw(stream, "modes/stabilisation", Chart(
         title, ChartAxis(float(hz[0]), float(hz[-1]), "frequency (Hz)"), y,
-        (_modes(modal, y.low, y.high), Curve("CMIF", hz, singular, BRIGHT), *clouds), wide=WIDE,
+        (mode_lines(modal, y.low, y.high), Curve("CMIF", hz, singular, BRIGHT), *clouds), wide=WIDE,
     ))  # fmt: skip
 
 
@@ -142,7 +152,7 @@ def _frf(
     draw(stream, f"modes/frf/{AXES[response]}{AXES[hit]}", Chart(
         f"response {AXES[response]}, hit {AXES[hit]} ({frf.hits[hit]} averaged)",
         ChartAxis(low, high, "frequency (Hz)"), y,
-        (_modes(modal, y.low, y.high), Curve("measured", hz, size, BRIGHT),
+        (mode_lines(modal, y.low, y.high), Curve("measured", hz, size, BRIGHT),
          Curve("fit", fitted_hz, np.abs(fitted), FIT)), (band,), WIDE,
     ))  # fmt: skip
 
@@ -156,5 +166,5 @@ def _coherence(stream: rr.RecordingStream, frf: Frf, modal: ModalModel, hit: int
     title = f"hit {AXES[hit]}" if known else f"hit {AXES[hit]}: not known, it takes two hits"
     draw(stream, f"modes/coherence/{AXES[hit]}", Chart(
         title, ChartAxis(0.0, float(frf.frequency_hz[-1]), "frequency (Hz)"),
-        ChartAxis(0.0, 1.05, "coherence"), (_modes(modal, 0.0, 1.0), *curves), wide=WIDER,
+        ChartAxis(0.0, 1.05, "coherence"), (mode_lines(modal, 0.0, 1.0), *curves), wide=WIDER,
     ))  # fmt: skip

@@ -13,7 +13,7 @@ from planner.milling.structure import Structure, beyond
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.plot_files import Pictures
-from planner.report.stability_source import Asked, structures_of_file
+from planner.report.stability_source import Asked, outside, structures_of_file
 from planner.report.stability_turns import TurnAdvice, turn_advice, turns_figure
 from planner.report.stability_way import Travelled, Way
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
@@ -137,7 +137,8 @@ def path_report(
             turned = turn_advice(travelled, cut, answer.best_spindle_rpm, within(tell, 0.5, 1.0))
             answer = replace(answer, turn=turned)
         feed = travelled.feed_in_base(answer.feed.turn_deg[answer.feed.best])
-        answer = replace(answer, feed=replace(answer.feed, direction_base=feed))
+        said = *outside(travelled.campaign, travelled.names, travelled.q), *answer.remarks
+        answer = replace(answer, feed=replace(answer.feed, direction_base=feed), remarks=said)
     if not pictures.wanted:
         return answer
     mark = SIMULATED_TITLE if answer.simulated else ""

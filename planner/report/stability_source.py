@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.campaign.planned import inside, outside_remark
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
@@ -125,7 +126,7 @@ def structure_of(asked: Asked, cut: Cut) -> Structure:
     if source.is_dir():
         campaign, q = _stands(source, asked.pose)
         (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
-        return found
+        return _with(found, outside(campaign, (str(asked.pose),), q[None]))
     no_pose(cut, source)
     if change is not None:
         return _coupled(asked, change, asked.pose, cut)
@@ -216,6 +217,13 @@ def at_poses_in_band(
         except OutOfBandError as error:
             found.append(error)
     return found
+
+
+def outside(campaign: "Campaign", names: Sequence[str], q: np.ndarray) -> tuple[str, ...]:
+    """A remark on those of the poses q (p, dof) in rad that lie outside the workspace, if any."""
+    there = inside(campaign.cell, q)
+    said = outside_remark([name for name, one in zip(names, there, strict=True) if not one])
+    return (said,) if said else ()
 
 
 def _with(structure: Structure, remarks: tuple[str, ...]) -> Structure:

@@ -4,7 +4,6 @@ import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 import pinocchio as pin
-import scipy.linalg
 
 from planner.robot.robot import BASE, Robot
 from planner.robot.virtual_joints import OUTER, SMALL
@@ -110,6 +109,8 @@ def _change(link: ElementTree.Element, values: np.ndarray) -> float:
 
 def _possible(nominal: np.ndarray, change: np.ndarray) -> float:
     """Share of a change of a pseudo-inertia that keeps it positive; 0 where it is not so before."""
+    import scipy.linalg  # 0.2 s, which reading inertias does not need
+
     try:
         least = scipy.linalg.eigh(change, nominal, eigvals_only=True)[0]
     except np.linalg.LinAlgError:

@@ -92,10 +92,18 @@ class Workspace:
         return scaled / (self.upper - self.lower)[varying]
 
     def contains(self, robot: Robot, q: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
-        """(n,) bool: whether poses q (n, dof) lie in the workspace."""
+        """(n,) bool: whether poses q (n, dof) lie in the workspace, the tool along its axis."""
         c = self.coordinates(robot, q)
+        along = np.ones(len(c), dtype=bool)
+        if self.tool_axis is not None:
+            # Angles that differ by whole turns are one: the one nearest to the box is meant.
+            middle = (self.lower[3] + self.upper[3]) / 2
+            c[:, 3] -= 2 * np.pi * np.round((c[:, 3] - middle) / (2 * np.pi))
+            axes = robot.forward_batch(np.atleast_2d(q))[0][:, :, 2]
+            along = np.linalg.norm(np.cross(axes, self.tool_axis), axis=1) <= tolerance
+            along &= axes @ self.tool_axis > 0
         inside = (c >= self.lower - tolerance) & (c <= self.upper + tolerance)
-        return np.all(inside, axis=1)
+        return np.all(inside, axis=1) & along
 
     def candidates(self, robot: Robot, n: int, seed: int) -> Candidates:
         """Up to n reachable poses spread evenly (Sobol); the same for the same seed.

@@ -43,7 +43,7 @@ def arrive(station: Station, course: Course) -> Course:
         campaign, proposal, station.hits_per_pose, station.inbox.folder, course
     )
     page = page_with_hits(page, (), (), undoable(station), station.auto, course)
-    station.screen.show(page.page())
+    station.screen.show(page.page)
     station.teller.tell()
     return replace(course, visit=Visit(proposal, page, time.monotonic()))
 

@@ -37,7 +37,7 @@ def page_with_hits(
     before = course.before.pose
     hits = tuple(_judged(number, one, before) for number, one in enumerate(verdicts, 1))
     page = replace(
-        page, hits=hits, unfinished=tuple(_named(*one) for one in waiting),
+        page, hits=hits, unfinished=tuple((one[0].name, _named(*one)) for one in waiting),
         progress=course.progress,
     )  # fmt: skip
     return replace(page, keys="" if auto else _keys(page, before, undoable))

@@ -1,12 +1,16 @@
 """The session's screen: one page that is drawn anew when something changed, and a bell."""
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
 
 NOTES = 4  # of the last sentences that stay on the page
+BELOW = 2  # lines under page and sentences: for what is being done, and for the cursor
+ENDLESS = 1000  # lines of what is no terminal
+
+Page = Callable[[int, int], RenderableType]  # of so many columns and lines at most
 
 
 class Screen:
@@ -14,18 +18,17 @@ class Screen:
 
     def __init__(self, console: Console):
         self.console = console
-        self._page: RenderableType | None = None
+        self._page: Page | None = None
         self._notes: deque[Text] = deque(maxlen=NOTES)
         self._shown = ""
         self._rung: set[tuple[str, int]] = set()
 
-    def show(self, page: RenderableType) -> None:
+    def show(self, page: Page | RenderableType) -> None:
         """Draw a page in the place of the one before; nothing where it is the same."""
-        self._page = page
-        with self.console.capture() as captured:
-            self.console.print(page)
-        if captured.get() != self._shown:
-            self._shown = captured.get()
+        self._page = page if callable(page) else lambda width, height: page
+        drawn = self._drawn(0)
+        if drawn != self._shown:
+            self._shown = drawn
             self._draw()
 
     def say(self, sentence: Text) -> None:
@@ -61,19 +64,38 @@ class Screen:
         return self.console.status(what)
 
     def _draw(self) -> None:
-        parts: list[RenderableType] = [] if self._page is None else [self._page]
         if not self.console.is_terminal:
-            self.console.print(Group(*parts))
+            if self._page is not None:
+                self.console.print(self._page(self.console.width, ENDLESS))
             return
+        last = self._lines(self._notes[-1]) if self._notes else 0
+        parts: list[RenderableType] = []
+        if self._page is not None:
+            parts.append(self._page(self.console.width, self._height - last))
+        room = self._height - self._drawn(last).count("\n")
         self.console.clear()
-        self.console.print(Group(*parts, *self._that_fit()))
+        self.console.print(Group(*parts, *self._that_fit(room)))
 
-    def _that_fit(self) -> list[Text]:
-        """The last sentences for which there is room under the page, and one line for work."""
-        room = self.console.height - self._shown.count("\n") - 2
+    @property
+    def _height(self) -> int:
+        return self.console.height - BELOW if self.console.is_terminal else ENDLESS
+
+    def _drawn(self, kept: int) -> str:
+        """The page where so many lines are kept for sentences."""
+        if self._page is None:
+            return ""
+        with self.console.capture() as captured:
+            self.console.print(self._page(self.console.width, self._height - kept))
+        return captured.get()
+
+    def _lines(self, note: Text) -> int:
+        return len(note.wrap(self.console, self.console.width))
+
+    def _that_fit(self, room: int) -> list[Text]:
+        """The last sentences for which there are so many lines."""
         fitting: list[Text] = []
         for note in reversed(self._notes):
-            room -= len(note.wrap(self.console, self.console.width))
+            room -= self._lines(note)
             if room < 0:
                 break
             fitting.insert(0, note)

@@ -158,7 +158,7 @@ def _looked(station: Station, course: Course, visit: Visit) -> Visit:
         return visit
     page = page_with_hits(visit.page, verdicts, waiting, undoable(station), station.auto, course)
     station.screen.ring({(str(v.path), n): v.kind for n, v in enumerate(verdicts, 1)})
-    station.screen.show(page.page())
+    station.screen.show(page.page)
     return replace(
         visit, page=page, whole=tuple(whole), verdicts=verdicts, shown=now, since=time.monotonic()
     )

@@ -8,6 +8,7 @@ averaged (see `importance`).
 
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,14 +62,20 @@ class Prior:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What an output's data say at each of k samples: L⁻¹ (k, c, c) and K⁻¹(y − mean) (k, c).
+    """What an output's data say at each of k samples: L (k, c, c) and K⁻¹(y − mean) (k, c).
 
-    K = LLᵀ is their covariance; `jitter`, relative to the prior variance, had to be added to it.
+    K = LLᵀ is their covariance, L as `triangular.in_bands` has it; `jitter`, relative to the prior
+    variance, had to be added to K.
     """
 
-    whiten: np.ndarray
+    factor: np.ndarray
     weights: np.ndarray
     jitter: float
+
+    @cached_property
+    def whiten(self) -> np.ndarray:
+        """L⁻¹ (k, c, c): of many points only what looks at its entries asks for it."""
+        return triangular.inverses(self.factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,18 +112,20 @@ class Posterior:
                 try:
                     # The same digits wherever those of many points are worked out again.
                     with threadpool_limits(1) if len(self.x) > AT_ONCE else nullcontext():
-                        whiten = self._whitening(j, jitter)
+                        factor = self._factor(j, jitter)
                 except np.linalg.LinAlgError:
                     continue
-                weights = np.swapaxes(whiten, 1, 2) @ (whiten @ self.y[j][:, None])
-                self._found[j] = Solved(whiten, weights[..., 0], jitter)
+                y = np.broadcast_to(self.y[j][:, None], (len(factor), len(self.x), 1))
+                white = triangular.divided(factor, y)
+                weights = triangular.divided_by_transposed(factor, white)[..., 0]
+                self._found[j] = Solved(factor, weights, jitter)
                 break
             else:
                 raise InputError(NO_FIT)
         return self._found[j]
 
-    def _whitening(self, j: int, jitter: float) -> np.ndarray:
-        """Inverse Cholesky factors (k, c, c); LinAlgError where a covariance is singular."""
+    def _factor(self, j: int, jitter: float) -> np.ndarray:
+        """Cholesky factors `in_bands` (k, c, c); LinAlgError where a covariance is singular."""
         kept, rows = len(self.theta[j]), np.flatnonzero(self.mask[j])
         held = slice(rows[-1] + 1 if len(rows) else 0)
         found = np.zeros((kept, len(self.x), len(self.x)))
@@ -128,8 +137,7 @@ class Posterior:
             block = slice(start, start + few)
             slope_sd, theta = self.slope_sd[j, block], self.theta[j, block]
             k = lower_half(self.kernel, self.x[held], *own, slope_sd, jitter, theta)
-            for i, factor in enumerate(np.linalg.cholesky(k), start):
-                found[i, held, held] = triangular.inverse(factor)
+            found[block, held, held] = triangular.in_bands(np.linalg.cholesky(k))
         return found
 
     @property
@@ -223,7 +231,12 @@ class Posterior:
         """
         known = self.known(j)
         cross = self._prior(j, self.x[known], self.low[j][known], x, low)
-        return cross, triangular.times(self.whitening(j), cross)
+        factor = self.solved(j).factor
+        if isinstance(known, slice):
+            return cross, triangular.divided(factor[:, known, known], cross)
+        whole = np.zeros((len(cross), len(self.x), len(x)))  # what holds no value is decoupled
+        whole[:, known] = cross
+        return cross, triangular.divided(factor, whole)[:, known]
 
     def known(self, j: int) -> slice | np.ndarray:
         """Which of the training points hold a value of output j."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import logsumexp, ndtri, softmax
 
 from planner import cache_folder, content_hash
 from planner.dataset.store import Store
+from planner.inference.log_space import log_sum, shares
 
 MOST_SHARED = 0.95  # points of one output are too few to stand for a narrower one
 SHARED_NODES = np.linspace(-4.0, 4.0, 33)  # of what outputs share, in its own sd
@@ -46,6 +46,7 @@ def _store() -> Store:
 
 
 def _normal_points(samples: int, dimensions: int, seed: int) -> np.ndarray:
+    from scipy.special import ndtri
     from scipy.stats import qmc
 
     sobol = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
@@ -78,17 +79,17 @@ def sample(
     first = len(normal) - len(later)
     points, log_weight = _from_prior(score, normal[:first], outputs, start)
     for stage, base in zip(later, normal[first:], strict=True):
-        centre, root = _around(points, softmax(log_weight, axis=1))
+        centre, root = _around(points, shares(log_weight, axis=1))
         wide = LATER_INFLATION * root
         points = centre[:, None, :] + base[: stage.count] @ np.swapaxes(wide, 1, 2)
         like = stage.score(points)
         if not np.isfinite(like).any(axis=1).all():
             raise np.linalg.LinAlgError
         log_weight = like + _log_normal(points) - _log_gaussian(points, centre, wide)
-    evidence = logsumexp(log_weight, axis=1) - np.log(points.shape[1])
+    evidence = log_sum(log_weight, axis=1) - np.log(points.shape[1])
     if shared is not None and shared.any():
         log_weight = log_weight + _learned_together(points[:, :, 1], log_weight, shared)
-    return _resampled(points, softmax(log_weight, axis=1), kept), evidence
+    return _resampled(points, shares(log_weight, axis=1), kept), evidence
 
 
 def _from_prior(
@@ -104,7 +105,7 @@ def _from_prior(
         if t == 0 and start is not None:
             centre, root = start
         else:
-            centre, root = _around(points, softmax(_log_weight(points, like, proposals), axis=1))
+            centre, root = _around(points, shares(_log_weight(points, like, proposals), axis=1))
         proposals.append((centre, PROPOSAL_INFLATION * root))
         moved = centre[:, None, :] + PROPOSAL_INFLATION * base @ np.swapaxes(root, 1, 2)
         points = np.concatenate([points, moved], axis=1)
@@ -121,15 +122,15 @@ def _learned_together(z: np.ndarray, log_weight: np.ndarray, shared: np.ndarray)
     most = np.minimum(shared, MOST_SHARED)[:, None, None]
     apart = z[:, :, None] - np.sqrt(most) * SHARED_NODES
     given = -0.5 * (apart**2 / (1 - most) + np.log(1 - most)) + 0.5 * z[:, :, None] ** 2
-    evidence = logsumexp(log_weight[:, :, None] + given, axis=1)  # (m, nodes)
+    evidence = log_sum(log_weight[:, :, None] + given, axis=1)  # (m, nodes)
     others = evidence.sum(axis=0) - evidence - 0.5 * SHARED_NODES**2
-    return np.asarray(logsumexp(given + others[:, None, :], axis=2))
+    return log_sum(given + others[:, None, :], axis=2)
 
 
 def _log_weight(points: np.ndarray, like: np.ndarray, proposals: list[Gaussians]) -> np.ndarray:
     """(m, s) of points (m, s, p) from equally many of N(0, 1) and of every proposal."""
     densities = [_log_normal(points), *(_log_gaussian(points, *g) for g in proposals)]
-    return like + densities[0] - logsumexp(densities, axis=0) + np.log(len(densities))
+    return like + densities[0] - log_sum(np.array(densities), axis=0) + np.log(len(densities))
 
 
 def _resampled(points: np.ndarray, weight: np.ndarray, kept: int) -> np.ndarray:

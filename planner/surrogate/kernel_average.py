@@ -12,7 +12,7 @@ from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.gp import Posterior
 from planner.surrogate.training_data import TrainingData
 
-NEGLIGIBLE_WEIGHT = 1e-3  # below which a kernel is not evaluated
+NEGLIGIBLE_WEIGHT = 1e-3  # below which a kernel is not evaluated for an output
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +41,14 @@ class KernelAverage:
 
     def predict(self, x: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) at x (q, d), simulation low (q, m) (NaN: unknown there)."""
-        used = self.counted
-        predictions = [self.models[i].predict(x, low) for i in used]
-        w = self.weights[used][:, None, :] / self.weights[used].sum(axis=0)
-        means, sds = (np.array([f[i] for f in predictions]) for i in (0, 1))
+        counted = np.where(self.weights > NEGLIGIBLE_WEIGHT, self.weights, 0.0)
+        shape = len(self.models), len(x), self.weights.shape[1]
+        means, sds = np.zeros(shape), np.zeros(shape)
+        for model, weight, mean, sd in zip(self.models, counted, means, sds, strict=True):
+            some = np.flatnonzero(weight)
+            if len(some):
+                mean[:, some], sd[:, some] = model.predict(x, low, some)
+        w = counted[:, None, :] / counted.sum(axis=0)
         mean = np.sum(w * means, axis=0)
         return mean, np.sqrt(np.sum(w * (sds**2 + (means - mean) ** 2), axis=0))
 

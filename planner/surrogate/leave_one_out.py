@@ -9,8 +9,8 @@ truncated weights, Ionides 2008).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
 
+from planner.inference.normal import below
 from planner.surrogate.gp import Posterior
 
 LEVELS = (0.5, 0.8, 0.9, 0.95)
@@ -57,7 +57,7 @@ def leave_one_out(posterior: Posterior, measurements: int) -> LeaveOneOut:
         mean = np.sum(w * off, axis=0)
         error[known, j] = mean
         sd[known, j] = np.sqrt(np.sum(w * (spread**2 + (off - mean) ** 2), axis=0))
-        rank[known, j] = np.sum(w * ndtr(off / spread), axis=0)
+        rank[known, j] = np.sum(w * below(off / spread), axis=0)
     return LeaveOneOut(error, sd, rank)
 
 

@@ -8,8 +8,8 @@ neither. Samples of the simpler models stand beside those of the free one, by th
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import logsumexp, softmax
 
+from planner.inference.log_space import log_sum, shares
 from planner.surrogate.ar1 import AR1, OutputPrior, fit_ar1
 from planner.surrogate.training_data import TrainingData
 
@@ -54,7 +54,7 @@ def _averaged(models: list[AR1], asked: np.ndarray) -> AR1:
     m, kept, size = first.theta.shape
     evidence = np.array([p.log_evidence for p in posteriors])
     evidence[1:, ~asked] = -np.inf
-    edges = np.cumsum(softmax(evidence, axis=0), axis=0)[:-1]  # (models − 1, m)
+    edges = np.cumsum(shares(evidence, axis=0), axis=0)[:-1]  # (models − 1, m)
     # Samples stand in an order; those that stay of each model are spread over it.
     place = (np.argsort(np.argsort((np.arange(kept) * GOLDEN_RATIO) % 1.0)) + 0.5) / kept
     chosen = np.sum(place[None, None, :] > edges[:, :, None], axis=0)  # (m, kept)
@@ -71,7 +71,7 @@ def _averaged(models: list[AR1], asked: np.ndarray) -> AR1:
         ),
         slope_sd=picked([p.slope_sd for p in posteriors]),
         # Each is believed as much as a GP that ignores the simulation, with which this is compared.
-        log_evidence=logsumexp(evidence, axis=0),
+        log_evidence=log_sum(evidence, axis=0),
         jitter=max(p.jitter for p in posteriors),
     )
     return replace(models[0], posterior=posterior)

@@ -7,7 +7,6 @@ heavier and its middle narrower.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr, ndtri
 
 BISECTIONS = 60  # 2⁻⁶⁰ of the first interval: all digits of a double
 
@@ -37,11 +36,15 @@ class Predictive:
 
     def below(self, y: np.ndarray) -> np.ndarray:
         """Probability (q,) of a value below y (q,)."""
+        from scipy.special import ndtr  # 0.1 s, which predictions do not need
+
         sds = np.maximum(self.sds, 1e-300)
         return self.weights @ ndtr((y - self.means) / sds)
 
     def quantile(self, probability: float) -> np.ndarray:
         """The value (q,) below which `probability` lies."""
+        from scipy.special import ndtri
+
         reach = abs(ndtri(probability)) + 8
         low, high = (np.min(self.means - reach * self.sds, axis=0),
                      np.max(self.means + reach * self.sds, axis=0))  # fmt: skip

@@ -8,6 +8,7 @@ import pytest
 
 from planner.cli.run import run
 from planner.modal.mac import mac
+from tests.cli.test_modes_pictures import entities_of
 from tests.support.matrix_files import write_matrix
 from tests.support.struck_structures import struck, unit_mass_shapes
 from tests.support.structures import plate
@@ -221,3 +222,27 @@ def test_dead_channels_are_left_out_and_named(structure, matrix, tmp_path, capsy
     assert "4 FRFs are zero throughout" in " ".join(answer["remarks"])
     assert [11, "z"] not in answer["dofs"]
     agree(answer, structure)
+
+
+@pytest.mark.parametrize("placed", [True, False])
+def test_the_recording_has_charts_shapes_and_mac_in_place_of_pictures(
+    structure, matrix, tmp_path, capsys, placed
+):
+    place = np.array([structure.position_m[n] for n in structure.nodes])
+    ends = [number for pair in structure.lines for number in (*pair, 0)]
+    sets = [
+        {"type": 15, "node_nums": np.array(structure.nodes), "x": place[:, 0], "y": place[:, 1],
+         "z": place[:, 2]},
+        {"type": 82, "trace_num": 1, "n_nodes": len(ends), "color": 0, "id": "grid",
+         "nodes": np.array(ends)},
+    ]  # fmt: skip
+    path = write_matrix(tmp_path / "set.uff", matrix, before=sets if placed else ())
+    code, answer, err = modes(capsys, path, "--band-hz", *BAND, "--rrd", tmp_path / "modes.rrd")
+    assert (code, err) == (0, "")
+    drawn = entities_of(answer["rrd"])
+    count = len(answer["modes"])
+    wanted = {"/modes/stabilisation/CMIF", "/modes/driving/2/fit", "/modes/mac/cells", "/note"}
+    own = "points" if placed else "shape"
+    wanted |= {f"/modes/shape/{k + 1}/{own}" for k in range(count)}
+    assert wanted <= drawn
+    assert "/modes/shape/1/rest" in drawn or not placed

@@ -131,8 +131,10 @@ def test_a_session_in_which_all_goes_wrong(cell):
             analyser.write(name, getattr(analyser, name)(axis))
             terminal.until(said, "x 0/2")
             assert terminal.seen.count("\a") > bells
+            assert "…" not in terminal.page[: terminal.page.index("waiting for hits in")]
         (inbox / "foreign.uff").write_bytes(b"this is no recording\n" * 30)
-        terminal.until("not whole yet", "foreign.uff")
+        page = terminal.until("not whole yet", "foreign.uff")
+        assert "…" not in page[: page.index("waiting for hits in")]
         whole = analyser.write("x1", analyser.good("+x"))
         data = whole.read_bytes()
         terminal.until("x 1/2")

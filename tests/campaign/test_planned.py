@@ -1,0 +1,103 @@
+"""Predictions outside what was planned are marked: by joints, places, tool and branch alike."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.cell import Cell
+from planner.campaign.config import load_campaign_config
+from planner.campaign.planned import inside, outside_remark
+from planner.demo import NAME, shipped
+from planner.report.predictions import predictions
+from planner.robot.collision import Collisions
+from planner.robot.inverse_kinematics import solve
+
+POSES = 80  # planned; as many again that are not
+
+
+def cell_of(config: Path) -> Cell:
+    return Cell.load(shipped(NAME) / "robot" / "robot.toml", load_campaign_config(config))
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory):
+    """A workspace of positions and rotations."""
+    config = tmp_path_factory.mktemp("places") / "campaign.toml"
+    text = (shipped(NAME) / "campaign.toml").read_text()
+    ranges = "position_m = [[1.2, 1.8], [-0.5, 0.6], [1.0, 1.4]]\nrotation_deg = [-40, 40]"
+    assert "\n[acquisition]" in text
+    text = text.replace("\n[acquisition]", f"\n[acquisition]\ncandidates = {POSES}")
+    old = next(line for line in text.splitlines() if line.startswith("position_m"))
+    config.write_text(text.replace(old, ranges))
+    return cell_of(config)
+
+
+@pytest.fixture(scope="module")
+def planned(places):
+    """Further poses as they would have been planned."""
+    return places.workspace.candidates(places.robot, 2 * POSES, 0).q[POSES:]
+
+
+def test_poses_as_planned_are_inside(places, planned):
+    assert inside(places, places.candidates.q).all()
+    assert inside(places, planned).all()
+    turned = planned.copy()
+    turned[:, 5] += np.where(turned[:, 5] > 0, -2 * np.pi, 2 * np.pi)  # the same pose
+    assert inside(places, turned).all()
+
+
+def test_a_wrist_turned_over_is_outside(places, planned):
+    rotation, position = places.robot.forward_batch(planned)
+    over = planned.copy()
+    over[:, 3] += np.where(over[:, 3] > 0, -np.pi, np.pi)
+    over[:, 4] *= -1
+    over[:, 5] += np.where(over[:, 5] > 0, -np.pi, np.pi)
+    same_rotation, same_position = places.robot.forward_batch(over)
+    np.testing.assert_allclose(same_rotation, rotation, atol=1e-9)
+    np.testing.assert_allclose(same_position, position, atol=1e-9)
+    assert places.workspace.contains(places.robot, over, 1e-5).all()
+    away = np.abs(planned[:, 4]) > np.deg2rad(15)  # where the two ways are far from one another
+    assert away.sum() > POSES / 2
+    # So few poses are planned here that one far from all may be reached either way.
+    assert inside(places, over[away]).mean() < 0.06
+
+
+def test_a_tilted_tool_is_outside(places, planned):
+    rotation, position = places.robot.forward_batch(planned[:10])
+    turn = np.array([[1, 0, 0], [0, np.cos(0.04), -np.sin(0.04)], [0, np.sin(0.04), np.cos(0.04)]])
+    free = Collisions(places.robot)
+    every = zip(rotation, position, planned, strict=False)
+    found = [solve(places.robot, r @ turn, p, q, free, 0).q for r, p, q in every]
+    tilted = np.array([q for q in found if q is not None])
+    assert len(tilted) > 5
+    np.testing.assert_allclose(
+        places.robot.forward_batch(tilted)[1], position[[q is not None for q in found]], atol=1e-4
+    )
+    assert not inside(places, tilted).any()
+
+
+def test_every_answer_marks_them(tmp_path):
+    source = shipped(NAME)
+    robot = source / "robot" / "robot.toml"
+    campaign = Campaign.new(tmp_path / "cell", robot, source / "campaign.toml")
+    here = campaign.cell.candidates.q[0]
+    tilted = here + np.deg2rad([0, 0, 0, 0, 3, 0])
+    report = predictions(campaign, ["here", "tilted"], [here, tilted], tmp_path / "p.npz")
+    assert [pose.outside for pose in report.poses] == [False, True]
+    assert np.load(tmp_path / "p.npz")["outside"].tolist() == [False, True]
+    rows = report.text().renderables[0]
+    assert "tilted (outside)" in list(rows.columns[0].cells)
+    assert "here" in list(rows.columns[0].cells)
+    marks = {
+        row["pose"]: row["outside"] for row in campaign.predict_records(np.array([here, tilted]))
+    }
+    assert marks == {1: False, 2: True}
+    assert str(report.text().renderables[1]) == outside_remark(["tilted"])
+
+
+def test_the_sentence_stays_short():
+    assert outside_remark([]) == ""
+    assert outside_remark(["A"]).startswith("A lies outside")
+    assert "and 14 more lie outside" in outside_remark([f"W{i}" for i in range(20)])

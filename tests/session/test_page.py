@@ -1,0 +1,133 @@
+"""The page of a pose is never higher than the screen, and says whole what is to be done."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from rich.text import Text
+
+from planner.campaign.events import Proposal
+from planner.recording.joints import JointUnits
+from planner.report.fitted_lines import Said, fitted
+from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do, remedy_first
+from planner.session.screen import Screen
+
+DOUBLE = JudgedHit(
+    1, "+x", "repeat",
+    "A second pulse of 120 N follows the first of 300 N; hit once and let it bounce off.",
+)  # fmt: skip
+AGAINST = JudgedHit(
+    2, "-x", "good",
+    "The tool answers hits along -x against their direction (Im H < 0 along x, where it is hit); "
+    "check the sign of the axis and the polarity of force and acceleration.",
+)  # fmt: skip
+CLIPPED = JudgedHit(
+    3, "", "repeat",
+    "The force is clipped at 312.5 (3 samples); raise the channel's range or hit more softly. The "
+    "acceleration x is clipped at 5.1 (4 samples); raise the channel's range or hit more softly.",
+)  # fmt: skip
+LATE = JudgedHit(4, "+z", "late", "answers as P001 did: [b] it is from there, [h] from here")
+OTHER = JudgedHit(
+    5, "+z", "repeat",
+    "Its FRF is that of hits along x (likeness 0.12, others 0.99); check axis and hit point, and "
+    "hit again.",
+)  # fmt: skip
+ALL = DOUBLE, AGAINST, CLIPPED, LATE, OTHER
+KEYS = keys_that_do([(key, f"does {key} to what waits there", True) for key in "arbhsku"])
+FOREIGN = "foreign.uff is no UFF file: it begins with other words than one; export it again."
+
+
+@pytest.fixture
+def page():
+    """Seven joints, one of them a rail; six modes; names as long as people give."""
+    names = ("rail", *(f"joint_{i}" for i in range(1, 7)))
+    place = (1200.0, 10.0, -30.0, 45.0, 90.0, 12.5, -170.0)
+    reason = "the model knows least there, and the frequencies of modes 3 and 4 cross nearby"
+    name = "left-of-the-fixture-station-12-once-more"
+    return PosePage(
+        Proposal(name, place, (1.234, -0.5, 1.6), None, reason), 17,
+        JointUnits(names, (True, *[False] * 6)), "tool0_hammer_tip", 4, (),
+        (8.12, 12.5, 17.8, 22.3, 28.9, 33.1), (0.12, 0.2, 0.3, 0.4, 0.5, 0.6),
+        Path("/home/someone/projects/2026/cell7/measurements/exports/analyser-3"),
+        unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is being written")),
+        progress="sd of all 1.23 %; 2.3 min per pose; 3 to 5 more poses, 7 to 12 min to go",
+        keys=KEYS,
+    )  # fmt: skip
+
+
+def lines(page, width=80, height=22):
+    console = Console(width=width)
+    with console.capture() as captured:
+        console.print(page.page(width, height))
+    return captured.get().rstrip("\n").split("\n")
+
+
+def whole(found):
+    return " ".join(" ".join(found).split())
+
+
+@pytest.mark.parametrize("last", range(1, len(ALL) + 1))
+@pytest.mark.parametrize("files", [0, 2])
+def test_the_last_verdict_is_whole_and_the_page_fits(page, last, files):
+    found = lines(replace(page, hits=ALL[:last], unfinished=page.unfinished[:files]))
+    assert len(found) <= 22
+    assert all(len(line) <= 80 for line in found)
+    text = whole(found)
+    do, why = remedy_first(ALL[last - 1].text)
+    assert f"{do} {why}".strip() in text
+    assert all(key in text for key in whole([KEYS]).split("  "))
+    cut = [line for line in found if "…" in line]
+    assert all(line.startswith("waiting for hits in") for line in cut)
+
+
+def test_what_to_do_comes_first(page):
+    assert remedy_first(DOUBLE.text) == (
+        "Hit once and let it bounce off.", "A second pulse of 120 N follows the first of 300 N."
+    )  # fmt: skip
+    do, why = remedy_first(CLIPPED.text)
+    assert do == "Raise the channel's range or hit more softly."  # once
+    assert why == "The force is clipped at 312.5 (3 samples). The acceleration x is clipped at " \
+        "5.1 (4 samples)."  # fmt: skip
+    assert remedy_first(LATE.text) == (LATE.text, "")
+    said = whole(lines(replace(page, hits=(CLIPPED,))))
+    assert (
+        "REPEAT HIT 3 (axis not stated): Raise the channel's range or hit more softly. The" in said
+    )
+    assert "foreign.uff: Export it again." in said
+    assert "half.uff is being written" in said
+
+
+def test_with_room_all_is_said(page):
+    found = lines(replace(page, hits=ALL), height=60)
+    text = whole(found)
+    assert all(" ".join(remedy_first(hit.text)).strip() in text for hit in ALL[-4:])
+    assert page.proposal.reason in text
+    assert str(page.folder) in text
+    assert "33.10 ± 0.60" in text
+    assert page.progress in text
+    assert not any("…" in line for line in found)
+
+
+def test_the_longest_forms_that_fit_are_taken():
+    long, short = Text("word " * 40), Text("word")
+    parts = [Said([short, long], rank) for rank in (2, 1)]
+    assert fitted(parts, 80, 100) == [long, long]
+    assert fitted(parts, 80, 4) == [short, long]
+    assert fitted(parts, 80, 1) == [short, short]
+    assert fitted([Said([None, short]), Said([short])], 80, 1) == [short]
+
+
+def test_a_sentence_under_a_full_page_is_seen(page):
+    console = Console(width=80, height=24, force_terminal=True, legacy_windows=False)
+    screen = Screen(console)
+    told = "Hits are missing (x 1/4, y 0/4, z 0/4): hit on, or press a again to accept it as it is."
+    with console.capture():
+        screen.show(replace(page, hits=ALL).page)
+        screen.say(Text("An earlier sentence."))
+    with console.capture() as captured:
+        screen.say(Text(told))
+    text = Text.from_ansi(captured.get().split("\x1b[2J")[-1]).plain
+    assert told in whole(text.split("\n"))
+    assert " ".join(remedy_first(OTHER.text)) in whole(text.split("\n"))
+    assert text.rstrip("\n").count("\n") < 24
