@@ -1,9 +1,7 @@
 """Rows of a matrix under a wrong sign or name, where only the places of the points show it.
 
-Between neighbours a structure moves smoothly. How a point should move in all modes is foretold
-from the others (Gaussian process over the places, or over the trace lines where there are some:
-Whittle's field on a graph, as smooth as a bent beam), each point left out in turn. A row that is
-the opposite of what is foretold was measured with a turned sign; two nodes whose rows fit each
+How a point should move in all modes is foretold from the others, each left out in turn. A row that
+is the opposite of what is foretold was measured with a turned sign; two nodes whose rows fit each
 other's places, and not their own, were exchanged.
 """
 
@@ -13,12 +11,10 @@ from itertools import combinations
 
 import numpy as np
 
+from planner.modal.motion_fields import NUGGET, motion_fields
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
-# Correlation lengths in spacings of the points; ranges of the field on trace lines likewise.
-LENGTHS = (1.0, 1.5, 2.2, 3.3, 5.0, 8.0)
-NUGGET = 0.03  # of the motion: rows err by this
 LEAST_ROWS, LEAST_MODES = 8, 3
 # A row is turned where the squared difference to what is foretold is less than this, with the sign
 # turned, and more than this as stated, relative to the row's own square, and where turning another
@@ -87,8 +83,7 @@ def _likeliest(
     The likeliest of several fields, each row left out in turn. Smooth modes then count more.
     """
     best, found = -np.inf, (values, np.eye(len(nodes)))
-    for covariance in _fields(nodes, geometry):
-        covariance = covariance / np.mean(np.diag(covariance))
+    for covariance in motion_fields(nodes, geometry):
         precision = np.linalg.inv(covariance + NUGGET**2 * np.eye(len(nodes)))
         spread = np.diag(precision)
         square = (precision @ values) ** 2 / spread[:, None]
@@ -99,42 +94,6 @@ def _likeliest(
         if likely > best:
             best, found = likely, (values / np.sqrt(usual), precision)
     return found
-
-
-def _fields(nodes: list[str], geometry: Geometry) -> list[np.ndarray]:
-    """Covariances (n, n) of motions at the nodes."""
-    place = np.array([geometry.at(node) for node in nodes])
-    apart = np.linalg.norm(place[:, None] - place, axis=-1)
-    spacing = float(np.median(np.min(apart + np.diag(np.full(len(nodes), np.inf)), axis=1)))
-    fields = []
-    for length in LENGTHS:
-        scaled = np.sqrt(5) * apart / (length * spacing)
-        fields.append((1 + scaled + scaled**2 / 3) * np.exp(-scaled))
-    ends = {node for line in geometry.lines for node in line}
-    if ends.issuperset(nodes):
-        fields += _on_lines(nodes, geometry)
-    return fields
-
-
-def _on_lines(nodes: list[str], geometry: Geometry) -> list[np.ndarray]:
-    """Covariances (n, n) of fields along the trace lines, (κ² + L)⁻² of the graph's Laplacian L."""
-    every = list(dict.fromkeys(node for line in geometry.lines for node in line))
-    index = {node: k for k, node in enumerate(every)}
-    a, b = (np.array([index[line[end]] for line in geometry.lines]) for end in (0, 1))
-    place = np.array([geometry.at(node) for node in every])
-    length = np.maximum(np.linalg.norm(place[a] - place[b], axis=1), 1e-300)
-    weight = (np.median(length) / length) ** 2
-    laplacian = np.zeros((len(every), len(every)))
-    np.add.at(laplacian, (a, b), -weight)
-    np.add.at(laplacian, (b, a), -weight)
-    laplacian -= np.diag(np.sum(laplacian, axis=1))
-    chosen = [index[node] for node in nodes]
-    values, vectors = np.linalg.eigh(laplacian)
-    fields = []
-    for reach in LENGTHS:
-        power = 1 / (1 / reach**2 + np.maximum(values, 0.0)) ** 2
-        fields.append((vectors[chosen] * power) @ vectors[chosen].T)
-    return fields
 
 
 def turned_rows(dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry) -> tuple[int, ...]:

@@ -8,9 +8,8 @@ from planner.modal.fit_data import Data
 from planner.modal.residues import unit
 from planner.modal.set_drift import sought
 from planner.modal.set_poles import FARTHEST, SetPoles, StrayedError, fit_sets
+from planner.modal.set_search import Places, searched_again
 
-# Row and column of each entry, columns being those of the few references.
-Places = tuple[np.ndarray, np.ndarray]
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
 # this share of the frequency, or within a bandwidth.
 ALIKE, TOGETHER = 0.8, 0.02
@@ -104,7 +103,7 @@ def unsplit(
     for group in _groups(fit, places, order):
         pairs = [group[k : k + 2] for k in range(len(group) - 1)] if len(group) > 2 else []
         for tried in (group, *pairs):
-            one = _as_one(data, sets, fit, variance, tried)
+            one = _as_one(data, sets, fit, variance, tried, places)
             if one is not None:
                 poles[tried[0]], own[tried[0]] = one
                 for k in tried[1:]:
@@ -144,7 +143,7 @@ def _alike(fit: SetPoles, places: Places, first: int, second: int) -> bool:
 
 def _as_one(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
-    group: np.ndarray,
+    group: np.ndarray, places: Places,
 ) -> tuple[complex, np.ndarray] | None:  # fmt: skip
     """Common pole and the sets' own of one mode instead of a group; None if that is worse."""
     share = fit.significance[group] / np.sum(fit.significance[group])
@@ -162,6 +161,12 @@ def _as_one(
     try:
         one = fit_sets(local, sets, variance[:, lines], poles, MERGED_ROUNDS, own)
         more = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
+        if explains(local, one, more, variance[:, lines], APART):
+            # Where it is one mode, the sets that fitted it badly are what two explain better.
+            own = searched_again(local, sets, one, variance[:, lines], places)
+            if own is None:
+                return None
+            one = fit_sets(local, sets, variance[:, lines], one.poles, MERGED_ROUNDS, own)
     except StrayedError:
         return None
     if explains(local, one, more, variance[:, lines], APART):
