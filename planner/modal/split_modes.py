@@ -89,6 +89,16 @@ def explains(
     return chi[0] - chi[1] > margin * local.threshold * scale
 
 
+def _in_most(
+    local: Data, sets: tuple[np.ndarray, ...], less: SetPoles, more: SetPoles, variance: np.ndarray
+) -> bool:
+    """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
+    square = [np.abs(local.response[:, 0] - fit.fitted) ** 2 for fit in (less, more)]
+    fall = np.sum(2 / variance * (square[0] - square[1]), axis=1)
+    each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in sets]
+    return bool(np.median(each) > APART)
+
+
 def unsplit(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
     places: Places,
@@ -162,7 +172,9 @@ def _as_one(
         one = fit_sets(local, sets, variance[:, lines], poles, MERGED_ROUNDS, own)
         more = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
         if explains(local, one, more, variance[:, lines], APART):
-            # Where it is one mode, the sets that fitted it badly are what two explain better.
+            # Where it is one mode, only sets that fitted it badly are explained better by two.
+            if _in_most(local, sets, one, more, variance[:, lines]):
+                return None
             own = searched_again(local, sets, one, variance[:, lines], places)
             if own is None:
                 return None
