@@ -13,7 +13,7 @@ from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
 KNOWN = 0.1  # a point is known whose sd is less than this share of the mode's usual motion
-LEAST_KNOWN = 8  # points of a direction, that foretell others
+LEAST_KNOWN = 8  # degrees of freedom, that foretell others
 LEAST_AROUND = 0.05  # of the mean square, that points are taken to move by around any point
 
 
@@ -32,24 +32,18 @@ def expected(
     mean, variance = np.zeros(shapes.shape, complex), np.tile(power, (len(shapes), 1))
     if geometry is None:
         return mean, variance
-    for direction in sorted({dof.positive.direction for dof in dofs}):
-        index = np.array(
-            [
-                k for k, dof in enumerate(dofs)
-                if dof.positive.direction == direction and geometry.at(dof.node) is not None
-            ], int,
-        )  # fmt: skip
-        if index.size <= LEAST_KNOWN:
-            continue
-        fields = motion_fields([dofs[k].node for k in index], geometry)
-        for k in range(shapes.shape[1]):
-            size = np.sqrt(power[k])
-            motion, sd = shapes[index, k] / size, sds[index, k] / size
-            found = _from_neighbours(fields, motion, sd)
-            if found is not None:
-                unknown = ~_known(motion, sd) & (found[1] < 1)
-                mean[index[unknown], k] = found[0][unknown] * size
-                variance[index[unknown], k] = found[1][unknown] * power[k]
+    index = np.array([k for k, dof in enumerate(dofs) if geometry.at(dof.node) is not None], int)
+    if index.size <= LEAST_KNOWN:
+        return mean, variance
+    fields = motion_fields([dofs[k] for k in index], geometry)
+    for k in range(shapes.shape[1]):
+        size = np.sqrt(power[k])
+        motion, sd = shapes[index, k] / size, sds[index, k] / size
+        found = _from_neighbours(fields, motion, sd)
+        if found is not None:
+            unknown = ~_known(motion, sd) & (found[1] < 1)
+            mean[index[unknown], k] = found[0][unknown] * size
+            variance[index[unknown], k] = found[1][unknown] * power[k]
     return mean, variance
 
 
