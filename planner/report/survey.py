@@ -9,6 +9,7 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import CampaignMisses, Visited, told_by
 from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import MeasuredPose, measure
@@ -16,7 +17,9 @@ from planner.dataset.screened_files import Source
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
+from planner.identification.measured_frfs import common_band
 from planner.identification.measurement_model import Tolerances
+from planner.identification.point_places import misplaced, questions
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import TABLE, joint_columns, read_recordings
@@ -26,6 +29,7 @@ from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode, check
 from planner.report.plot_files import Pictures
 from planner.report.sensor_masses import WithoutSensors, without_sensors
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.robot.robot import Robot
 
 ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
@@ -181,21 +185,21 @@ def survey(
     q = table.joints.internal([first[name].joints_deg for name in names])
     misses = _misses(visited, robot_toml, band)
     found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
-    bare = without_sensors(names, found, _simulations(misses, robot_toml), q, every)
+    simulations = _simulations(misses, robot_toml)
+    doubts = _doubts(names, simulations, q, every, band)
+    bare = without_sensors(names, found, simulations, q, every)
     tracks, expected = _labelled(bare.modes, q, robot_toml)
     poses = tuple(_pose(name, tracks, i, bare) for i, name in enumerate(names))
     hits = tuple(hit for pose in misses.poses for hit in pose.hits)
     return SurveyReport(
-        poses, poses[0].modes, band, tuple(refused), bare.remarks, simulated, hit_errors=hits,
-        habits=habits(hits), tracks=tracks, simulated_hz=expected,
+        poses, poses[0].modes, band, tuple(refused), (*doubts, *bare.remarks), simulated,
+        hit_errors=hits, habits=habits(hits), tracks=tracks, simulated_hz=expected,
     )  # fmt: skip
 
 
 def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
     if robot_toml is None:
         return read_recordings(folder, joint_columns(folder))
-    from planner.robot.robot import Robot
-
     robot = Robot.load(robot_toml)
     return read_recordings(folder, robot.joints, robot.points)
 
@@ -219,22 +223,47 @@ def _misses(
     """By the robot's simulation, identified from these recordings; none without a robot."""
     if robot_toml is None or not visited:
         return CampaignMisses((), None, Tolerances(), band)
-    from planner.robot.robot import Robot
-
     robot = Robot.load(robot_toml)
-    tolerances = Tolerances.of(robot.config, robot.joints.slides)
     visits, whole = zip(*visited, strict=True)
-    return told_by(Simulation(robot), visits, whole, tolerances, band)
+    return told_by(Simulation(robot), visits, whole, _tolerances(robot), band)
+
+
+def _tolerances(robot: Robot) -> Tolerances:
+    return Tolerances.of(robot.config, robot.joints.slides)
 
 
 def _simulations(misses: CampaignMisses, robot_toml: Path | None) -> list[Simulation]:
     """As stated, and as identified from the recordings where that was done."""
     if robot_toml is None:
         return []
-    from planner.robot.robot import Robot
-
     told = [misses.told.simulation] if misses.told is not None and misses.trusted else []
     return [Simulation(Robot.load(robot_toml)), *told]
+
+
+def _doubts(
+    names: Sequence[str],
+    simulations: Sequence[Simulation],
+    q: np.ndarray,
+    measured: Sequence[MeasuredPose],
+    band: tuple[float, float],
+) -> tuple[str, ...]:
+    """Questions about points whose FRFs a simulation describes far better elsewhere."""
+    index = [i for i, one in enumerate(measured) if one.whole is not None]
+    frfs = [one.whole for one in measured if one.whole is not None]
+    if not simulations or not frfs:
+        return ()
+    usable = common_band(frfs, band)
+    found = misplaced(simulations, q[index], frfs, usable)
+    tool = [(i, frf.of_tool) for i, frf in zip(index, frfs, strict=True)]
+    known = [(i, frf) for i, frf in tool if frf is not None]
+    if found and known:
+        # What was identified from wrongly named points too is spoiled: from the tool's alone.
+        nominal = LowFidelity(1, simulations[0], _tolerances(simulations[0].robot))
+        learned = learn(nominal, [frf for _, frf in known], q[[i for i, _ in known]], band).learned
+        if learned is not None:
+            tried = [*simulations, learned.identified.simulation]
+            found = misplaced(tried, q[index], frfs, usable)
+    return questions(found, [names[i] for i in index])
 
 
 def _labelled(
@@ -245,8 +274,6 @@ def _labelled(
     labels = max(map(len, found))
     if robot_toml is None:
         return track(found, Guide.by_example(found), x), None
-    from planner.robot.robot import Robot
-
     simulation = Simulation(Robot.load(robot_toml))
     middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
     count = min(labels + ABOVE, simulation.elastic.size)
