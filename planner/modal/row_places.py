@@ -143,6 +143,21 @@ def exchanged_nodes(
     return None
 
 
+def exchange_is_clearer(
+    dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry, pair: tuple[str, str], row: int
+) -> bool:
+    """Whether two exchanged nodes explain more than one row (index) with a turned sign."""
+    found = foretold(dofs, shapes, geometry)
+    if found is None:
+        return False
+    own = [
+        {dofs[i].positive.direction: k for k, i in enumerate(found.index) if dofs[i].node == node}
+        for node in pair
+    ]
+    turned = found.gain[np.flatnonzero(found.index == row)]
+    return bool(np.all(_gain(found, *_both(*own)) > turned))
+
+
 def _both(one: dict[str, int], other: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
     """Rows (k,) of two nodes, direction by direction."""
     return np.array(list(one.values())), np.array([other[direction] for direction in one])
