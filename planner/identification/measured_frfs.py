@@ -47,7 +47,7 @@ class Measured:
         """Matrices between the points of `layout` with the mass of sensors that were there."""
         count = np.count_nonzero(self.used, axis=(2, 3)).reshape(len(self.used), -1, 3)
         there = np.sum(count, axis=2) > 0
-        return _loaded(matrices, simulation.robot, self.layout, there)
+        return with_sensors(matrices, simulation.robot, self.layout, there)
 
 
 def common_band(frfs: Sequence[Frf], band_hz: tuple[float, float]) -> tuple[float, float]:
@@ -114,10 +114,10 @@ def matrices_at(
     layout = layout_of(frfs)
     found = elastic.with_slopes(q, layout) if sloped else elastic.matrices(q, layout=layout)
     there = np.array([[name in f.layout.sensors for name in layout.sensors] for f in frfs])
-    return _loaded(found, elastic.robot, layout, there)
+    return with_sensors(found, elastic.robot, layout, there)
 
 
-def _loaded(found: Matrices, robot: Robot, layout: Layout, there: np.ndarray) -> Matrices:
+def with_sensors(found: Matrices, robot: Robot, layout: Layout, there: np.ndarray) -> Matrices:
     """With the mass of sensors at the poses where they were, `there` (n, s)."""
     mass = found.mass
     for number, name in enumerate(layout.sensors):

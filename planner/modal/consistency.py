@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.exchanged import Exchange, exchanges, turning_helps
+from planner.modal.exchanged import Exchange, exchanged_instead, exchanges, turning_helps
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.matrix_sides import Sides
 from planner.modal.odd_entries import odd_entries, place
@@ -88,8 +88,9 @@ def check(
     turned = tuple(dof for dof in wrong if dof not in rows)
     swapped: tuple[Exchange, ...] = ()
     # Two exchanged points may look like two turned signs: one fault is likelier than two.
-    alone = len(rows) == 1 and not turned
-    if enough and not alone and not turning_helps(sides, turned):
+    if len(rows) == 1 and not turned:
+        swapped = exchanged_instead(sides, geometry, rows[0])
+    elif enough and not turning_helps(sides, turned):
         swapped = exchanges(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)
     faults = [exchange.text for exchange in swapped]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.modal.matrix_sides import Sides
-from planner.modal.row_places import exchanged_nodes
+from planner.modal.row_places import exchange_is_clearer, exchanged_nodes
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
@@ -59,11 +59,24 @@ def exchanges(sides: Sides, geometry: Geometry | None) -> tuple[Exchange, ...]:
     if found or geometry is None:
         return found
     pair = exchanged_nodes(sides.rows, motions[0].real, geometry)
-    if pair is None:
+    return () if pair is None else (_named(sides, pair),)
+
+
+def exchanged_instead(sides: Sides, geometry: Geometry | None, row: Dof) -> tuple[Exchange, ...]:
+    """Points whose exchange explains more than a turned sign of a row, where there are any."""
+    if sides.motions is None or geometry is None:
         return ()
-    nan = float("nan")
-    first = [next(dof for dof in sides.rows if dof.node == node) for node in pair]
-    return (Exchange(first[0], first[1], nan, nan),)
+    shapes = sides.motions[0].real
+    pair, turned = exchanged_nodes(sides.rows, shapes, geometry), sides.rows.index(row)
+    if pair is None or not exchange_is_clearer(sides.rows, shapes, geometry, pair, turned):
+        return ()
+    return (_named(sides, pair),)
+
+
+def _named(sides: Sides, pair: tuple[str, str]) -> Exchange:
+    """Two nodes of which only the neighbours tell."""
+    first, second = (next(dof for dof in sides.rows if dof.node == node) for node in pair)
+    return Exchange(first, second, float("nan"), float("nan"))
 
 
 def turning_helps(sides: Sides, turned: tuple[Dof, ...]) -> bool:

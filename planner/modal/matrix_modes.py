@@ -8,6 +8,7 @@ from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix, by_number
 from planner.modal.consistency import Consistency, check
 from planner.modal.matrix_poles import MatrixPoles, identify_matrix
+from planner.modal.neighbours import expected
 from planner.modal.pole_identification import natural, probability, support
 from planner.modal.rank_one_fit import Entries, FittedShape, fit_shape
 from planner.modal.residues import realign
@@ -95,8 +96,9 @@ def modes_of_matrix(
     found = _put_right(matrix, found, checks)
     dofs, entries = _points(matrix, found, checks)
     shapes = _shapes(found, inside, entries)
+    shapes = _informed(shapes, dofs, geometry)
     modes = tuple(
-        _mode(found, int(k), shape, entries, len(dofs), matrix.scaled)
+        _mode(found, int(k), shape, entries, matrix.scaled)
         for k, shape in zip(inside, shapes, strict=True)
     )
     remarks = (*matrix.remarks, *checks.faults, *checks.remarks)
@@ -162,7 +164,7 @@ def _shapes(found: MatrixPoles, modes: list[int], entries: Entries) -> list[Fitt
 
 
 def _mode(
-    found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, points: int, scaled: bool
+    found: MatrixPoles, k: int, fitted: FittedShape, entries: Entries, scaled: bool
 ) -> MatrixMode:
     fit, m = found.fit, found.fit.poles.size
     pole = complex(fit.poles[k])
@@ -170,8 +172,8 @@ def _mode(
     covariance = found.scale[k] * fit.covariance[np.ix_(index, index)]
     frequency, damping, sd = natural(pole, covariance)
     group, odd = entries.groups
-    scaled = scaled and bool(np.all(odd[group[:points]]))
-    shape, shape_sd = _shrunk(fitted.shape[:points], fitted.sd[:points])
+    shape, shape_sd = fitted.shape, fitted.sd
+    scaled = scaled and bool(np.all(odd[group[: shape.size]]))
     if scaled:
         shape = shape * (np.sign(shape[np.argmax(np.abs(shape))].real) or 1.0)
     else:
@@ -186,18 +188,24 @@ def _mode(
     )  # fmt: skip
 
 
-def _shrunk(shape: np.ndarray, sd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A shape whose hardly determined points are drawn towards zero, and its sds.
+def _informed(
+    shapes: list[FittedShape], dofs: tuple[Dof, ...], geometry: Geometry | None
+) -> list[FittedShape]:
+    """Shapes over `dofs`, points that are hardly determined drawn to where others expect them.
 
-    Points move about as far as those of the well determined half (normal prior): where poles of a
-    set nearly coincide, or only a reference near a mode's node felt a point, its residues alone
-    would be anything.
+    Where poles of a set nearly coincide, or only a reference near a mode's node felt a point, its
+    residues alone would be anything.
     """
-    relative = sd / np.maximum(np.abs(shape), 1e-300)
-    known = relative <= np.median(relative)
-    power = float(np.mean(np.abs(shape[known]) ** 2))
-    share = power / np.maximum(power + 2 * sd**2, 1e-300)
-    return shape * share, sd * np.sqrt(share)
+    n = len(dofs)
+    values = np.stack([fitted.shape[:n] for fitted in shapes], axis=1)
+    sd = np.stack([fitted.sd[:n] for fitted in shapes], axis=1)
+    mean, variance = expected(dofs, values, sd, geometry)
+    share = variance / np.maximum(variance + 2 * sd**2, 1e-300)
+    values, sd = mean + share * (values - mean), sd * np.sqrt(share)
+    return [
+        replace(fitted, shape=value, sd=own)
+        for fitted, value, own in zip(shapes, values.T, sd.T, strict=True)
+    ]
 
 
 def _support(found: MatrixPoles, pole: complex) -> float:

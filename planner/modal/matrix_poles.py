@@ -7,7 +7,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix
 from planner.modal.fit_data import Data
-from planner.modal.matrix_selection import common, established, judged
+from planner.modal.matrix_selection import established, first_variance, judged
 from planner.modal.plscf import PoleSet, plscf, row_errors
 from planner.modal.pole_identification import ladder
 from planner.modal.set_poles import SetPoles
@@ -71,8 +71,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     sets = _sets(matrix, rows, columns)
     felt = len(matrix.responses) >= len(matrix.references)
     places = (rows, columns) if felt else (columns, rows)
-    variance, poles = common(data, start)
-    fit, variance = established(data, sets, variance, poles, places)
+    fit, variance = established(data, sets, first_variance(data, start), start, places)
     if not fit.poles.size:
         return None
     scale, weak, presence = judged(data, fit, variance)

@@ -10,7 +10,8 @@ from planner.modal.mode_selection import MAX_DAMPING, excess, running_mean
 from planner.modal.refine import refine
 from planner.modal.residues import unit
 from planner.modal.set_poles import ROUNDS, SetPoles, StrayedError, fit_sets
-from planner.modal.split_modes import REACH, Places, around, drifted, explains, thinned, unsplit
+from planner.modal.set_search import Places, searched_again
+from planner.modal.split_modes import REACH, around, drifted, explains, thinned, unsplit
 
 # Share of the response at its frequency that a mode must be: one of the diagram's stable lines,
 # and one that only the fit's error tells of. Chosen on simulated plates and aeroplanes.
@@ -18,26 +19,22 @@ PRESENT, PRESENT_ADDED = 0.03, 0.2
 MOST_ADDED = 6
 ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
 PASSES = 4  # of leaving out and adding
+SEARCHES = 1  # of sets that fit badly, before each
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
 SETTLING = 2  # rounds of a fit that has been fitted before, to other lines
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
-def common(data: Data, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variance (e, F) and poles where all entries share them."""
-    power = np.mean(np.abs(data.response) ** 2, axis=-1, keepdims=True)
-    variance = np.broadcast_to(power, data.response.shape)
-    for _ in range(2):
-        some = thinned(data, poles)
-        part = data.lines.part(some), data.response[..., some], variance[..., some]
-        found = refine(*part, poles, data.allowed)
-        poles = found.poles
-        shown = found.residues.residue @ unit(data.lines, poles)
-        shown += found.residues.residue.conj() @ unit(data.lines, poles.conj())
-        fitted = shown + found.residues.rest @ data.lines.rest
-        variance = _variance(data, fitted[:, 0], poles.size)[:, None]
-    return variance[:, 0], poles
+def first_variance(data: Data, poles: np.ndarray) -> np.ndarray:
+    """(e, F) where all entries share poles that stay as they are.
+
+    Poles that were refined so would leave weak modes to imitate how strong ones drift.
+    """
+    power = np.mean(np.abs(data.response[:, 0]) ** 2, axis=-1, keepdims=True)
+    every = (np.arange(len(power)),)
+    fit = fit_sets(data, every, np.broadcast_to(power, data.response[:, 0].shape), poles, rounds=0)
+    return _variance(data, fit.fitted, poles.size)
 
 
 def _variance(data: Data, fitted: np.ndarray, modes: int) -> np.ndarray:
@@ -61,6 +58,9 @@ def established(
     searched = False
     for _ in range(PASSES):
         variance = _variance(data, fit.fitted, fit.poles.size)
+        # Not before: sets would be moved to where they imitate the modes that a fit lacks.
+        if searched:
+            fit, variance = _settled(data, sets, fit, places)
         left = _part_of(fit, _standing(data, fit, variance))
         poles, own = unsplit(data, sets, left, variance, places)
         # What a fit lacks is looked for where it has no mode too many.
@@ -71,12 +71,25 @@ def established(
             poles = np.append(poles, added)
             own = np.column_stack([own, np.tile(added, (len(own), 1))])
             if not added.size:
-                break
+                continue
         if not poles.size:
             return replace(left, poles=poles), variance
         fit = _fit(data, sets, variance, poles, own)
-    variance = _variance(data, fit.fitted, fit.poles.size)
+    fit, variance = _settled(data, sets, fit, places)
     fit = _fit(data, sets, variance, fit.poles, fit.own, SETTLING, every=True)
+    return fit, _variance(data, fit.fitted, fit.poles.size)
+
+
+def _settled(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, places: Places
+) -> tuple[SetPoles, np.ndarray]:
+    """The fit, and its variance, after those sets have been searched again that fit badly."""
+    for _ in range(SEARCHES):
+        variance = _variance(data, fit.fitted, fit.poles.size)
+        own = searched_again(data, sets, fit, variance, places)
+        if own is None:
+            return fit, variance
+        fit = _fit(data, sets, variance, fit.poles, own)
     return fit, _variance(data, fit.fitted, fit.poles.size)
 
 

@@ -107,7 +107,7 @@ def fit_shape(
         found = _fitted(problem, 1 / spread, found, ROUGH)
         left, jacobian = problem.left(found), problem.jacobian(found)
         covariance = problem.covariance(jacobian, 1 / spread)
-        taken = np.einsum("ea,ab,eb->e", jacobian.conj(), covariance, jacobian).real / spread
+        taken = np.sum((jacobian.conj() @ covariance) * jacobian, axis=1).real / spread
         free = residue.size - float(np.sum(taken))
         if free < LEAST_FREE:
             spread, proportional = noise, np.zeros(noise.size)

@@ -109,9 +109,9 @@ def _columns(data: SetData, poles: np.ndarray) -> tuple[np.ndarray, int]:
     both[:, 2 * m : linear, :lines] = np.concatenate([rest.real, -rest.imag])
     both[:, 2 * m : linear, lines:] = np.concatenate([rest.imag, rest.real])
     up, down = 1 / (data.lines.x - poles[..., None]), 1 / (data.lines.x - poles.conj()[..., None])
-    factor = data.lines.factor * data.root
-    for start, power in ((0, 1), (linear, 2)):
-        first, second = factor * up**power, factor * down**power
+    first = second = data.lines.factor * data.root
+    for start in (0, linear):
+        first, second = first * up, second * down
         one, other = slice(start, start + m), slice(start + m, start + 2 * m)
         both[:, one, :lines], both[:, one, lines:] = (
             first.real + second.real,

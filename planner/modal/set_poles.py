@@ -10,6 +10,7 @@ agree, the variance is zero and all share one pole.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from planner.modal.fit_data import Data
 from planner.modal.residues import Lines
@@ -45,9 +46,10 @@ class StrayedError(ValueError):
 class SetPoles:
     """Common poles (m,) in rad/s and those of every set (k, m), with residues of all entries.
 
-    `covariance` (2m, 2m) of the common poles' real, then imaginary parts; `spread` (2m,) their
-    variance from set to set. `residue` and `residue_variance` (e, m), the variance of real and
-    imaginary part each; `fitted` (e, F). `significance` (m,): rise of χ² without the mode.
+    `covariance` (2m, 2m) of the common poles' real, then imaginary parts, for intervals of 95 %;
+    `spread` (2m,) their variance from set to set. `residue` and `residue_variance` (e, m), the
+    variance of real and imaginary part each; `fitted` (e, F). `significance` (m,): rise of χ²
+    without the mode.
     """
 
     poles: np.ndarray
@@ -151,6 +153,20 @@ def _common(point: SetPoints, own: np.ndarray, spread: np.ndarray) -> tuple[np.n
     return covariance @ right, covariance
 
 
+def _student(point: SetPoints, spread: np.ndarray) -> np.ndarray:
+    """(2m,) factors of sds, since so many sets alone tell how much sets differ.
+
+    Student's t over the normal quantile, for that part of the variance which comes from it.
+    """
+    known = np.einsum("kaa->ka", point.normal)
+    weight = known / (1 + spread * known)
+    total = np.maximum(np.sum(weight, axis=0), 1e-300)
+    freedom = np.maximum(total**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
+    noise = total / np.maximum(np.sum(known, axis=0), 1e-300)
+    ratio = stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975)
+    return np.sqrt(noise + (1 - noise) * ratio**2)
+
+
 def _own(point: SetPoints, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """The sets' most probable poles (k, 2m), shrunk towards the common ones."""
     pull = np.einsum("kab,kb->ka", point.normal, x - common) - point.gradient
@@ -177,7 +193,8 @@ def _finish(
     there = data.entries >= 0
     residue_variance = np.zeros(residue.shape)
     residue_variance[data.entries[there]] = ((parts[..., :m] + parts[..., m:]) / 2)[there]
+    wider = _student(point, spread)
     return SetPoles(
-        _complex(common), _complex(own), covariance, spread, residue, residue_variance, response,
-        significances(point, data.weight, m),
+        _complex(common), _complex(own), wider[:, None] * covariance * wider, spread, residue,
+        residue_variance, response, significances(point, data.weight, m),
     )  # fmt: skip

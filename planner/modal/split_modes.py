@@ -8,9 +8,8 @@ from planner.modal.fit_data import Data
 from planner.modal.residues import unit
 from planner.modal.set_drift import sought
 from planner.modal.set_poles import FARTHEST, SetPoles, StrayedError, fit_sets
+from planner.modal.set_search import Places, searched_again
 
-# Row and column of each entry, columns being those of the few references.
-Places = tuple[np.ndarray, np.ndarray]
 # Poles of one mode take part at the references alike (MAC of the participation), and lie within
 # this share of the frequency, or within a bandwidth.
 ALIKE, TOGETHER = 0.8, 0.02
@@ -90,6 +89,16 @@ def explains(
     return chi[0] - chi[1] > margin * local.threshold * scale
 
 
+def _in_most(
+    local: Data, sets: tuple[np.ndarray, ...], less: SetPoles, more: SetPoles, variance: np.ndarray
+) -> bool:
+    """Whether a fit with one mode more is clearly better than chance makes it in most sets."""
+    square = [np.abs(local.response[:, 0] - fit.fitted) ** 2 for fit in (less, more)]
+    fall = np.sum(2 / variance * (square[0] - square[1]), axis=1)
+    each = [np.sum(fall[chosen]) / (2 * len(chosen) + 2) for chosen in sets]
+    return bool(np.median(each) > APART)
+
+
 def unsplit(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
     places: Places,
@@ -104,7 +113,7 @@ def unsplit(
     for group in _groups(fit, places, order):
         pairs = [group[k : k + 2] for k in range(len(group) - 1)] if len(group) > 2 else []
         for tried in (group, *pairs):
-            one = _as_one(data, sets, fit, variance, tried)
+            one = _as_one(data, sets, fit, variance, tried, places)
             if one is not None:
                 poles[tried[0]], own[tried[0]] = one
                 for k in tried[1:]:
@@ -144,7 +153,7 @@ def _alike(fit: SetPoles, places: Places, first: int, second: int) -> bool:
 
 def _as_one(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray,
-    group: np.ndarray,
+    group: np.ndarray, places: Places,
 ) -> tuple[complex, np.ndarray] | None:  # fmt: skip
     """Common pole and the sets' own of one mode instead of a group; None if that is worse."""
     share = fit.significance[group] / np.sum(fit.significance[group])
@@ -162,6 +171,14 @@ def _as_one(
     try:
         one = fit_sets(local, sets, variance[:, lines], poles, MERGED_ROUNDS, own)
         more = fit_sets(local, sets, variance[:, lines], fit.poles[near], known=fit.own[:, near])
+        if explains(local, one, more, variance[:, lines], APART):
+            # Where it is one mode, only sets that fitted it badly are explained better by two.
+            if _in_most(local, sets, one, more, variance[:, lines]):
+                return None
+            own = searched_again(local, sets, one, variance[:, lines], places)
+            if own is None:
+                return None
+            one = fit_sets(local, sets, variance[:, lines], one.poles, MERGED_ROUNDS, own)
     except StrayedError:
         return None
     if explains(local, one, more, variance[:, lines], APART):

@@ -1,6 +1,6 @@
 """Answer of `modes` for a recordings folder with several poses: which modes are the same."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -9,13 +9,17 @@ from rich.console import Group
 from rich.text import Text
 
 from planner.campaign.hit_habits import HitMiss, habits
+from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import CampaignMisses, Visited, told_by
 from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
+from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
+from planner.identification.measured_frfs import common_band
 from planner.identification.measurement_model import Tolerances
+from planner.identification.point_places import misplaced, questions
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import TABLE, joint_columns, read_recordings
@@ -23,7 +27,9 @@ from planner.recording.records import PoseRow, RecordingsFolder
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
 from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode, check_options
 from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+from planner.report.sensor_masses import WithoutSensors, without_sensors
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.robot.robot import Robot
 
 ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
@@ -31,7 +37,11 @@ SURE = 0.9  # probability of a label below which the text marks it as doubtful
 
 @dataclass(frozen=True)
 class SurveyedMode:
-    """A mode of a pose; `label` counts the modes of all poses from 1, None where it has none."""
+    """A mode of a pose; `label` counts the modes of all poses from 1, None where it has none.
+
+    `sensors_lowered_percent` is what the sensors' masses had lowered its frequency by, which is
+    given without them; None where the simulation has no such mode.
+    """
 
     label: int | None
     label_probability: float | None
@@ -42,11 +52,19 @@ class SurveyedMode:
     shape: tuple[tuple[float, float], ...]
     probability: float
     residue: tuple[tuple[float, float, float], ...]
+    sensors_lowered_percent: float | None = 0.0
 
     @classmethod
-    def of(cls, mode: Mode, label: int | None = None, sure: float | None = None) -> "SurveyedMode":
+    def of(
+        cls,
+        mode: Mode,
+        label: int | None = None,
+        sure: float | None = None,
+        lowered_percent: float | None = 0.0,
+    ) -> "SurveyedMode":
         """Of a mode of a modal model."""
-        return cls(label, sure, **vars(IdentifiedMode.of(mode)))
+        own = vars(IdentifiedMode.of(mode))
+        return cls(label, sure, **own, sensors_lowered_percent=lowered_percent)
 
     @property
     def cell(self) -> str:
@@ -117,6 +135,7 @@ class SurveyReport(Answer):
             made.add_row(pose.pose, *(by_label.get(label, "–") for label in labels), others)
         parts = [made, Text("  ?: the label is less than 90 % sure."), *drawn(self.plots)]
         parts += [Text(f"  {habit}") for habit in self.habits]
+        parts += remarks(self.remarks)
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
@@ -142,7 +161,7 @@ def survey(
     band = band_hz or DEFAULT_BAND_HZ
     table = _table(folder, robot_toml)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
-    found, refused, simulated = [], [], False
+    found, every, refused, simulated = [], [], [], False
     visited: list[tuple[Visited, Frf]] = []
     for number, name in enumerate(names):
         progress(f"pose {name}, {number} of {len(names)} done")
@@ -153,6 +172,7 @@ def survey(
         ]
         simulated |= any(v.simulated for v in measured.verdicts)
         found.append(measured.modal.modes if measured.modal else ())
+        every.append(measured)
         if robot_toml is not None and measured.frf is not None:
             q = table.joints.internal(rows[0].joints_deg)
             visited.append(_visited(name, q, measured))
@@ -165,20 +185,21 @@ def survey(
     q = table.joints.internal([first[name].joints_deg for name in names])
     misses = _misses(visited, robot_toml, band)
     found = [tuple(misses.without_misses(*one)) for one in zip(names, found, strict=True)]
-    tracks, expected = _labelled(found, q, robot_toml)
-    poses = tuple(_pose(name, tracks, i) for i, name in enumerate(names))
+    simulations = _simulations(misses, robot_toml)
+    doubts = _doubts(names, simulations, q, every, band)
+    bare = without_sensors(names, found, simulations, q, every)
+    tracks, expected = _labelled(bare.modes, q, robot_toml)
+    poses = tuple(_pose(name, tracks, i, bare) for i, name in enumerate(names))
     hits = tuple(hit for pose in misses.poses for hit in pose.hits)
     return SurveyReport(
-        poses, poses[0].modes, band, tuple(refused), (), simulated, hit_errors=hits,
-        habits=habits(hits), tracks=tracks, simulated_hz=expected,
+        poses, poses[0].modes, band, tuple(refused), (*doubts, *bare.remarks), simulated,
+        hit_errors=hits, habits=habits(hits), tracks=tracks, simulated_hz=expected,
     )  # fmt: skip
 
 
 def _table(folder: Path, robot_toml: Path | None) -> RecordingsFolder:
     if robot_toml is None:
         return read_recordings(folder, joint_columns(folder))
-    from planner.robot.robot import Robot
-
     robot = Robot.load(robot_toml)
     return read_recordings(folder, robot.joints, robot.points)
 
@@ -202,26 +223,57 @@ def _misses(
     """By the robot's simulation, identified from these recordings; none without a robot."""
     if robot_toml is None or not visited:
         return CampaignMisses((), None, Tolerances(), band)
-    from planner.dynamics.simulation import Simulation
-    from planner.robot.robot import Robot
-
     robot = Robot.load(robot_toml)
-    tolerances = Tolerances.of(robot.config, robot.joints.slides)
     visits, whole = zip(*visited, strict=True)
-    return told_by(Simulation(robot), visits, whole, tolerances, band)
+    return told_by(Simulation(robot), visits, whole, _tolerances(robot), band)
+
+
+def _tolerances(robot: Robot) -> Tolerances:
+    return Tolerances.of(robot.config, robot.joints.slides)
+
+
+def _simulations(misses: CampaignMisses, robot_toml: Path | None) -> list[Simulation]:
+    """As stated, and as identified from the recordings where that was done."""
+    if robot_toml is None:
+        return []
+    told = [misses.told.simulation] if misses.told is not None and misses.trusted else []
+    return [Simulation(Robot.load(robot_toml)), *told]
+
+
+def _doubts(
+    names: Sequence[str],
+    simulations: Sequence[Simulation],
+    q: np.ndarray,
+    measured: Sequence[MeasuredPose],
+    band: tuple[float, float],
+) -> tuple[str, ...]:
+    """Questions about points whose FRFs a simulation describes far better elsewhere."""
+    index = [i for i, one in enumerate(measured) if one.whole is not None]
+    frfs = [one.whole for one in measured if one.whole is not None]
+    if not simulations or not frfs:
+        return ()
+    usable = common_band(frfs, band)
+    found = misplaced(simulations, q[index], frfs, usable)
+    tool = [(i, frf.of_tool) for i, frf in zip(index, frfs, strict=True)]
+    known = [(i, frf) for i, frf in tool if frf is not None]
+    if found and known:
+        # What was identified from wrongly named points too is spoiled: from the tool's alone.
+        nominal = LowFidelity(1, simulations[0], _tolerances(simulations[0].robot))
+        learned = learn(nominal, [frf for _, frf in known], q[[i for i, _ in known]], band).learned
+        if learned is not None:
+            tried = [*simulations, learned.identified.simulation]
+            found = misplaced(tried, q[index], frfs, usable)
+    return questions(found, [names[i] for i in index])
 
 
 def _labelled(
-    found: list[tuple[Mode, ...]], q: np.ndarray, robot_toml: Path | None
+    found: Sequence[tuple[Mode, ...]], q: np.ndarray, robot_toml: Path | None
 ) -> tuple[Tracks, np.ndarray | None]:
     span = np.ptp(q, axis=0)
     x = ((q - q.min(axis=0)) / np.where(span > 0, span, 1.0))[:, span > 0]
     labels = max(map(len, found))
     if robot_toml is None:
         return track(found, Guide.by_example(found), x), None
-    from planner.dynamics.simulation import Simulation
-    from planner.robot.robot import Robot
-
     simulation = Simulation(Robot.load(robot_toml))
     middle = int(np.argmin(np.linalg.norm(x - x.mean(axis=0), axis=1)))
     count = min(labels + ABOVE, simulation.elastic.size)
@@ -230,10 +282,11 @@ def _labelled(
     return tracks, modes.frequency_hz
 
 
-def _pose(name: str, tracks: Tracks, i: int) -> SurveyedPose:
+def _pose(name: str, tracks: Tracks, i: int, bare: WithoutSensors) -> SurveyedPose:
     modes = tuple(
-        SurveyedMode.of(mode, k + 1, float(tracks.probability[i, k]))
+        SurveyedMode.of(mode, k + 1, float(tracks.probability[i, k]), bare.of(i, mode))
         for k, mode in enumerate(tracks.modes[i])
         if mode is not None
     )
-    return SurveyedPose(name, modes, tuple(map(SurveyedMode.of, tracks.unexpected[i])))
+    others = (SurveyedMode.of(m, lowered_percent=bare.of(i, m)) for m in tracks.unexpected[i])
+    return SurveyedPose(name, modes, tuple(others))

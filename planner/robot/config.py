@@ -134,6 +134,7 @@ class Obstacle(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class PointTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A point that may be hit, or carry a sensor of `mass_kg` with the axes named.
 
+    Simulations beside recordings carry that mass where the sensor was, and `modes` takes it out.
     Its frame lies at `position_m` in that of a link (or another frame of the URDF), turned by
     roll, pitch and yaw. `node` is its number in universal files. One called "tcp" or "sensor" is
     where the tool is hit, or its sensor sits, and needs no link.

@@ -1,10 +1,11 @@
 """Proofs on fresh roving-hammer sets: shapes, intervals, naming of faults, beside a peer.
 
-pytest -m slow -s tests/modes/test_matrix_proof.py
+SEED=5000 pytest -m slow -s tests/modes/test_matrix_proof.py
 """
 
 import contextlib
 import io
+import os
 import warnings
 from collections import Counter
 
@@ -17,7 +18,13 @@ from planner.modal.matrix_modes import modes_of_matrix
 from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled, tellable, told
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(3000)]
-SETS, MISSING, PEER = range(2000, 2042), range(2100, 2115), range(2200, 2206)
+SEED = int(os.environ.get("SEED", "2000"))
+SETS, MISSING, PEER = (
+    range(SEED + first, SEED + first + count) for first, count in ((0, 42), (100, 15), (200, 6))
+)
+# Whose sign nobody can tell: rows that move less than this (rms, of the usual row); and nodes whose
+# rows differ by less than this, relatively, may stand under each other's names.
+STILL, ALIKE = 0.3, 0.3
 
 
 def line(name, values):
@@ -66,12 +73,15 @@ def faults_named(case, found, tally):
         checks = said(columns=[column], geometry=geometry)
         right = checks.turned == (case.matrix.references[column],) and len(checks.faults) == 1
         count(f"column {name}", checks, right)
+    true = case.shapes.real / np.sqrt(np.mean(case.shapes.real**2, axis=0))
+    moves = np.sqrt(np.sum(true**2, axis=1) / np.mean(np.sum(true**2, axis=1)))
     for row in rng.choice(n, 2, replace=False).tolist():
         checks = said(rows=[row])
         right = checks.turned_rows == (case.matrix.responses[row],) and len(checks.faults) == 1
         # At a reference row and column are turned alike: which, only the neighbours can tell.
         right = right or checks.turned == (case.matrix.responses[row],)
-        count(f"row of a {case.kind}", checks, right)
+        still = " that hardly moves" if moves[row] < STILL else ""
+        count(f"row of a {case.kind}{still}", checks, right)
     for a, b in (rng.choice(len(nodes), 2, replace=False) for _ in range(2)):
         owner = np.array(case.structure.nodes)
         one, two = np.flatnonzero(owner == nodes[a]), np.flatnonzero(owner == nodes[b])
@@ -80,7 +90,10 @@ def faults_named(case, found, tally):
         checks = said(order=order)
         text = " ".join(checks.faults)
         right = len(checks.faults) == 1 and all(f"ode {nodes[k]}'s" in text for k in (a, b))
-        count(f"exchange on a {case.kind}", checks, right)
+        apart = np.linalg.norm(true[one] - true[two]) / np.linalg.norm(true[[*one, *two]])
+        still = np.max(moves[[*one, *two]]) < STILL or apart < ALIKE
+        alike = " of nodes that hardly move, or alike" if still else ""
+        count(f"exchange on a {case.kind}{alike}", checks, right)
 
 
 def test_fresh_sets():
@@ -104,24 +117,33 @@ def test_fresh_sets():
     assert 0.9 < cover < 0.985
     assert tally["nulls with geometry: accused"] == tally["nulls without: accused"] == 0
     assert tally["column with geometry: named"] > 0.95 * len(SETS)
-    assert tally["row of a panel: named"] > 0.9 * 2 * len(SETS) / 3
+    for kind, rows, nodes in (("panel", 0.9, 0.9), ("pieces", 0.9, 0.9), ("frame", 0.5, 0.8)):
+        for fault, least in (("row of", rows), ("exchange on", nodes)):
+            named, silent = (
+                tally[f"{fault} a {kind}: {word}"] for word in ("named", "silent or other")
+            )
+            assert named > least * (named + silent)
+            assert tally[f"{fault} a {kind}: wrong"] <= 1
 
 
 def test_a_fifth_is_missing():
-    values, known = [], []
+    values, known, placed = [], [], []
     for seed in MISSING:
         case = rough_set(seed, missing=0.2, drift=0.001)
+        found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case))
+        placed += told(case, found.modes, found.dofs)
         found = modes_of_matrix(case.matrix, case.band_hz)
         seen = told(case, found.modes, found.dofs)
         values += seen
         known += [t for t, sure in zip(seen, tellable(case), strict=True) if sure]
     print()
-    cover = line("a fifth missing", values)[3]
-    share, right, sized, _ = line("of these, every point felt by a reference that moves", known)
-    assert share > 0.97
-    assert right > 0.95
-    assert sized > 0.9
-    assert 0.9 < cover < 0.985
+    share, right, sized, cover = line("a fifth missing, places known", placed)
+    bare = line("a fifth missing, no geometry", values)[3]
+    sure = line("of these, every point felt by a reference that moves", known)
+    assert min(share, sure[0]) > 0.96
+    assert min(right, sure[1]) > 0.9
+    assert min(sized, sure[2]) > 0.9
+    assert all(0.9 < c < 0.985 for c in (cover, bare))
 
 
 def test_beside_a_peer_that_is_told_the_frequencies():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from planner.modal.motion_fields import motion_fields
 from planner.modal.row_places import exchanged_nodes, turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
@@ -75,3 +76,24 @@ def test_directions_are_told_apart(sheet):
     moved = np.concatenate([shapes, shapes[:, ::-1]])
     moved[60] *= -1
     assert turned_rows(both, moved, place) == (60,)
+
+
+def test_beams_tell_what_a_field_without_directions_cannot():
+    """Points on a straight line move alike along it, however far apart they are."""
+    place = Geometry(
+        tuple("abcde"),
+        np.array([[0, 0, 0], [0.3, 0, 0], [0.6, 0, 0], [0.6, 0, 0.3], [0.6, 0, 0.6]], float),
+        (("a", "b"), ("b", "c"), ("c", "d"), ("d", "e")),
+    )
+    dofs = [Dof(node, direction) for node in "abcde" for direction in "xyz"]
+    beams = motion_fields(dofs, place)[-2]
+    sd = np.sqrt(np.diag(beams))
+    alike = {
+        (str(one), str(two)): beams[i, j] / sd[i] / sd[j]
+        for i, one in enumerate(dofs)
+        for j, two in enumerate(dofs)
+    }
+    assert alike["a:x", "c:x"] > 0.99
+    assert alike["c:z", "e:z"] > 0.99
+    assert alike["a:z", "c:z"] < 0.9
+    assert len(motion_fields(dofs, Geometry(place.nodes, place.position_m))) == 6

@@ -1,0 +1,143 @@
+"""Whether what was measured at a point is that point's, where only the physics can tell.
+
+FRFs of a sensor that the simulation describes far better at another point of robot.toml were
+probably felt there; likewise hits.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.dynamics.gradient import response
+from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
+from planner.identification.measured_frfs import Measured, stack
+from planner.recording.points import SENSOR, TCP, Layout
+
+MOST_LINES = 200  # of a pose, that are compared
+# FRFs fit another point far better where they then differ from the simulation by less than this
+# share of what they do as named; and by less than CLOSE of themselves, for a simulation that
+# describes neither tells nothing. Chosen: points of one link differ by less than FAR_BETTER.
+FAR_BETTER, CLOSE = 0.5, 0.6
+
+
+@dataclass(frozen=True)
+class Misplaced:
+    """A point of a pose whose FRFs fit another's; relative differences `named` and `there`."""
+
+    pose: int
+    point: str
+    fits: str
+    hit: bool
+    named: float
+    there: float
+
+
+def misplaced(
+    simulations: Sequence[Simulation], q: np.ndarray, frfs: Sequence[Frf], band: tuple[float, float]
+) -> list[Misplaced]:
+    """Points whose FRFs, measured at q (n, dof), fit another's far better.
+
+    By that simulation which describes all points best, named as they fit it.
+    """
+    measured = stack(frfs, band, MOST_LINES, 0.0)
+    points = [p.name for p in simulations[0].robot.config.point]
+    names = simulations[0].robot.points
+    hits = tuple(dict.fromkeys((TCP, *measured.layout.hits, *map(names.hit, points))))
+    sensors = tuple(dict.fromkeys((SENSOR, *measured.layout.sensors, *map(names.sensor, points))))
+    if len(points) < 2:
+        return []
+    tried = [_Differences.of(s, q, measured, Layout(hits, sensors)) for s in simulations]
+    best = min(tried, key=lambda one: one.total)
+    return best.misplaced()
+
+
+@dataclass(frozen=True, eq=False)
+class _Differences:
+    """Relative differences (n, named points, all points) of FRFs to a simulation, NaN: no FRF."""
+
+    named: Layout
+    wide: Layout
+    by_sensor: np.ndarray
+    by_hit: np.ndarray
+
+    @classmethod
+    def of(
+        cls, simulation: Simulation, q: np.ndarray, measured: Measured, wide: Layout
+    ) -> "_Differences":
+        """Of all sensors as if at each point of `wide`, and of all hits."""
+        own = measured.layout
+        loaded = measured.loaded(simulation.elastic.matrices(q, layout=own), simulation)
+        matrices = replace(simulation.elastic.matrices(q, layout=wide), mass=loaded.mass)
+        h = response(matrices, simulation.elasticity, measured.s)
+        h = h.reshape(len(q), len(wide.sensors), 3, len(wide.hits), 3, -1)
+        shape = len(q), len(own.sensors), 3, len(own.hits), 3, h.shape[-1]
+        used = measured.used.reshape(shape)
+        given = np.where(used, measured.accelerance.reshape(shape), 0.0)
+        to_sensor = [wide.sensors.index(name) for name in own.sensors]
+        to_hit = [wide.hits.index(name) for name in own.hits]
+
+        def differences(side: int, simulated: np.ndarray) -> np.ndarray:
+            """(n, named) from FRFs (as given), with their points on axis `side`."""
+            axes = tuple(axis for axis in range(1, 6) if axis != side)
+            left = np.sum(np.abs(np.where(used, given - simulated, 0.0)) ** 2, axis=axes)
+            power = np.sum(np.abs(given) ** 2, axis=axes)
+            return np.sqrt(np.divide(left, power, out=np.full(left.shape, np.nan), where=power > 0))
+
+        by_sensor = [
+            differences(1, h[:, [p] * len(to_sensor)][:, :, :, to_hit]) for p in range(h.shape[1])
+        ]
+        by_hit = [
+            differences(3, h[:, to_sensor][:, :, :, [p] * len(to_hit)]) for p in range(h.shape[3])
+        ]
+        return cls(own, wide, np.stack(by_sensor, axis=-1), np.stack(by_hit, axis=-1))
+
+    @property
+    def total(self) -> float:
+        """How far all sensors are off, each at the point which fits it best."""
+        return float(np.nansum(np.min(self.by_sensor, axis=-1)))
+
+    def misplaced(self) -> list[Misplaced]:
+        """Sensors, then hits, that fit elsewhere far better; the tool's own are as they are."""
+        found = []
+        sides = (
+            (self.by_sensor, self.named.sensors, self.wide.sensors, SENSOR, False),
+            (self.by_hit, self.named.hits, self.wide.hits, TCP, True),
+        )
+        for differences, named, wide, tool, hit in sides:
+            for i, k in np.argwhere(np.isfinite(differences[..., 0])):
+                each = differences[i, k]
+                stated, best = float(each[wide.index(named[k])]), int(np.argmin(each))
+                if named[k] != tool and each[best] < min(FAR_BETTER * stated, CLOSE):
+                    there = float(each[best])
+                    found.append(Misplaced(int(i), named[k], wide[best], hit, stated, there))
+        return found
+
+
+def questions(found: Sequence[Misplaced], poses: Sequence[str]) -> tuple[str, ...]:
+    """A sentence for each point that fits another's place, with the poses where it does."""
+    told: dict[tuple[str, str, bool], list[Misplaced]] = {}
+    for one in found:
+        told.setdefault((one.point, one.fits, one.hit), []).append(one)
+    sentences, done = [], set()
+    for (point, fits, hit), each in told.items():
+        if (point, fits, hit) in done:
+            continue
+        where = ", ".join(dict.fromkeys(poses[one.pose] for one in each))
+        named, there = (
+            100 * float(np.median(v))
+            for v in zip(*((one.named, one.there) for one in each), strict=True)
+        )
+        what = "hits at" if hit else "FRFs of"
+        text = (
+            f"{where}: {what} {point} fit {fits} far better (there they differ from the simulation"
+            f" by {there:.0f} %, at {point} by {named:.0f} %)"
+        )
+        if (fits, point, hit) in told:
+            done.add((fits, point, hit))
+            text += f", and {fits}'s fit {point}: were the two exchanged?"
+        else:
+            text += f": was the {'hit' if hit else 'sensor'} there, or is a node wrong?"
+        sentences.append(text)
+    return tuple(sentences)

@@ -1,0 +1,261 @@
+"""Sets whose poles Gauss-Newton has left in a wrong place are searched again.
+
+Of two close modes that drift by more than they lie apart, a set may be fitted with one pole on the
+other's peak, or with the two exchanged. Such a set fits worse than the others around these modes,
+or its residues do not go with how the modes take part at the references, which all sets share.
+Its poles are then looked for on a grid, one mode after the other, each mode excited as in all sets.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.modal.fit_data import Data
+from planner.modal.residues import Lines, basis, stack, unit
+from planner.modal.set_poles import FARTHEST, SetPoles
+
+# Row and column of each entry, columns being those of the few references.
+Places = tuple[np.ndarray, np.ndarray]
+# A set is searched where its error around a mode is so many times that of the usual set, or where
+# its residues leave so many times their variance of how the mode takes part (and of what is usual).
+WORSE, APART = 1.5, 9.0
+GAIN = 16.0  # of χ², from which what was found takes the place of what was there
+COST = 0.1  # of that gain, by which χ² with residues left free may rise: an FRF may be spoiled
+# Poles are looked for up to so many sds of the sets' poles, and half bandwidths, from the common
+# ones; the lines looked at reach so many half bandwidths farther.
+FAR, FAR_HALVES, REACH = 4.0, 2.0, 4.0
+STEP, MOST = 0.5, 40  # trials lie so many half bandwidths apart, at most so many to either side
+SWEEPS = 2  # over the modes of a set, on the coarse grid
+FINE = (0.2, 0.06, 0.02)  # half bandwidths: steps of the refinement
+ROBUST_ROUNDS = 5
+RIDGE = 1e-9
+
+
+def searched_again(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray, places: Places
+) -> np.ndarray | None:
+    """Poles (k, m) of all sets, those of badly fitted sets as found anew; None where none are."""
+    taking_part = participation(fit, places)
+    off = _off(data, sets, fit, variance) | _apart(sets, fit, places, taking_part)
+    own, moved = fit.own.copy(), False
+    for modes in _together(data, fit):
+        lines = np.flatnonzero(np.any([_near(data, fit, j) for j in modes], axis=0))
+        for s in np.flatnonzero(off[:, modes].any(axis=1)):
+            shares = taking_part[places[1][sets[s]]][:, modes]
+            values = _less_others(data, fit, sets[s], fit.own[s], modes, lines)
+            found = _Neighbourhood.of(
+                data.lines.part(lines), values, variance[np.ix_(sets[s], lines)],
+                places[0][sets[s]], shares, _Poles.of(fit, int(s), modes),
+            ).best()  # fmt: skip
+            if found is not None:
+                own[s, modes] = found
+                moved = True
+    return own if moved else None
+
+
+def participation(fit: SetPoles, places: Places) -> np.ndarray:
+    """(columns, m) how modes take part at the references, of unit length.
+
+    Most sets agree on it: rows count the less the worse they fit.
+    """
+    rows, columns = places
+    table = np.zeros((int(rows.max()) + 1, int(columns.max()) + 1, fit.poles.size), complex)
+    table[rows, columns] = fit.residue
+    found = np.zeros(table.shape[1:], complex)
+    for k, each in enumerate(np.moveaxis(table, -1, 0)):
+        usual = float(np.median(np.linalg.norm(each, axis=1)))
+        weight, right = np.ones(len(each)), found[:, k]
+        for _ in range(ROBUST_ROUNDS):
+            right = np.linalg.svd(weight[:, None] * each, full_matrices=False)[2][0]
+            left = np.linalg.norm(each - np.outer(each @ right.conj(), right), axis=1)
+            weight = 1 / np.sqrt(left + 0.1 * usual + 1e-300)
+        found[:, k] = right
+    return found
+
+
+def _reach(fit: SetPoles) -> np.ndarray:
+    """(m,) how far (rad/s) a set's pole is looked for."""
+    m = fit.poles.size
+    far = FAR * np.sqrt(fit.spread[m:]) + FAR_HALVES * np.abs(fit.poles.real)
+    return np.minimum(far, FARTHEST * fit.poles.imag)
+
+
+def _near(data: Data, fit: SetPoles, mode: int) -> np.ndarray:
+    """(F,) bool: lines around a mode, wherever a set may have it."""
+    far = _reach(fit)[mode] + REACH * np.abs(fit.poles[mode].real)
+    return np.abs(2 * np.pi * data.frequency_hz - fit.poles[mode].imag) < far
+
+
+def _together(data: Data, fit: SetPoles) -> list[np.ndarray]:
+    """Modes (indices) among the lines, in groups whose peaks may overlap."""
+    omega, far = 2 * np.pi * data.frequency_hz[[0, -1]], _reach(fit)
+    inside = (fit.poles.imag > omega[0]) & (fit.poles.imag < omega[1])
+    groups: list[list[int]] = []
+    for k in np.argsort(fit.poles.imag):
+        if not inside[k]:
+            continue
+        last = groups[-1][-1] if groups else k
+        if groups and fit.poles[k].imag - fit.poles[last].imag < far[k] + far[last]:
+            groups[-1].append(int(k))
+        else:
+            groups.append([int(k)])
+    return [np.array(group) for group in groups]
+
+
+def _off(
+    data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, variance: np.ndarray
+) -> np.ndarray:
+    """(k, m) bool: sets that fit worse around a mode than the others do."""
+    square = np.abs(data.response[:, 0] - fit.fitted) ** 2 / variance
+    off = np.zeros((len(sets), fit.poles.size), bool)
+    for j in range(fit.poles.size):
+        lines = _near(data, fit, j)
+        if lines.any():
+            each = np.mean(square[:, lines], axis=1)
+            error = np.array([np.mean(each[chosen]) for chosen in sets])
+            off[:, j] = error > WORSE * np.median(error)
+    return off
+
+
+def _apart(
+    sets: tuple[np.ndarray, ...], fit: SetPoles, places: Places, taking_part: np.ndarray
+) -> np.ndarray:
+    """(k, m) bool: sets whose residues do not go with how the mode takes part."""
+    rows, columns = places
+    theirs = taking_part[columns]
+    weight = 1 / np.maximum(2 * fit.residue_variance, 1e-300)
+    shape = int(rows.max()) + 1, fit.poles.size
+    along, power = np.zeros(shape, complex), np.zeros(shape)
+    np.add.at(along, rows, weight * theirs.conj() * fit.residue)
+    np.add.at(power, rows, weight * np.abs(theirs) ** 2)
+    left = fit.residue - (along / np.maximum(power, 1e-300))[rows] * theirs
+    square = weight * np.abs(left) ** 2
+    apart = np.array([np.mean(square[chosen], axis=0) for chosen in sets])
+    return apart > APART * np.maximum(np.median(apart, axis=0), 1.0)
+
+
+def _less_others(
+    data: Data, fit: SetPoles, chosen: np.ndarray, own: np.ndarray, modes: np.ndarray,
+    lines: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """(e, F) responses of one set (entries `chosen`, poles `own`) less all modes but some."""
+    others = np.setdiff1d(np.arange(own.size), modes)
+    part, residue = data.lines.part(lines), fit.residue[np.ix_(chosen, others)]
+    up, down = unit(part, own[others]), unit(part, own[others].conj())
+    return data.response[:, 0][np.ix_(chosen, lines)] - residue @ up - residue.conj() @ down
+
+
+@dataclass(frozen=True, eq=False)
+class _Poles:
+    """Poles (n,) of some modes: common ones, those of a set, variance of the imaginary part."""
+
+    common: np.ndarray
+    own: np.ndarray
+    spread: np.ndarray
+    reach: np.ndarray
+
+    @classmethod
+    def of(cls, fit: SetPoles, s: int, modes: np.ndarray) -> "_Poles":
+        """Of one set; in any case a pole may move by half its bandwidth."""
+        common = fit.poles[modes]
+        spread = np.maximum(fit.spread[fit.poles.size + modes], common.real**2)
+        return cls(common, fit.own[s, modes], spread, _reach(fit)[modes])
+
+
+@dataclass(frozen=True, eq=False)
+class _Neighbourhood:
+    """Responses of one set around modes that lie together, weighted.
+
+    `values` (e, 2F) real, then imaginary parts, free of a straight line (`far`, orthonormal);
+    `level` (e,) their variance where `profile` (F,) is one; `rows` (e,) which rows they are of,
+    `shares` (e, n) how the modes take part there.
+    """
+
+    lines: Lines
+    profile: np.ndarray
+    level: np.ndarray
+    values: np.ndarray
+    far: np.ndarray
+    rows: np.ndarray
+    shares: np.ndarray
+    poles: _Poles
+
+    @classmethod
+    def of(
+        cls, lines: Lines, response: np.ndarray, variance: np.ndarray, rows: np.ndarray,
+        shares: np.ndarray, poles: _Poles,
+    ) -> "_Neighbourhood":  # fmt: skip
+        """From responses and variance (e, F)."""
+        profile = np.sqrt(variance[0, 0] / variance[0])
+        line = np.stack([np.ones(lines.x.size), np.linspace(-1, 1, lines.x.size)]) * profile
+        far = np.linalg.qr(stack(np.concatenate([line, 1j * line])).T)[0]
+        values = stack(response * profile)
+        level = variance[:, 0] / 2
+        return cls(
+            lines, profile, level, values - values @ far @ far.T, far, rows, shares, poles
+        )  # fmt: skip
+
+    def best(self) -> np.ndarray | None:
+        """Poles (n,) that fit clearly better than those of now, None where there are none."""
+        common, reach = self.poles.common, self.poles.reach
+        poles, half = common, np.abs(common.real)
+        for _ in range(SWEEPS):
+            for a in range(poles.size):
+                count = min(MOST, int(np.ceil(reach[a] / (STEP * half[a]))))
+                shift = np.linspace(-reach[a], reach[a], 2 * count + 1)
+                poles = self._along(poles, a, common[a] - poles[a] + 1j * shift)
+        for step in FINE:
+            for a in range(poles.size):
+                for way in (1j, 1.0):
+                    poles = self._along(poles, a, way * step * half[a] * np.arange(-2, 3))
+        bound, free = self._misfit(np.stack([poles, self.poles.own]))
+        gain = bound[1] - bound[0]
+        return poles if gain > GAIN and free[0] - free[1] < COST * gain else None
+
+    def _along(self, poles: np.ndarray, a: int, shift: np.ndarray) -> np.ndarray:
+        """The best of poles (n,) with one of them moved by each of `shift`."""
+        trials = np.tile(poles, (shift.size, 1))
+        trials[:, a] += shift
+        trials = trials[trials[:, a].real < 0]
+        return trials[np.argmin(self._misfit(trials)[0])]
+
+    @cached_property
+    def _turns(self) -> np.ndarray:
+        """(e, 2n, 2n) from motions (real, then imaginary parts) to residues of modes that take
+        part so."""
+        real, imag = (
+            each[:, None] * np.eye(each.shape[1]) for each in (self.shares.real, self.shares.imag)
+        )
+        return np.block([[real, -imag], [imag, real]])
+
+    def _misfit(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(t,) χ² of trials (t, n): excited as in all sets, and with residues left free."""
+        columns = stack(basis(self.lines, poles, False) * self.profile)
+        columns = columns - columns @ self.far @ self.far.T
+        norm = np.linalg.norm(columns, axis=-1)
+        gram = columns @ columns.transpose(0, 2, 1)
+        cross = columns @ self.values.T
+        pull = np.sum((poles.imag - self.poles.common.imag) ** 2 / self.poles.spread, axis=1)
+        total = pull + np.sum(self.values**2 / self.level[:, None])
+        free = total - _explained(gram, cross / np.sqrt(self.level), norm)
+        bound = total
+        for row in np.unique(self.rows):
+            here = np.flatnonzero(self.rows == row)
+            turns, level = self._turns[here], self.level[here]
+            back = turns.transpose(0, 2, 1) / level[:, None, None]
+            normal, right = np.zeros_like(gram), np.zeros(gram.shape[:2])
+            for e, b, t in zip(here, back, turns, strict=True):
+                normal += b @ gram @ t
+                right += cross[:, :, e] @ b.T
+            size = np.sqrt(np.einsum("taa->ta", normal))
+            bound = bound - _explained(normal, right[..., None], size)
+        return bound, free
+
+
+def _explained(normal: np.ndarray, right: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """(t,) fall of χ² by least squares from normal (t, c, c), right (t, c, k), size (t, c)."""
+    size = np.maximum(size, 1e-300)
+    normal = normal / size[:, :, None] / size[:, None] + RIDGE * np.eye(size.shape[1])
+    right = right / size[..., None]
+    return np.sum(right * np.linalg.solve(normal, right), axis=(1, 2))
