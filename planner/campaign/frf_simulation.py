@@ -1,8 +1,8 @@
 """The simulation by which a campaign predicts FRFs: the identified one, and what it may lack.
 
 What identifies the simulation between hits takes hits and measuring chain for exact, in little
-time. Here both are part of what is fitted. Where that does not bring the FRFs to their noise, the
-structure is widened: the base shifts and turns, links bend, something hangs on a link.
+time. Here both are part of what is fitted, and the structure is widened where the FRFs speak for
+it: the base shifts and turns, links bend, something hangs on a link.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from planner.campaign.frf_posterior import CHAIN, FrfPosterior, fitted
+from planner.campaign.chain_misfit import CHAIN
+from planner.campaign.frf_posterior import FrfPosterior, fitted, fitted_afresh
 from planner.campaign.low_fidelity import Learned
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.extra_compliance import across, triple
@@ -21,9 +22,7 @@ from planner.diagnosis.linear.fit import Fit, glance
 from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
-from planner.errors import InputError
 from planner.frf.frf import Frf
-from planner.identification.effort import QUICK, STAGES
 from planner.identification.extended_structure import (
     DAMPING_S,
     FLOOR,
@@ -31,7 +30,6 @@ from planner.identification.extended_structure import (
     Structure,
     extended,
 )
-from planner.identification.identify import identify
 from planner.identification.measured_frfs import common_band
 from planner.identification.parameters import place_name
 from planner.identification.truncated_decay import cut_off
@@ -39,37 +37,40 @@ from planner.robot.config import Compliance
 
 Spring = tuple[Compliance, dict[str, tuple[float, float]]]  # and its priors' bounds, by name
 
-# χ² per value above which more structure is looked for: where nothing lacked on generated cells it
-# was 0.3 to 0.6, for hands and sensors are mostly better than their tolerances; where a link bends,
-# 0.6 to 0.9 hid FRFs as much as twice as far off as need be.
-FITS = 0.65
-SWINGS = 1.0  # the same, above which something that swings on a link is looked for: that takes long
-PATIENT = replace(
-    QUICK, stages=STAGES, lines=32, last_lines=32, log_lines=24, log_steps=40, last_completions=0
-)
+# χ² per value above which something that swings on a link is looked for: that takes long.
+SWINGS = 1.0
 SHORT = 0.1  # of the longest link: what is shorter does not bend
 BEND = 0.3  # of the joint's stiffness: the scale of a link's, whose prior is STIFFNESS times this
 FOLLOWED, TRIED_STEPS = 3, 10  # places of a resonator that are tried, and in how many steps
 
 
 def learned_simulation(
-    learned: Learned, frfs: Sequence[Frf], q: np.ndarray, band_hz: tuple[float, float]
+    learned: Learned,
+    stated: Structure,
+    frfs: Sequence[Frf],
+    q: np.ndarray,
+    band_hz: tuple[float, float],
 ) -> FrfPosterior | None:
     """From what was identified of FRFs at q (n, dof) in rad, to what explains them best.
 
-    By the evidence of each structure, χ² counting as the closest one's says. None where none of
-    them can be: the robot would not stand.
+    Beside it all structures begin anew from what is `stated`: what was identified may have found a
+    place where wrong parts make up for each other. By the evidence of each, χ² counting as the
+    closest one's says. None where none of them can be: the robot would not stand.
     """
     first, structure = learned.identified, learned.structure
     whole = completed(frfs, first.simulation, q)
     band = common_band(frfs, band_hz)
     problem = Problem(whole, q, structure.simulation, band, structure.priors)
-    stated = fitted(problem, Effect(""), first.mean)
-    found = [stated]
-    if stated.misfit > FITS:
-        found += _wider(structure, whole, q, band)
-    if min(f.misfit for f in found) > SWINGS and np.isfinite(stated.misfit):
-        found += _resonant(stated)
+    identified = fitted(problem, Effect(""), first.mean)
+    wider = [widened(stated)]
+    if structure.swinging:
+        wider.append(widened(structure))
+    found = [identified]
+    for wide in wider:
+        problem = Problem(whole, q, wide.simulation, band, wide.priors)
+        found.append(fitted_afresh(problem, Effect("")))
+    if min(f.misfit for f in found) > SWINGS and np.isfinite(identified.misfit):
+        found += _resonant(identified)
     found = [f for f in found if np.isfinite(f.misfit)]
     if not found:
         return None
@@ -91,21 +92,6 @@ def completed(frfs: Sequence[Frf], simulation: Simulation, q: np.ndarray) -> tup
         values[..., above] += lost
         out.append(replace(frf, accelerance=values, tail_s=float("inf")))
     return tuple(out)
-
-
-def _wider(
-    structure: Structure, frfs: tuple[Frf, ...], q: np.ndarray, band_hz: tuple[float, float]
-) -> list[FrfPosterior]:
-    """With every spring that may be missing, from an identification that begins anew."""
-    wide = widened(structure)
-    try:
-        found = identify(
-            frfs, q, wide.simulation, wide.priors, band_hz=band_hz, starts=1, effort=PATIENT
-        )
-    except (InputError, ValueError):  # a search that ended nowhere: no candidate
-        return []
-    problem = Problem(frfs, q, wide.simulation, band_hz, wide.priors)
-    return [fitted(problem, Effect(""), found.mean)]
 
 
 def widened(structure: Structure) -> Structure:
