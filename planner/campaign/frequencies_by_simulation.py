@@ -24,9 +24,11 @@ LINES = 120  # a pose, at most
 MODEL_ERROR = 0.01  # relative sd of what no simulation follows; as for FRFs
 # Before: sds of ln f, of ln ζ and of a residue's relative change.
 FREQUENCY, DAMPING, SIZE = 0.05, 0.3, 0.1
+ROUNDS = 2  # after the first: frequencies a percent off are beyond the first order
 # Of a pose's FRFs: what is left of them, relative, from which the simulation tells nothing there.
 # And sd of ln f from which it tells nothing of a mode. Chosen.
 TOO_WRONG, UNKNOWN = 0.15, 0.02
+LARGEST = 0.95  # damping ratio of what oscillates
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +66,7 @@ def tuned_frequencies(
     open_ = basis(h, turned, s, tolerances)
     modes = simulation.modes(q, count)
     told = [_told(_at(modes, i), measured, h[i], open_[i], i) for i in range(len(q))]
-    change, sd = (np.array(values) for values in zip(*told, strict=True))
-    hertz = modes.frequency_hz * np.exp(change)
+    hertz, sd = (np.array(values) for values in zip(*told, strict=True))
     return TunedFrequencies(hertz, hertz * sd)
 
 
@@ -76,13 +77,43 @@ def _at(modes: SimulatedModes, i: int) -> SimulatedModes:
 def _told(
     modes: SimulatedModes, measured: Measured, h: np.ndarray, open_: np.ndarray, i: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Change of ln f (count,) at pose i and its sd; NaN where it is not told."""
-    count = len(modes.frequency_hz)
-    known = np.isfinite(modes.frequency_hz)
+    """Frequencies (count,) at pose i and sds of ln f; NaN where they are not told."""
+    count, known = len(modes.frequency_hz), np.isfinite(modes.frequency_hz)
+    own = SimulatedModes(*(values[known] for values in vars(modes).values()))
+    rest = h - _sum_of(own, measured.s[i])
+    change, sd, wrong = _change(own, measured, rest, open_, i)
+    for _ in range(ROUNDS):
+        own = replace(
+            own,
+            frequency_hz=own.frequency_hz * np.exp(FREQUENCY * change[0]),
+            damping_ratio=np.minimum(own.damping_ratio * np.exp(DAMPING * change[1]), LARGEST),
+        )
+        change, sd, wrong = _change(own, measured, rest, open_, i)
+    hertz, sds = np.full((2, count), np.nan)
+    if not wrong:
+        hertz[known] = own.frequency_hz * np.exp(FREQUENCY * change[0])
+        sds[known] = FREQUENCY * sd
+    return hertz, np.where(sds < UNKNOWN, sds, np.nan)
+
+
+def _sum_of(modes: SimulatedModes, s: np.ndarray) -> np.ndarray:
+    """Accelerance (3, 3, F) of k modes at s (F,)."""
+    pole = synthesis.pole(modes.frequency_hz, modes.damping_ratio)[:, None, None, None]
+    residue = modes.residue[..., None]
+    return np.sum(s**2 * (residue / (s - pole) + residue.conj() / (s - pole.conj())), axis=0)
+
+
+def _change(
+    modes: SimulatedModes, measured: Measured, rest: np.ndarray, open_: np.ndarray, i: int
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Changes of ln f and ln ζ (2, k) in their sds before, that of ln f's sd (k,), to first order.
+
+    And whether what is left is too much; `rest` (3, 3, F) is the response without these modes.
+    """
     used = measured.used[i]
     sd = np.where(used, measured.sd[i], np.inf)
-    off = np.where(used, measured.accelerance[i] - h, 0.0)
-    tuning, size = _by_modes(modes, known, measured.s[i])
+    off = np.where(used, measured.accelerance[i] - rest - _sum_of(modes, measured.s[i]), 0.0)
+    tuning, size = _by_modes(modes, measured.s[i])
     weight = np.sqrt(2) / sd
     columns = real_rows(weight * tuning)
     others = real_rows(weight * np.concatenate([open_, size]))
@@ -96,25 +127,18 @@ def _told(
     eta = np.linalg.solve(factor.T, along - across @ change)
     left = r - columns.T @ change - others.T @ eta
     misfit = float(left @ left) / max(2 * np.count_nonzero(used), 1)
-    spread = np.sqrt(np.diagonal(covariance) * max(misfit, 1.0))[: len(covariance) // 2]
+    spread = np.sqrt(np.diagonal(covariance) * max(misfit, 1.0))
     noise = np.where(used, sd, 0.0) ** 2
     square = np.abs(np.where(used, measured.accelerance[i], 0.0)) ** 2
-    residual = np.abs(left.view(complex).reshape(off.shape) / weight.clip(1e-300)) ** 2
+    residual = np.abs(left.view(complex).reshape(off.shape) / np.where(used, weight, 1.0)) ** 2
     wrong = np.sum(np.where(used, residual - noise, 0.0)) > TOO_WRONG**2 * np.sum(square)
-    found, sds = np.full(count, np.nan), np.full(count, np.nan)
-    if not wrong:
-        found[known] = FREQUENCY * change[: len(spread)]
-        sds[known] = FREQUENCY * spread
-    told = sds < UNKNOWN
-    return np.where(told, found, 0.0), np.where(told, sds, np.nan)
+    return change.reshape(2, -1), spread[: len(spread) // 2], bool(wrong)
 
 
-def _by_modes(
-    modes: SimulatedModes, known: np.ndarray, s: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _by_modes(modes: SimulatedModes, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Changes (2k, 3, 3, F) of FRFs by an sd of ln f, then of ln ζ, and (2k, …) of residues."""
-    zeta, residue = modes.damping_ratio[known], modes.residue[known][..., None]
-    pole = synthesis.pole(modes.frequency_hz[known], zeta)[:, None, None, None]
+    zeta, residue = modes.damping_ratio, modes.residue[..., None]
+    pole = synthesis.pole(modes.frequency_hz, zeta)[:, None, None, None]
     by_damping = np.abs(pole[:, 0, 0, 0]) * zeta * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))
     lift, lift_mirrored = s**2 / (s - pole), s**2 / (s - pole.conj())
     steep, steep_mirrored = lift / (s - pole), lift_mirrored / (s - pole.conj())

@@ -26,7 +26,7 @@ SAME = 0.01  # relative difference of the misfits of two starts that met: no mor
 # Misfit from which a mass that swings is sought, and share of what exceeds the noise that it must
 # explain: one that is not there has a mode too, which no hit shows, so that modes would be
 # miscounted. Of generated campaigns masses that were there explained 0.4 to 0.9, others 0.01.
-SWINGS, PART = 1.25, 0.33
+SWINGS, PART = 1.5, 0.33
 HELPS = 0.8  # share of the misfit: where a mass leaves less, springs are tried beside it
 
 

@@ -22,7 +22,7 @@ from planner.robot.config import Resonator
 # All starts at all links are followed for a few steps by logarithms, the most promising of each
 # link farther: on so many poses, for fewer have fewer wrong minima. Starts whose values differ by
 # less have met.
-FIRST_STEPS, PROMISING, LOG_STEPS, FEW, MET = 4, 4, 10, 2, 1e-4
+FIRST_STEPS, PROMISING, LOG_STEPS, FEW, MET = 4, 4, 10, 3, 1e-4
 
 
 def swinging(
