@@ -187,12 +187,12 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters_percent
     named = [_told_of(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
-    shares = list(
-        without_slight(fits, named, weights.probabilities[:-1], prior, weights.bent, matters / 100)
-    )
+    left = np.array([m.unexplained for m in weights.mismatch])
+    own = weights.probabilities[:-1], prior, weights.bent, left
+    shares = list(without_slight(fits, named, *own, matters / 100))
     unknown = float(weights.probabilities[-1])
     leader = int(np.argmax(shares))
-    own = prior[leader]
+    lead = prior[leader]
     before = _priors([effect for effect, _, _ in found.left], all_)
     best = fits[leader]
     half = float(best.misfit.counts.sum()) / (2 * weights.temper)
@@ -200,7 +200,7 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
         fits.append(left)
         # It was left while nothing fitted, when little told apart; by now more would.
         since = max(behind, half * (left.per_value - best.per_value))
-        shares.append(shares[leader] * float(np.exp(-since)) * weight / own)
+        shares.append(shares[leader] * float(np.exp(-since)) * weight / lead)
     total = sum(shares) + unknown
     parts = [_told_of(f, weights.temper) for f in fits]
     groups: dict[tuple, list[int]] = {}

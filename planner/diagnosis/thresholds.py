@@ -74,6 +74,9 @@ CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose
 # share of what refitting left. Beyond, it is less likely by a normal law of ln(left), sd ln
 # LEFT_FACTOR. Chosen.
 LEFT_SHARE = 0.15
+# Of the squares of what refitting leaves: an effect that takes so much of it is no part of what
+# every robot has a little of, and is named from this share of what matters on. Chosen.
+GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.25
 LEFT_FACTOR = 1.5
 SOMETHING_UNKNOWN = 0.05  # probability, before any data, that something of no library is there
 # Where it is, each stated stiffness and inertia is with this probability pulled away by so many of

@@ -7,12 +7,12 @@ Z = K(1+iη) + s C + s² M. Z is symmetric, so that with X = Z⁻¹ Jᵀ any cha
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 
 import numpy as np
 
+from planner.dynamics.motion import ActualPorts, Motion, Turned, synthesis, times_real
 from planner.dynamics.simulation import Elasticity
-from planner.robot.angle_slopes import AngleSlopes
 from planner.robot.elastic_model import Matrices
 
 
@@ -58,7 +58,7 @@ class Impedance:
 
     def gradient(self, x_hit: np.ndarray, x_sensor: np.ndarray, out: np.ndarray) -> None:
         """X_sᵀ dZ X_h into out (n, p, 3s, 3h, F), of solutions (n, e, 3, F)."""
-        hit, sensor = _moved(self.ports, x_hit), _moved(self.ports, x_sensor)
+        hit, sensor = times_real(self.ports, x_hit), times_real(self.ports, x_sensor)
         each = np.empty((len(hit), len(self.shapes), *out.shape[2:]), dtype=complex)
         _between(self.shapes, sensor, hit, each)
         out[:] = 0.0
@@ -76,76 +76,15 @@ def response(
     matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
 ) -> np.ndarray:
     """Accelerance (n, 3s, 3h, F) in m/s²/N at s (n, F); `mass` (n, e, e) takes M's place."""
-    return _synthesis(matrices.sensor, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Of e elastic degrees of freedom: X (n, e, points, F) in rad/N at s (n, F).
-
-    `x_turn`, in rad per N·m at the hit point, is there where that was asked for.
-    """
-
-    matrices: Matrices
-    x_hit: np.ndarray
-    x_sensor: np.ndarray
-    s: np.ndarray
-    x_turn: np.ndarray | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class Turned:
-    """What goes with accelerances (n, 3s, 3h, F): responses to moments, to turned joints.
-
-    Made of the motions of poses one after another, each where it is first asked for.
-    """
-
-    motions: tuple[Motion, ...]
-
-    @cached_property
-    def moment(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in m/s² per N·m at the hit point."""
-        # Z is symmetric: what a moment at the hit point does to the sensor, a force at the sensor
-        # does to the turning of the hit point.
-        turns = [_synthesis(m.matrices.hit_turn, m.x_sensor, m.s) for m in self.motions]
-        return np.swapaxes(_joined(turns), 1, 2)
-
-    @cached_property
-    def turning(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in rad/s² per N: how the sensor turns."""
-        return _joined([_synthesis(m.matrices.sensor_turn, m.x_hit, m.s) for m in self.motions])
-
-    @cached_property
-    def twisting(self) -> np.ndarray:
-        """(n, 3s, 3h, F) in rad/s² per N·m: how the sensor turns with moments at the hit point."""
-        turns = [(m.matrices.sensor_turn, m.x_turn, m.s) for m in self.motions]
-        return _joined([_synthesis(rows, x, s) for rows, x, s in turns if x is not None])
-
-    @cached_property
-    def by_angle(self) -> np.ndarray | None:
-        """(n, dof, 3s, 3h, F) in m/s²/N per rad of each joint; None where slopes are not known."""
-        found = [
-            _by_angle(m.matrices.by_angle, m.x_hit, m.x_sensor, m.s)
-            for m in self.motions
-            if m.matrices.by_angle is not None
-        ]
-        return _joined(found) if len(found) == len(self.motions) else None
-
-
-def _joined(parts: list[np.ndarray]) -> np.ndarray:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
+    return synthesis(matrices.sensor, _solutions(matrices, elasticity, s, mass, matrices.hit), s)
 
 
 def response_turned(
     matrices: Matrices, elasticity: Elasticity, s: np.ndarray, mass: np.ndarray | None = None
 ) -> tuple[np.ndarray, Turned]:
     """Accelerance (n, 3s, 3h, F) at s (n, F), and what goes with it."""
-    points = matrices.hit.shape[1]
-    rows = np.concatenate([matrices.hit, matrices.sensor, matrices.hit_turn], axis=1)
-    x = _solutions(matrices, elasticity, s, mass, rows)
-    x_hit, x_sensor, x_turn = x[:, :, :points], x[:, :, points:-points], x[:, :, -points:]
-    turned = Turned((Motion(matrices, x_hit, x_sensor, s, x_turn),))
-    return _synthesis(matrices.sensor, x_hit, s), turned
+    motion = moved(matrices, elasticity, s, mass)
+    return motion.accelerance, Turned((motion,))
 
 
 def response_gradient(
@@ -173,15 +112,47 @@ def response_parts(
     The parameters are ln stiffness (e), ln damping (e), ln loss factor (e, only if one is not 0),
     those of `inertias` (B · p, only if given), and those of all that is `added` to Z.
     """
-    points = matrices.hit.shape[1]
-    both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
-    x = _solutions(matrices, elasticity, s, mass, both, added)
-    x_hit, x_sensor = x[:, :, :points], x[:, :, points:]
-    e, lossy = x.shape[1], bool(elasticity.loss_factor.any())
+    motion = moved(matrices, elasticity, s, mass, added)
+    slope = motion_slopes(motion, elasticity, inertias, added)
+    return motion.accelerance, slope, Turned((motion,))
+
+
+def moved(
+    matrices: Matrices,
+    elasticity: Elasticity,
+    s: np.ndarray,
+    mass: np.ndarray | None = None,
+    added: Sequence[Impedance] = (),
+    actual: ActualPorts | None = None,
+) -> Motion:
+    """The motion behind accelerances at s (n, F); where hits and sensors were, if that is known."""
+    if actual is None:
+        points = matrices.hit.shape[1]
+        both = np.concatenate([matrices.hit, matrices.sensor], axis=1)
+        x = _solutions(matrices, elasticity, s, mass, both, added)
+        return Motion(matrices, x[:, :, :points], x[:, :, points:], s)
+    matrices = actual.turned(matrices)
+    mass = (matrices.mass if mass is None else mass) + actual.heavier(matrices)
+    rows = np.concatenate([actual.struck(matrices), actual.heard(matrices)], axis=1)
+    x = _solutions(matrices, elasticity, s, mass, rows, added)
+    points = actual.hit.shape[2]
+    return Motion(matrices, x[:, :, :points], x[:, :, points:], s, actual=actual)
+
+
+def motion_slopes(
+    motion: Motion,
+    elasticity: Elasticity,
+    inertias: Inertias | None = None,
+    added: Sequence[Impedance] = (),
+) -> np.ndarray:
+    """Derivatives (n, P, 3s, 3h, F) of a motion's accelerance: see `response_parts`."""
+    # All derivatives are products with the sensors' motions, by which the chain shows them.
+    x_hit, x_sensor, s = motion.x_hit, motion.scaled(motion.x_sensor), motion.s
+    e, lossy = x_hit.shape[1], bool(elasticity.loss_factor.any())
     springs = (3 if lossy else 2) * e
     extra = 0 if inertias is None else inertias.basis.shape[0] * inertias.basis.shape[1]
     own = sum(len(one.slope) for one in added)
-    shape = len(s), springs + extra + own, x_sensor.shape[2], points, s.shape[1]
+    shape = len(s), springs + extra + own, x_sensor.shape[2], x_hit.shape[2], s.shape[1]
     out = np.empty(shape, dtype=complex)
     minus = -(s**2)[:, None, None, None]
     each = out[:, :e]
@@ -202,35 +173,7 @@ def response_parts(
         part = out[:, place : place + len(one.slope)]
         one.gradient(x_hit * minus[:, 0], x_sensor, part)
         place += len(one.slope)
-    return (
-        _synthesis(matrices.sensor, x_hit, s),
-        out,
-        Turned((Motion(matrices, x_hit, x_sensor, s),)),
-    )
-
-
-def _by_angle(
-    slopes: AngleSlopes, x_hit: np.ndarray, x_sensor: np.ndarray, s: np.ndarray
-) -> np.ndarray:
-    """s² [J_s' X_h + X_sᵀ (J_h'ᵀ − Z' X_h)] of each joint's angle, (n, dof, 3s, 3h, F)."""
-    n, dof, e, _ = slopes.mass.shape
-    square = (s**2)[:, None, None, None]
-    inner = _moved(slopes.mass.reshape(n, -1, e), x_hit).reshape(n, dof, e, *x_hit.shape[2:])
-    inner *= -square
-    if slopes.stiffness.any():
-        inner -= slopes.stiffness[..., None, None] * x_hit[:, None]
-    inner += np.swapaxes(slopes.hit, 2, 3)[..., None]
-    out = _moved(slopes.sensor.reshape(n, -1, e), x_hit).reshape(n, dof, -1, *x_hit.shape[2:])
-    out = out + np.einsum("neif,nkejf->nkijf", x_sensor, inner)
-    return square * out
-
-
-def _synthesis(rows: np.ndarray, x: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Accelerations (n, r, points, F) along rows (n, r, e) of motions x (n, e, points, F)."""
-    n, e, points, lines = x.shape
-    flat = np.ascontiguousarray(x).reshape(n, e, -1).view(float)
-    receptance = (rows @ flat).view(complex).reshape(n, -1, points, lines)
-    return (s**2)[:, None, None] * receptance
+    return out
 
 
 def _solutions(
@@ -290,13 +233,6 @@ def _between(shapes: np.ndarray, sensor: np.ndarray, hit: np.ndarray, out: np.nd
 @cache
 def _upper(size: int) -> tuple[np.ndarray, np.ndarray]:
     return np.triu_indices(size)
-
-
-def _moved(ports: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Real ports (n, r, e) times complex columns (n, e, 3, F)."""
-    n, r, _ = ports.shape
-    flat = np.ascontiguousarray(x).reshape(n, x.shape[1], -1).view(float)
-    return (ports @ flat).view(complex).reshape(n, r, *x.shape[2:])
 
 
 def _times(matrix: np.ndarray, columns: np.ndarray) -> np.ndarray:

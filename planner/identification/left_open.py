@@ -8,16 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.dynamics.gradient import Turned
-from planner.identification.measurement_model import (
-    OF_HIT,
-    OpenNumbers,
-    Tolerances,
-    basis,
-    chain_basis,
-    hit_basis,
-    real_rows,
-)
+from planner.dynamics.motion import ActualPorts, Turned
+from planner.identification.measurement_model import OpenNumbers, Tolerances, basis, real_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,18 +28,28 @@ class Told:
 
     own: np.ndarray
     chain: np.ndarray
+    hits: int
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """(n, l) of all, as `OpenNumbers` counts them."""
+        chain = np.tile(self.chain, (len(self.own), 1))
+        return np.hstack([self.own[:, : self.hits], chain, self.own[:, self.hits :]])
 
 
 @dataclass(frozen=True, eq=False)
 class LeftOpen:
     """B of n poses, weighted, as it is somewhere and held there.
 
-    `crossed` (n, r, c, F), weighted, is what goes beyond first order. Were B to follow the
-    parameters, larger FRFs would seem to fit better, having larger B.
+    FRFs are those between `actual` ports, and `crossed` (n, r, c, F), weighted, takes what they
+    were told to make of them back to first order. Were B to follow the parameters, larger FRFs
+    would seem to fit better, having larger B.
     """
 
     poses: tuple["_Pose", ...]
     crossed: np.ndarray
+    hits: int
+    actual: ActualPorts | None = None
 
     @classmethod
     def at(
@@ -57,22 +59,18 @@ class LeftOpen:
         s: np.ndarray,
         weight: np.ndarray,
         tolerances: Tolerances,
-        told: Told | None = None,
+        eta: np.ndarray | None = None,
     ) -> "LeftOpen":
-        """Of accelerances h (n, r, c, F) and the weight of residuals.
-
-        With `told`, what the chain makes of hits that miss, of second order, is that of these
-        estimates. (B itself must not follow them: it would then be fitted to the same noise.)
-        """
+        """Of accelerances h (n, r, c, F), around eta (n, l) if given, and the residuals' weight."""
         made = basis(h, turned, s, tolerances)
-        crossed = np.zeros_like(h) if told is None else _crossed(made, turned, s, tolerances, told)
         made *= weight[:, None]
+        crossed = np.zeros_like(h) if eta is None else -np.einsum("nl,nlijf->nijf", eta, made)
         numbers, used = OpenNumbers.of(h), np.repeat(weight > 0, 2, axis=-1)
         poses = (
             _Pose.of(real_rows(numbers.own(pose)), real_rows(numbers.shared(pose)), there.ravel())
             for pose, there in zip(made, used, strict=True)
         )
-        return cls(tuple(poses), weight * crossed)
+        return cls(tuple(poses), crossed, numbers.hits, turned.actual)
 
     def integrated(self, residual: np.ndarray, slope: np.ndarray) -> Integrated:
         """Of residuals (n, r, c, F) and their derivatives (n, d, r, c, F), both weighted."""
@@ -115,7 +113,7 @@ class LeftOpen:
             -np.linalg.solve(pose.factor.T, pose.own @ r + pose.across @ chain)
             for pose, r in zip(self.poses, flat, strict=True)
         ]
-        return Told(np.array(left), chain)
+        return Told(np.array(left), chain, self.hits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,17 +146,3 @@ class _Pose:
         """Of values (d, r, c, F) those that were measured, as real rows (d, m)."""
         rows = real_rows(some)
         return rows if self.used.all() else rows[:, self.used]
-
-
-def _crossed(
-    made: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances, told: Told
-) -> np.ndarray:
-    """Of second order (n, r, c, F): what the chain makes of the misses, both as they are told."""
-    count = OpenNumbers.of(made)
-    hits, joints = made[:, : count.hits], made[:, count.known :]
-    missed = np.einsum("nl,nlijf->nijf", told.own[:, : count.hits], hits)
-    missed += np.einsum("nl,nlijf->nijf", told.own[:, count.hits :], joints)
-    turns = hit_basis(turned.turning, turned.twisting, t)
-    numbers = told.own[:, : count.hits].reshape(len(made), -1, OF_HIT)
-    turning = np.einsum("nam,namif->niaf", numbers, turns)
-    return np.einsum("k,nkijf->nijf", told.chain, chain_basis(missed, turning, s, t))

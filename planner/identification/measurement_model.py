@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
-from planner.dynamics.gradient import Turned
+from planner.dynamics.motion import ActualPorts, Turned
 from planner.robot.config import RobotConfig
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
@@ -59,6 +59,7 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
+MISSED_MOST = 4.0  # prior sds, that a guess of a miss is kept within while a simulation is far off
 OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
 
 
@@ -142,32 +143,100 @@ def chain_basis(
 def basis(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> np.ndarray:
     """All of them of the poses, (n, l, r, c, F): as `OpenNumbers` counts them.
 
-    Those of the joints are there where the matrices behind `turned` have their slopes.
+    Those of the joints are there where the matrices behind `turned` have their slopes. Where it
+    knows of actual ports, h and the changes are around those.
     """
-    return _basis(h, turned.moment, turned.turning, turned.by_angle, s, t)
+    return _basis(_Answers.of(h, turned), s, t)
 
 
-def _basis(
-    h: np.ndarray,
-    moment: np.ndarray,
-    turning: np.ndarray,
-    by_angle: np.ndarray | None,
-    s: np.ndarray,
-    t: Tolerances,
-) -> np.ndarray:
-    n, rows, columns, lines = h.shape
-    numbers = OpenNumbers.of(h)
-    joints = 0 if by_angle is None else by_angle.shape[1]
+@dataclass(frozen=True, eq=False)
+class _Answers:
+    """FRFs h (n, r, c, F), and what the changes are made of: see `Turned`.
+
+    `matrix` (n, r, r) is what the sensors show of what they feel, None where that is everything.
+    """
+
+    h: np.ndarray
+    forces: np.ndarray
+    moment: np.ndarray
+    felt: np.ndarray
+    turning: np.ndarray
+    by_angle: np.ndarray | None
+    matrix: np.ndarray | None
+
+    @classmethod
+    def of(cls, h: np.ndarray, turned: Turned) -> "_Answers":
+        actual, by_angle = turned.actual, turned.by_angle
+        if actual is None:
+            return cls(h, h, turned.moment, h, turned.turning, by_angle, None)
+        return cls(
+            h, turned.forces, turned.moment, turned.felt, turned.turning, by_angle, actual.matrix
+        )
+
+    def between(self, rows: slice, columns: slice) -> "_Answers":
+        """Of one sensor and one hit point."""
+        at = (slice(None), rows, columns)
+        parts = (one[at] for one in (self.h, self.forces, self.moment, self.felt, self.turning))
+        by_angle = None if self.by_angle is None else self.by_angle[:, :, rows, columns]
+        matrix = None if self.matrix is None else self.matrix[:, rows, rows]
+        return _Answers(*parts, by_angle=by_angle, matrix=matrix)
+
+
+def _basis(a: _Answers, s: np.ndarray, t: Tolerances) -> np.ndarray:
+    n, rows, columns, lines = a.h.shape
+    numbers = OpenNumbers.of(a.h)
+    joints = 0 if a.by_angle is None else a.by_angle.shape[1]
     # All is written once, in place: such arrays are large.
     out = np.zeros((n, numbers.known + joints, rows, columns, lines), dtype=complex)
     by_axis = out[:, : numbers.hits].reshape(n, columns, OF_HIT, rows, columns, lines)
     # A miss along an axis changes the column of that axis only: a view of these.
-    hit_basis(h, moment, t, np.einsum("namiaf->namif", by_axis))
-    chain_basis(h, turning, s, t, out[:, numbers.hits : numbers.known])
-    if by_angle is not None:
+    hit_basis(a.forces, a.moment, t, np.einsum("namiaf->namif", by_axis))
+    of_chain = out[:, numbers.hits : numbers.known]
+    chain_basis(a.felt, a.turning, s, t, of_chain)
+    if a.matrix is not None:
+        for sensor in range(rows // 3):
+            places = of_chain[:, OF_SENSOR * sensor + 9 : OF_SENSOR * (sensor + 1)]
+            places[:] = np.einsum("nij,nkjcf->nkicf", a.matrix, places)
+        np.multiply(a.h, t.force_gain, out=of_chain[:, -2])
+        np.multiply(a.h, -t.delay_s * s[:, None, None], out=of_chain[:, -1])
+    if a.by_angle is not None:
         sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
-        np.multiply(by_angle, sd, out=out[:, numbers.known :])
+        np.multiply(a.by_angle, sd, out=out[:, numbers.known :])
     return out
+
+
+def actual_ports(
+    eta: np.ndarray, s: np.ndarray, t: Tolerances, shape: tuple[int, int]
+) -> ActualPorts:
+    """Where hits and sensors were, and the joints stood, whose numbers eta (n, l) are known.
+
+    They are in sds, as `OpenNumbers` counts them, of FRFs of `shape` (r, c) at s (n, F).
+    """
+    n, (rows, columns) = len(eta), shape
+    numbers = OpenNumbers(OF_HIT * columns, OF_SENSOR * (rows // 3) + OF_HAMMER)
+    hit = np.concatenate([np.eye(columns), np.zeros((columns, columns))])
+    hit = np.repeat(hit[None], n, axis=0)
+    place = np.repeat(np.eye(rows, 2 * rows)[None], n, axis=0)
+    matrix = np.repeat(np.eye(rows)[None], n, axis=0)
+    missed = eta[:, : numbers.hits].reshape(n, columns, OF_HIT)
+    for column in range(columns):
+        at = column - column % 3
+        first, second = (at + axis for axis in ACROSS[column % 3])
+        hit[:, first, column] = t.angle_rad * missed[:, column, 0]
+        hit[:, second, column] = t.angle_rad * missed[:, column, 1]
+        hit[:, columns + second, column] = -t.offset_m * missed[:, column, 2]
+        hit[:, columns + first, column] = t.offset_m * missed[:, column, 3]
+    chain = eta[:, numbers.hits : numbers.known]
+    for sensor, at in enumerate(range(0, rows, 3)):
+        own = chain[:, OF_SENSOR * sensor : OF_SENSOR * (sensor + 1)]
+        within = np.where(np.eye(3), t.gain, t.across) * own[:, :9].reshape(-1, 3, 3)
+        matrix[:, at : at + 3, at : at + 3] += within
+        for axis, (first, second) in enumerate(ACROSS):
+            place[:, at + first, rows + at + second] = t.position_m * own[:, 9 + axis]
+            place[:, at + second, rows + at + first] = -t.position_m * own[:, 9 + axis]
+    scale = (1 + t.force_gain * chain[:, -2:-1]) * np.exp(-t.delay_s * chain[:, -1:] * s)
+    angle = np.asarray(t.joint_rad) * eta[:, numbers.known :]
+    return ActualPorts(hit, place, matrix, scale, angle)
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,18 +292,15 @@ class Block:
 
 def blocks(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> tuple[Block, ...]:
     """`basis` without all that is 0: of each sensor and hit point."""
-    numbers, found = OpenNumbers.of(h), []
-    moment, turning, angles = turned.moment, turned.turning, turned.by_angle
-    joints = 0 if angles is None else angles.shape[1]
+    numbers, found, answers = OpenNumbers.of(h), [], _Answers.of(h, turned)
+    joints = 0 if answers.by_angle is None else answers.by_angle.shape[1]
     of_all = np.arange(numbers.known - OF_HAMMER, numbers.known + joints)
     for sensor in range(h.shape[1] // 3):
         of_sensor = numbers.hits + OF_SENSOR * sensor + np.arange(OF_SENSOR)
         for point in range(h.shape[2] // 3):
             of_hits = HIT_NUMBERS * point + np.arange(HIT_NUMBERS)
             rows, columns = (slice(3 * k, 3 * k + 3) for k in (sensor, point))
-            at = (slice(None), rows, columns)
-            by_angle = None if angles is None else angles[:, :, rows, columns]
-            own = _basis(h[at], moment[at], turning[at], by_angle, s, t)
+            own = _basis(answers.between(rows, columns), s, t)
             every = np.concatenate([of_hits, of_sensor, of_all])
             found.append(Block(rows, columns, every, own))
     return tuple(found)

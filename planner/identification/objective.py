@@ -11,11 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from planner.dynamics.gradient import Inertias, response_gradient, response_turned
+from planner.dynamics.gradient import Inertias, motion_slopes, moved
+from planner.dynamics.motion import ActualPorts, Motion, Turned
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.left_open import Integrated, LeftOpen
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import Tolerances
+from planner.identification.measurement_model import MISSED_MOST, Tolerances, actual_ports
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
 from planner.inference.least_squares import Quadratic
@@ -81,17 +82,28 @@ class Objective:
     def opened(self, x: np.ndarray, tolerances: Tolerances) -> "Objective":
         """With what these tolerances of hits, chain and readback leave open, as it is at x.
 
-        To second order, by what the data tell of it there, if it was opened before.
+        Around what the data tell of it there, if it was opened before.
         """
-        p, count, s = self.parametrisation, len(self.parametrisation.parameters), self.measured.s
-        springs, mass = p.elasticity(x[:count]), self._mass(x[count:])
-        h, turned = response_turned(self.matrices, springs, s, mass)
-        weight = weight_of(self.measured, False)
-        told = None
+        s, weight, eta = self.measured.s, weight_of(self.measured, False), None
         if self.left_open is not None:
             lost = 0.0 if self.completion is None else self.completion.values
-            told = self.left_open.told(weight * (h - lost - self.measured.accelerance))
-        return replace(self, left_open=LeftOpen.at(h, turned, s, weight, tolerances, told))
+            off = self._motion(x).accelerance - lost - self.measured.accelerance
+            told = self.left_open.told(weight * off).numbers
+            eta = np.clip(told, -MISSED_MOST, MISSED_MOST)
+        actual = None if eta is None else actual_ports(eta, s, tolerances, weight.shape[1:3])
+        motion = self._motion(x, actual)
+        turned = Turned((motion,))
+        opened = LeftOpen.at(motion.accelerance, turned, s, weight, tolerances, eta)
+        return replace(self, left_open=opened)
+
+    def _motion(self, x: np.ndarray, actual: ActualPorts | None = None) -> Motion:
+        """At x, between the ports that are known unless others are given."""
+        p, count = self.parametrisation, len(self.parametrisation.parameters)
+        if actual is None and self.left_open is not None:
+            actual = self.left_open.actual
+        springs = p.elasticity(x[:count])
+        s, mass = self.measured.s, self._mass(x[count:])
+        return moved(self.matrices, springs, s, mass, actual=actual)
 
     def by_pose(self, x: np.ndarray) -> np.ndarray:
         """χ² per real value (n,) of each pose at x, where that can be."""
@@ -138,13 +150,9 @@ class Objective:
         p = self.parametrisation
         count = len(p.parameters)
         inertias = self.inertias if self.free_inertia else None
-        h, slope = response_gradient(
-            self.matrices,
-            p.elasticity(x[:count]),
-            self.measured.s,
-            self._mass(x[count:]),
-            inertias,
-        )
+        motion = self._motion(x)
+        slope = motion_slopes(motion, p.elasticity(x[:count]), inertias)
+        h = motion.accelerance
         if self.completion is not None:
             lost, since = self.completion, x - self.completed_at
             h = h - lost.values

@@ -1,12 +1,16 @@
 """Every effect's derivatives against finite differences, in the misfit that is minimised."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from planner.diagnosis.effects import library
+from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
+from planner.identification.measurement_model import actual_ports, basis
 from planner.robot.robot import Robot
 from tests.support.known_robots import kr210_folder
 
@@ -52,3 +56,56 @@ def test_gradient_is_that_of_finite_differences(problem, wanted):
 
 def test_every_kind_is_tested(problem):
     assert {e.name for e in library(problem.simulation)} == {w.split()[0] for w in EFFECTS}
+
+
+def missed(misfit, eta):
+    """FRFs and derivatives between the ports that eta (n, l) tell of, and what changes them."""
+    s, t = misfit.setting.s, misfit.tolerances
+    h, slope, turned = misfit.parts(misfit.mean, actual_ports(eta, s, t, (3, 3)))
+    return h, slope, basis(h, turned, s, t)
+
+
+@pytest.fixture(scope="module")
+def told(problem):
+    misfit = problem.misfit(Effect(""), Grade(12))
+    open_ = basis(*misfit.values(misfit.mean), misfit.setting.s, misfit.tolerances)
+    return misfit, np.random.default_rng(3).standard_normal(open_.shape[:2])
+
+
+def test_misses_of_nothing_are_the_stated_ports(told):
+    misfit, eta = told
+    h, slope, open_ = missed(misfit, 0 * eta)
+    plain = misfit.parts(misfit.mean)
+    assert h == pytest.approx(plain[0])
+    assert slope == pytest.approx(plain[1])
+    assert open_ == pytest.approx(
+        basis(plain[0], plain[2], misfit.setting.s, misfit.tolerances), abs=1e-12
+    )
+
+
+def test_what_misses_change_around_misses_is_that_of_finite_differences(told):
+    misfit, eta = told
+    open_ = missed(misfit, eta)[2]
+    for number in range(eta.shape[1]):
+        step = np.zeros_like(eta)
+        step[:, number] = 1e-4
+        expected = (missed(misfit, eta + step)[0] - missed(misfit, eta - step)[0]) / 2e-4
+        # Where a hit beside its point moves with a joint that is turned is left out.
+        assert np.abs(open_[:, number] - expected).max() <= 0.01 * np.abs(expected).max(), number
+
+
+def test_misses_and_parameters_act_together(problem, told):
+    """The misfit's gradient, where hits and chain err by as much as they may."""
+    misfit, eta = told
+    measured = replace(misfit.measured, accelerance=missed(misfit, eta)[0])
+    misfit = replace(misfit, measured=measured)
+    x = misfit.mean + 0.02 * misfit.sd * np.random.default_rng(4).standard_normal(len(misfit.mean))
+    at = misfit(x)
+    whitened = np.linalg.cholesky(at.normal)
+    found = []
+    for direction in np.linalg.inv(whitened):
+        step = 0.02 * direction
+        found.append((misfit(x + step).value - misfit(x - step).value) / 0.04)
+    expected = np.linalg.solve(whitened, at.gradient)
+    off = np.linalg.norm(np.array(found) - expected)
+    assert off < 0.02 * np.linalg.norm(expected), (off, np.linalg.norm(expected))

@@ -36,12 +36,14 @@ def at(tmp_path_factory) -> Callable[[str, str, Moved], Fit]:
     return made
 
 
-def given_on(whole: Fit, without: Fit, prior=(100.0, 1.0)) -> float:
-    """Share of the effect that ends up with the fit without it."""
+def given_on(whole: Fit, without: Fit, prior=(100.0, 1.0), left=(0.01, 0.01)) -> float:
+    """Share of the effect that ends up with the fit without it; what both leave is `left`."""
     fits = [without, whole]
     told = [f.effect.parts() for f in fits]
     bent = np.array([moved(f, without) for f in fits])
-    return float(without_slight(fits, told, np.array([0.0, 1.0]), prior, bent, 0.03)[0])
+    return float(
+        without_slight(fits, told, np.array([0.0, 1.0]), prior, bent, np.array(left), 0.03)[0]
+    )
 
 
 def moved(fit: Fit, plain: Fit) -> float:

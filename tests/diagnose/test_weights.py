@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
 from planner.diagnosis.linear.evidence import shares_of
 from planner.diagnosis.thresholds import ALIKE, DISCREPANCIES, NOISE_OVERSTATED
+from planner.identification.measurement_model import OpenNumbers
 from planner.inference.evidence import shared_noise, temper
 
 POSES = 9
@@ -120,15 +121,14 @@ def test_evidence_is_that_of_one_normal_distribution():
     c, j = rng.normal(size=(poses, chain, values)), rng.normal(size=(poses, free, values))
     rows = np.concatenate([r[:, None], b, d, c, j], axis=1)
     misfit = SimpleNamespace(free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([42]))
-    around = rng.normal(size=chain)
     made = InnerProducts(
         cast(Any, SimpleNamespace(misfit=misfit, x=x)),
-        rows @ np.swapaxes(rows, 1, 2), np.array([0, 0, 1.0, 5.0]), around,
+        rows @ np.swapaxes(rows, 1, 2), np.array([0, 0, 1.0, 5.0]), OpenNumbers(0, chain),
     )  # fmt: skip
 
     def dense(size: float) -> float:
-        # r holds where x and the chain are as they are: the priors' means are elsewhere.
-        expected = r - np.einsum("kpv,p->kv", j, x - mean) - np.einsum("kcv,c->kv", c, around)
+        # r holds where x is as it is: the priors' means are elsewhere.
+        expected = r - np.einsum("kpv,p->kv", j, x - mean)
         whole = temper_ * np.eye(poses * values)
         for k in range(poses):
             own = slice(k * values, (k + 1) * values)

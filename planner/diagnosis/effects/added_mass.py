@@ -47,7 +47,6 @@ class AddedMass(Effect):
 
     name = "added_mass"
     absorbed = True
-    vanishing = ("mass",)
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["AddedMass", ...]:

@@ -1,7 +1,7 @@
 """An effect: a change of the simulation, its priors, Z, or the measured FRFs."""
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -87,8 +87,7 @@ class Effect:
 
     `springs` names the parameters of `priors` that belong to the effect: they are reported with
     `quantities`, the ones that it adds. `absorbed`: springs and inertias that are refitted can take
-    its place, so that only its own size says how much it matters, not what FRFs lack without it.
-    `vanishing` names the quantities that are 0 where it is not there.
+    its place, so that not only what FRFs lack without it says how much it matters.
     """
 
     at: str
@@ -97,7 +96,6 @@ class Effect:
     name = "none"
     artefact = False
     absorbed = False
-    vanishing: ClassVar[tuple[str, ...]] = ()
 
     @property
     def prior(self) -> float:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, approached
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.thresholds import (
@@ -23,7 +24,7 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_UNKNOWN,
     DISCREPANCY_USUAL,
 )
-from planner.identification.measurement_model import ChainTransfer, OpenNumbers, basis
+from planner.identification.measurement_model import MISSED_MOST, OpenNumbers
 from planner.identification.objective import FARTHEST
 
 
@@ -39,47 +40,52 @@ class InnerProducts:
     fit: Fit
     products: np.ndarray
     own: np.ndarray
-    chain: np.ndarray
+    numbers: OpenNumbers
 
     @classmethod
     def of(cls, fit: Fit, springs: Sequence[str]) -> "InnerProducts":
         """Of a fit; `springs` may differ from pose to pose.
 
-        Misses of hits and the chain act together, which is of second order: all is taken around
-        the chain that the fit itself tells.
+        All is taken around what the fit tells of hits, joints and the chain of all poses.
         """
-        tolerances = fit.misfit.tolerances
-        none = OpenNumbers.of(fit.misfit.measured.accelerance).chain
-        first = cls.around(fit, springs, np.zeros(0 if tolerances is None else none))
-        if tolerances is None:
-            return first
-        return cls.around(fit, springs, first.worth(1.0).chain)
+        misfit = fit.misfit
+        if misfit.tolerances is None:
+            h, slope = misfit.response(fit.x)
+            residual = misfit.weight * (h - misfit.measured.accelerance)
+            nothing = np.zeros((len(h), 0, *h.shape[1:]))
+            slope = misfit.weight[:, None] * slope
+            return cls._of(fit, springs, residual, nothing, slope, OpenNumbers(0, 0))
+        first = cls.around(fit, springs, misfit.around_misses(fit.x))
+        told = np.clip(first.worth(1.0).missed, -MISSED_MOST, MISSED_MOST)
+        return cls.around(fit, springs, misfit.around_these(fit.x, told))
 
     @classmethod
-    def around(cls, fit: Fit, springs: Sequence[str], chain: np.ndarray) -> "InnerProducts":
-        """Of a fit, around a chain with these numbers."""
-        misfit = fit.misfit
-        h, slope, turned = misfit.parts(fit.x)
-        own = multiples(misfit, springs)
-        loose = np.flatnonzero(own)
-        open_, tolerances = np.zeros((len(h), 0, *h.shape[1:])), misfit.tolerances
-        if tolerances is not None:
-            open_ = basis(h, turned, misfit.setting.s, tolerances)
-        if tolerances is not None and chain.any():
-            seen = ChainTransfer.of(chain, misfit.setting.s, tolerances)
-            h = seen.shown(h, turned)
-            open_, slope = seen.of_accelerations(open_), seen.of_accelerations(slope)
-        residual = misfit.weight * (h - misfit.measured.accelerance)
-        open_, sloped = misfit.weight[:, None] * open_, misfit.weight[:, None] * slope
-        made, numbers = [], OpenNumbers.of(h)
-        for i in range(len(h)):
-            r, b, j = _real(residual[i][None]), _real(open_[i]), _real(sloped[i])
+    def around(cls, fit: Fit, springs: Sequence[str], there: AroundMisses) -> "InnerProducts":
+        """Of a fit, around known misses."""
+        assert there.slope is not None
+        numbers = OpenNumbers.of(there.residual)
+        return cls._of(fit, springs, there.residual, there.opened(), there.slope, numbers)
+
+    @classmethod
+    def _of(
+        cls,
+        fit: Fit,
+        springs: Sequence[str],
+        residual: np.ndarray,
+        open_: np.ndarray,
+        slope: np.ndarray,
+        numbers: OpenNumbers,
+    ) -> "InnerProducts":
+        own = multiples(fit.misfit, springs)
+        loose, made = np.flatnonzero(own), []
+        for one, opened, sloped in zip(residual, open_, slope, strict=True):
+            r, b, j = _real(one[None]), _real(opened), _real(sloped)
             varies = b.copy()
             varies[numbers.hits : numbers.known] *= CHAIN_VARIES
             rows = np.concatenate([r, varies, j[loose], numbers.shared(b), j])
             made.append(rows @ rows.T)
         own = np.concatenate([np.zeros(open_.shape[1]), own[loose]])
-        return cls(fit, np.array(made), own, chain)
+        return cls(fit, np.array(made), own, numbers)
 
     def worth(self, temper: float) -> "Worth":
         """Evidence over all sizes, χ² counting 1/`temper`."""
@@ -87,11 +93,14 @@ class InnerProducts:
         evidence = np.array([one[0] for one in each])
         scores = np.array([one[1] for one in each])
         likeliest = int(np.argmax(evidence))
-        _, _, chi2, step = each[likeliest]
+        _, _, chi2, step, own = each[likeliest]
         values = max(float(self.fit.misfit.counts.sum()), 1.0)
-        size, chain = DISCREPANCIES[likeliest], len(self.chain)
+        size, chain = DISCREPANCIES[likeliest], self.numbers.chain
+        missed = own[:, : np.count_nonzero(self.own == 0)]
+        of_chain = slice(self.numbers.hits, self.numbers.known)
+        missed[:, of_chain] = CHAIN_VARIES * missed[:, of_chain] + step[:chain]
         ends = np.array([self._moved(one[3][chain:]) for one in each])
-        return Worth(evidence, scores, chi2 / values, size, self.chain + step[:chain], ends)
+        return Worth(evidence, scores, chi2 / values, size, missed, ends)
 
     def _moved(self, step: np.ndarray) -> np.ndarray:
         """x (D,) after a step (free,) in prior sds, no farther off than is looked for."""
@@ -100,25 +109,29 @@ class InnerProducts:
         far[misfit.free] += step
         return misfit.mean + misfit.sd * np.clip(far, -FARTHEST, FARTHEST)
 
-    def _at(self, size: float, temper: float) -> tuple[float, np.ndarray, float, np.ndarray]:
-        """Log evidence, −2 ln likelihood (n,) of each pose, χ², and the step, at a `size`.
+    def _at(
+        self, size: float, temper: float
+    ) -> tuple[float, np.ndarray, float, np.ndarray, np.ndarray]:
+        """Log evidence, −2 ln likelihood (n,) of each pose, χ², the step, and what is each pose's.
 
         By Laplace's method, after one step to the optimum that goes with this size.
         """
         misfit, count = self.fit.misfit, len(self.own)
         scale = np.where(self.own > 0, size * self.own, 1.0)
         rest = np.r_[0, 1 + count : self.products.shape[1]]
-        left, volume = [], []
+        left, volume, told = [], [], []
         for product in self.products / temper:
             inner = scale[:, None] * product[1 : 1 + count, 1 : 1 + count] * scale + np.eye(count)
             factor = np.linalg.cholesky(inner)
             onto = np.linalg.solve(factor, scale[:, None] * product[1 : 1 + count][:, rest])
             left.append(product[np.ix_(rest, rest)] - onto.T @ onto)
             volume.append(2 * float(np.sum(np.log(np.diagonal(factor)))))
+            told.append(np.linalg.solve(factor.T, onto))
         whole = np.sum(left, axis=0)
         free = np.flatnonzero(misfit.free)
-        sd = np.concatenate([np.ones(len(self.chain)), misfit.sd[free]])
-        away = np.concatenate([self.chain, ((self.fit.x - misfit.mean) / misfit.sd)[free]])
+        chain = self.numbers.chain
+        sd = np.concatenate([np.ones(chain), misfit.sd[free]])
+        away = np.concatenate([np.zeros(chain), ((self.fit.x - misfit.mean) / misfit.sd)[free]])
         precision = whole[1:, 1:] * np.outer(sd, sd) + np.eye(len(sd))
         gradient = whole[1:, 0] * sd + away
         step = -np.linalg.solve(precision, gradient)
@@ -129,22 +142,24 @@ class InnerProducts:
         evidence -= np.linalg.slogdet(precision)[1] / 2
         chi2 = np.array([one[0, 0] for one in left])
         score = chi2 * (1 - 2 * gain / max(chi2.sum(), 1e-300)) + volumes
-        return float(evidence), score, temper * float(chi2.sum() - 2 * gain), step
+        own = -np.array(told) @ np.append(1.0, sd * step)
+        return float(evidence), score, temper * float(chi2.sum() - 2 * gain), step, own
 
 
 @dataclass(frozen=True, eq=False)
 class Worth:
     """Log evidence (sizes,) of a fit, and −2 ln likelihood (sizes, n) of each pose.
 
-    What is left of χ² per value, and the chain's numbers, are those of the likeliest `size` of the
-    discrepancy; `ends` (sizes, D) is where x is best at each.
+    What is left of χ² per value, and what was `missed` (n, l) by hits, chain and readback, in sds,
+    are those of the likeliest `size` of the discrepancy; `ends` (sizes, D) is where x is best at
+    each.
     """
 
     by_size: np.ndarray
     scores: np.ndarray
     per_value: float
     size: float
-    chain: np.ndarray
+    missed: np.ndarray
     ends: np.ndarray
 
     @property

@@ -9,7 +9,8 @@ from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Grade, Problem
-from planner.dynamics.gradient import Inertias, Turned, response_parts
+from planner.dynamics.gradient import Inertias, motion_slopes, moved
+from planner.dynamics.motion import ActualPorts, Turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measured_frfs import common_band
 
@@ -20,7 +21,13 @@ class DriftMisfit(Misfit):
 
     order: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
+    def values(self, x: np.ndarray) -> tuple[np.ndarray, Turned]:
+        h, _, turned = self.parts(x)
+        return h, turned
+
+    def parts(
+        self, x: np.ndarray, actual: ActualPorts | None = None
+    ) -> tuple[np.ndarray, np.ndarray, Turned]:
         assert isinstance(self.effect, Drift)
         p, (a, b) = self.parametrisation, self.split
         elasticity = p.elasticity(x[:a])
@@ -35,15 +42,15 @@ class DriftMisfit(Misfit):
             inertias = None
             if self.inertial:
                 inertias = Inertias(self.inertias.jacobians[one], self.inertias.basis)
-            h, full, turned = response_parts(
-                matrices, now, self.setting.s[one], mass[one], inertias
-            )
+            ports = None if actual is None else actual.at(one)
+            motion = moved(matrices, now, self.setting.s[one], mass[one], actual=ports)
+            full = motion_slopes(motion, now, inertias)
             e, springs = p.size, len(p.held)
             theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
             along = full[:, :e].sum(axis=1)
             own = slope[i][None, :, None, None, None] * along[:, None]
-            values.append(h)
-            turns += turned.motions
+            values.append(motion.accelerance)
+            turns.append(motion)
             slopes.append(np.concatenate([theta, full[:, springs:], own], axis=1))
         return np.concatenate(values), np.concatenate(slopes), Turned(tuple(turns))
 

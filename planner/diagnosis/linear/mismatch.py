@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.linear.objective import Misfit
-from planner.identification.measurement_model import basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,15 +47,9 @@ def residuals(misfit: Misfit, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     The misses are the likeliest ones, pose by pose.
     """
-    h, _, turned = misfit.parts(x)
+    h = misfit.response(x)[0]
     whole = misfit.weight * (h - misfit.measured.accelerance)
     if misfit.tolerances is None:
         return whole, whole
-    open_ = misfit.weight[:, None] * basis(h, turned, misfit.setting.s, misfit.tolerances)
-    left = np.empty_like(whole)
-    for i, columns in enumerate(open_):
-        r = np.ascontiguousarray(whole[i]).reshape(-1).view(float)
-        b = np.ascontiguousarray(columns).reshape(len(columns), -1).view(float)
-        eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
-        left[i] = (r - eta @ b).view(complex).reshape(whole[i].shape)
-    return whole, left
+    around = misfit.around_misses(x)
+    return whole, around.left(around.misses())

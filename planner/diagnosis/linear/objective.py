@@ -6,15 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
-from planner.dynamics.gradient import Impedance, Inertias, Turned, response_parts
+from planner.diagnosis.linear.around_misses import AroundMisses
+from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
+from planner.dynamics.motion import ActualPorts, Turned, recorded
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import (
-    Part,
-    Tolerances,
-    blocks,
-    marginal_of,
-    real_rows,
-)
+from planner.identification.measurement_model import MISSED_MOST, Tolerances, actual_ports
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
@@ -121,29 +117,51 @@ class Misfit:
 
     def response(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """FRFs as they would be measured (n, 3, 3, F), and derivatives (n, free, 3, 3, F)."""
-        return self.parts(x)[:2]
+        h, slope, _ = self.parts(x)
+        return h, slope
 
-    def parts(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, Turned]:
-        """As `response`, and responses to moments and the turning of the sensor."""
-        p, (a, b), s = self.parametrisation, self.split, self.setting.s
+    def values(self, x: np.ndarray) -> tuple[np.ndarray, Turned]:
+        """As `parts`, without derivatives."""
+        p, (a, b) = self.parametrisation, self.split
         psi = x[b:]
-        rate = self.effect.rate(psi)
-        s = s if rate is None else s + rate
+        setting = self._setting(psi)
+        added = self._added(setting, psi)
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        setting = self.setting if rate is None else replace(self.setting, s=s)
+        motion = moved(self.matrices, p.elasticity(x[:a]), setting.s, mass, added)
+        seen = self.effect.transfer(self.setting, psi)
+        h, left = motion.accelerance, None if seen is None else seen.left
+        return h if left is None else recorded(left, h), Turned((motion,), left)
+
+    def _setting(self, psi: np.ndarray) -> Setting:
+        rate = self.effect.rate(psi)
+        return self.setting if rate is None else replace(self.setting, s=self.setting.s + rate)
+
+    def _added(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         added = self.effect.impedance(setting, psi)
-        added = added if rate is None else (*added, _weight(self.matrices, s.shape[1]))
-        inertias = self.inertias if self.inertial else None
-        h, full, turned = response_parts(
-            self.matrices, p.elasticity(x[:a]), s, mass, inertias, added
-        )
+        if self.effect.rate(psi) is None:
+            return added
+        return (*added, _weight(self.matrices, setting.s.shape[1]))
+
+    def parts(
+        self, x: np.ndarray, actual: ActualPorts | None = None
+    ) -> tuple[np.ndarray, np.ndarray, Turned]:
+        """As `response`, and what goes with it; between `actual` ports where those are known."""
+        p, (a, b) = self.parametrisation, self.split
+        psi = x[b:]
+        rate, setting = self.effect.rate(psi), self._setting(psi)
+        s, added = setting.s, self._added(setting, psi)
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        springs = p.elasticity(x[:a])
+        motion = moved(self.matrices, springs, s, mass, added, actual)
+        full = motion_slopes(motion, springs, self.inertias if self.inertial else None, added)
+        h = motion.accelerance
         by_weight = full[:, -1]
         if rate is not None:
             full = full[:, :-1]
-        springs, slope = len(p.held), full
-        if not np.array_equal(p.spread, np.eye(springs)):
-            theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
-            slope = np.concatenate([theta, full[:, springs:]], axis=1)
+        held, slope = len(p.held), full
+        if not np.array_equal(p.spread, np.eye(held)):
+            theta = np.einsum("np...,pq->nq...", full[:, :held], p.spread, optimize=True)
+            slope = np.concatenate([theta, full[:, held:]], axis=1)
         if rate is not None:
             # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
             e = p.size
@@ -153,17 +171,16 @@ class Misfit:
         seen = self.effect.transfer(self.setting, psi)
         if seen is not None:
             own = np.einsum("npijf,njkf->npikf", seen.slope, h)
-            slope = np.einsum("nijf,npjkf->npikf", seen.left, slope, optimize=True)
-            slope = np.concatenate([slope, own], axis=1)
-            h = np.einsum("nijf,njkf->nikf", seen.left, h)
-        return h, slope, turned
+            slope = np.concatenate([recorded(seen.left, slope), own], axis=1)
+            h = recorded(seen.left, h)
+        return h, slope, Turned((motion,), None if seen is None else seen.left)
 
     def by_pose(self, x: np.ndarray) -> ByPose:
-        """Misfit of each pose at x."""
-        h, slope, turned = self.parts(x)
-        residual, slope = self._residual(h, slope)
+        """Misfit of each pose, and its derivatives; what is left open is integrated out."""
         if self.tolerances is not None and not self.logarithmic:
-            return self._marginal(x, h, turned, residual, slope)
+            return self._marginal(x)
+        h, slope, _ = self.parts(x)
+        residual, slope = self._residual(h, slope)
         n, d = slope.shape[:2]
         j = np.ascontiguousarray(slope).reshape(n, d, -1).view(float)
         r = np.ascontiguousarray(residual).reshape(n, -1).view(float)
@@ -173,33 +190,38 @@ class Misfit:
         normal[:, free[:, None], free] = j @ np.swapaxes(j, 1, 2)
         return ByPose(np.sum(r**2, axis=1), gradient, normal)
 
-    def _marginal(
-        self, x: np.ndarray, h: np.ndarray, turned: Turned, residual: np.ndarray, slope: np.ndarray
-    ) -> ByPose:
-        """Misfit of each pose, what hits and chain leave open being integrated out."""
+    def around_misses(self, x: np.ndarray) -> AroundMisses:
+        """FRFs at x and what hits, chain and readback leave open, around its likeliest."""
         assert self.tolerances is not None
-        n, d = slope.shape[:2]
-        open_ = blocks(h, turned, self.setting.s, self.tolerances)
-        for one in open_:
-            one.basis[:] *= self.weight[:, None, one.rows, one.columns]
-        count = 1 + max(int(one.numbers.max()) for one in open_)
-        loose = np.zeros(0) if self.discrepancy is None else self.discrepancy
-        further = count + np.arange(len(loose))
-        free, size = np.flatnonzero(self.free), len(x)
-        chi2, gradient = np.empty(n), np.zeros((n, size))
-        normal = np.zeros((n, size, size))
+        if self.discrepancy is None:
+            h, turned = self.values(x)
+            first = self._around(h, None, turned)
+        else:
+            first = self._around(*self.parts(x))
+        eta = np.clip(first.misses(), -MISSED_MOST, MISSED_MOST)
+        return self.around_these(x, eta)
+
+    def around_these(self, x: np.ndarray, eta: np.ndarray) -> AroundMisses:
+        """The same around these numbers (n, l)."""
+        assert self.tolerances is not None
+        shape = self.measured.accelerance.shape[1:3]
+        actual = actual_ports(eta, self.setting.s, self.tolerances, shape)
+        return self._around(*self.parts(x, actual), eta=eta)
+
+    def _around(
+        self, h: np.ndarray, slope: np.ndarray | None, turned: Turned, eta: np.ndarray | None = None
+    ) -> AroundMisses:
+        assert self.tolerances is not None
+        off = h - self.measured.accelerance
+        s, loose = self.setting.s, self.discrepancy
+        return AroundMisses.of(off, slope, turned, h, s, self.weight, self.tolerances, eta, loose)
+
+    def _marginal(self, x: np.ndarray) -> ByPose:
+        around = self.around_misses(x)
+        free, size, n = np.flatnonzero(self.free), len(x), len(around.residual)
+        chi2, gradient, normal = np.empty(n), np.zeros((n, size)), np.zeros((n, size, size))
         for i in range(n):
-            parts = []
-            for one in open_:
-                if len(open_) > 1 and not self.weight[i, one.rows, one.columns].any():
-                    continue
-                j, b = one.of(slope[i]), real_rows(one.basis[i])
-                r, numbers = one.of(residual[i][None])[0], one.numbers
-                if len(loose):
-                    b = np.concatenate([b, loose[:, None] * j[: len(loose)]])
-                    numbers = np.concatenate([numbers, further])
-                parts.append(Part(r, j, b, numbers))
-            found = marginal_of(parts, count + len(loose), d)
+            found = around.marginal(i)
             chi2[i] = found.chi2
             gradient[i, free] = found.gradient
             normal[i][np.ix_(free, free)] = found.normal

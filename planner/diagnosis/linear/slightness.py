@@ -16,8 +16,16 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.discrepancy import multiples
 from planner.diagnosis.linear.evidence import stated_springs
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
+from planner.diagnosis.linear.mismatch import residuals
+from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Problem
-from planner.diagnosis.thresholds import DISCREPANCY_USUAL, LEFT_FACTOR
+from planner.diagnosis.thresholds import (
+    CLEARLY_MATTERS,
+    DISCREPANCY_USUAL,
+    GOOD_PART,
+    LEFT_FACTOR,
+    SOMETHING_UNKNOWN,
+)
 
 FOLLOWED = 1e-3  # shares below it are left where they are
 
@@ -28,18 +36,27 @@ def without_slight(
     shares: np.ndarray,
     prior: Sequence[float],
     bent: np.ndarray,
+    left: np.ndarray,
     matters: float,
 ) -> np.ndarray:
     """Shares (k,) of fits on the same lines, those of effects that do not matter given on.
 
     The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
-    weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`. A fit
-    gives as much as FRFs say that one of its effects changes less than `matters` of them, and than
-    what every robot has, once the rest is refitted; the fit without it takes it. FRFs that are
-    nearly the same leave it to what was known before which of both it is: the farther the rest had
-    to go, the likelier is an effect that pulls at it.
+    weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`; `left`
+    (k,) is what each leaves of the recordings, relative, see `Mismatch`. A fit gives as much as
+    FRFs say that one of its effects changes less than `matters` of them, and than what every robot
+    has, once the rest is refitted; the fit without it takes it. An effect that takes a good part of
+    all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
+    known before which of both it is: the farther the rest had to go, the likelier is an effect that
+    pulls at it.
     """
+    pull = np.logaddexp(np.log1p(-SOMETHING_UNKNOWN), np.log(SOMETHING_UNKNOWN) + bent)
+    enough = matters * CLEARLY_MATTERS
     matters = float(np.hypot(matters, usual(fits[0])))
+
+    def taken(i: int, j: int) -> float:
+        return max(left[j] ** 2 - left[i] ** 2, 0.0) / max(left[0] ** 2, 1e-300)
+
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
     shares = np.array(shares, dtype=float)
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
@@ -52,8 +69,10 @@ def without_slight(
         if not fewer:
             continue
         given = [
-            _slight(fits[j], fits[i], _only(told[i], called[j]), matters)
-            * expit(np.log(prior[j] / prior[i]) + bent[i] - bent[j])
+            _slight(
+                _size(fits[j], fits[i], _only(told[i], called[j])), matters, enough, taken(i, j)
+            )
+            * expit(np.log(prior[j] / prior[i]) + pull[i] - pull[j])
             for j in fewer
         ]
         most = int(np.argmax(given))
@@ -66,10 +85,29 @@ def _only(told: Sequence[Effect], others: frozenset) -> Effect:
     return next(e for e in told if e.at and (e.name, e.at) not in others)
 
 
-def _slight(without: Fit, whole: Fit, part: Effect, matters: float) -> float:
-    """Probability that an effect of `whole` does not matter."""
-    size = removal(without, whole, part) if part.absorbed else change(without, whole)
-    return float(norm.cdf(np.log(matters / max(size, 1e-12)) / np.log(LEFT_FACTOR)))
+def _size(without: Fit, whole: Fit, part: Effect) -> float:
+    """`change`; of what is a stated spring's own value, by that."""
+    if not (part.absorbed and part.springs(whole.misfit.setting.simulation)):
+        return change(without, whole)
+    misfit, x = whole.misfit, whole.x.copy()
+    stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
+    for name in part.springs(misfit.setting.simulation):
+        x[misfit.names.index(name)] = stated[name]
+    return _apart(residuals(misfit, x)[1], whole)
+
+
+def _slight(size: float, matters: float, enough: float, taken: float) -> float:
+    """Probability that an effect does not matter that changes FRFs by a relative `size`.
+
+    It has `taken` so large a share of the squares of all that refitting leaves.
+    """
+    good = _above(taken, GOOD_PART) * _above(size, enough)
+    return (1 - _above(size, matters)) * (1 - good)
+
+
+def _above(size: float, limit: float) -> float:
+    """Probability that a size counts as above a limit: neither is known better than by a factor."""
+    return float(norm.cdf(np.log(max(size, 1e-12) / limit) / np.log(LEFT_FACTOR)))
 
 
 def usual(fit: Fit) -> float:
@@ -77,20 +115,13 @@ def usual(fit: Fit) -> float:
     misfit = fit.misfit
     size = DISCREPANCY_USUAL * multiples(misfit, stated_springs(fit))
     moved = misfit.parts(fit.x)[1][:, : len(size)] * size[:, None, None, None]
-    used = misfit.weight > 0
-    measured = np.sum(np.abs(misfit.measured.accelerance[used]) ** 2)
-    return float(np.sqrt(np.sum(np.sum(np.abs(moved) ** 2, axis=1)[used]) / measured))
-
-
-def removal(without: Fit, whole: Fit, part: Effect) -> float:
-    """As `change`, where an effect is taken from `whole` and nothing is refitted."""
-    misfit, x = whole.misfit, whole.x.copy()
-    stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
-    for name in part.springs(misfit.setting.simulation):
-        x[misfit.names.index(name)] = stated[name]
-    for name in part.vanishing:
-        x[misfit.names.index(f"{name} of {part.name} at {part.at}")] = 0.0
-    return _apart(misfit.parts(x)[0], whole)
+    if misfit.tolerances is not None:
+        around = misfit.around_misses(fit.x)
+        assert around.slope is not None
+        moved = around.net(around.slope[:, : len(size)] * size[:, None, None, None])
+        moved = moved * _noise(misfit)[:, None]
+    squares = np.sum(np.abs(moved) ** 2, axis=1)
+    return _relative(squares, misfit)
 
 
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
@@ -124,12 +155,28 @@ def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:
 
 
 def change(without: Fit, whole: Fit) -> float:
-    """Root mean square by which two fits' FRFs differ, relative to those that were measured."""
-    return _apart(without.misfit.parts(without.x)[0], whole)
+    """Root mean square by which two fits' FRFs differ, relative to those that were measured.
+
+    Of what they say of the recordings, each with the misses that it takes to be likeliest: by what
+    a tilted hit or a gain can be, no effect is seen.
+    """
+    return _apart(residuals(without.misfit, without.x)[1], whole)
 
 
-def _apart(frfs: np.ndarray, whole: Fit) -> float:
-    used = whole.misfit.weight > 0
-    difference = (whole.misfit.parts(whole.x)[0] - frfs)[used]
-    measured = whole.misfit.measured.accelerance[used]
-    return float(np.sqrt(np.sum(np.abs(difference) ** 2) / np.sum(np.abs(measured) ** 2)))
+def _apart(left: np.ndarray, whole: Fit) -> float:
+    misfit = whole.misfit
+    difference = residuals(misfit, whole.x)[1] - left
+    return _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
+
+
+def _noise(misfit: Misfit) -> np.ndarray:
+    """(n, r, c, F) in m/s²/N, √2 of which is usual; 0 where nothing was measured."""
+    weight = misfit.weight
+    return np.divide(1.0, weight, where=weight > 0, out=np.zeros_like(weight))
+
+
+def _relative(squares: np.ndarray, misfit: Misfit) -> float:
+    """Root of the sum of squares (n, r, c, F) over that of what was measured."""
+    used = misfit.weight > 0
+    measured = np.sum(np.abs(misfit.measured.accelerance[used]) ** 2)
+    return float(np.sqrt(np.sum(squares[used]) / measured))
