@@ -20,7 +20,7 @@ from planner.identification.measurement_model import Tolerances, basis, real_row
 from planner.identification.truncated_decay import cut_off
 from planner.surrogate.modal_surrogate import ModalObservations
 
-LINES = 120  # a pose, at most
+LINES, LEAST, MOST = 600, 40, 120  # of all poses together, and of one at least and at most
 MODEL_ERROR = 0.01  # relative sd of what no simulation follows; as for FRFs
 # Before: sds of ln f, of ln ζ and of a residue's relative change.
 FREQUENCY, DAMPING, SIZE = 0.05, 0.3, 0.1
@@ -57,7 +57,8 @@ def tuned_frequencies(
     count: int,
 ) -> TunedFrequencies:
     """Of the first `count` modes at q (n, dof) in rad, from the tool's FRFs there."""
-    measured = stack(frfs, band_hz, LINES, MODEL_ERROR)
+    lines = int(np.clip(LINES // len(frfs), LEAST, MOST))
+    measured = stack(frfs, band_hz, lines, MODEL_ERROR)
     matrices = matrices_at(simulation.elastic, q, frfs, True)
     s = measured.s
     h, turned = response_turned(matrices, simulation.elasticity, s, matrices.mass)
