@@ -7,7 +7,8 @@ import numpy as np
 
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
-from planner.campaign.labels import LabelledPose, frequencies, label, observations
+from planner.campaign.frequencies_by_simulation import TunedFrequencies, tuned_frequencies
+from planner.campaign.labels import LabelledPose, label, observations
 from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import tell, visits_of
 from planner.campaign.model import FrfOf, Model
@@ -35,7 +36,7 @@ def build(
     which is asked only where the simulation learns. Without it nothing is told of single hits.
     """
     low, used, table = cell.frozen, state.used, cell.config.modes
-    noise, told, learns = None, None, cell.config.fidelity.simulation == "updated"
+    noise, told, tuned, learns = None, None, None, cell.config.fidelity.simulation == "updated"
     if learns and used:
         frfs = tuple(frf_of(m, table) for m in used)
         hits = tuple(hits_of(m, table) for m in used) if hits_of else None
@@ -45,11 +46,16 @@ def build(
         low = learn(low, whole, q, table.band_hz)
         misfit = low.identified.misfit if low.identified else 1.0
         noise = FrfNoise.of(whole, table.band_hz, misfit)
+        if cell.hits_err and low.learned is not None:
+            simulation, count = low.learned.identified.simulation, low.count
+            seen = tuple(f.within(table.band_hz) for f in frfs)
+            tuned = tuned_frequencies(simulation, seen, q, table.band_hz, cell.tolerances, count)
         if hits is not None and low.learned is not None:
             visits = visits_of(joints, used, hits, frfs)
             told = tell(visits, low.learned, cell.tolerances, table.band_hz)
-    candidates = [_Guided.by(cell, used, low)]
-    if low.learned is not None and not low.learned.fits:
+    fits = low.learned is None or low.learned.fits
+    candidates = [_Guided.by(cell, used, low, tuned if fits else None)]
+    if not fits:
         # What lacks physics is bent by fitting it: as it stands it may be a better
         # guide, or none.
         stated = replace(cell.frozen, suspect=low.learned)
@@ -57,6 +63,8 @@ def build(
             _Guided.by(cell, used, one) for one in (stated, replace(stated, nominal=None))
         ]
     best = max(candidates, key=lambda guided: guided.log_evidence)
+    if not fits and best.low.learned is not None:
+        best = _Guided.by(cell, used, low, tuned)
     surrogate = fit_surrogate(
         best.seen,
         primary=best.primary,
@@ -81,10 +89,18 @@ class _Guided:
     primary: HedgedAR1
 
     @classmethod
-    def by(cls, cell: Cell, used: tuple[Measurement, ...], low: LowFidelity) -> "_Guided":
+    def by(
+        cls,
+        cell: Cell,
+        used: tuple[Measurement, ...],
+        low: LowFidelity,
+        tuned: TunedFrequencies | None = None,
+    ) -> "_Guided":
+        """`tuned` frequencies take the place of those that modal analyses found."""
         labelled = label(cell, used, low)
         seen = observations(cell, labelled)
-        known = low.discrepancy(frequencies(labelled)) if labelled else None
+        seen = seen if tuned is None else tuned.into(seen)
+        known = low.discrepancy(seen.frequency_hz) if labelled else None
         primary = fit_primary(seen, known, low.left_out, low.belief, cell.visit_scatter)
         return cls(low, used, labelled, seen, primary)
 

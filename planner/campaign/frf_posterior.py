@@ -6,29 +6,19 @@ poses have in common may be a gain or a mass, and FRFs elsewhere are as uncertai
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
+from planner.campaign.chain_misfit import CHAIN, ChainMisfit, FrfEvidence, real_values, shown
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.predict import misfit_at
-from planner.diagnosis.linear.problem import Grade, Problem, tolerances_of
-from planner.identification.measurement_model import (
-    CHAIN_NUMBERS,
-    HIT_NUMBERS,
-    OPEN,
-    Tolerances,
-    basis,
-    marginal,
-)
+from planner.diagnosis.linear.problem import Grade, Problem
 from planner.identification.objective import FARTHEST
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import (
     LONGEST,
     Damping,
     Limits,
-    Quadratic,
     accept,
     begin,
     expected,
@@ -41,112 +31,15 @@ from planner.inference.least_squares import (
 # to 0.03, those that lack something better the larger it is.
 MODEL_ERROR = 0.01
 LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
-CHAIN = CHAIN_NUMBERS  # numbers of the chain, which are the same at all poses
 NEARLY = 0.999  # of the farthest that is possible
 TOLERANCE, MOST_STEPS = 5e-5, 30  # of a fit: least gain of a step, and how many
 # Of a fit's first step: a scale that mass and chain share has eigenvalues of 1e-5 of the diagonal.
 LIGHT = Damping(first=1e-5)
+# Model errors by which a fit that knows no place to begin at comes near, and steps at each: while
+# FRFs count little, inertias and springs stay near their priors but for what matters most.
+COARSE_ERRORS, COARSE_STEPS = (0.5, 0.3, 0.1, 0.03), 20
 FOLDS = 6  # that poses are left out in, at most
 LEFT_STEPS = 3  # of a fit without a pose, from one with it
-
-
-@dataclass(frozen=True, eq=False)
-class PoseData:
-    """What one pose says of z: χ², half gradient (d,), normal (d, d), and how many values."""
-
-    chi2: float
-    gradient: np.ndarray
-    normal: np.ndarray
-    count: int
-
-
-@dataclass(frozen=True, eq=False)
-class FrfEvidence(Quadratic):
-    """Data and prior at a z, and what each pose says there."""
-
-    data: tuple[PoseData, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class ChainMisfit:
-    """χ²/2 of data and prior over z = (x of a misfit (D,), the chain's deviations in sds (14,))."""
-
-    misfit: Misfit
-
-    @cached_property
-    def mean(self) -> np.ndarray:
-        """Prior mean of z."""
-        return np.append(self.misfit.mean, np.zeros(CHAIN))
-
-    @cached_property
-    def sd(self) -> np.ndarray:
-        """Prior sd of z."""
-        return np.append(self.misfit.sd, np.ones(CHAIN))
-
-    def parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The robot's FRFs (n, 3, 3, F), derivatives by z, and what poses leave open (n, 18, …).
-
-        Derivatives and misses are as the chain shows them: else the lighter robot under a lower
-        gain would not look the same, and a fit would end where it began.
-        """
-        h, slope, turned = self.misfit.parts(z[:-CHAIN])
-        s, tolerances = self.misfit.setting.s, tolerances_of(self.misfit.setting.simulation)
-        open_ = basis(h, turned, s, tolerances)
-        chain = open_[:, HIT_NUMBERS:OPEN]
-        own = np.concatenate([open_[:, :HIT_NUMBERS], open_[:, OPEN:]], axis=1)
-        own, slope = (v + through_chain(v, z[-CHAIN:], s, tolerances) for v in (own, slope))
-        return h, np.concatenate([slope, chain], axis=1), own
-
-    def __call__(self, z: np.ndarray) -> FrfEvidence:
-        """∞ where z cannot be."""
-        if not self.misfit.possible(z[:-CHAIN]):
-            nothing = np.zeros(len(z))
-            return FrfEvidence(np.inf, nothing, np.diag(nothing), np.inf, ())
-        h, slope, hits = self.parts(z)
-        data = []
-        for i, weight in enumerate(self.misfit.weight):
-            off = shown(h[i], slope[i], z) - self.misfit.measured.accelerance[i]
-            found = marginal(
-                _real(weight * off)[0], _real(weight * slope[i]), _real(weight * hits[i])
-            )
-            count = 2 * int(np.count_nonzero(weight))
-            data.append(PoseData(found.chi2, found.gradient, found.normal, count))
-        chi2 = sum(d.chi2 for d in data)
-        away = (z - self.mean) / self.sd
-        return FrfEvidence(
-            (chi2 + float(away @ away)) / 2,
-            sum(d.gradient for d in data) + away / self.sd,
-            sum(d.normal for d in data) + np.diag(1 / self.sd**2),
-            chi2,
-            tuple(data),
-        )
-
-    def of(self, poses: np.ndarray) -> "ChainMisfit":
-        """Of some of the poses, by their numbers."""
-        m, s, inertias = self.misfit.measured, self.misfit.setting, self.misfit.inertias
-        matrices = self.misfit.matrices
-        some = replace(
-            self.misfit,
-            measured=m.at(poses),
-            setting=replace(s, q=s.q[poses], s=s.s[poses], jacobians=s.jacobians[poses]),
-            inertias=replace(inertias, jacobians=inertias.jacobians[poses]),
-            matrices=matrices.at(poses),
-        )
-        return ChainMisfit(some)
-
-
-def shown(h: np.ndarray, slope: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """FRFs (3, 3, F) as the chain shows them; `slope` (d, 3, 3, F) by z, the chain's last."""
-    return h + np.tensordot(z[-CHAIN:], slope[-CHAIN:], axes=1)
-
-
-def through_chain(
-    values: np.ndarray, chain: np.ndarray, s: np.ndarray, t: Tolerances
-) -> np.ndarray:
-    """What a chain (CHAIN,) in sds adds to accelerations (n, k, 3, c, F); its place aside."""
-    by_axis = chain[:9].reshape(3, 3) * np.where(np.eye(3) > 0, t.gain, t.across)
-    alike = t.force_gain * chain[-2] - t.delay_s * chain[-1] * s
-    return np.einsum("ij,nkjcf->nkicf", by_axis, values) + alike[:, None, None, None] * values
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,12 +81,12 @@ class FrfPosterior:
 
     def precision(self, temper: float) -> np.ndarray:
         """(d, d) of z."""
-        prior = np.diag(1 / self.objective.sd**2)
+        prior = self.objective.prior(self.z).normal
         return (self.at.normal - prior) / temper + prior
 
     def log_evidence(self, temper: float) -> float:
         """By Laplace's method, χ² counting 1/temper."""
-        away = (self.z - self.objective.mean) / self.objective.sd
+        away = np.sqrt(2 * self.objective.prior(self.z).value)[None]
         return laplace(self.at.chi2, away, self.precision(temper), self.objective.sd, temper)
 
     def response(self, q: np.ndarray, frequency_hz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -232,7 +125,7 @@ def _beside(one: ChainMisfit, z: np.ndarray, precision: np.ndarray) -> LeftOutFr
     m, weight = one.misfit.measured, one.misfit.weight[0]
     predicted = shown(h[0], slope[0], z)
     off = np.where(m.used[0], m.accelerance[0] - predicted, 0.0)
-    b, r = _real(weight * hits[0]), _real(weight * off)[0]
+    b, r = real_values(weight * hits[0]), real_values(weight * off)[0]
     eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
     return LeftOutFrf(
         m.frequency_hz[0], m.accelerance[0], m.sd[0], predicted,
@@ -254,6 +147,21 @@ def fitted(problem: Problem, effect: Effect, z: np.ndarray, most: int = MOST_STE
     return FrfPosterior(problem, effect, objective, z, at)
 
 
+def fitted_afresh(problem: Problem, effect: Effect) -> FrfPosterior:
+    """The same from the prior's mean, by FRFs that count more and more.
+
+    As by deterministic annealing, this leads past minima where parts that the recordings do not
+    tell make up for each other.
+    """
+    lines = closely(len(problem.q)).lines
+    x = problem.misfit(effect, Grade(lines)).mean
+    z = np.append(x, np.zeros(CHAIN))
+    for error in COARSE_ERRORS:
+        objective = ChainMisfit(problem.misfit(effect, Grade(lines, error)))
+        z, _ = least(objective, z, COARSE_STEPS)
+    return fitted(problem, effect, z)
+
+
 def least(objective: ChainMisfit, z: np.ndarray, most: int) -> tuple[np.ndarray, FrfEvidence]:
     """Where at most so many steps from z lead, and what is there; nothing leaves its bounds.
 
@@ -270,12 +178,6 @@ def least(objective: ChainMisfit, z: np.ndarray, most: int) -> tuple[np.ndarray,
             break
         state = accept(state, trial, objective(trial))
     return state.x, state.at
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    """(…, 3, 3, F) complex to (k, m) real."""
-    shaped = values.reshape(-1, *values.shape[-3:])
-    return np.ascontiguousarray(shaped).reshape(len(shaped), -1).view(float)
 
 
 def _root(precision: np.ndarray) -> np.ndarray:

@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from planner.campaign.learned import SUSPECT, Learned, lacking
 from planner.campaign.missing_physics import with_springs, with_swinging_mass
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK, Effort
-from planner.identification.extended_structure import FLOOR, Structure
+from planner.identification.extended_structure import Structure
 from planner.identification.frequency_uncertainty import frequency_sd
 from planner.identification.identify import identify
 from planner.identification.measured_frfs import layout_of
@@ -22,13 +23,10 @@ from planner.surrogate.hedged import PRIOR_BELIEF
 
 # Where hits count as exact: masses and moments are right to 5 %, centres of mass to 1 cm.
 OF_EXACT_HITS = Priors(mass=0.05, inertia=0.05, com_m=0.01)
-# Misfit (χ² per value) from which the simulation is suspected to lack physics; and where hits count
-# as exact. On generated cells that lacked nothing it was 0.5 to 1.4, where a link bent 2.7. Where
+# Misfit from which the simulation is suspected to lack physics where hits count as exact. Where
 # springs that robot.toml does not state do not mend that, what it says of a pose is tested by
 # identifying it without that pose; into so many parts at most.
-SUSPECT, EXACT_SUSPECT, FOLDS = 2.0, 3.0, 2
-# A spring not stated is named where its stiffness is known to 30 % and no more than that expected.
-KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
+EXACT_SUSPECT, FOLDS = 3.0, 2
 BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
 RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
 LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
@@ -47,43 +45,6 @@ def _effort(frfs: Sequence[Frf]) -> Effort:
         last_lines=max(20, min(QUICK.last_lines, last)),
         searched=LINES // FEWEST,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Learned:
-    """What the recordings taught the simulation; `suspect` is the misfit that is too large."""
-
-    structure: Structure
-    identified: Identification
-    suspect: float = SUSPECT
-
-    @property
-    def fits(self) -> bool:
-        """Whether nothing speaks for physics that it lacks."""
-        return self.identified.misfit <= self.suspect
-
-    @property
-    def priors(self) -> Priors:
-        """Those it was identified with."""
-        return self.structure.priors
-
-    @property
-    def found(self) -> tuple[str, ...]:
-        """Springs that robot.toml does not state, that matter and that the recordings determine.
-
-        The softest first, in units of the stiffest that is stated at the same place.
-        """
-        stated = len(self.structure.simulation.robot.config.compliance) - self.structure.added
-        springs = [
-            e for e in self.identified.estimates
-            if e.kind == "stiffness" and min(e.blocks) >= stated
-        ]  # fmt: skip
-        told = [e for e in springs if e.log_sd < KNOWN and e.value < MATTERS * e.prior_median]
-        told.sort(key=lambda e: e.value / e.prior_median)
-        return tuple(
-            f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} {e.unit}"
-            for e in told
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,8 +145,8 @@ class LowFidelity:
             return ""
         swinging = learned.structure.swinging
         if learned.fits:
-            lacking = _lacking(learned.found) if learned.structure.added else ""
-            return " ".join(filter(None, (swinging, lacking)))
+            more = lacking(learned.found) if learned.structure.added else ""
+            return " ".join(filter(None, (swinging, more)))
         text = (
             f"Identified from the recordings, the simulation still misses them by "
             f"{np.sqrt(learned.identified.misfit):.2g} times their noise: it lacks physics"
@@ -208,16 +169,6 @@ class LowFidelity:
             return np.zeros((len(q), self.count))
         nominal, identified = self.learned.structure.simulation, self.learned.identified
         return frequency_sd(identified, nominal, self.learned.priors, q, simulated)
-
-
-def _lacking(found: tuple[str, ...]) -> str:
-    text = "robot.toml lacks compliance that the recordings show"
-    if not found:
-        return f"{text}, but not yet where; tilts of all joints and the floor are identified."
-    more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
-    named = "; ".join(found[:NAMED])
-    bolts = " Check the anchor bolts." if FLOOR in named else ""
-    return f"{text}, identified beside what it states: {named}{more}.{bolts}"
 
 
 def learn(

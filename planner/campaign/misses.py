@@ -7,8 +7,9 @@ import numpy as np
 
 from planner.campaign.hit_habits import HitMiss, Pair, PoseMisses
 from planner.campaign.labels import LabelledPose
+from planner.campaign.learned import Learned
 from planner.campaign.log_conversion import to_mode
-from planner.campaign.low_fidelity import Learned, LowFidelity, learn
+from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.state import Measurement
 from planner.dataset.hit_columns import HitColumns, PoseHits
 from planner.dynamics.simulation import Simulation

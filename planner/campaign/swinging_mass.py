@@ -9,9 +9,8 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 
-from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear.fit import Fit, approached, glance, settle
+from planner.diagnosis.linear.fit import Fit, approached, settle
 from planner.diagnosis.linear.problem import CLOSE, GLANCE, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
@@ -20,10 +19,10 @@ from planner.identification.held_out import farthest_first
 from planner.identification.result import Identification
 from planner.robot.config import Resonator
 
-# Steps by logarithms, on so many poses, in which every start at every link is followed where that
-# is asked for: fewer poses have fewer wrong minima.
-LOG_STEPS, FEW = 10, 2
-FOLLOWED = 2  # links that are followed after a glance at all
+# All starts at all links are followed for a few steps by logarithms, the most promising of each
+# link farther: on so many poses, for fewer have fewer wrong minima. Starts whose values differ by
+# less have met.
+FIRST_STEPS, PROMISING, LOG_STEPS, FEW, MET = 4, 4, 10, 3, 1e-4
 
 
 def swinging(
@@ -32,7 +31,6 @@ def swinging(
     frfs: Sequence[Frf],
     q: np.ndarray,
     band_hz: tuple[float, float],
-    everywhere: bool,
 ) -> tuple[Structure, np.ndarray]:
     """The structure with a mass on a spring at the link where it explains most.
 
@@ -44,35 +42,37 @@ def swinging(
         frfs: Measured at q.
         q: (n, dof) in rad.
         band_hz: Where they are compared.
-        everywhere: Whether all starts at all links are followed: seconds.
     """
     problem = Problem(tuple(frfs), q, structure.simulation, band_hz, structure.priors)
+    few = problem.at(farthest_first(q)[:FEW].tolist())
+    springs = identified.mean[: len(identified.estimates)]
     effects = LocalResonator.everywhere(structure.simulation)
-    if everywhere:
-        few = problem.at(farthest_first(q)[:FEW].tolist())
-        best = settle(problem, _best([_from_everywhere(few, e) for e in effects]), CLOSE)
-    else:
-        none = approached(problem.misfit(Effect(""), CLOSE), [identified.mean], steps=0)
-        rough = sorted([glance(problem, e, none) for e in effects], key=_value)
-        best = _best([settle(problem, f, CLOSE) for f in rough[:FOLLOWED]])
+    near = [
+        settle(few, approached(f.misfit, [f.x], LOG_STEPS), CLOSE)
+        for effect in effects
+        for f in _promising(few, effect, springs)
+    ]
+    best = min(near, key=_value)
+    best = settle(problem, best, CLOSE)
     return _with(structure, best), np.exp(best.x[None, : best.misfit.split[0]])
-
-
-def _best(fits: Sequence[Fit]) -> Fit:
-    return min(fits, key=_value)
 
 
 def _value(fit: Fit) -> float:
     return fit.misfit(fit.x).value
 
 
-def _from_everywhere(problem: Problem, effect: LocalResonator) -> Fit:
-    """Followed from each of its starts: most of them end beside the right one."""
+def _promising(problem: Problem, effect: LocalResonator, springs: np.ndarray) -> list[Fit]:
+    """Where a few steps lead from its starts beside springs θ (P,): the best that differ."""
     rough = problem.misfit(effect, GLANCE)
-    springs = rough.mean[: rough.split[1]]
-    starts = [np.concatenate([springs, psi]) for psi in effect.starts()]
-    near = [approached(rough, [x], LOG_STEPS) for x in starts]
-    return _best([settle(problem, f, CLOSE) for f in near])
+    others = np.append(springs, rough.mean[len(springs) : rough.split[1]])
+    tried = [approached(rough, [np.append(others, psi)], FIRST_STEPS) for psi in effect.starts()]
+    kept: list[Fit] = []
+    last = 0.0
+    for value, fit in sorted(((_value(f), f) for f in tried), key=lambda pair: pair[0]):
+        if value > last * (1 + MET):
+            kept.append(fit)
+        last = value
+    return kept[:PROMISING]
 
 
 def _with(structure: Structure, found: Fit) -> Structure:

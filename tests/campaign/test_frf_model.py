@@ -180,3 +180,13 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     monkeypatch.setattr(frf_of_model, "frf_model_of", refused)
     again = Campaign(tmp_path / "c", store).frf(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
+
+
+def test_a_link_that_bends_is_found_though_other_springs_fit_two_poses(tmp_path):
+    case = make("irb6640", "bending link", 7308, tmp_path, poses=5)
+    model = case.model(2)
+    assert model.low.learned is not None
+    assert model.low.learned.fits
+    score = FrfScore.of(case, model)
+    assert score.alone < 0.98 < 0.998 < score.frac
+    assert score.covered > 0.85
