@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.dynamics.motion import ActualPorts, Turned
-from planner.inference.block_diagonal import block_diagonal
+from planner.dynamics.motion import Turned
 from planner.robot.config import RobotConfig
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
@@ -59,7 +58,6 @@ class Tolerances:
         return float(np.hypot(self.cross_axis, self.mounting_rad))
 
 
-MISSED_MOST = 4.0  # prior sds, that a guess of a miss is kept within while a simulation is far off
 OF_HIT, OF_SENSOR, OF_HAMMER = 4, 12, 2  # numbers of each hit axis, each sensor, and of all
 
 
@@ -203,74 +201,6 @@ def _basis(a: _Answers, s: np.ndarray, t: Tolerances) -> np.ndarray:
         sd = np.broadcast_to(t.joint_rad, joints).reshape(-1, 1, 1, 1)
         np.multiply(a.by_angle, sd, out=out[:, numbers.known :])
     return out
-
-
-def actual_ports(
-    eta: np.ndarray, s: np.ndarray, t: Tolerances, shape: tuple[int, int]
-) -> ActualPorts:
-    """Where hits and sensors were, and the joints stood, whose numbers eta (n, l) are known.
-
-    They are in sds, as `OpenNumbers` counts them, of FRFs of `shape` (r, c) at s (n, F).
-    """
-    n, (rows, columns) = len(eta), shape
-    numbers = OpenNumbers(OF_HIT * columns, OF_SENSOR * (rows // 3) + OF_HAMMER)
-    hit = np.concatenate([np.eye(columns), np.zeros((columns, columns))])
-    hit = np.repeat(hit[None], n, axis=0)
-    place = np.repeat(np.eye(rows, 2 * rows)[None], n, axis=0)
-    matrix = np.repeat(np.eye(rows)[None], n, axis=0)
-    missed = eta[:, : numbers.hits].reshape(n, columns, OF_HIT)
-    for column in range(columns):
-        at = column - column % 3
-        first, second = (at + axis for axis in ACROSS[column % 3])
-        hit[:, first, column] = t.angle_rad * missed[:, column, 0]
-        hit[:, second, column] = t.angle_rad * missed[:, column, 1]
-        hit[:, columns + second, column] = -t.offset_m * missed[:, column, 2]
-        hit[:, columns + first, column] = t.offset_m * missed[:, column, 3]
-    chain = eta[:, numbers.hits : numbers.known]
-    for sensor, at in enumerate(range(0, rows, 3)):
-        own = chain[:, OF_SENSOR * sensor : OF_SENSOR * (sensor + 1)]
-        within = np.where(np.eye(3), t.gain, t.across) * own[:, :9].reshape(-1, 3, 3)
-        matrix[:, at : at + 3, at : at + 3] += within
-        for axis, (first, second) in enumerate(ACROSS):
-            place[:, at + first, rows + at + second] = t.position_m * own[:, 9 + axis]
-            place[:, at + second, rows + at + first] = -t.position_m * own[:, 9 + axis]
-    scale = (1 + t.force_gain * chain[:, -2:-1]) * np.exp(-t.delay_s * chain[:, -1:] * s)
-    angle = np.asarray(t.joint_rad) * eta[:, numbers.known :]
-    return ActualPorts(hit, place, matrix, scale, angle)
-
-
-@dataclass(frozen=True, eq=False)
-class ChainTransfer:
-    """What a chain shows whose numbers are known: `scale` (n, F) times `matrix` (r, r).
-
-    `place` (s, 3) is where each sensor is, in m from where it is said to be.
-    """
-
-    matrix: np.ndarray
-    scale: np.ndarray
-    place: np.ndarray
-
-    @classmethod
-    def of(cls, numbers: np.ndarray, s: np.ndarray, t: Tolerances) -> "ChainTransfer":
-        """Of all its numbers in sds, in the order of `chain_basis`, at s (n, F) in rad/s."""
-        each = numbers[:-OF_HAMMER].reshape(-1, OF_SENSOR)
-        within = np.where(np.eye(3), t.gain, t.across) * each[:, :9].reshape(-1, 3, 3)
-        matrix = block_diagonal(*(np.eye(3) + within))
-        scale = (1 + t.force_gain * numbers[-2]) * np.exp(-t.delay_s * numbers[-1] * s)
-        return cls(matrix, scale, t.position_m * each[:, 9:])
-
-    def of_accelerations(self, values: np.ndarray) -> np.ndarray:
-        """What is shown of accelerations (n, …, r, c, F), those of the responses third to last."""
-        lines = values.shape[-1]
-        flat = values.reshape(*values.shape[:-2], -1)
-        scale = self.scale.reshape(len(self.scale), *[1] * (values.ndim - 2), lines)
-        return (self.matrix @ flat).reshape(values.shape) * scale
-
-    def shown(self, h: np.ndarray, turned: Turned) -> np.ndarray:
-        """FRFs (n, r, c, F) as the chain shows them."""
-        turning = turned.turning.reshape(len(h), len(self.place), 3, *h.shape[2:])
-        beside = np.cross(np.moveaxis(turning, 2, -1), self.place[:, None, None])
-        return self.of_accelerations(h + np.moveaxis(beside, -1, 2).reshape(h.shape))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,8 @@ from planner.dynamics.motion import ActualPorts, Motion, Turned
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.left_open import Integrated, LeftOpen
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import MISSED_MOST, Tolerances, actual_ports
+from planner.identification.measurement_model import Tolerances
+from planner.identification.missed_ports import MISSED_MOST, actual_ports
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
 from planner.inference.block_diagonal import block_diagonal

@@ -10,7 +10,8 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.measurement_model import actual_ports, basis
+from planner.identification.measurement_model import basis
+from planner.identification.missed_ports import actual_ports
 from planner.robot.robot import Robot
 from tests.support.known_robots import kr210_folder
 

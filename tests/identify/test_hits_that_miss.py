@@ -9,12 +9,8 @@ from planner.dynamics.gradient import moved, response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.identify import identify
 from planner.identification.left_open import LeftOpen
-from planner.identification.measurement_model import (
-    CHAIN_NUMBERS,
-    OpenNumbers,
-    Tolerances,
-    actual_ports,
-)
+from planner.identification.measurement_model import CHAIN_NUMBERS, OpenNumbers, Tolerances
+from planner.identification.missed_ports import actual_ports
 from planner.identification.parameters import CAD_INERTIAS
 from planner.robot.robot import Robot
 from planner.truth.deviation import Deviation

@@ -24,7 +24,8 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_UNKNOWN,
     DISCREPANCY_USUAL,
 )
-from planner.identification.measurement_model import MISSED_MOST, OpenNumbers
+from planner.identification.measurement_model import OpenNumbers
+from planner.identification.missed_ports import MISSED_MOST
 from planner.identification.objective import FARTHEST
 
 

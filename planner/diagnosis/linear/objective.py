@@ -10,7 +10,8 @@ from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Turned, recorded
 from planner.identification.measured_frfs import Measured
-from planner.identification.measurement_model import MISSED_MOST, Tolerances, actual_ports
+from planner.identification.measurement_model import Tolerances
+from planner.identification.missed_ports import MISSED_MOST, actual_ports
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
