@@ -5,7 +5,7 @@ little noise tell them by hundreds of nats, which says that they are there, not 
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.special import expit
@@ -166,12 +166,17 @@ def change(without: Fit, whole: Fit) -> float:
     Of what they say of the recordings, each with the misses that it takes to be likeliest: by what
     a tilted hit or a gain can be, no effect is seen.
     """
-    return _apart(residuals(without.misfit, without.x)[1], whole)
+    return _apart(_left(without), whole)
+
+
+@lru_cache(maxsize=64)
+def _left(fit: Fit) -> np.ndarray:
+    return residuals(fit.misfit, fit.x)[1]
 
 
 def _apart(left: np.ndarray, whole: Fit) -> float:
     misfit = whole.misfit
-    difference = residuals(misfit, whole.x)[1] - left
+    difference = _left(whole) - left
     return _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
 
 
