@@ -5,7 +5,7 @@ little noise tell them by hundreds of nats, which says that they are there, not 
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from scipy.special import expit
@@ -62,15 +62,12 @@ def without_slight(
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
         if shares[i] < FOLLOWED:
             continue
-        fewer = [
-            j for j in range(len(fits))
-            if len(called[i]) == len(called[j]) + 1 and called[j] < called[i]
-        ]  # fmt: skip
+        fewer = [j for j in range(len(fits)) if called[j] < called[i]]
         if not fewer:
             continue
         given = [
             _slight(
-                _size(fits[j], fits[i], _only(told[i], called[j])), matters, enough, taken(i, j)
+                _size(fits[j], fits[i], _more(told[i], called[j])), matters, enough, taken(i, j)
             )
             * expit(np.log(prior[j] / prior[i]) + pull[i] - pull[j])
             for j in fewer
@@ -81,17 +78,19 @@ def without_slight(
     return shares
 
 
-def _only(told: Sequence[Effect], others: frozenset) -> Effect:
-    return next(e for e in told if e.at and (e.name, e.at) not in others)
+def _more(told: Sequence[Effect], others: frozenset) -> list[Effect]:
+    return [e for e in told if e.at and (e.name, e.at) not in others]
 
 
-def _size(without: Fit, whole: Fit, part: Effect) -> float:
+def _size(without: Fit, whole: Fit, parts: Sequence[Effect]) -> float:
     """`change`; of what is a stated spring's own value, by that."""
-    if not (part.absorbed and part.springs(whole.misfit.setting.simulation)):
+    simulation = whole.misfit.setting.simulation
+    own = [name for part in parts if part.absorbed for name in part.springs(simulation)]
+    if not own:
         return change(without, whole)
     misfit, x = whole.misfit, whole.x.copy()
     stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
-    for name in part.springs(misfit.setting.simulation):
+    for name in own:
         x[misfit.names.index(name)] = stated[name]
     return _apart(residuals(misfit, x)[1], whole)
 
@@ -167,12 +166,17 @@ def change(without: Fit, whole: Fit) -> float:
     Of what they say of the recordings, each with the misses that it takes to be likeliest: by what
     a tilted hit or a gain can be, no effect is seen.
     """
-    return _apart(residuals(without.misfit, without.x)[1], whole)
+    return _apart(_left(without), whole)
+
+
+@lru_cache(maxsize=64)
+def _left(fit: Fit) -> np.ndarray:
+    return residuals(fit.misfit, fit.x)[1]
 
 
 def _apart(left: np.ndarray, whole: Fit) -> float:
     misfit = whole.misfit
-    difference = residuals(misfit, whole.x)[1] - left
+    difference = _left(whole) - left
     return _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
 
 
