@@ -16,6 +16,7 @@ from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.extended_structure import Structure
 from planner.identification.held_out import farthest_first
+from planner.identification.parameters import parametrise
 from planner.identification.result import Identification
 from planner.robot.config import Resonator
 
@@ -47,13 +48,17 @@ def swinging(
     few = problem.at(farthest_first(q)[:FEW].tolist())
     springs = identified.mean[: len(identified.estimates)]
     effects = LocalResonator.everywhere(structure.simulation)
+    stated = parametrise(structure.simulation, structure.priors).mean
     near = [
         settle(few, approached(f.misfit, [f.x], LOG_STEPS), CLOSE)
         for effect in effects
-        for f in _promising(few, effect, springs)
+        for f in _promising(few, effect, (springs, stated))
     ]
     best = min(near, key=_value)
-    best = settle(problem, best, CLOSE)
+    # Its frequency shows before its place does.
+    hertz = best.x[best.misfit.split[1] + 1]
+    near = [settle(few, f, CLOSE) for e in effects for f in _at_frequency(few, e, best, hertz)]
+    best = settle(problem, min([best, *near], key=_value), CLOSE)
     return _with(structure, best), np.exp(best.x[None, : best.misfit.split[0]])
 
 
@@ -61,11 +66,16 @@ def _value(fit: Fit) -> float:
     return fit.misfit(fit.x).value
 
 
-def _promising(problem: Problem, effect: LocalResonator, springs: np.ndarray) -> list[Fit]:
+def _promising(
+    problem: Problem, effect: LocalResonator, springs: Sequence[np.ndarray]
+) -> list[Fit]:
     """Where a few steps lead from its starts beside springs θ (P,): the best that differ."""
     rough = problem.misfit(effect, GLANCE)
-    others = np.append(springs, rough.mean[len(springs) : rough.split[1]])
-    tried = [approached(rough, [np.append(others, psi)], FIRST_STEPS) for psi in effect.starts()]
+    tried = []
+    for some in springs:
+        others = np.append(some, rough.mean[len(some) : rough.split[1]])
+        starts = [np.append(others, psi) for psi in effect.starts()]
+        tried += [approached(rough, [x], FIRST_STEPS) for x in starts]
     kept: list[Fit] = []
     last = 0.0
     for value, fit in sorted(((_value(f), f) for f in tried), key=lambda pair: pair[0]):
@@ -73,6 +83,17 @@ def _promising(problem: Problem, effect: LocalResonator, springs: np.ndarray) ->
             kept.append(fit)
         last = value
     return kept[:PROMISING]
+
+
+def _at_frequency(problem: Problem, effect: LocalResonator, found: Fit, hertz: float) -> list[Fit]:
+    """On another link, in three directions, with the frequency (its logarithm) that was found."""
+    rough = problem.misfit(effect, GLANCE)
+    others, fits = found.x[: found.misfit.split[1]], []
+    for psi in effect.starts()[:3]:
+        x = np.append(others, psi)
+        x[len(others) + 1] = hertz
+        fits.append(approached(rough, [x], LOG_STEPS))
+    return fits
 
 
 def _with(structure: Structure, found: Fit) -> Structure:
