@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from planner.identification.extended_structure import FLOOR, Structure
 from planner.identification.parameters import Priors, parametrise
 from planner.identification.result import Identification
+from planner.inference.block_diagonal import block_diagonal
 from planner.inference.evidence import laplace
 
 # Misfit (χ² per value) from which the simulation is suspected to lack physics. On generated cells
@@ -41,7 +41,7 @@ class Learned:
         found = self.identified
         p = parametrise(self.structure.simulation, self.structure.priors)
         away = found.mean - np.append(p.mean, np.zeros(len(p.nuisances)))
-        prior = np.asarray(block_diag(p.precision, np.eye(len(p.nuisances))))
+        prior = block_diagonal(p.precision, np.eye(len(p.nuisances)))
         data = (np.linalg.inv(found.covariance) - prior) * max(found.misfit, 1.0)
         root = np.linalg.cholesky(np.linalg.inv(prior))
         white = root.T @ (data / temper + prior) @ root
