@@ -121,7 +121,7 @@ def _loosened(problem: Problem, refitted: Fit, found: Found, effects: Sequence[E
 
     A spring far from its stated value bends all else first: few steps lead nowhere from there.
     """
-    if _best_of_few(found).per_value <= AT_NOISE:
+    if refitted.per_value <= AT_NOISE:
         return found
     moved = [e for e in effects if strayed(refitted, e)]
     return Found((*found.finalists, *side_by_side(partial(staged, problem), moved)), found.left)
