@@ -68,6 +68,7 @@ def search(
     if not effects:
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
+    found = _loosened(problem, refitted, found, effects)
     if _best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
@@ -113,6 +114,17 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
     if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
         ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
     return tuple(ends)
+
+
+def _loosened(problem: Problem, refitted: Fit, found: Found, effects: Sequence[Effect]) -> Found:
+    """Adds the stiffness of each joint whose spring refitting moved far, followed from afar.
+
+    A spring far from its stated value bends all else first: few steps lead nowhere from there.
+    """
+    if refitted.per_value <= AT_NOISE:
+        return found
+    moved = [e for e in effects if strayed(refitted, e)]
+    return Found((*found.finalists, *side_by_side(partial(staged, problem), moved)), found.left)
 
 
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
