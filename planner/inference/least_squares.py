@@ -233,7 +233,8 @@ def minimise(
     """
     here = at if at is not None else objective(start)
     assert here is not None, "the objective is not defined where the fit begins"
-    state = begin(start, here, rule, Limits(longest, *(box or ())))
+    lower, upper = box or (-np.inf, np.inf)
+    state = begin(start, here, rule, Limits(longest, lower, upper))
     for iteration in range(1, most + 1):
         if progress:
             progress(iteration, state.at.value)
