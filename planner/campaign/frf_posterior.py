@@ -13,7 +13,7 @@ from planner.campaign.chain_misfit import CHAIN, ChainMisfit, FrfEvidence, real_
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Grade, Problem
-from planner.identification.objective import FARTHEST
+from planner.identification.objective import FARTHEST, NEARLY
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import (
     LONGEST,
@@ -31,7 +31,6 @@ from planner.inference.least_squares import (
 # to 0.03, those that lack something better the larger it is.
 MODEL_ERROR = 0.01
 LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
-NEARLY = 0.999  # of the farthest that is possible
 TOLERANCE, MOST_STEPS = 5e-5, 30  # of a fit: least gain of a step, and how many
 # Of a fit's first step: a scale that mass and chain share has eigenvalues of 1e-5 of the diagonal.
 LIGHT = Damping(first=1e-5)

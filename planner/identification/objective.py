@@ -25,6 +25,7 @@ from planner.robot.elastic_model import Matrices
 
 LOG_FLOOR = 0.3  # relative sd that no logarithmic residual falls below: far-off models err by more
 FARTHEST = 8.0  # sds of the prior beyond which nothing is looked for
+NEARLY = 0.999  # of these, where a parameter stays that goes as far as it may
 # Far from the truth the data err by bias, not noise, and neighbouring lines alike: the prior counts
 # for more. Without this, dampers that lock a joint where a spring should give are traps.
 LOG_PRIOR = 10.0
@@ -120,6 +121,13 @@ class Objective:
     def count(self) -> int:
         """Number of real residuals that carry weight."""
         return 2 * int(np.count_nonzero(weight_of(self.measured, self.logarithmic)))
+
+    def box(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest values (D,) that are looked at; x is among them."""
+        p, inertias = self.parametrisation, np.zeros(len(x) - len(self.parametrisation.parameters))
+        mean, sd = np.append(p.mean, inertias), np.append(p.log_sd, inertias + 1)
+        reach = NEARLY * FARTHEST * sd
+        return np.minimum(mean - reach, x), np.maximum(mean + reach, x)
 
     def __call__(self, x: np.ndarray) -> Quadratic:
         """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where that cannot be."""

@@ -118,4 +118,5 @@ class StagedProblem:
             tell(Progress(start, stage, iteration, 2 * value / count))
 
         tolerance = LOG_TOLERANCE if objective.logarithmic else self.effort.tolerance
-        return minimise(objective, x, tolerance, steps, told if tell else None)
+        box = objective.box(x)
+        return minimise(objective, x, tolerance, steps, told if tell else None, box=box)

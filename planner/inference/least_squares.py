@@ -125,17 +125,52 @@ def begin(
 
 
 def propose(state: Iterate[Q]) -> np.ndarray:
-    """The point (P,) that the damped Gauss-Newton step leads to."""
+    """The point (P,) that the damped Gauss-Newton step leads to.
+
+    What it would lead out of the box goes to its side, and the others to where they are best then.
+    """
     # In units in which the diagonal is 1: parameters of any size are solved for as well.
     scale = np.diagonal(state.at.normal)
     unit = 1 / np.sqrt(np.where(scale > 0, scale, 1.0))
     damped = state.at.normal * np.outer(unit, unit) + state.damping * np.eye(len(unit))
-    downhill = -unit * state.at.gradient
+    downhill, limits = -unit * state.at.gradient, state.limits
+    lower, upper = (
+        np.broadcast_to(side - state.x, unit.shape) for side in (limits.lower, limits.upper)
+    )
+    step = unit * _within_box(damped, downhill, lower / unit, upper / unit)
+    return limits.within(state.x, step)
+
+
+def _within_box(
+    normal: np.ndarray, downhill: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> np.ndarray:
+    """Where ½ xᵀ N x − dᵀ x is least for x (P,) within sides; which of them hold is tried in turn.
+
+    After Stark and Parker (1995), bounded-variable least squares.
+    """
+    x, free = _solved(normal, downhill), np.ones(len(downhill), dtype=bool)
+    for _ in range(3 * len(x)):
+        beyond = np.where(free, np.maximum(lower - x, x - upper), 0.0)
+        if beyond[worst := int(np.argmax(beyond))] > 0:
+            free[worst] = False
+            x[worst] = lower[worst] if x[worst] < lower[worst] else upper[worst]
+        else:
+            slope = normal @ x - downhill
+            inward = np.where(free, 0.0, np.where(x <= lower, -slope, slope))
+            if inward.max(initial=0.0) <= 1e-9 * np.abs(downhill).max(initial=0.0):
+                break
+            free[int(np.argmax(inward))] = True
+        if free.any():
+            rest = downhill[free] - normal[np.ix_(free, ~free)] @ x[~free]
+            x[free] = _solved(normal[np.ix_(free, free)], rest)
+    return x
+
+
+def _solved(damped: np.ndarray, downhill: np.ndarray) -> np.ndarray:
     try:
-        step = unit * triangular.solve(np.linalg.cholesky(damped), downhill)
+        return triangular.solve(np.linalg.cholesky(damped), downhill)
     except np.linalg.LinAlgError:  # rounding has left a direction without curvature
-        step = unit * np.linalg.lstsq(damped, downhill, rcond=None)[0]
-    return state.limits.within(state.x, step)
+        return np.linalg.lstsq(damped, downhill, rcond=None)[0]
 
 
 def expected(state: Iterate[Q], x: np.ndarray) -> float:
@@ -178,6 +213,7 @@ def minimise(
     longest: float | np.ndarray = LONGEST,
     at: Q | None = None,
     rule: Damping | None = None,
+    box: tuple[np.ndarray, np.ndarray] | None = None,
     settled: Callable[[Iterate[Q], np.ndarray, Q], bool] | None = None,
 ) -> Minimum[Q]:
     """Least value from `start`, until a step would gain less than `tolerance` of it.
@@ -191,12 +227,14 @@ def minimise(
         longest: by how much an entry may move in one step, one for all or (P,).
         at: the objective at `start`, where that is known.
         rule: of the damping, Nielsen's unless given.
+        box: least and largest values (P,) that are looked at.
         settled: a further rule to stop by: told the fit before a step, the proposed x and the
             objective there.
     """
     here = at if at is not None else objective(start)
     assert here is not None, "the objective is not defined where the fit begins"
-    state = begin(start, here, rule, Limits(longest))
+    lower, upper = box or (-np.inf, np.inf)
+    state = begin(start, here, rule, Limits(longest, lower, upper))
     for iteration in range(1, most + 1):
         if progress:
             progress(iteration, state.at.value)

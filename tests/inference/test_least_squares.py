@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import lsq_linear
 
 from planner.inference.least_squares import (
     Damping,
@@ -86,6 +87,24 @@ def test_limits_of_a_step_and_the_box():
     np.testing.assert_allclose(each.within(x, step), [1.5, 0.3])
     box = Limits(longest=np.inf, lower=np.array([-1.0, 0.1]), upper=np.array([1.0, 0.2]))
     np.testing.assert_allclose(box.within(x, step), [1.0, 0.2])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_reaches_a_side_of_the_box_does_not_hold_up_the_others(seed):
+    """Against a peer that knows bounds, where parameters are nearly alike."""
+    rng = np.random.default_rng(seed)
+    a = rng.standard_normal((12, 6)) @ (np.ones((6, 6)) + 0.05 * rng.standard_normal((6, 6)))
+    b = a @ (3.0 * rng.standard_normal(6)) + rng.standard_normal(12)
+
+    def objective(x: np.ndarray) -> Quadratic:
+        r = a @ x - b
+        return Quadratic(float(r @ r) / 2, a.T @ r, a.T @ a, float(r @ r))
+
+    box = np.full(6, -1.0), np.full(6, 1.0)
+    found = minimise(objective, np.zeros(6), 1e-12, 200, box=box)
+    peer = lsq_linear(a, b, (-1.0, 1.0), tol=1e-14)
+    assert np.all(np.abs(found.x) <= 1.0)
+    assert found.at.value <= peer.cost * (1 + 1e-3)
 
 
 def test_a_direction_without_curvature_stays():

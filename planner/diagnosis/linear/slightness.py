@@ -25,6 +25,7 @@ from planner.diagnosis.thresholds import (
     GOOD_PART,
     LEFT_FACTOR,
     SOMETHING_UNKNOWN,
+    SPRING_STRAYED,
 )
 
 FOLLOWED = 1e-3  # shares below it are left where they are
@@ -83,16 +84,16 @@ def _more(told: Sequence[Effect], others: frozenset) -> list[Effect]:
 
 
 def _size(without: Fit, whole: Fit, parts: Sequence[Effect]) -> float:
-    """`change`; of what is a stated spring's own value, by that."""
-    simulation = whole.misfit.setting.simulation
-    own = [name for part in parts if part.absorbed for name in part.springs(simulation)]
-    if not own:
-        return change(without, whole)
+    """`change`; of what is a stated spring's own value, by that, where it is far from stated."""
     misfit, x = whole.misfit, whole.x.copy()
-    stated = dict(zip(without.misfit.names, without.misfit.mean, strict=True))
-    for name in own:
-        x[misfit.names.index(name)] = stated[name]
-    return _apart(residuals(misfit, x)[1], whole)
+    simulation, before = misfit.setting.simulation, without.misfit
+    far = False
+    for name in (n for part in parts if part.absorbed for n in part.springs(simulation)):
+        here, stated = misfit.names.index(name), before.names.index(name)
+        away = x[here] - before.mean[stated]
+        far = far or abs(away) > SPRING_STRAYED * before.sd[stated]
+        x[here] = before.mean[stated]
+    return _apart(residuals(misfit, x)[1], whole) if far else change(without, whole)
 
 
 def _slight(size: float, matters: float, enough: float, taken: float) -> float:
