@@ -104,9 +104,10 @@ def value(found: Fit) -> float:
 @pytest.mark.parametrize("rate", [0.0, 2.0])
 def test_what_is_tried_is_what_happens_without_noise(tied, rate):
     problem, (light, heavy) = tied
-    problem = replace(
-        problem, frfs=tuple(replace(f, exponential_rate_1_s=rate) for f in problem.frfs)
-    )
+    rng = np.random.default_rng(1)
+    there = [misfit_at(problem, heavy.effect, q[None], LINES, rate) for q in problem.q]
+    shown = [measured(one.response(heavy.x)[0][0], SD, rng) for one in there]
+    problem = replace(problem, frfs=tuple(replace(f, exponential_rate_1_s=rate) for f in shown))
     true = replace(heavy, x=np.concatenate([heavy.x[:-1], heavy.x[-1:] + 1.0]))
     poses = KR210.poses(12, 9)
     before = [carried_on(problem, f, f.effect) for f in (true, light)]
