@@ -127,13 +127,16 @@ def begin(
 def propose(state: Iterate[Q]) -> np.ndarray:
     """The point (P,) that the damped Gauss-Newton step leads to.
 
-    What it would lead out of the box goes to its side, and the others to where they are best then.
+    What it would lead out of the box goes to its side, and the others to where they are best then;
+    not where each entry is cut by itself, far from where the objective is quadratic.
     """
     # In units in which the diagonal is 1: parameters of any size are solved for as well.
     scale = np.diagonal(state.at.normal)
     unit = 1 / np.sqrt(np.where(scale > 0, scale, 1.0))
     damped = state.at.normal * np.outer(unit, unit) + state.damping * np.eye(len(unit))
     downhill, limits = -unit * state.at.gradient, state.limits
+    if limits.entrywise:
+        return limits.within(state.x, unit * _solved(damped, downhill))
     lower, upper = (
         np.broadcast_to(side - state.x, unit.shape) for side in (limits.lower, limits.upper)
     )
