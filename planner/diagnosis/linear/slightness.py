@@ -84,7 +84,12 @@ def _more(told: Sequence[Effect], others: frozenset) -> list[Effect]:
 
 
 def _size(without: Fit, whole: Fit, parts: Sequence[Effect]) -> float:
-    """`change`; of what is a stated spring's own value, by that, where it is far from stated."""
+    """`change`; of what is a stated spring's own value, by that, where it is far from stated.
+
+    Artefacts are told by their size beyond what chains have, and change nothing once those are out.
+    """
+    if any(part.artefact for part in parts):
+        return np.inf
     misfit, x = whole.misfit, whole.x.copy()
     simulation, before = misfit.setting.simulation, without.misfit
     far = False
