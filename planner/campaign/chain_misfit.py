@@ -15,6 +15,7 @@ from planner.identification.measurement_model import (
     Tolerances,
     basis,
     marginal,
+    real_rows,
 )
 from planner.inference.least_squares import Quadratic
 
@@ -106,9 +107,9 @@ class ChainMisfit:
         for i, weight in enumerate(self.misfit.weight):
             off = shown(h[i], slope[i], z) - self.misfit.measured.accelerance[i]
             found = marginal(
-                real_values(weight * off)[0],
-                real_values(weight * slope[i]),
-                real_values(weight * hits[i]),
+                real_rows((weight * off)[None])[0],
+                real_rows(weight * slope[i]),
+                real_rows(weight * hits[i]),
             )
             count = 2 * int(np.count_nonzero(weight))
             data.append(PoseData(found.chi2, found.gradient, found.normal, count))
@@ -147,9 +148,3 @@ def through_chain(
     by_axis = chain[:9].reshape(3, 3) * np.where(np.eye(3) > 0, t.gain, t.across)
     alike = t.force_gain * chain[-2] - t.delay_s * chain[-1] * s
     return np.einsum("ij,nkjcf->nkicf", by_axis, values) + alike[:, None, None, None] * values
-
-
-def real_values(values: np.ndarray) -> np.ndarray:
-    """(…, 3, 3, F) complex to (k, m) real."""
-    shaped = values.reshape(-1, *values.shape[-3:])
-    return np.ascontiguousarray(shaped).reshape(len(shaped), -1).view(float)

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.chain_misfit import CHAIN, ChainMisfit, FrfEvidence, real_values, shown
+from planner.campaign.chain_misfit import CHAIN, ChainMisfit, FrfEvidence, shown
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Grade, Problem
+from planner.identification.measurement_model import real_rows
 from planner.identification.objective import FARTHEST, NEARLY
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import (
@@ -124,7 +125,7 @@ def _beside(one: ChainMisfit, z: np.ndarray, precision: np.ndarray) -> LeftOutFr
     m, weight = one.misfit.measured, one.misfit.weight[0]
     predicted = shown(h[0], slope[0], z)
     off = np.where(m.used[0], m.accelerance[0] - predicted, 0.0)
-    b, r = real_values(weight * hits[0]), real_values(weight * off)[0]
+    b, r = real_rows(weight * hits[0]), real_rows((weight * off)[None])[0]
     eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
     return LeftOutFrf(
         m.frequency_hz[0], m.accelerance[0], m.sd[0], predicted,

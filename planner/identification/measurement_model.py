@@ -288,5 +288,5 @@ def marginal_of(parts: Sequence[Part], size: int, count: int) -> Marginal:
 
 
 def real_rows(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts (l, 2rcF) of values (l, r, c, F)."""
-    return np.ascontiguousarray(values).reshape(len(values), -1).view(float)
+    """Real and imaginary parts (k, 2N) of values (k, …), N in each."""
+    return np.ascontiguousarray(values, dtype=complex).reshape(len(values), -1).view(float)

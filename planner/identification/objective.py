@@ -16,7 +16,7 @@ from planner.identification.feasible_inertias import Barrier
 from planner.identification.left_open import Integrated, LeftOpen
 from planner.identification.measured_frfs import Measured
 from planner.identification.measurement_model import Tolerances
-from planner.identification.missed_ports import MISSED_MOST, actual_ports
+from planner.identification.missed_ports import actual_ports, guess
 from planner.identification.parameters import Parametrisation
 from planner.identification.truncated_decay import Completion, completion
 from planner.inference.block_diagonal import block_diagonal
@@ -91,7 +91,7 @@ class Objective:
             lost = 0.0 if self.completion is None else self.completion.values
             off = self._motion(x).accelerance - lost - self.measured.accelerance
             told = self.left_open.told(weight * off).numbers
-            eta = np.clip(told, -MISSED_MOST, MISSED_MOST)
+            eta = guess(told)
         actual = None if eta is None else actual_ports(eta, s, tolerances, weight.shape[1:3])
         motion = self._motion(x, actual)
         turned = Turned((motion,))

@@ -9,10 +9,11 @@ from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, system_of
 from planner.diagnosis.laws.one_joint_response import FASTEST, Strokes, spectra, strokes
-from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, real_rows, whitening
+from planner.diagnosis.laws.open_misses import OpenMisses, Whitening, whitening
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LAW_DIFFERENCE_ERROR, LAW_MODEL_ERROR
 from planner.dynamics.gradient import Impedance, response_gradient
+from planner.identification.measurement_model import real_rows
 
 LINES = 64
 LAID = 4.0  # rate (1/s) of the window: so that 1.3 s of each hit are enough

@@ -16,7 +16,13 @@ from planner.dataset.dataset import LAID, Dataset
 from planner.dataset.level_columns import Column, column
 from planner.diagnosis.linear.fit import Fit
 from planner.dynamics.gradient import response_turned
-from planner.identification.measurement_model import ACROSS, Tolerances, chain_basis, hit_basis
+from planner.identification.measurement_model import (
+    ACROSS,
+    Tolerances,
+    chain_basis,
+    hit_basis,
+    real_rows,
+)
 from planner.recording.force_levels import peak_n
 
 RELATIVE = 0.01  # of B: what no simulation is right to, however well it fits
@@ -164,11 +170,6 @@ class Whitening:
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Of values (..., m)."""
         return values - ((values @ self.directions.T) * self.taken) @ self.directions
-
-
-def real_rows(values: np.ndarray) -> np.ndarray:
-    """Real and imaginary parts (k, N) of complex values (k, ...)."""
-    return np.ascontiguousarray(values, dtype=complex).reshape(len(values), -1).view(float)
 
 
 def whitening(basis: np.ndarray, weight: np.ndarray) -> Whitening:

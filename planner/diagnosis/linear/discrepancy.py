@@ -24,9 +24,10 @@ from planner.diagnosis.thresholds import (
     DISCREPANCY_UNKNOWN,
     DISCREPANCY_USUAL,
 )
-from planner.identification.measurement_model import OpenNumbers
-from planner.identification.missed_ports import MISSED_MOST
+from planner.identification.measurement_model import OpenNumbers, real_rows
+from planner.identification.missed_ports import guess
 from planner.identification.objective import FARTHEST
+from planner.inference.log_space import log_sum
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,37 +51,19 @@ class InnerProducts:
         All is taken around what the fit tells of hits, joints and the chain of all poses.
         """
         misfit = fit.misfit
-        if misfit.tolerances is None:
-            h, slope = misfit.response(fit.x)
-            residual = misfit.weight * (h - misfit.measured.accelerance)
-            nothing = np.zeros((len(h), 0, *h.shape[1:]))
-            slope = misfit.weight[:, None] * slope
-            return cls._of(fit, springs, residual, nothing, slope, OpenNumbers(0, 0))
         first = cls.around(fit, springs, misfit.around_misses(fit.x))
-        told = np.clip(first.worth(1.0).missed, -MISSED_MOST, MISSED_MOST)
+        told = guess(first.worth(1.0).missed)
         return cls.around(fit, springs, misfit.around_these(fit.x, told))
 
     @classmethod
     def around(cls, fit: Fit, springs: Sequence[str], there: AroundMisses) -> "InnerProducts":
         """Of a fit, around known misses."""
         assert there.slope is not None
-        numbers = OpenNumbers.of(there.residual)
-        return cls._of(fit, springs, there.residual, there.opened(), there.slope, numbers)
-
-    @classmethod
-    def _of(
-        cls,
-        fit: Fit,
-        springs: Sequence[str],
-        residual: np.ndarray,
-        open_: np.ndarray,
-        slope: np.ndarray,
-        numbers: OpenNumbers,
-    ) -> "InnerProducts":
+        numbers, open_ = OpenNumbers.of(there.residual), there.opened()
         own = multiples(fit.misfit, springs)
         loose, made = np.flatnonzero(own), []
-        for one, opened, sloped in zip(residual, open_, slope, strict=True):
-            r, b, j = _real(one[None]), _real(opened), _real(sloped)
+        for one, opened, sloped in zip(there.residual, open_, there.slope, strict=True):
+            r, b, j = real_rows(one[None]), real_rows(opened), real_rows(sloped)
             varies = b.copy()
             varies[numbers.hits : numbers.known] *= CHAIN_VARIES
             rows = np.concatenate([r, varies, j[loose], numbers.shared(b), j])
@@ -166,7 +149,7 @@ class Worth:
     @property
     def log_evidence(self) -> float:
         """Over all sizes, as they are where nothing unknown is there."""
-        return log_sum(self.by_size + size_priors()[0])
+        return float(log_sum(self.by_size + size_priors()[0], axis=0))
 
 
 def multiples(misfit: Misfit, springs: Sequence[str]) -> np.ndarray:
@@ -195,16 +178,4 @@ def size_priors() -> tuple[np.ndarray, np.ndarray]:
     sizes = np.maximum(DISCREPANCIES, 1e-6)
     over = np.log(np.maximum(sizes / DISCREPANCY_USUAL, 1.0)) / np.log(DISCREPANCY_FACTOR)
     under = np.log(np.minimum(sizes / DISCREPANCY_UNKNOWN, 1.0)) / np.log(DISCREPANCY_FACTOR)
-    return tuple(p - log_sum(p) for p in (-(over**2) / 2, -(under**2) / 2))  # type: ignore
-
-
-def log_sum(values: np.ndarray) -> float:
-    """ln Σ e^values."""
-    most = float(values.max())
-    return most + float(np.log(np.sum(np.exp(values - most))))
-
-
-def _real(values: np.ndarray) -> np.ndarray:
-    """Complex (k, r, c, F) as real rows (k, 2rcF)."""
-    whole = np.ascontiguousarray(values, dtype=complex)
-    return whole.reshape(len(values), -1).view(float)
+    return tuple(p - log_sum(p, axis=0) for p in (-(over**2) / 2, -(under**2) / 2))  # type: ignore

@@ -8,7 +8,7 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, log_sum, size_priors
+from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, size_priors
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.stated_values import pulled
@@ -22,6 +22,7 @@ from planner.diagnosis.thresholds import (
     SOMETHING_UNKNOWN,
 )
 from planner.inference.evidence import bootstrapped, shared_noise, temper
+from planner.inference.log_space import log_sum
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 BOOTSTRAPS = 400
@@ -79,7 +80,8 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     bent = np.array([_bent(f, w, fits[0]) for f, w in zip(fits, worth, strict=True)])
     least = float(seen.min())
     shares = shares_of(worth, left, prior, matters, least, seed, bent)
-    total = log_sum(_log_joint(worth, np.maximum(left, least), prior, matters, least, bent))
+    joint = _log_joint(worth, np.maximum(left, least), prior, matters, least, bent)
+    total = float(log_sum(joint.ravel(), axis=0))
     return Weights(shares, total, t, worth, mismatch, bent[:, USUAL])
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect, Setting
 from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.dynamics.gradient import Impedance, Inertias, motion_slopes, moved
-from planner.dynamics.motion import ActualPorts, Turned, recorded
+from planner.dynamics.motion import ActualPorts, Motion, Turned, recorded
 from planner.identification.measured_frfs import Measured
 from planner.identification.measurement_model import Tolerances
-from planner.identification.missed_ports import MISSED_MOST, actual_ports
+from planner.identification.missed_ports import actual_ports, guess
 from planner.identification.objective import (
     FARTHEST,
     LOG_PRIOR,
@@ -123,25 +123,26 @@ class Misfit:
 
     def values(self, x: np.ndarray) -> tuple[np.ndarray, Turned]:
         """As `parts`, without derivatives."""
-        p, (a, b) = self.parametrisation, self.split
-        psi = x[b:]
-        setting = self._setting(psi)
-        added = self._added(setting, psi)
-        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        motion = moved(self.matrices, p.elasticity(x[:a]), setting.s, mass, added)
-        seen = self.effect.transfer(self.setting, psi)
+        motion, _ = self._motion(x)
+        seen = self.effect.transfer(self.setting, x[self.split[1] :])
         h, left = motion.accelerance, None if seen is None else seen.left
         return h if left is None else recorded(left, h), Turned((motion,), left)
 
-    def _setting(self, psi: np.ndarray) -> Setting:
+    def _motion(
+        self, x: np.ndarray, actual: ActualPorts | None = None
+    ) -> tuple[Motion, tuple[Impedance, ...]]:
+        """At x, between `actual` ports where those are known; what the effect adds to Z."""
+        a, b = self.split
+        psi, setting = x[b:], self.setting
         rate = self.effect.rate(psi)
-        return self.setting if rate is None else replace(self.setting, s=self.setting.s + rate)
-
-    def _added(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
+        if rate is not None:
+            setting = replace(setting, s=setting.s + rate)
         added = self.effect.impedance(setting, psi)
-        if self.effect.rate(psi) is None:
-            return added
-        return (*added, _weight(self.matrices, setting.s.shape[1]))
+        if rate is not None:
+            added = (*added, _weight(self.matrices, setting.s.shape[1]))
+        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
+        springs = self.parametrisation.elasticity(x[:a])
+        return moved(self.matrices, springs, setting.s, mass, added, actual), added
 
     def parts(
         self, x: np.ndarray, actual: ActualPorts | None = None
@@ -149,13 +150,10 @@ class Misfit:
         """As `response`, and what goes with it; between `actual` ports where those are known."""
         p, (a, b) = self.parametrisation, self.split
         psi = x[b:]
-        rate, setting = self.effect.rate(psi), self._setting(psi)
-        s, added = setting.s, self._added(setting, psi)
-        mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
-        springs = p.elasticity(x[:a])
-        motion = moved(self.matrices, springs, s, mass, added, actual)
-        full = motion_slopes(motion, springs, self.inertias if self.inertial else None, added)
-        h = motion.accelerance
+        rate, (motion, added) = self.effect.rate(psi), self._motion(x, actual)
+        inertias = self.inertias if self.inertial else None
+        full = motion_slopes(motion, p.elasticity(x[:a]), inertias, added)
+        h, s = motion.accelerance, motion.s
         by_weight = full[:, -1]
         if rate is not None:
             full = full[:, :-1]
@@ -199,7 +197,7 @@ class Misfit:
             first = self._around(h, None, turned)
         else:
             first = self._around(*self.parts(x))
-        eta = np.clip(first.misses(), -MISSED_MOST, MISSED_MOST)
+        eta = guess(first.misses())
         return self.around_these(x, eta)
 
     def around_these(self, x: np.ndarray, eta: np.ndarray) -> AroundMisses:

@@ -119,14 +119,14 @@ def usual(fit: Fit) -> float:
     """As `change`, by springs and dampers that differ from pose to pose as those of any robot."""
     misfit = fit.misfit
     size = DISCREPANCY_USUAL * multiples(misfit, stated_springs(fit))
-    moved = misfit.parts(fit.x)[1][:, : len(size)] * size[:, None, None, None]
-    if misfit.tolerances is not None:
+    by_size = size[:, None, None, None]
+    if misfit.tolerances is None:
+        moved = misfit.response(fit.x)[1][:, : len(size)] * by_size
+    else:
         around = misfit.around_misses(fit.x)
         assert around.slope is not None
-        moved = around.net(around.slope[:, : len(size)] * size[:, None, None, None])
-        moved = moved * _noise(misfit)[:, None]
-    squares = np.sum(np.abs(moved) ** 2, axis=1)
-    return _relative(squares, misfit)
+        moved = around.net(around.slope[:, : len(size)] * by_size) * _noise(misfit)[:, None]
+    return _relative(np.sum(np.abs(moved) ** 2, axis=1), misfit)
 
 
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:
