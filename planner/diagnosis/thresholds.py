@@ -18,8 +18,8 @@ UNKNOWN = "unknown"
 NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong; chosen
 SECOND_EFFECT = 0.2  # how much less likely one more effect is than one; chosen on generated cases
 SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; chosen
-# Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong: that
-# of the generated robots. Dampers scatter more, and a loss factor may take the place of most of one:
+# Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong:
+# that of the generated robots. Dampers scatter more, and a loss factor may take the place of one:
 # chosen. Inertias do as in any identification (CAD_INERTIAS).
 STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.5
 # Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as

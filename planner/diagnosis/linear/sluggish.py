@@ -26,7 +26,8 @@ def sluggish(fit: Fit, temper: float) -> bool:
         if k is None or sd[k] > STIFFNESS_KNOWN:
             continue
         c, eta = (
-            place.get(stiffness.replace("stiffness", kind, 1)) for kind in ("damping", "loss_factor")
+            place.get(stiffness.replace("stiffness", kind, 1))
+            for kind in ("damping", "loss_factor")
         )
         viscous = 0.0 if c is None else np.exp(fit.x[c] - fit.x[k]) * mid_rad_s
         structural = 0.0 if eta is None else np.exp(fit.x[eta])
