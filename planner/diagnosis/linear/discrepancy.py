@@ -27,6 +27,7 @@ from planner.diagnosis.thresholds import (
 from planner.identification.measurement_model import OpenNumbers, real_rows
 from planner.identification.missed_ports import guess
 from planner.identification.objective import FARTHEST
+from planner.inference.least_squares import within_box
 from planner.inference.log_space import log_sum
 
 
@@ -118,16 +119,19 @@ class InnerProducts:
         away = np.concatenate([np.zeros(chain), ((self.fit.x - misfit.mean) / misfit.sd)[free]])
         precision = whole[1:, 1:] * np.outer(sd, sd) + np.eye(len(sd))
         gradient = whole[1:, 0] * sd + away
-        step = -np.linalg.solve(precision, gradient)
+        reach = np.where(np.arange(len(sd)) < chain, np.inf, FARTHEST)
+        step = within_box(precision, -gradient, -reach - away, reach - away)
+        gain = -float(gradient @ step + step @ precision @ step / 2)
         # A step too long for what is linear gains at most what there is to gain.
-        gain = min(-0.5 * float(gradient @ step), 0.45 * float(whole[0, 0]))
-        volumes = np.array(volume)
-        evidence = gain - (whole[0, 0] + away @ away + volumes.sum()) / 2
+        most = 0.45 * float(whole[0, 0])
+        step = step * (1 - np.sqrt(1 - most / gain) if gain > most else 1.0)
+        there = np.append(1.0, sd * step)
+        chi2 = np.array([there @ one @ there for one in left])
+        far, volumes = away + step, np.array(volume)
+        evidence = -(chi2.sum() + far @ far + volumes.sum()) / 2
         evidence -= np.linalg.slogdet(precision)[1] / 2
-        chi2 = np.array([one[0, 0] for one in left])
-        score = chi2 * (1 - 2 * gain / max(chi2.sum(), 1e-300)) + volumes
-        own = -np.array(told) @ np.append(1.0, sd * step)
-        return float(evidence), score, temper * float(chi2.sum() - 2 * gain), step, own
+        own = -np.array(told) @ there
+        return float(evidence), chi2 + volumes, temper * float(chi2.sum()), step, own
 
 
 @dataclass(frozen=True, eq=False)
