@@ -47,10 +47,10 @@ def without_slight(
     The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
     weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`; `left`
     (k,) is what each leaves of the recordings, relative, see `Mismatch`, `evidence` (k,) the
-    logarithm of what each is worth. A fit gives as much as
-    FRFs say that one of its effects changes less than `matters` of them, and than what every robot
-    has, once the rest is refitted; the fit without it takes it, of several that do as well the
-    likeliest. An effect that takes a good part of all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
+    logarithm of what each is worth. A fit gives as much as FRFs say that one of its effects changes
+    less than `matters` of them, and than what every robot has, once the rest is refitted; the fit
+    without it takes it, of several that do as well the likeliest. An effect that takes a good part
+    of all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
     known before which of both it is: the farther the rest had to go, the likelier is an effect that
     pulls at it.
     """
