@@ -23,7 +23,7 @@ from planner.inference.parallel import side_by_side
 
 ROUGH = replace(GLANCE, lines=24, inertial=False)
 POSES = 5
-BANDS = (0.28, 12), (1.0, 30)  # shares of the band, one after the other, and steps in each
+BANDS = (0.28, 24), (1.0, 60)  # shares of the band, one after the other, and steps in each
 FOLLOWED = 20  # steps of what is left alone
 GAVE = -0.4  # prior sds from stiff at which a spring is said to give
 CARRIED = 0.25  # prior sds of mass at which a link is said to carry something
