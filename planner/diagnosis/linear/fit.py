@@ -204,7 +204,9 @@ def _minimise(
     misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: MisfitAtPoint | None = None
 ) -> Minimum[MisfitAtPoint]:
     reach = NEARLY * FARTHEST * misfit.sd
-    box = np.minimum(misfit.mean - reach, x), np.maximum(misfit.mean + reach, x)
+    upper = misfit.mean + reach
+    upper[: misfit.split[0]] = np.minimum(upper[: misfit.split[0]], misfit.parametrisation.most)
+    box = np.minimum(misfit.mean - reach, x), np.maximum(upper, x)
     return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at, box=box)
 
 
