@@ -122,7 +122,10 @@ def test_evidence_is_that_of_one_normal_distribution():
     b, d = rng.normal(size=(poses, 2, values)), rng.normal(size=(poses, springs, values))
     c, j = rng.normal(size=(poses, chain, values)), rng.normal(size=(poses, free, values))
     rows = np.concatenate([r[:, None], b, d, c, j], axis=1)
-    misfit = SimpleNamespace(free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([42]))
+    misfit = SimpleNamespace(
+        free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([42]),
+        sides=(np.full(free, -np.inf), np.full(free, np.inf)),
+    )  # fmt: skip
     made = InnerProducts(
         cast(Any, SimpleNamespace(misfit=misfit, x=x)),
         rows @ np.swapaxes(rows, 1, 2), np.array([0, 0, 1.0, 5.0]), OpenNumbers(0, chain),
@@ -154,7 +157,10 @@ def test_evidence_counts_no_values_beyond_those_that_are_looked_at():
     pulled = sd * np.array([-30.0, 0.3, -0.2])
     r = np.einsum("kpv,p->kv", j, x - pulled) + 0.1 * rng.normal(size=(poses, values))
     rows = np.concatenate([r[:, None], j], axis=1)
-    misfit = SimpleNamespace(free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([40]))
+    misfit = SimpleNamespace(
+        free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([40]),
+        sides=(-FARTHEST * sd, FARTHEST * sd),
+    )  # fmt: skip
     made = InnerProducts(
         cast(Any, SimpleNamespace(misfit=misfit, x=x)),
         rows @ np.swapaxes(rows, 1, 2), np.zeros(0), OpenNumbers(0, 0),
