@@ -129,9 +129,9 @@ class Misfit:
         h, slope, _ = self.parts(x)
         return h, slope
 
-    def values(self, x: np.ndarray) -> tuple[np.ndarray, Turned]:
+    def values(self, x: np.ndarray, actual: ActualPorts | None = None) -> tuple[np.ndarray, Turned]:
         """As `parts`, without derivatives."""
-        motion, _ = self._motion(x)
+        motion, _ = self._motion(x, actual)
         seen = self.effect.transfer(self.setting, x[self.split[1] :])
         h, left = motion.accelerance, None if seen is None else seen.left
         return h if left is None else recorded(left, h), Turned((motion,), left)
