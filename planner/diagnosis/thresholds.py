@@ -21,7 +21,7 @@ SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; c
 # Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong:
 # that of the generated robots. Dampers scatter more, and a loss factor may take the place of one:
 # chosen. Inertias do as in any identification (CAD_INERTIAS).
-STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.5
+STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.0
 # Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as
 # gears and bearings are both and no data sheet says in which share.
 STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
