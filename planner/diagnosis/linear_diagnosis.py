@@ -8,6 +8,7 @@ import numpy as np
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.beyond_tolerance import with_artefacts
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
@@ -124,13 +125,21 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
 
 
 def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Found, Weights]:
-    """Weights of all finalists, and of the likeliest with one effect fewer after the other."""
+    """Weights of all finalists, and of the likeliest with one effect fewer after the other.
+
+    And with an artefact more, where it needs a measuring chain beyond its tolerance.
+    """
 
     def weights(fits: Sequence[Fit]) -> Weights:
         return weigh(fits, _priors([f.effect for f in fits], all_))
 
     first = weights(found.finalists)
-    likeliest = found.finalists[int(np.argmax(first.probabilities[:-1]))]
+    number = int(np.argmax(first.probabilities[:-1]))
+    likeliest = found.finalists[number]
+    if wrong := with_artefacts(problem, likeliest, first.worth[number], all_):
+        found = distinct(replace(found, finalists=(*found.finalists, *wrong)))
+        first = weights(found.finalists)
+        likeliest = found.finalists[int(np.argmax(first.probabilities[:-1]))]
     more = thinned(problem, likeliest, found.finalists)
     if not more:
         return found, first

@@ -77,7 +77,7 @@ CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose
 LEFT_SHARE = 0.15
 # Of the squares of what refitting leaves: an effect that takes so much of it is no part of what
 # every robot has a little of, and is named from this share of what matters on. Chosen.
-GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.15
+GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.2
 LEFT_FACTOR = 1.5
 # c·ω/k mid-band from which a spring that gives is no bearing, link or foot (welded frames: 0.01,
 # rubber feet: 0.3), where the FRFs tell ln k to within the second. Chosen.
