@@ -143,7 +143,7 @@ def test_evidence_is_that_of_one_normal_distribution():
         flat = common.reshape(chain + free, -1)
         return float(multivariate_normal.logpdf(expected.ravel(), cov=whole + flat.T @ flat))
 
-    told = [made._at(size, temper_)[0] - dense(size) for size in (0.0, 0.01, 0.3)]
+    told = [made.at(size, temper_).evidence - dense(size) for size in (0.0, 0.01, 0.3)]
     assert np.ptp(told) < 1e-8
 
 
@@ -169,10 +169,12 @@ def test_evidence_counts_no_values_beyond_those_that_are_looked_at():
     away = x / sd
     target = np.concatenate([-r.ravel(), -away])
     best = lsq_linear(white, target, (-FARTHEST - away, FARTHEST - away))
-    evidence, scores, chi2, step, _ = made._at(0.0, 1.0)
-    np.testing.assert_allclose(step, best.x, atol=1e-8)
-    assert abs(step[0] + away[0] + FARTHEST) < 1e-9
+    told = made.at(0.0, 1.0)
+    np.testing.assert_allclose((told.end - x) / sd, best.x, atol=1e-8)
+    assert abs(told.end[0] / sd[0] + FARTHEST) < 1e-9
     least = 2 * best.cost - np.sum((away + best.x) ** 2)
-    np.testing.assert_allclose([scores.sum(), chi2], least, rtol=1e-9)
+    np.testing.assert_allclose([told.scores.sum(), told.chi2], least, rtol=1e-9)
     volume = np.linalg.slogdet(white.T @ white)[1]
-    assert abs(evidence + best.cost + volume / 2) < 1e-6 * best.cost
+    assert abs(told.evidence + best.cost + volume / 2) < 1e-6 * best.cost
+    # Where x stays, all of it is left.
+    assert abs(told.stays + (r.ravel() @ r.ravel() + away @ away + volume) / 2) < 1e-6 * best.cost

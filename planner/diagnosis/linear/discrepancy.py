@@ -29,6 +29,11 @@ from planner.identification.missed_ports import guess
 from planner.inference.least_squares import within_box
 from planner.inference.log_space import log_sum
 
+MOST_STEPS, NOTHING_GAINED = 16, 0.5  # to where a fit is best; nats that a step is not worth
+HELD_BACK = 0.1  # damping, relative to the diagonal, after a step that led nowhere better
+FALLEN = 40.0  # nats by which one size is behind another, from which on no farther ones count
+NOT_LOOKED_AT = -1e12  # log evidence of sizes at which a fit was not followed
+
 
 @dataclass(frozen=True, eq=False)
 class InnerProducts:
@@ -52,7 +57,7 @@ class InnerProducts:
         """
         misfit = fit.misfit
         first = cls.around(fit, springs, misfit.around_misses(fit.x))
-        told = guess(first.worth(1.0).missed)
+        told = guess(first.at(DISCREPANCY_USUAL, 1.0).missed)
         return cls.around(fit, springs, misfit.around_these(fit.x, told))
 
     @classmethod
@@ -71,33 +76,38 @@ class InnerProducts:
         own = np.concatenate([np.zeros(open_.shape[1]), own[loose]])
         return cls(fit, np.array(made), own, numbers)
 
-    def worth(self, temper: float) -> "Worth":
-        """Evidence over all sizes, χ² counting 1/`temper`."""
-        each = [self._at(size, temper) for size in DISCREPANCIES]
-        evidence = np.array([one[0] for one in each])
-        scores = np.array([one[1] for one in each])
-        likeliest = int(np.argmax(evidence))
-        _, _, chi2, step, own = each[likeliest]
+    def worth(
+        self, temper: float, springs: Sequence[str], sizes: Sequence[float] = DISCREPANCIES
+    ) -> "Worth":
+        """Evidence over `sizes` of the discrepancy, χ² counting 1/`temper`.
+
+        From the usual size on, each is followed from its neighbour, while it may count.
+        """
+        each: dict[float, AtSize] = {}
+        for way in (
+            [size for size in sizes[::-1] if size <= DISCREPANCY_USUAL],
+            [size for size in sizes if size > DISCREPANCY_USUAL],
+        ):
+            here = self
+            for size in way:
+                here, each[size] = here.settled(size, temper, springs)
+                if each[size].evidence < max(e.evidence for e in each.values()) - FALLEN:
+                    break
+        best = max(each.values(), key=lambda one: one.evidence)
+        likeliest = next(size for size, one in each.items() if one is best)
         values = max(float(self.fit.misfit.counts.sum()), 1.0)
-        size, chain = DISCREPANCIES[likeliest], self.numbers.chain
-        missed = own[:, : np.count_nonzero(self.own == 0)]
-        of_chain = slice(self.numbers.hits, self.numbers.known)
-        missed[:, of_chain] = CHAIN_VARIES * missed[:, of_chain] + step[:chain]
-        ends = np.array([self._moved(one[3][chain:]) for one in each])
-        return Worth(evidence, scores, chi2 / values, size, missed, ends)
+        known = [each.get(size, best) for size in DISCREPANCIES]
+        evidence = np.array(
+            [each[s].evidence if s in each else NOT_LOOKED_AT for s in DISCREPANCIES]
+        )
+        scores, ends = (np.array([getattr(one, n) for one in known]) for n in ("scores", "end"))
+        return Worth(evidence, scores, best.chi2 / values, likeliest, best.missed, ends)
 
-    def _moved(self, step: np.ndarray) -> np.ndarray:
-        """x (D,) after a step (free,) in prior sds."""
-        misfit, x = self.fit.misfit, self.fit.x.copy()
-        x[misfit.free] += misfit.sd[misfit.free] * step
-        return x
+    def at(self, size: float, temper: float, damping: float = 0.0) -> "AtSize":
+        """With a discrepancy of this size: what a step to the optimum that goes with it promises.
 
-    def _at(
-        self, size: float, temper: float
-    ) -> tuple[float, np.ndarray, float, np.ndarray, np.ndarray]:
-        """Log evidence, −2 ln likelihood (n,) of each pose, χ², the step, and what is each pose's.
-
-        By Laplace's method, after one step to the optimum that goes with this size.
+        By Laplace's method; the step is held back where `damping` is above 0, and stays within what
+        is looked at.
         """
         misfit, count = self.fit.misfit, len(self.own)
         scale = np.where(self.own > 0, size * self.own, 1.0)
@@ -111,28 +121,80 @@ class InnerProducts:
             volume.append(2 * float(np.sum(np.log(np.diagonal(factor)))))
             told.append(np.linalg.solve(factor.T, onto))
         whole = np.sum(left, axis=0)
-        free = np.flatnonzero(misfit.free)
-        chain = self.numbers.chain
+        free, chain = np.flatnonzero(misfit.free), self.numbers.chain
         sd = np.concatenate([np.ones(chain), misfit.sd[free]])
         away = np.concatenate([np.zeros(chain), ((self.fit.x - misfit.mean) / misfit.sd)[free]])
         precision = whole[1:, 1:] * np.outer(sd, sd) + np.eye(len(sd))
         gradient = whole[1:, 0] * sd + away
+        held = precision.copy()
+        held[range(chain, len(sd)), range(chain, len(sd))] *= 1 + damping
         lower, upper = (
             np.append(np.full(chain, far), ((side - self.fit.x) / misfit.sd)[free])
             for far, side in zip((-np.inf, np.inf), misfit.sides, strict=True)
         )
-        step = within_box(precision, -gradient, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
-        gain = -float(gradient @ step + step @ precision @ step / 2)
-        # A step too long for what is linear gains at most what there is to gain.
-        most = 0.45 * float(whole[0, 0])
-        step = step * (1 - np.sqrt(1 - most / gain) if gain > most else 1.0)
-        there = np.append(1.0, sd * step)
+        step = within_box(held, -gradient, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
+        there, volumes = np.append(1.0, sd * step), np.array(volume)
         chi2 = np.array([there @ one @ there for one in left])
-        far, volumes = away + step, np.array(volume)
-        evidence = -(chi2.sum() + far @ far + volumes.sum()) / 2
-        evidence -= np.linalg.slogdet(precision)[1] / 2
+        far = away + step
+        constant = volumes.sum() + np.linalg.slogdet(precision)[1]
+        # Where x stays, the chain is as it fits best.
+        fixed = -np.linalg.solve(precision[:chain, :chain], gradient[:chain])
+        stays = whole[0, 0] + gradient[:chain] @ fixed + away @ away
         own = -np.array(told) @ there
-        return float(evidence), chi2 + volumes, temper * float(chi2.sum()), step, own
+        missed = own[:, : np.count_nonzero(self.own == 0)]
+        of_chain = slice(self.numbers.hits, self.numbers.known)
+        missed[:, of_chain] = CHAIN_VARIES * missed[:, of_chain] + step[:chain]
+        return AtSize(
+            -(float(chi2.sum() + far @ far) + constant) / 2, -(float(stays) + constant) / 2,
+            chi2 + volumes, temper * float(chi2.sum()), self._moved(step[chain:]), missed,
+        )  # fmt: skip
+
+    def settled(
+        self, size: float, temper: float, springs: Sequence[str]
+    ) -> "tuple[InnerProducts, AtSize]":
+        """Followed, step by step, to where it is best with a discrepancy of this size.
+
+        What is told of misses, and of x, is told around itself: one step from elsewhere is wrong
+        by hundreds of nats where hits miss.
+        """
+        here, damping, misfit = self, 0.0, self.fit.misfit
+        last = here.at(size, temper)
+        for _ in range(MOST_STEPS):
+            if last.evidence - last.stays < NOTHING_GAINED:
+                break
+            after = None
+            if misfit.possible(last.end):
+                around = misfit.around_these(last.end, guess(last.missed))
+                there = InnerProducts.around(replace(self.fit, x=last.end), springs, around)
+                after = there, there.at(size, temper)
+            if after is not None and after[1].stays >= last.stays:
+                (here, last), damping = after, 0.0
+            else:
+                damping = max(10 * damping, HELD_BACK)
+                last = here.at(size, temper, damping)
+        return here, last
+
+    def _moved(self, step: np.ndarray) -> np.ndarray:
+        """x (D,) after a step (free,) in prior sds."""
+        misfit, x = self.fit.misfit, self.fit.x.copy()
+        x[misfit.free] += misfit.sd[misfit.free] * step
+        return x
+
+
+@dataclass(frozen=True, eq=False)
+class AtSize:
+    """Log evidence of a fit with a discrepancy of one size, after a step and where x `stays`.
+
+    `scores` (n,) are −2 ln likelihood of each pose after the step, `chi2` is that of all, without
+    temper; the step leads to `end` (D,), and `missed` (n, l) is what goes with it, in sds.
+    """
+
+    evidence: float
+    stays: float
+    scores: np.ndarray
+    chi2: float
+    end: np.ndarray
+    missed: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

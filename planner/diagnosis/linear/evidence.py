@@ -26,6 +26,7 @@ from planner.inference.log_space import log_sum
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 BOOTSTRAPS = 400
+CLOSE = 500.0  # log evidence behind the best within which all sizes are looked at
 USUAL = DISCREPANCIES.index(DISCREPANCY_USUAL)  # what every robot has may move as much
 LOG_KNOWN = float(np.log(1 / SOMETHING_UNKNOWN - 1))  # odds, before any data, of nothing unknown
 
@@ -70,9 +71,17 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     measured = fits[0].misfit.measured
     spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
     shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
-    least = min(p.worth(1.0).per_value for p in products)
-    t = max(least, NOISE_OVERSTATED) * shared
-    worth = tuple(p.worth(t) for p in products)
+    settled = [p.settled(DISCREPANCY_USUAL, 1.0, springs) for p in products]
+    products, rough = [p for p, _ in settled], np.array([at.evidence for _, at in settled])
+    close = rough > rough.max() - CLOSE
+    close[0] = True
+    best = products[int(np.argmax(rough))].worth(1.0, springs)
+    t = max(best.per_value, NOISE_OVERSTATED) * shared
+    usual = (DISCREPANCY_USUAL,)
+    worth = tuple(
+        p.worth(t, springs, DISCREPANCIES if near else usual)
+        for p, near in zip(products, close, strict=True)
+    )
     mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
     left = np.array([m.unexplained for m in mismatch])
     seen = np.array([m.resolution for m in mismatch])
