@@ -109,18 +109,9 @@ class InnerProducts:
         By Laplace's method; the step is held back where `damping` is above 0, and stays within what
         is looked at.
         """
-        misfit, count = self.fit.misfit, len(self.own)
-        scale = np.where(self.own > 0, size * self.own, 1.0)
-        rest = np.r_[0, 1 + count : self.products.shape[1]]
-        left, volume, told = [], [], []
-        for product in self.products / temper:
-            inner = scale[:, None] * product[1 : 1 + count, 1 : 1 + count] * scale + np.eye(count)
-            factor = np.linalg.cholesky(inner)
-            onto = np.linalg.solve(factor, scale[:, None] * product[1 : 1 + count][:, rest])
-            left.append(product[np.ix_(rest, rest)] - onto.T @ onto)
-            volume.append(2 * float(np.sum(np.log(np.diagonal(factor)))))
-            told.append(np.linalg.solve(factor.T, onto))
-        whole = np.sum(left, axis=0)
+        misfit = self.fit.misfit
+        left, volumes, told = self._without_own(size, temper)
+        whole = left.sum(axis=0)
         free, chain = np.flatnonzero(misfit.free), self.numbers.chain
         sd = np.concatenate([np.ones(chain), misfit.sd[free]])
         away = np.concatenate([np.zeros(chain), ((self.fit.x - misfit.mean) / misfit.sd)[free]])
@@ -133,21 +124,38 @@ class InnerProducts:
             for far, side in zip((-np.inf, np.inf), misfit.sides, strict=True)
         )
         step = within_box(held, -gradient, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
-        there, volumes = np.append(1.0, sd * step), np.array(volume)
-        chi2 = np.array([there @ one @ there for one in left])
+        there = np.append(1.0, sd * step)
+        chi2 = np.einsum("i,nij,j->n", there, left, there)
         far = away + step
         constant = volumes.sum() + np.linalg.slogdet(precision)[1]
         # Where x stays, the chain is as it fits best.
         fixed = -np.linalg.solve(precision[:chain, :chain], gradient[:chain])
         stays = whole[0, 0] + gradient[:chain] @ fixed + away @ away
-        own = -np.array(told) @ there
-        missed = own[:, : np.count_nonzero(self.own == 0)]
+        missed = (-told @ there)[:, : np.count_nonzero(self.own == 0)]
         of_chain = slice(self.numbers.hits, self.numbers.known)
         missed[:, of_chain] = CHAIN_VARIES * missed[:, of_chain] + step[:chain]
         return AtSize(
             -(float(chi2.sum() + far @ far) + constant) / 2, -(float(stays) + constant) / 2,
             chi2 + volumes, temper * float(chi2.sum()), self._moved(step[chain:]), missed,
         )  # fmt: skip
+
+    def _without_own(self, size: float, temper: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Products (n, 1 + k + D, …) once what is a pose's own is integrated out.
+
+        The logarithms (n,) that this costs, and what is told of a pose's own by the rest.
+        """
+        count = len(self.own)
+        scale = np.where(self.own > 0, size * self.own, 1.0)
+        rest = np.r_[0, 1 + count : self.products.shape[1]]
+        left, volume, told = [], [], []
+        for product in self.products / temper:
+            inner = scale[:, None] * product[1 : 1 + count, 1 : 1 + count] * scale + np.eye(count)
+            factor = np.linalg.cholesky(inner)
+            onto = np.linalg.solve(factor, scale[:, None] * product[1 : 1 + count][:, rest])
+            left.append(product[np.ix_(rest, rest)] - onto.T @ onto)
+            volume.append(2 * float(np.sum(np.log(np.diagonal(factor)))))
+            told.append(np.linalg.solve(factor.T, onto))
+        return np.array(left), np.array(volume), np.array(told)
 
     def settled(
         self, size: float, temper: float, springs: Sequence[str]
