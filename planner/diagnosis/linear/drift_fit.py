@@ -21,8 +21,8 @@ class DriftMisfit(Misfit):
 
     order: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    def values(self, x: np.ndarray) -> tuple[np.ndarray, Turned]:
-        h, _, turned = self.parts(x)
+    def values(self, x: np.ndarray, actual: ActualPorts | None = None) -> tuple[np.ndarray, Turned]:
+        h, _, turned = self.parts(x, actual)
         return h, turned
 
     def parts(
