@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.learned import SUSPECT, Learned, lacking
-from planner.campaign.missing_physics import with_springs, with_swinging_mass
+from planner.campaign.learned import SUSPECT, Learned, lacking, likeliest
+from planner.campaign.missing_physics import SWINGS, with_springs, with_swinging_mass
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
@@ -31,6 +31,9 @@ BELIEVED = 0.99  # in a simulation that fits the recordings to their noise
 RIGHT = 0.003  # of ln f: what is left where the simulation explains the recordings
 LINES, LOG_LINES, LAST_LINES = 180, 150, 300  # of all poses together: nobody waits between hits
 FEWEST = 12  # of them a pose
+# Misfit of what is stated from which it is followed to the end only if nothing that is added fits:
+# twice what those may leave, by a search of as many steps as the last fit has.
+HOPELESS = 2 * SWINGS
 
 
 def _effort(frfs: Sequence[Frf]) -> Effort:
@@ -183,8 +186,14 @@ def learn(
     if nominal is None or not frfs:
         return before
     lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
-    stated = lesson.identified(Structure(nominal, before.priors))
-    learned = with_swinging_mass(stated, with_springs(stated, lesson), lesson)
+    structure = Structure(nominal, before.priors)
+    stated = lesson.glanced(structure)
+    learned = with_springs(stated, lesson)
+    if stated.identified.misfit > HOPELESS and learned.identified.misfit > SWINGS:
+        # Nothing explains the recordings: now it matters how nearly what is stated does.
+        stated = lesson.identified(structure)
+        learned = likeliest([stated, learned])
+    learned = with_swinging_mass(stated, learned, lesson)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)
@@ -206,9 +215,16 @@ class Lesson:
         warm: Identification | None = None,
         starts: int | np.ndarray = 1,
     ) -> Learned:
-        suspect = EXACT_SUSPECT if self.tolerances is None else SUSPECT
         found = self._identify(structure, warm, _effort(self.frfs), starts)
-        return Learned(structure, found, suspect)
+        return self._learned(structure, found)
+
+    def _learned(self, structure: Structure, found: Identification) -> Learned:
+        return Learned(structure, found, EXACT_SUSPECT if self.tolerances is None else SUSPECT)
+
+    def glanced(self, structure: Structure) -> Learned:
+        """As `identified`; not followed to the end where it is far from the recordings."""
+        effort = replace(_effort(self.frfs), hopeless=HOPELESS)
+        return self._learned(structure, self._identify(structure, None, effort))
 
     def without(self, away: np.ndarray, warm: Learned) -> Identification:
         """From fewer poses, starting where all of them led; `away` (n,) bool."""

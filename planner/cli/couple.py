@@ -44,6 +44,7 @@ def couple(
         Path | None, typer.Option(metavar="FOLDER", help="Draw the FRFs into this folder.")
     ] = None,
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
+    rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
     as_json: AsJson = False,
 ) -> int:
     """Predict the FRFs of another tool: the tested one is taken off, the other put on.
@@ -56,7 +57,7 @@ def couple(
     from planner.report.coupling_source import fitted_contact, tip_of, within
     from planner.report.plot_files import Pictures
 
-    pictures = Pictures(plot, format_)
+    pictures = Pictures(plot, format_, rrd)
     target = load_tool(tool)
     tested = None if reference is None else load_tool(reference)
     tip, name = tip_of(source, tested, pose, robot, noise / 100)

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,6 +77,7 @@ def identify(
     misfits: tuple[float, ...] = ()
     if best is None:
         x, misfits = _search(problem.to_search(), _starting_points(p, starts, seed))
+        problem = replace(problem, effort=effort.last(min(misfits)))
         best = _refine(*problem.carried(x))
         if not np.isfinite(best.misfit):  # it can't be with the weight that these springs carry
             best = _refine(problem, x)

@@ -74,6 +74,7 @@ class CouplingReport(Answer):
     simulated: bool = False
     remarks: tuple[str, ...] = ()
     plots: tuple[str, ...] = ()
+    rrd: str | None = None
     before: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
     coupled: CoupledFrf | None = field(default=None, metadata=NOT_IN_JSON)
 
@@ -97,7 +98,7 @@ class CouplingReport(Answer):
             lines.append(Text(_contact_sentence(self.contact)))
         if self.simulated:
             lines.append(SIMULATED)
-        return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots))
+        return Group(made, *lines, *remarks(self.remarks), *drawn(self.plots, self.rrd))
 
     def with_pictures(self, pictures: Pictures) -> "CouplingReport":
         """The same, its pictures drawn."""
@@ -107,8 +108,16 @@ class CouplingReport(Answer):
         title = f"{mark}{self.tool} at {self.pose}"
         before = "as measured" if self.reference is None else f"measured: {self.reference}"
         figures = coupling_figures(self.before, self.coupled, title, before)
-        written = pictures.write(figures, self.tool)
-        return replace(self, plots=tuple(written["plots"]))
+        both = self.before, self.coupled
+
+        def record(rrd: Path) -> None:
+            from planner.report.rerun_coupling import NOTE, coupling_sheets
+            from planner.report.rerun_sheet import record_sheets
+
+            record_sheets(coupling_sheets(*both, before), "coupling", title, mark + NOTE, rrd)
+
+        written = pictures.write(figures, self.tool, record)
+        return replace(self, plots=tuple(written["plots"]), rrd=written["rrd"])
 
 
 def _contact_sentence(contact: dict[str, Any]) -> str:

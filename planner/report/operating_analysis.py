@@ -139,4 +139,10 @@ def _draw(pictures: Pictures, found: OperatingModes, name: str, simulated: bool)
         ),
         "mac": mac_figure(found, f"{mark}AutoMAC, unscaled · {name}"),
     }
-    return pictures.write(figures, name)
+
+    def record(rrd: Path) -> None:
+        from planner.report.rerun_operating import record_operating
+
+        record_operating(found, name, mark, rrd)
+
+    return pictures.write(figures, name, record)

@@ -1,6 +1,7 @@
 """Answer of `stability --map`: what a cut is allowed all over a campaign's workspace."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -120,8 +121,22 @@ def map_report(
     if not pictures.wanted:
         return answer
     coordinates = _coordinates(campaign)
-    figure = _figure(answer, candidates.features[kept], coordinates, cut)
-    written = pictures.write({"stability_map": figure}, asked.source.name)
+    features = candidates.features[kept]
+    figure = _figure(answer, features, coordinates, cut)
+
+    def record(rrd: Path) -> None:
+        from planner.report.rerun_sheet import record_sheets
+        from planner.report.rerun_stability import MAP, map_sheets
+
+        shown = np.minimum(answer.depth_limit_m_at_95, cut.depth_m[1])
+        most = _most(features, shown)
+        of = features[:, most], coordinates[most], answer.wanted_depth_m
+        sheets = map_sheets(answer.position_m, shown, *of)
+        mark = SIMULATED_TITLE if answer.simulated else ""
+        said = f"{mark}At {answer.spindle_rpm:.0f} rpm. {MAP}"
+        record_sheets(sheets, "stability_map", asked.source.name, said, rrd)
+
+    written = pictures.write({"stability_map": figure}, asked.source.name, record)
     return replace(answer, plots=tuple(written["plots"]), rrd=written["rrd"])
 
 
@@ -163,7 +178,7 @@ def _figure(answer: MapReport, features: np.ndarray, names: tuple[str, ...], cut
         panel.set_xlabel(labels[0])
         panel.set_ylabel(labels[1])
         panel.set_aspect("equal", "datalim")
-    most = int(np.argmax([abs(_rank_correlation(column, shown)) for column in features.T]))
+    most = _most(features, shown)
     panels[2].plot(features[:, most], shown, "o", ms=5)
     panels[2].plot(
         features[tight, most], shown[tight], "o", mfc="none", mec="tab:red", ms=13, mew=1.8
@@ -184,6 +199,11 @@ def _figure(answer: MapReport, features: np.ndarray, names: tuple[str, ...], cut
         f"(ring: the tightest)", fontsize=11,
     )  # fmt: skip
     return figure
+
+
+def _most(features: np.ndarray, depth: np.ndarray) -> int:
+    """Which of the features (n, d) the depth (n,) hangs on most."""
+    return int(np.argmax([abs(_rank_correlation(column, depth)) for column in features.T]))
 
 
 def _rank_correlation(a: np.ndarray, b: np.ndarray) -> float:

@@ -1,6 +1,7 @@
 """From a source of FRFs and a cut to the answer of `stability`."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -39,7 +40,16 @@ def stability_of(
 
         mark = SIMULATED_TITLE if answer.simulated else ""
         figure = lobes_figure(cut, found, drawn, point, mark)
-        answer = replace(answer, **pictures.write({"stability": figure}, asked.source.name))
+        name = asked.source.name
+
+        def record(rrd: Path) -> None:
+            from planner.report.rerun_sheet import record_sheets
+            from planner.report.rerun_stability import LOBES, lobes_sheets
+
+            sheets = lobes_sheets(cut, found, drawn, point)
+            record_sheets(sheets, "stability", name, mark + LOBES, rrd)
+
+        answer = replace(answer, **pictures.write({"stability": figure}, name, record))
     return answer
 
 

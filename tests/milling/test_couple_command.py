@@ -11,6 +11,7 @@ import pyuff
 
 from planner.cli.run import run
 from planner.milling.tip_files import read_tip
+from tests.support.rerun_columns import columns_of, of
 
 LEI = Path(__file__).parents[2] / "campaigns" / "irb6660_lei2023"
 PAIR = ["--tool", f"{LEI}/target.toml", "--reference", f"{LEI}/reference.toml"]
@@ -28,7 +29,16 @@ def answered(*arguments):
 def coupled(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lei")
     code, answer = answered(
-        LEI / "modes.toml", *PAIR, "--noise", 1, "--out", folder / "new.npz", "--plot", folder
+        LEI / "modes.toml",
+        *PAIR,
+        "--noise",
+        1,
+        "--out",
+        folder / "new.npz",
+        "--plot",
+        folder,
+        "--rrd",
+        folder / "new.rrd",
     )
     assert code == 0
     return answer
@@ -44,6 +54,15 @@ def test_the_shipped_example(coupled):
     assert any("z" in remark for remark in coupled["remarks"])
     assert 1 < coupled["amplification"]["worst"] < 10
     assert Path(coupled["plots"][0]).stat().st_size > 10_000
+
+
+def test_the_recording_has_charts_and_no_picture_of_one(coupled):
+    found = columns_of(Path(coupled["rrd"]))
+    assert not any("blob" in name.lower() for _, name in found)
+    for entity in ("/coupling/0/0/this_tool", "/coupling/1/1/this_tool", "/coupling/2/0/errors"):
+        places = np.array(of(found, entity, "strips")[0][0]).reshape(-1, 2)
+        assert len(places) > 100
+        assert np.all(np.diff(places[:, 0]) >= 0)
 
 
 def test_the_npz_is_laid_out_as_predicts(coupled):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from planner.cli.run import run
+from tests.support.rerun_columns import columns_of, of
 
 MODES = """
 [[mode]]
@@ -73,12 +74,20 @@ def test_frfs_of_predict_and_the_picture(files, tmp_path, capsys):
     assert run(command) == 2
     assert "--pose" in capsys.readouterr().err
     asked = ["--pose", "B", "--samples", "20", "--plot", str(tmp_path / "pictures")]
+    asked += ["--rrd", str(tmp_path / "lobes.rrd")]
     assert run([*command, *asked]) == 0
     said = json.loads(capsys.readouterr().out)
     assert all(
         a < b for a, b in zip(said["depth_limit_m_at_95"], said["depth_limit_m"], strict=True)
     )
     assert (tmp_path / "pictures" / "stability.png").stat().st_size > 10_000
+    drawn = columns_of(tmp_path / "lobes.rrd")
+    assert not any("blob" in name.lower() for _, name in drawn)
+    low, high = (
+        np.array(of(drawn, f"/stability/0/0/{name}", "strips")[0][0])[:, 1]
+        for name in ("stable_with_95__", "limit")
+    )
+    assert np.all(low > high)  # the scene's second axis points down
 
 
 WRONG_CUTS = {

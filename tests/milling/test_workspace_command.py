@@ -7,6 +7,7 @@ import pytest
 
 from planner.cli.run import run
 from planner.truth.arms import KR10
+from tests.support.rerun_columns import columns_of, of
 
 CUT = """
 teeth = 2
@@ -67,7 +68,19 @@ def asked(cell, capsys, *more, code=0):
 
 
 def test_map_of_the_workspace(cell, tmp_path, capsys):
-    said = asked(cell, capsys, "--map", "--poses", 4, "--point", "6000,0.0002", "--plot", tmp_path)
+    said = asked(
+        cell,
+        capsys,
+        "--map",
+        "--poses",
+        4,
+        "--point",
+        "6000,0.0002",
+        "--plot",
+        tmp_path,
+        "--rrd",
+        tmp_path / "map.rrd",
+    )
     assert said["spindle_rpm"] == 6000
     found, robust = (np.array(said[n], float) for n in ("depth_limit_m", "depth_limit_m_at_95"))
     assert found.shape == (4,)
@@ -76,6 +89,9 @@ def test_map_of_the_workspace(cell, tmp_path, capsys):
     assert said["wanted_share"] == np.mean(robust > 2e-4)
     assert np.array(said["position_m"]).shape == (4, 3)
     assert (tmp_path / "stability_map.png").stat().st_size > 10_000
+    drawn = columns_of(tmp_path / "map.rrd")
+    assert not any("blob" in name.lower() for _, name in drawn)
+    assert len(of(drawn, "/stability_map/2/0/pose", "positions")[0]) == 4
 
 
 def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path, capsys):
@@ -92,7 +108,11 @@ def test_poses_that_chatter_outside_the_band_are_left_out_of_the_map(tmp_path, c
 
 def test_a_program_with_turns_and_another_tool(cell, tmp_path, capsys):
     way = ("--path", cell / "part.nc", "--origin", "0.6,-0.1,0.4", "--poses", 2)
-    said = asked(cell, capsys, *way, "--turns", "--plot", tmp_path)
+    said = asked(cell, capsys, *way, "--turns", "--plot", tmp_path, "--rrd", tmp_path / "path.rrd")
+    found = columns_of(tmp_path / "path.rrd")
+    assert not any("blob" in name.lower() for _, name in found)
+    assert of(found, "/path/0/0/whole_path", "strips")[0]
+    assert of(found, "/path/1/0/the_tightest", "strips")[0]
     turn = said["turn"]
     depth = np.array(turn["depth_m"], float)
     assert depth.shape == (2, 12)

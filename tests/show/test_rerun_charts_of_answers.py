@@ -1,31 +1,16 @@
 """Learning curves and identifications as Rerun recordings: charts, not pictures of charts."""
 
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from rerun.chunk import RrdReader
 
 from planner.report.identification_plots import DirectFrfs, ShownPose
 from planner.report.learning_curves import Band, Learning
 from planner.report.rerun_chart import HEIGHT
 from planner.report.rerun_identification import CELLS, record
 from planner.report.rerun_learning import TALL, write
-
-
-def columns_of(rrd: Path) -> dict[tuple[str, str], list[Any]]:
-    """All values of a recording by entity and component."""
-    reader, found = RrdReader(rrd), {}
-    for chunk in reader.stream(store=reader.recordings()[0]):
-        for name, values in chunk.to_record_batch().to_pydict().items():
-            found.setdefault((str(chunk.entity_path), name), []).extend(values)
-    return found
-
-
-def of(found: dict[tuple[str, str], list[Any]], entity: str, part: str) -> list[Any]:
-    (values,) = [v for (path, name), v in found.items() if path == entity and part in name]
-    return values
+from tests.support.rerun_columns import columns_of, of
 
 
 def test_learning_curves_lie_where_their_numbers_say(tmp_path):
