@@ -57,10 +57,10 @@ def modes(
     Example: planner modes exports/P001/*.uff --plot pictures
     """
     from planner.cli.progress import reporting
+    from planner.recording.folder import several_poses
     from planner.report.matrix_analysis import matrix_report
     from planner.report.modal_analysis import modal_report
     from planner.report.plot_files import Pictures
-    from planner.report.survey import several_poses, survey
 
     pictures = Pictures(plot, format_, rrd)
     for_points = [
@@ -69,6 +69,8 @@ def modes(
         if given
     ]
     if several_poses(paths):
+        from planner.report.survey import survey
+
         if for_points:
             raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
         given = paths[0], band_hz, robot, estimator, quantity, window_rate_1_s

@@ -21,7 +21,8 @@ class Data:
     window which the records carry; poles are those of the structure, without it. `tail_s` is the
     time from the pulse to the end of the record (see `residues`). `force_share` and
     `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `pooled`: an
-    unknown variance is taken as a level for each entry times one profile of lines.
+    unknown variance is taken as a level for each entry times one profile of lines. `near`: modes
+    may lie close below the band.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -33,11 +34,12 @@ class Data:
     force_share: np.ndarray | None = None  # (inputs, F)
     force_window_s: float = 0.0
     pooled: bool = False
+    near: bool = False
 
     @cached_property
     def lines(self) -> Lines:
         if self.step_s is None:
-            return laplace(self.frequency_hz, self.rate_1_s, self.tail_s)
+            return laplace(self.frequency_hz, self.rate_1_s, self.tail_s, self.near)
         s = 2j * np.pi * self.frequency_hz + self.rate_1_s
         x = np.exp(s * self.step_s)
         return Lines(x, x, np.stack([np.ones_like(x), x]))

@@ -62,7 +62,8 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
             f" {band_hz[1]:g} Hz: widen the band or record longer."
         )
     rows, columns = np.nonzero(matrix.measured)
-    data = Data(f[chosen], matrix.accelerance[rows, columns][:, None, chosen], None, pooled=True)
+    response = matrix.accelerance[rows, columns][:, None, chosen]
+    data = Data(f[chosen], response, None, pooled=True, near=True)
     orders, found = _diagram(matrix, chosen)
     start = np.array([line.pole for line in stable(found)])
     if not start.size:

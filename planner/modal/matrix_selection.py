@@ -19,10 +19,9 @@ PRESENT, PRESENT_ADDED = 0.03, 0.2
 MOST_ADDED = 6
 ROUGH_ROUNDS = 2  # of the first fit, whose weights do not know yet how sets differ
 PASSES = 4  # of leaving out and adding
-SEARCHES = 1  # of sets that fit badly, before each
 # A pole that only the error tells of is no more damped than this, and lies above so many lines.
 DAMPING_ADDED, LINES_BELOW = 0.1, 6
-SETTLING = 2  # rounds of a fit that has been fitted before, to other lines
+SETTLING = 2  # rounds of a fit that has been fitted before, to other lines or but for a few sets
 MOST_FAILED = 2  # candidates in a row that are no modes: weaker ones are not tried
 
 
@@ -44,7 +43,7 @@ def _variance(data: Data, fitted: np.ndarray, modes: int) -> np.ndarray:
     lines = square.shape[1]
     floor = 1e-20 * np.mean(np.abs(data.response[:, 0]) ** 2, axis=-1, keepdims=True)
     profile = running_mean(np.mean(square / np.maximum(flat, floor), axis=0), max(10, lines // 20))
-    lost = max(0.1, 1 - (modes + 3) / lines)
+    lost = max(0.1, 1 - (modes + len(data.lines.rest)) / lines)
     return flat * (0.9 * profile + 0.1) / lost + floor
 
 
@@ -84,12 +83,11 @@ def _settled(
     data: Data, sets: tuple[np.ndarray, ...], fit: SetPoles, places: Places
 ) -> tuple[SetPoles, np.ndarray]:
     """The fit, and its variance, after those sets have been searched again that fit badly."""
-    for _ in range(SEARCHES):
-        variance = _variance(data, fit.fitted, fit.poles.size)
-        own = searched_again(data, sets, fit, variance, places)
-        if own is None:
-            return fit, variance
-        fit = _fit(data, sets, variance, fit.poles, own)
+    variance = _variance(data, fit.fitted, fit.poles.size)
+    own = searched_again(data, sets, fit, variance, places)
+    if own is None:
+        return fit, variance
+    fit = _fit(data, sets, variance, fit.poles, own, SETTLING)
     return fit, _variance(data, fit.fitted, fit.poles.size)
 
 
@@ -144,7 +142,11 @@ def judged(
 def _excess(data: Data, fit: SetPoles, variance: np.ndarray) -> np.ndarray:
     """(F,) χ² per degree of freedom around each line, at least 1."""
     error = (data.response[:, 0] - fit.fitted)[:, None]
-    free = 2 * error.size - 2 * fit.poles.size - data.entries * 2 * (fit.poles.size + 3)
+    free = (
+        2 * error.size
+        - 2 * fit.poles.size
+        - data.entries * 2 * (fit.poles.size + len(data.lines.rest))
+    )
     return excess(data, error, variance[:, None], free)
 
 

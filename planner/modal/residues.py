@@ -2,9 +2,10 @@
 
 Accelerance of one entry: Σ s²[R/(s−λ) + R*/(s−λ*)] + L + s V + s² U, L and U standing for the
 modes below and above the band (Heylen, Lammens, Sas, Modal Analysis Theory and Testing, 1997,
-A.3); all may be complex, because the modes outside are damped. s = iω, or iω + rate where the
-records carry an exponential window e^{−rate·t}: the transform of the windowed record is that of
-the record itself at iω + rate, so poles and residues need no correction afterwards.
+A.3), with a term 1/s² more where modes lie close below; all may be complex, because the modes
+outside are damped. s = iω, or iω + rate where the records carry an exponential window e^{−rate·t}:
+the transform of the windowed record is that of the record itself at iω + rate, so poles and
+residues need no correction afterwards.
 
 A record that ends before its decay lacks the tail that starts at its end. With the end a time τ
 after the pulse, s² becomes s² − λ² e^{(λ−s)τ}: exact for an impulse, and it is not leakage that
@@ -52,10 +53,19 @@ class Lines:
         return Lines(self.x[chosen], self.factor[chosen], self.rest[:, chosen], self.tail_s)
 
 
-def laplace(frequency_hz: np.ndarray, rate_1_s: float = 0.0, tail_s: float = np.inf) -> Lines:
-    """Accelerance lines (Hz) of records windowed by e^{−rate·t}: s = iω + rate."""
+def laplace(
+    frequency_hz: np.ndarray, rate_1_s: float = 0.0, tail_s: float = np.inf, near: bool = False
+) -> Lines:
+    """Accelerance lines (Hz) of records windowed by e^{−rate·t}: s = iω + rate.
+
+    `near`: modes lie close below, as those of the suspension do. Their accelerance is
+    R·(1 − ω₀²/ω² + …) there, so that a term 1/s² is added (none at s = 0).
+    """
     s = 2j * np.pi * np.asarray(frequency_hz) + rate_1_s
-    return Lines(s, s**2, np.stack([np.ones_like(s), s, s**2]), tail_s)
+    rest = [np.ones_like(s), s, s**2]
+    if near:
+        rest.insert(1, np.divide(1, s**2, out=np.zeros_like(s), where=s != 0))
+    return Lines(s, s**2, np.stack(rest), tail_s)
 
 
 def unit(lines: Lines, poles: np.ndarray) -> np.ndarray:

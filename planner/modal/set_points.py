@@ -12,7 +12,7 @@ import numpy as np
 from planner.modal.residues import Lines, Residues, synthesize, unpack
 
 RIDGE = 1e-13  # of the residues' normal matrix: keeps poles that coincide apart from rounding
-AT_ONCE = 100_000  # values of one column for all poles and sets of a block
+AT_ONCE = 30_000  # values of one column for all poles and sets of a block, to stay in the cache
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ agree, the variance is zero and all share one pole.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
+from planner.inference.student import wider
 from planner.modal.fit_data import Data
 from planner.modal.residues import Lines
 from planner.modal.set_points import (
@@ -28,6 +28,7 @@ ROUNDS = 4  # each a Gauss-Newton step of every set and of what is common
 FARTHEST, FARTHEST_DAMPING = 0.015, 2.0
 SETTLED = 0.1  # standard deviations of the common poles: a step below is the last
 STILL = 0.01  # half bandwidths: sets' own poles that move less are at rest
+UNTOLD = 1e-6  # of the information of a pole known as roughly as it may stray
 LONGEST_STEP = 1.0  # of half a bandwidth, of a common pole in one round
 
 
@@ -108,9 +109,10 @@ def _spread(point: SetPoints, own: np.ndarray, common: np.ndarray) -> np.ndarray
     """(2m,) variance from set to set beyond what each set's noise explains."""
     if len(own) < 3:
         return np.zeros(common.size)
-    inverse = np.linalg.pinv(point.normal, hermitian=True)
-    alone = own - np.einsum("kab,kb->ka", inverse, point.gradient)
     far = farthest(common)
+    # What a set does not tell is told so little that it counts for nothing.
+    inverse = np.linalg.inv(point.normal + np.diag(UNTOLD / far**2))
+    alone = own - np.einsum("kab,kb->ka", inverse, point.gradient)
     least = (1e-6 * far) ** 2  # finer than that no set's pole is known
     weight = 1 / np.maximum(np.einsum("kaa->ka", inverse), least)
     # A set in which the mode can hardly be seen says nothing.
@@ -163,8 +165,7 @@ def _student(point: SetPoints, spread: np.ndarray) -> np.ndarray:
     total = np.maximum(np.sum(weight, axis=0), 1e-300)
     freedom = np.maximum(total**2 / np.maximum(np.sum(weight**2, axis=0), 1e-300) - 1, 2.0)
     noise = total / np.maximum(np.sum(known, axis=0), 1e-300)
-    ratio = stdtrit(freedom, 0.975) / stdtrit(np.inf, 0.975)
-    return np.sqrt(noise + (1 - noise) * ratio**2)
+    return np.sqrt(noise + (1 - noise) * wider(freedom) ** 2)
 
 
 def _own(point: SetPoints, x: np.ndarray, common: np.ndarray, spread: np.ndarray) -> np.ndarray:
@@ -193,8 +194,8 @@ def _finish(
     there = data.entries >= 0
     residue_variance = np.zeros(residue.shape)
     residue_variance[data.entries[there]] = ((parts[..., :m] + parts[..., m:]) / 2)[there]
-    wider = _student(point, spread)
+    factor = _student(point, spread)
     return SetPoles(
-        _complex(common), _complex(own), wider[:, None] * covariance * wider, spread, residue,
+        _complex(common), _complex(own), factor[:, None] * covariance * factor, spread, residue,
         residue_variance, response, significances(point, data.weight, m),
     )  # fmt: skip

@@ -200,16 +200,20 @@ class _Neighbourhood:
         """Poles (n,) that fit clearly better than those of now, None where there are none."""
         common, reach = self.poles.common, self.poles.reach
         poles, half = common, np.abs(common.real)
-        for _ in range(SWEEPS):
+        for _ in range(SWEEPS if poles.size > 1 else 1):
+            before = poles
             for a in range(poles.size):
                 count = min(MOST, int(np.ceil(reach[a] / (STEP * half[a]))))
                 shift = np.linspace(-reach[a], reach[a], 2 * count + 1)
                 poles = self._along(poles, a, common[a] - poles[a] + 1j * shift)
+            if np.array_equal(poles, before):
+                break
         for step in FINE:
             for a in range(poles.size):
                 for way in (1j, 1.0):
                     poles = self._along(poles, a, way * step * half[a] * np.arange(-2, 3))
-        bound, free = self._misfit(np.stack([poles, self.poles.own]))
+        last = np.stack([poles, self.poles.own])
+        bound, free = self._bound(last), self._free(last)
         gain = bound[1] - bound[0]
         return poles if gain > GAIN and free[0] - free[1] < COST * gain else None
 
@@ -218,7 +222,7 @@ class _Neighbourhood:
         trials = np.tile(poles, (shift.size, 1))
         trials[:, a] += shift
         trials = trials[trials[:, a].real < 0]
-        return trials[np.argmin(self._misfit(trials)[0])]
+        return trials[np.argmin(self._bound(trials))]
 
     @cached_property
     def _turns(self) -> np.ndarray:
@@ -229,33 +233,35 @@ class _Neighbourhood:
         )
         return np.block([[real, -imag], [imag, real]])
 
-    def _misfit(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(t,) χ² of trials (t, n): excited as in all sets, and with residues left free."""
+    def _sums(self, poles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(t,) χ² without any mode, (t, 2n, 2n) and (t, 2n, e) products of the modes' columns."""
         columns = stack(basis(self.lines, poles, False) * self.profile)
         columns = columns - columns @ self.far @ self.far.T
-        norm = np.linalg.norm(columns, axis=-1)
-        gram = columns @ columns.transpose(0, 2, 1)
-        cross = columns @ self.values.T
         pull = np.sum((poles.imag - self.poles.common.imag) ** 2 / self.poles.spread, axis=1)
         total = pull + np.sum(self.values**2 / self.level[:, None])
-        free = total - _explained(gram, cross / np.sqrt(self.level), norm)
-        bound = total
+        return total, columns @ columns.transpose(0, 2, 1), columns @ self.values.T
+
+    def _free(self, poles: np.ndarray) -> np.ndarray:
+        """(t,) χ² of trials (t, n) with residues left free."""
+        total, gram, cross = self._sums(poles)
+        return total - _explained(gram, cross / np.sqrt(self.level))
+
+    def _bound(self, poles: np.ndarray) -> np.ndarray:
+        """(t,) χ² of trials (t, n) excited as in all sets."""
+        total, gram, cross = self._sums(poles)
         for row in np.unique(self.rows):
             here = np.flatnonzero(self.rows == row)
-            turns, level = self._turns[here], self.level[here]
-            back = turns.transpose(0, 2, 1) / level[:, None, None]
-            normal, right = np.zeros_like(gram), np.zeros(gram.shape[:2])
-            for e, b, t in zip(here, back, turns, strict=True):
-                normal += b @ gram @ t
-                right += cross[:, :, e] @ b.T
-            size = np.sqrt(np.einsum("taa->ta", normal))
-            bound = bound - _explained(normal, right[..., None], size)
-        return bound, free
+            turns = self._turns[here]
+            back = turns.transpose(0, 2, 1) / self.level[here, None, None]
+            normal = np.sum((back[:, None] @ gram) @ turns[:, None], axis=0)
+            right = np.einsum("eab,tbe->ta", back, cross[:, :, here])
+            total = total - _explained(normal, right[..., None])
+        return total
 
 
-def _explained(normal: np.ndarray, right: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """(t,) fall of χ² by least squares from normal (t, c, c), right (t, c, k), size (t, c)."""
-    size = np.maximum(size, 1e-300)
+def _explained(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """(t,) fall of χ² by least squares from normal (t, c, c) and right (t, c, k)."""
+    size = np.maximum(np.sqrt(np.einsum("taa->ta", normal)), 1e-300)
     normal = normal / size[:, :, None] / size[:, None] + RIDGE * np.eye(size.shape[1])
     right = right / size[..., None]
     return np.sum(right * np.linalg.solve(normal, right), axis=(1, 2))

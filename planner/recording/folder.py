@@ -19,6 +19,11 @@ MAX_ROWS = 200_000
 ANGLE, SLIDE = "_deg", "_mm"
 
 
+def several_poses(paths: list[Path]) -> bool:
+    """Whether a single folder with recordings.csv is named."""
+    return len(paths) == 1 and (paths[0] / TABLE).is_file()
+
+
 def joint_columns(folder: Path) -> JointUnits:
     """The joints as the table's columns `…_deg` and `…_mm` name them, where no robot is named."""
     header, _ = _table(folder / TABLE)

@@ -22,7 +22,7 @@ from planner.identification.measurement_model import Tolerances
 from planner.identification.point_places import misplaced, questions
 from planner.modal.modes import Mode
 from planner.modal.tracking import Guide, Tracks, track
-from planner.recording.folder import TABLE, joint_columns, read_recordings
+from planner.recording.folder import joint_columns, read_recordings
 from planner.recording.records import PoseRow, RecordingsFolder
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
 from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode, check_options
@@ -137,11 +137,6 @@ class SurveyReport(Answer):
         parts += [Text(f"  {habit}") for habit in self.habits]
         parts += remarks(self.remarks)
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
-
-
-def several_poses(paths: list[Path]) -> bool:
-    """Whether a single folder with recordings.csv is named."""
-    return len(paths) == 1 and (paths[0] / TABLE).is_file()
 
 
 def survey(

@@ -21,6 +21,7 @@ AXES, STEPS = ("z", "y", "y", "x"), ("0 0 .3", "0.12 0 .2", "0 0 .7", "0.1 0 .1"
 MASSES = ((60, "0 0 .1", (2, 2, 1.5)), (45, "0 .05 .35", (2.2, 2.2, 0.3)),
           (30, "0.08 0 .05", (0.5, 0.6, 0.5)), (12, "0.25 0 0", (0.1, 0.5, 0.5)))  # fmt: skip
 STIFFNESS = (9e5, 7e5, 4e5, 9e4)
+BAND_HZ = 4.0, 90.0
 
 
 def _link(name: str, mass: float, centre: str, moments: tuple[float, ...]) -> str:
@@ -51,7 +52,7 @@ def write_arm(folder: Path, more: str = "") -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     folder.joinpath("arm.urdf").write_text(f'<robot name="arm">{urdf}</robot>')
     text = 'name = "arm"\nurdf = "arm.urdf"\ntcp_frame = "tcp"\nsensor_frame = "sensor"\n'
-    text += "band_hz = [4.0, 90.0]\n"
+    text += f"band_hz = {list(BAND_HZ)}\n"
     for i, (axis, k) in enumerate(zip(AXES, STIFFNESS, strict=True), 1):
         unit = [float(axis == a) for a in "xyz"]
         text += f'[[compliance]]\njoint = "a{i}"\naxis = {unit}\nstiffness = {k}\n'

@@ -19,14 +19,30 @@ from planner.dataset.dataset import Dataset
 from planner.recording.points import SENSOR
 from planner.report.diagnosis import DiagnosisReport
 from planner.robot.robot import Robot
-from planner.truth.deviation import AttachedResonator, BentLink, Spring, StiffnessRipple
+from planner.truth.deviation import (
+    AttachedResonator,
+    BentLink,
+    Deviation,
+    Spring,
+    StiffnessRipple,
+)
 from planner.truth.handling import EVERYDAY, together
 from planner.truth.hits import Hammer, write_recordings
 from planner.truth.load import load_truth
+from planner.truth.nats import Conditions, Lacking, nats
 from planner.truth.scene import log_uniform, some_direction, triple
 from planner.truth.secret import HitVisit, Secret, hit_poses, quiet_hits
 from planner.truth.world import REAL
-from tests.support.arm_with_points import AXES, MASSES, NODES, STEPS, STIFFNESS, poses, write_arm
+from tests.support.arm_with_points import (
+    AXES,
+    BAND_HZ,
+    MASSES,
+    NODES,
+    STEPS,
+    STIFFNESS,
+    poses,
+    write_arm,
+)
 
 KINDS = "base", "joint", "link", "hose"
 SENSORS = ("sensor", "shoulder", "elbow", "foot")
@@ -40,7 +56,8 @@ class Said:
     """What a diagnosis of `hits` hits by `sensors` sensors said of a case.
 
     `named`: it names effect and place of what is concealed; `in_set`: or a set of at most two that
-    it cannot tell apart from that; `others`: names that it gives beside.
+    it cannot tell apart from that; `others`: names that it gives beside. `nats`: what the tool's
+    sensor can tell of it in all poses.
     """
 
     case: str
@@ -52,6 +69,7 @@ class Said:
     verdict: str
     said: tuple[Place, ...]
     cpu_s: float
+    nats: float = float("nan")
 
 
 def _springs(place: str, axes: np.ndarray, stiffness: tuple[float, ...]) -> tuple[Spring, ...]:
@@ -68,7 +86,16 @@ def _across(joint: int) -> np.ndarray:
     return np.eye(3)[["xyz".index(AXES[joint]) != k for k in range(3)]]
 
 
-def concealed(kind: str, rng: np.random.Generator) -> tuple[Place, Secret]:
+@dataclass(frozen=True, eq=False)
+class Concealed:
+    """An effect at its place in a robot with imperfections, and the same robot without it."""
+
+    place: Place
+    secret: Secret
+    plain: Secret
+
+
+def concealed(kind: str, rng: np.random.Generator) -> Concealed:
     """One effect in a robot with imperfections; sizes from hardly to be told to large."""
     plain = REAL.scatter.of(int(rng.integers(2**31)))
     sizes = RIPPLE * rng.standard_normal((4, 2))
@@ -76,42 +103,54 @@ def concealed(kind: str, rng: np.random.Generator) -> tuple[Place, Secret]:
         StiffnessRipple(f"a{n}", 1, float(c), float(s)) for n, (c, s) in enumerate(sizes, 1)
     )
     number = int(rng.integers(3))
-    joint = f"a{number + 1}"
     bearings = [
         _springs(f"a{n + 1}", _across(n), (BEARINGS * k, BEARINGS * k))
         for n, k in enumerate(STIFFNESS)
-        if not (kind == "joint" and n == number)
     ]
-    robot = replace(plain, mixed=MIXED, harmonics=wave, extra=tuple(s for b in bearings for s in b))
+    kept = [s for n, b in enumerate(bearings) if kind != "joint" or n != number for s in b]
+    robot = replace(plain, mixed=MIXED, harmonics=wave, extra=tuple(kept))
+    whole = Secret(replace(robot, extra=tuple(s for b in bearings for s in b)))
+    place, changed = _with(kind, robot, number, rng)
+    return Concealed(place, Secret(changed), whole)
+
+
+def _with(
+    kind: str, robot: Deviation, number: int, rng: np.random.Generator
+) -> tuple[Place, Deviation]:
+    """Where an effect is, and the robot that has it at a joint, or link, of this number."""
+    k = STIFFNESS[number]
     if kind == "base":
-        own = _springs("base", np.eye(3)[:2], _pair(rng, 5e5, 8e6))
-        return ("base_compliance", "base"), Secret(replace(robot, extra=(*robot.extra, *own)))
+        own = _springs("base", np.eye(3)[:2], _pair(rng, 1e6, 5e7))
+        return ("base_compliance", "base"), replace(robot, extra=(*robot.extra, *own))
     if kind == "joint":
-        k = STIFFNESS[number]
-        own = _springs(joint, _across(number), _pair(rng, 0.4 * k, 8 * k))
+        own = _springs(f"a{number + 1}", _across(number), _pair(rng, 0.8 * k, 40 * k))
         place = "transverse_compliance", f"joint_{number + 1}"
-        return place, Secret(replace(robot, extra=(*robot.extra, *own)))
+        return place, replace(robot, extra=(*robot.extra, *own))
     if kind == "link":
-        k = STIFFNESS[number]
-        beam = BentLink(f"l{number + 1}", _pair(rng, 0.3 * k, 5 * k), 3 * k, DAMPING_S)
-        return ("link_flexibility", f"link_{number + 1}"), Secret(replace(robot, beams=(beam,)))
+        beam = BentLink(f"l{number + 1}", _pair(rng, 0.5 * k, 25 * k), 15 * k, DAMPING_S)
+        return ("link_flexibility", f"link_{number + 1}"), replace(robot, beams=(beam,))
     moving = sum(mass for mass, *_ in MASSES)
     at = rng.uniform(0.3, 1.0) * np.array(STEPS[number + 1].split(), dtype=float)
     hose = AttachedResonator(
         f"l{number + 1}", triple(at), triple(some_direction(rng)),
-        moving * log_uniform(rng, 0.003, 0.05), log_uniform(rng, 10.0, 50.0),
+        moving * log_uniform(rng, 0.005, 0.08), log_uniform(rng, 10.0, 50.0),
         log_uniform(rng, 0.01, 0.05),
     )  # fmt: skip
-    return ("local_resonator", f"link_{number + 1}"), Secret(replace(robot, resonators=(hose,)))
+    return ("local_resonator", f"link_{number + 1}"), replace(robot, resonators=(hose,))
 
 
-def make(kind: str, seed: int, folder: Path) -> Place:
-    """Write folder/robot and folder/hits, and say what is concealed."""
+def make(kind: str, seed: int, folder: Path) -> tuple[Place, float]:
+    """Write folder/robot and folder/hits; what is concealed, and nats that the tool's tells of it.
+
+    In all poses, with robot, hits and measuring chain refitted (`Nats.nats_open`).
+    """
     rng = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     toml = write_arm(folder / "robot")
-    place, secret = concealed(kind, rng)
+    drawn = concealed(kind, rng)
     chains = {name: EVERYDAY.chain(rng) for name in SENSORS}
-    secret = replace(secret, chain=chains[SENSOR], chains=chains)
+    secret, plain = (
+        replace(s, chain=chains[SENSOR], chains=chains) for s in (drawn.secret, drawn.plain)
+    )
     truth, common = load_truth(toml, secret.deviation), EVERYDAY.common(rng)
     shots = [(f"+{axis}", 250.0) for axis in "xyz"]
     stated, visits = poses(POSES, int(rng.integers(2**31))), []
@@ -130,7 +169,22 @@ def make(kind: str, seed: int, folder: Path) -> Place:
         for hit in hits
     ]
     write_recordings(folder / "hits", truth.joint_names, rows, hammer, truth.description, NODES)
-    return place
+    return drawn.place, _told_by_the_tool(toml, (secret, plain), visits, hammer)
+
+
+def _told_by_the_tool(
+    toml: Path, secrets: tuple[Secret, Secret], visits: Sequence[HitVisit], hammer: Hammer
+) -> float:
+    """Nats of the effect, which the first secret has and the second has not."""
+    alone = [replace(visit, sensors=(SENSOR,)) for visit in visits]
+    truths = [load_truth(toml, secret.deviation) for secret in secrets]
+    quiet = [
+        quiet_hits(t, s, alone, hammer, np.random.default_rng(0))
+        for t, s in zip(truths, secrets, strict=True)
+    ]
+    conditions = Conditions(alone, BAND_HZ, REAL.scatter, EVERYDAY, hammer)
+    lacking = Lacking(truths[1], secrets[1], quiet[1])
+    return nats(conditions, truths[0], secrets[0], quiet[0], lacking).nats_open
 
 
 def told(folder: Path, sensors: int, count: int) -> tuple[DiagnosisReport, Dataset]:
@@ -171,27 +225,38 @@ def _named(report: DiagnosisReport) -> tuple[Place, ...]:
 def answers(
     folder: Path, each: int, first_seed: int, parts: Sequence[tuple[int, int]]
 ) -> Iterator[Said]:
-    """Of so many cases of each kind, part by part: by how many sensors, at how many poses.
+    """Of so many cases of each kind, each by so many sensors at so many poses.
 
-    What the folder holds already is not done again. Kinds take turns, so that what was done when
-    it was stopped holds as many of each.
+    What the folder holds already is not done again. Kinds take turns and each case is heard in all
+    ways before the next, so that what was done when it was stopped can be compared.
     """
-    for sensors, count in parts:
-        for seed in range(first_seed, first_seed + each):
-            for kind in KINDS:
+    for seed in range(first_seed, first_seed + each):
+        for kind in KINDS:
+            for sensors, count in parts:
                 yield _answer(folder, kind, seed, sensors, count)
+
+
+def held(folder: Path) -> list[Said]:
+    """All answers that a folder holds."""
+    return [_read(path) for path in sorted(folder.glob("*_*_*_*.json"))]
 
 
 def _answer(folder: Path, kind: str, seed: int, sensors: int, count: int) -> Said:
     case = f"{kind}_{seed}"
     path, sealed = folder / f"{case}_{sensors}_{count}.json", folder / f"{case}.json"
     if not sealed.is_file():
-        place = make(kind, seed, folder / case)
-        _write(sealed, place)
+        _write(sealed, make(kind, seed, folder / case))
     if not path.is_file():
-        place = tuple(json.loads(sealed.read_text()))
+        place = tuple(json.loads(sealed.read_text())[0])
         _write(path, asdict(said(case, place, folder / case, sensors, count)))
-    return Said(**json.loads(path.read_text()))
+    return _read(path)
+
+
+def _read(path: Path) -> Said:
+    """An answer, with the nats that its case's seal holds."""
+    found = json.loads(path.read_text())
+    sealed = path.with_name(f"{found['case']}.json")
+    return Said(**found | {"nats": json.loads(sealed.read_text())[1]})
 
 
 def _write(path: Path, what: object) -> None:

@@ -99,6 +99,14 @@ class Misfit:
         return np.concatenate([np.full(b, LONGEST), STRIDE * self.sd[b:]])
 
     @cached_property
+    def sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest x (D,) that is looked at."""
+        reach, springs = FARTHEST * self.sd, self.split[0]
+        upper = self.mean + reach
+        upper[:springs] = np.minimum(upper[:springs], self.parametrisation.most)
+        return self.mean - reach, upper
+
+    @cached_property
     def weight(self) -> np.ndarray:
         """See `weight_of`."""
         return weight_of(self.measured, self.logarithmic)
