@@ -15,6 +15,7 @@ from planner.campaign.model import FrfOf, Model
 from planner.campaign.state import CampaignState, Measurement
 from planner.dataset.hit_columns import PoseHits
 from planner.design.parameter_sensitivity import FrfNoise
+from planner.frf.frf import Frf
 from planner.surrogate.gp import STAGES
 from planner.surrogate.hedged import HedgedAR1
 from planner.surrogate.modal_surrogate import ModalObservations, fit_primary, fit_surrogate
@@ -72,10 +73,28 @@ def build(
         taught=best.low.taught,
         visits=cell.visit_scatter,
     )
+    if hits_of is not None and cell.hits_err:
+        frf_of = _OfOneHit(frf_of, hits_of)
     model = Model(cell, best.labelled, best.low, best.seen, surrogate, noise, told, used, frf_of)
     if learns:
         _ = model.frfs  # which are at hand, and kept with the model
     return model
+
+
+@dataclass(frozen=True)
+class _OfOneHit:
+    """The tool's FRFs of a measurement as one hit in the middle of all would show them.
+
+    Their variance is that of the noise alone: how hits scatter is part of how they miss, which is
+    integrated out, and would count twice.
+    """
+
+    frf_of: FrfOf
+    hits_of: Callable[[Measurement, ModesTable], PoseHits]
+
+    def __call__(self, measurement: Measurement, table: ModesTable) -> Frf:
+        found = self.hits_of(measurement, table).whole.of_tool
+        return found or self.frf_of(measurement, table)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,9 @@ from planner.inference.least_squares import (
 # imperfections, readback. Of generated cases those that lack nothing are predicted as well by 0.003
 # to 0.03, those that lack something better the larger it is.
 MODEL_ERROR = 0.01
-LINES, LEAST, MOST = 240, 16, 72  # of all poses together, and of one at least and at most
+# Of all poses together, and of one at least and at most: by fewer than identify a simulation
+# between hits, FRFs would be less exact than its own.
+LINES, LEAST, MOST = 300, 20, 80
 TOLERANCE, MOST_STEPS = 5e-5, 30  # of a fit: least gain of a step, and how many
 # Of a fit's first step: a scale that mass and chain share has eigenvalues of 1e-5 of the diagonal.
 LIGHT = Damping(first=1e-5)

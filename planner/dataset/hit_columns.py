@@ -108,7 +108,7 @@ def hits_of(
         every = tuple(hit for found, _ in read for hit in found)
         at_tool = [of_tool(found) for found, _ in read]
         file = tuple(number for number, found in enumerate(at_tool) for _ in found)
-        columns = _none()
+        columns = no_columns()
         if file:
             hits = tuple(hit for found in at_tool for hit in found)
             columns = hit_columns(hits, file, band_hz, window_rate_1_s)
@@ -117,7 +117,8 @@ def hits_of(
     return pose.kept("hits", PoseHits, make)
 
 
-def _none() -> HitColumns:
+def no_columns() -> HitColumns:
+    """Of no hit."""
     empty, h = np.zeros(0), np.zeros((0, CHANNELS, 0))
     return HitColumns(
         empty.astype(int), empty.astype(int), empty, empty, h.astype(complex), h,

@@ -13,6 +13,7 @@ from planner.campaign.config import config_from_builtins
 from planner.campaign.log_conversion import from_modal
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState, Measurement
+from planner.dataset.hit_columns import PoseHits, no_columns
 from planner.errors import RefusedError
 from planner.frf import metrics
 from planner.frf.estimator import estimate
@@ -49,6 +50,7 @@ class FrfCase:
     cell: Cell
     measurements: tuple[Measurement, ...]
     frfs: dict[str, Frf]
+    one_hit: dict[str, Frf]
     unseen: np.ndarray
     lines_hz: np.ndarray
     true_frf: np.ndarray
@@ -57,10 +59,15 @@ class FrfCase:
         """As a campaign asks for it."""
         return self.frfs[measurement.pose]
 
-    def model(self, n: int) -> Model:
-        """After the first n poses."""
+    def hits_of(self, measurement: Measurement, _: object) -> PoseHits:
+        """As a campaign asks for it; nothing of single hits."""
+        return PoseHits(no_columns(), self.one_hit[measurement.pose])
+
+    def model(self, n: int, hits: bool = True) -> Model:
+        """After the first n poses; without `hits` as of exported FRFs, whose hits nobody knows."""
         used = {m.pose: m for m in self.measurements[:n]}
-        return build(self.cell, CampaignState(measurements=used, events=n), self.frf_of)
+        state = CampaignState(measurements=used, events=n)
+        return build(self.cell, state, self.frf_of, self.hits_of if hits else None)
 
     def models(self) -> Iterator[Model]:
         """After each pose."""
@@ -85,7 +92,7 @@ def make(
         secret = EFFECTS[LACKING[lacking]](scene, secret, rng).secret
     truth = load_truth(toml, secret.deviation)
     hammer = Hammer(PEAK_N[robot], PULSE_S, noise=float(rng.uniform(0.005, 0.03)))
-    measurements, frfs = _measured(truth, secret, q, hammer, arm.band_hz, handling, rng)
+    measurements, frfs, one_hit = _measured(truth, secret, q, hammer, arm.band_hz, handling, rng)
     table = {
         "robot": str(toml),
         "workspace": {"joints_deg": [list(r) for r in arm.joints_deg]},
@@ -96,13 +103,13 @@ def make(
     cell = Cell.load(toml, config_from_builtins(table))
     lines = np.linspace(*arm.band_hz, LINES)
     true = np.array([truth.accelerance(one, lines) for one in other])
-    return FrfCase(cell, measurements, frfs, other, lines, true)
+    return FrfCase(cell, measurements, frfs, one_hit, other, lines, true)
 
 
 def _measured(
     truth: Truth, secret: Secret, q: np.ndarray, hammer: Hammer, band_hz: tuple[float, float],
     handling: Handling, rng: np.random.Generator,
-) -> tuple[tuple[Measurement, ...], dict[str, Frf]]:  # fmt: skip
+) -> tuple[tuple[Measurement, ...], dict[str, Frf], dict[str, Frf]]:  # fmt: skip
     """REPEATS hits an axis at each pose (n, 6), with errors of hand and chain."""
     secret, common = replace(secret, chain=handling.chain(rng)), handling.common(rng)
     axes = [axis for axis in range(3) for _ in range(REPEATS)]
@@ -113,7 +120,7 @@ def _measured(
         own = zip(axes, handling.aims(axes, rng), strict=True)
         aims = [together(common[axis], aim) for axis, aim in own]
         visits.append(HitVisit(there, shots, aims=aims))
-    measurements, frfs = [], {}
+    measurements, frfs, one_hit = [], {}, {}
     for number, recorded in enumerate(hit_poses(truth, secret, visits, hammer, rng)):
         rate = hammer.sampling_rate_hz
         hits = tuple(
@@ -126,8 +133,8 @@ def _measured(
         except RefusedError:
             modes = ()
         measurements.append(Measurement(name, tuple(np.rad2deg(q[number])), (), modes))
-        frfs[name] = frf
-    return tuple(measurements), frfs
+        frfs[name], one_hit[name] = frf, estimate(hits, band_hz, "one_hit")
+    return tuple(measurements), frfs, one_hit
 
 
 @dataclass(frozen=True)
