@@ -5,21 +5,23 @@ from functools import cached_property
 
 import numpy as np
 
+from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import tolerances_of
+from planner.dynamics.motion import ActualPorts, Turned
 from planner.identification.feasible_inertias import Barrier
 from planner.identification.measurement_model import (
     CHAIN_NUMBERS,
     HIT_NUMBERS,
     OPEN,
-    Tolerances,
+    Block,
     basis,
-    marginal,
-    real_rows,
 )
+from planner.identification.missed_ports import actual_ports, guess
 from planner.inference.least_squares import Quadratic
 
 CHAIN = CHAIN_NUMBERS  # numbers of the chain, which are the same at all poses
+OF_CHAIN = slice(HIT_NUMBERS, OPEN)  # where they are among all that a pose leaves open
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,19 +84,47 @@ class ChainMisfit:
             normal[a:b, a:b] += curvature
         return PriorAtPoint(value, gradient, normal)
 
-    def parts(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The robot's FRFs (n, 3, 3, F), derivatives by z, and what poses leave open (n, 18, …).
+    def around(self, z: np.ndarray) -> AroundMisses:
+        """FRFs at z and what hits and readback of each pose leave open, around its likeliest.
 
-        Derivatives and misses are as the chain shows them: else the lighter robot under a lower
-        gain would not look the same, and a fit would end where it began.
+        The chain is as z says: else the lighter robot under a lower gain would not look the same,
+        and a fit would end where it began.
         """
-        h, slope, turned = self.misfit.parts(z[:-CHAIN])
-        s, tolerances = self.misfit.setting.s, tolerances_of(self.misfit.setting.simulation)
-        open_ = basis(h, turned, s, tolerances)
-        chain = open_[:, HIT_NUMBERS:OPEN]
-        own = np.concatenate([open_[:, :HIT_NUMBERS], open_[:, OPEN:]], axis=1)
-        own, slope = (v + through_chain(v, z[-CHAIN:], s, tolerances) for v in (own, slope))
-        return h, np.concatenate([slope, chain], axis=1), own
+        eta = self._of_chain(z)
+        h, turned = self.misfit.values(z[:-CHAIN], self._ports(eta))
+        told = guess(self._around(h, turned, eta).misses())
+        eta[:, own_numbers(eta.shape[1])] = told
+        h, slope, turned = self.misfit.parts(z[:-CHAIN], self._ports(eta))
+        return self._around(h, turned, eta, slope)
+
+    def shown(self, z: np.ndarray) -> np.ndarray:
+        """FRFs (n, 3, 3, F) in m/s²/N at z as the chain shows them; no hit misses."""
+        return self.misfit.values(z[:-CHAIN], self._ports(self._of_chain(z)))[0]
+
+    def _of_chain(self, z: np.ndarray) -> np.ndarray:
+        """Open numbers (n, l) where the chain is as z says, and nothing else is off."""
+        q, known = self.misfit.setting.q, self.misfit.matrices.by_angle is not None
+        eta = np.zeros((len(q), OPEN + (q.shape[1] if known else 0)))
+        eta[:, OF_CHAIN] = z[-CHAIN:]
+        return eta
+
+    def _ports(self, eta: np.ndarray) -> ActualPorts:
+        setting, shape = self.misfit.setting, self.misfit.measured.accelerance.shape[1:3]
+        return actual_ports(eta, setting.s, tolerances_of(setting.simulation), shape)
+
+    def _around(
+        self, h: np.ndarray, turned: Turned, eta: np.ndarray, slope: np.ndarray | None = None
+    ) -> AroundMisses:
+        m, setting, weight = self.misfit.measured, self.misfit.setting, self.misfit.weight
+        open_ = basis(h, turned, setting.s, tolerances_of(setting.simulation))
+        open_ *= weight[:, None]
+        own = own_numbers(open_.shape[1])
+        hits, missed = open_[:, own], eta[:, own]
+        residual = weight * (h - m.accelerance) - np.einsum("nl,nlijf->nijf", missed, hits)
+        if slope is not None:
+            slope = np.concatenate([weight[:, None] * slope, open_[:, OF_CHAIN]], axis=1)
+        block = Block(slice(3), slice(3), np.arange(len(own)), hits)
+        return AroundMisses(residual, slope, (block,), weight, missed, np.zeros(0))
 
     def __call__(self, z: np.ndarray) -> FrfEvidence:
         """∞ where z cannot be."""
@@ -102,15 +132,9 @@ class ChainMisfit:
         if not np.isfinite(prior.value) or not self.misfit.possible(z[:-CHAIN]):
             nothing = np.zeros(len(z))
             return FrfEvidence(np.inf, nothing, np.diag(nothing), np.inf, ())
-        h, slope, hits = self.parts(z)
-        data = []
+        around, data = self.around(z), []
         for i, weight in enumerate(self.misfit.weight):
-            off = shown(h[i], slope[i], z) - self.misfit.measured.accelerance[i]
-            found = marginal(
-                real_rows((weight * off)[None])[0],
-                real_rows(weight * slope[i]),
-                real_rows(weight * hits[i]),
-            )
+            found = around.marginal(i)
             count = 2 * int(np.count_nonzero(weight))
             data.append(PoseData(found.chi2, found.gradient, found.normal, count))
         chi2 = sum(d.chi2 for d in data)
@@ -136,15 +160,6 @@ class ChainMisfit:
         return ChainMisfit(some)
 
 
-def shown(h: np.ndarray, slope: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """FRFs (3, 3, F) as the chain shows them; `slope` (d, 3, 3, F) by z, the chain's last."""
-    return h + np.tensordot(z[-CHAIN:], slope[-CHAIN:], axes=1)
-
-
-def through_chain(
-    values: np.ndarray, chain: np.ndarray, s: np.ndarray, t: Tolerances
-) -> np.ndarray:
-    """What a chain (CHAIN,) in sds adds to accelerations (n, k, 3, c, F); its place aside."""
-    by_axis = chain[:9].reshape(3, 3) * np.where(np.eye(3) > 0, t.gain, t.across)
-    alike = t.force_gain * chain[-2] - t.delay_s * chain[-1] * s
-    return np.einsum("ij,nkjcf->nkicf", by_axis, values) + alike[:, None, None, None] * values
+def own_numbers(count: int) -> np.ndarray:
+    """Of a pose's open numbers those that are its own: of its hits, and of its joints' readback."""
+    return np.append(np.arange(HIT_NUMBERS), np.arange(OPEN, count))

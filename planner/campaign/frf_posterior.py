@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.campaign.chain_misfit import CHAIN, ChainMisfit, FrfEvidence, shown
+from planner.campaign.chain_misfit import CHAIN, ChainMisfit, FrfEvidence
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Grade, Problem
-from planner.identification.measurement_model import real_rows
 from planner.identification.objective import FARTHEST, NEARLY
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import (
@@ -121,16 +120,13 @@ class FrfPosterior:
 
 
 def _beside(one: ChainMisfit, z: np.ndarray, precision: np.ndarray) -> LeftOutFrf:
-    h, slope, hits = one.parts(z)
-    m, weight = one.misfit.measured, one.misfit.weight[0]
-    predicted = shown(h[0], slope[0], z)
-    off = np.where(m.used[0], m.accelerance[0] - predicted, 0.0)
-    b, r = real_rows(weight * hits[0]), real_rows((weight * off)[None])[0]
-    eta = np.linalg.solve(np.eye(len(b)) + b @ b.T, b @ r)
-    return LeftOutFrf(
-        m.frequency_hz[0], m.accelerance[0], m.sd[0], predicted,
-        _spread(_root(precision), slope[0]), np.tensordot(eta, hits[0], axes=1),
-    )  # fmt: skip
+    m, around, predicted = one.misfit.measured, one.around(z), one.shown(z)[0]
+    weight = np.where(m.used[0], around.weight[0], np.inf)
+    left = around.left(around.misses())[0] / weight
+    assert around.slope is not None
+    sd = _spread(_root(precision), around.slope[0] / weight)
+    missed = np.where(m.used[0], m.accelerance[0] + left - predicted, 0.0)
+    return LeftOutFrf(m.frequency_hz[0], m.accelerance[0], m.sd[0], predicted, sd, missed)
 
 
 def closely(poses: int) -> Grade:

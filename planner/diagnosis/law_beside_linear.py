@@ -6,7 +6,9 @@ the other has told.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
@@ -62,13 +64,14 @@ def beside(
     pays = found.refitted.per_value > PAYS * linear.fit.per_value
     if not pays and found.verdict != "explained":
         return None
-    explained = possible_simulation(found, linear)
-    if explained is None:
+    tried = (_with_law(recorded, found, c, tell) for c in _with_parts(linear, possible))
+    both = [b for b in tried if b is not None]
+    least = min((b.law.misfit for b in both), default=np.inf)
+    if least * LAW_BETTER > min(f.misfit for f in before):
         return None
-    again = force_levels.screen(recorded, explained, single=True, tell=tell)
-    law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)
-    if law is None or law.misfit * LAW_BETTER > min(f.misfit for f in before):
-        return None
+    chosen = min((b for b in both if b.law.misfit <= PAYS * least), key=lambda b: b.numbers)
+    linear, again = chosen.linear, chosen.findings
+    assert linear.fit is not None
     kept = [f for f in findings if f not in before and f.effect != "joint_stiffness"]
     # Springs make up for what averages tell wrongly of the linear effect.
     again = [f for f in again if f.effect != "joint_stiffness"]
@@ -77,6 +80,36 @@ def beside(
     ranked = tuple(replace(c, probability=c.probability / total) for c in there if total)
     ranked = ranked or (replace(linear, probability=1.0),)
     return (*kept, *again), replace(found, candidates=ranked, verdict="explained", best=linear.fit)
+
+
+@dataclass(frozen=True)
+class _Both:
+    """A linear explanation, and what the force levels tell beside it: the joint's `law` first."""
+
+    linear: Candidate
+    findings: tuple[Finding, ...]
+    law: Finding
+
+    @property
+    def numbers(self) -> tuple[int, int]:
+        """See `_numbers`."""
+        return _numbers(self.linear)
+
+
+def _with_law(recorded: Dataset, found: Diagnosis, linear: Candidate, tell: Tell) -> _Both | None:
+    """None where no robot has what explains the averages, or the levels tell of no law then."""
+    explained = possible_simulation(found, linear)
+    if explained is None:
+        return None
+    again = force_levels.screen(recorded, explained, single=True, tell=tell)
+    law = next((f for f in again if f.effect in LAWS_OF_JOINTS), None)
+    return None if law is None else _Both(linear, again, law)
+
+
+def _with_parts(whole: Candidate, possible: Sequence[Candidate]) -> list[Candidate]:
+    """An explanation, and those by some of its effects: the others may stand for the law alone."""
+    parts = [c for c in possible if c.fit is not None and set(c.places) < set(whole.places)]
+    return [whole, *parts]
 
 
 def _simplest(found: Diagnosis, possible: Sequence[Candidate]) -> Candidate | None:

@@ -189,7 +189,8 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     named = [_told_of(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
     left = np.array([m.unexplained for m in weights.mismatch])
-    own = weights.probabilities[:-1], prior, weights.bent, left
+    evidence = np.array([w.log_evidence for w in weights.worth])
+    own = weights.probabilities[:-1], prior, weights.bent, left, evidence
     shares = list(without_slight(fits, named, *own, matters / 100))
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):

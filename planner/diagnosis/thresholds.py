@@ -18,9 +18,10 @@ UNKNOWN = "unknown"
 NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong; chosen
 SECOND_EFFECT = 0.2  # how much less likely one more effect is than one; chosen on generated cases
 SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; chosen
-# Springs and dampers as robot.toml states them scatter by this factor (1 sd) without anything being
-# wrong: that of the generated robots. Inertias do as in any identification (CAD_INERTIAS).
-STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 1.6
+# Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong:
+# that of the generated robots. Dampers scatter more, and a loss factor may take the place of one:
+# chosen. Inertias do as in any identification (CAD_INERTIAS).
+STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.0
 # Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as
 # gears and bearings are both and no data sheet says in which share.
 STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
@@ -76,7 +77,7 @@ CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose
 LEFT_SHARE = 0.15
 # Of the squares of what refitting leaves: an effect that takes so much of it is no part of what
 # every robot has a little of, and is named from this share of what matters on. Chosen.
-GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.25
+GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.15
 LEFT_FACTOR = 1.5
 # c·ω/k mid-band from which a spring that gives is no bearing, link or foot (welded frames: 0.01,
 # rubber feet: 0.3), where the FRFs tell ln k to within the second. Chosen.

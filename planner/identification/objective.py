@@ -127,7 +127,8 @@ class Objective:
         p, inertias = self.parametrisation, np.zeros(len(x) - len(self.parametrisation.parameters))
         mean, sd = np.append(p.mean, inertias), np.append(p.log_sd, inertias + 1)
         reach = NEARLY * FARTHEST * sd
-        return np.minimum(mean - reach, x), np.maximum(mean + reach, x)
+        most = np.append(p.most, np.full(len(inertias), np.inf))
+        return np.minimum(mean - reach, x), np.maximum(np.minimum(mean + reach, most), x)
 
     def __call__(self, x: np.ndarray) -> Quadratic:
         """At x = (θ, φ) or, where inertias are not free, at x = θ; ∞ where that cannot be."""

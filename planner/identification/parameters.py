@@ -9,7 +9,7 @@ import numpy as np
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
-from planner.robot.config import Compliance, RobotConfig
+from planner.robot.config import LOSS_FACTOR_BELOW, Compliance, RobotConfig
 from planner.robot.virtual_joints import inertia_basis
 
 NEAR = 6.0
@@ -101,6 +101,12 @@ class Parametrisation:
     def log_sd(self) -> np.ndarray:
         """Prior sd of θ (P,)."""
         return np.array([p.log_sd for p in self.parameters])
+
+    @cached_property
+    def most(self) -> np.ndarray:
+        """Largest θ (P,) that robot.toml takes: what is fitted can be written and read again."""
+        below = np.log(0.999 * LOSS_FACTOR_BELOW)
+        return np.array([below if p.kind == "loss_factor" else np.inf for p in self.parameters])
 
     @cached_property
     def covariance(self) -> np.ndarray:

@@ -140,11 +140,11 @@ def propose(state: Iterate[Q]) -> np.ndarray:
     lower, upper = (
         np.broadcast_to(side - state.x, unit.shape) for side in (limits.lower, limits.upper)
     )
-    step = unit * _within_box(damped, downhill, lower / unit, upper / unit)
+    step = unit * within_box(damped, downhill, lower / unit, upper / unit)
     return limits.within(state.x, step)
 
 
-def _within_box(
+def within_box(
     normal: np.ndarray, downhill: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> np.ndarray:
     """Where ½ xᵀ N x − dᵀ x is least for x (P,) within sides; which of them hold is tried in turn.

@@ -10,6 +10,7 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.robot.config import (
     LISTS,
+    LOSS_FACTOR_BELOW,
     Compliance,
     DiagnoseTable,
     HitsTable,
@@ -113,9 +114,10 @@ def _check_compliances(config: RobotConfig, path: Path) -> None:
         length = sum(a * a for a in block.axis) ** 0.5
         if not abs(length - 1) < 1e-3:
             raise InputError(f"{entry} has an axis of length {length:.4g}; give a unit vector.")
-        if not 0 <= block.loss_factor < 2:
+        if not 0 <= block.loss_factor < LOSS_FACTOR_BELOW:
             raise InputError(
-                f"{entry} has loss_factor {block.loss_factor}; it must be at least 0 and below 2."
+                f"{entry} has loss_factor {block.loss_factor}; it must be at least 0 and "
+                f"below {LOSS_FACTOR_BELOW:g}."
             )
         _check_percent(block.stiffness_sd_percent, f"{entry}: stiffness_sd_percent")
         same = first.setdefault(block.tie or f"\0{number}", block)

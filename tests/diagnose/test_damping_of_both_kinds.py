@@ -10,9 +10,11 @@ from planner.diagnosis.effects.exponential_window import ExponentialWindow
 from planner.diagnosis.laws.equivalent_stiffness import System
 from planner.diagnosis.laws.one_joint_response import modal
 from planner.diagnosis.linear_diagnosis import Diagnosis, diagnose
+from planner.diagnosis.write_explained import explained_simulation
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.identification.truncated_decay import cut_off
+from planner.robot.config import LOSS_FACTOR_BELOW
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR10
 
@@ -37,8 +39,8 @@ def partly_lossy(stated: Simulation, shares) -> Simulation:
     return Simulation(replace(stated.robot, config=config))
 
 
-def told(stated: Simulation, truth: Simulation, rate_1_s: float = 0.0) -> Diagnosis:
-    """Whether a window of which nobody said anything is seen."""
+def seen(truth: Simulation, rate_1_s: float = 0.0) -> list[Frf]:
+    """With noise, and under a window of which nobody said anything."""
     rng, nothing = np.random.default_rng(0), np.full((3, 3, len(LINES)), np.nan)
     frfs = []
     for solved in (truth.poles(q[None]) for q in Q):
@@ -49,7 +51,26 @@ def told(stated: Simulation, truth: Simulation, rate_1_s: float = 0.0) -> Diagno
         frfs.append(
             Frf(LINES, h + sd * (noise[0] + 1j * noise[1]), sd**2, nothing, (3,) * 3, BAND_HZ)
         )
-    return diagnose(frfs, Q, stated, effects=ExponentialWindow.everywhere(stated))
+    return frfs
+
+
+def told(stated: Simulation, truth: Simulation, rate_1_s: float = 0.0) -> Diagnosis:
+    """Whether the window is seen."""
+    effects = ExponentialWindow.everywhere(stated)
+    return diagnose(seen(truth, rate_1_s), Q, stated, effects=effects)
+
+
+def test_a_spring_that_all_but_only_damps_is_fitted_as_robot_toml_takes_it(stated):
+    blocks = list(stated.robot.config.compliance)
+    blocks[2] = msgspec.structs.replace(blocks[2], loss_factor=6.0)
+    config = msgspec.structs.replace(stated.robot.config, compliance=tuple(blocks))
+    truth = Simulation(replace(stated.robot, config=config))
+    found = diagnose(seen(truth), Q, stated, effects=())
+    none = next(c for c in found.candidates if c.fit is not None)
+    written = explained_simulation(found, none)
+    assert written.elasticity.loss_factor.max() < LOSS_FACTOR_BELOW
+    assert written.elasticity.loss_factor.argmax() == 2
+    assert written.elasticity.loss_factor[2] > 0.9 * LOSS_FACTOR_BELOW
 
 
 def test_no_window_is_named_for_a_loss_factor(stated):

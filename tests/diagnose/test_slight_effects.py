@@ -42,9 +42,8 @@ def given_on(whole: Fit, without: Fit, prior=(100.0, 1.0), left=(0.01, 0.01)) ->
     fits = [without, whole]
     told = [f.effect.parts() for f in fits]
     bent = np.array([moved(f, without) for f in fits])
-    return float(
-        without_slight(fits, told, np.array([0.0, 1.0]), prior, bent, np.array(left), 0.03)[0]
-    )
+    shares, evidence = np.array([0.0, 1.0]), np.array([-50.0, 0.0])
+    return float(without_slight(fits, told, shares, prior, bent, np.array(left), evidence, 0.03)[0])
 
 
 def moved(fit: Fit, plain: Fit) -> float:
@@ -73,12 +72,32 @@ def test_a_mass_of_nothing_is_none_and_one_that_counts_stays(at):
 
 def test_values_far_from_stated_are_likelier_where_something_unknown_pulls(at):
     springs = at("none", "", {"stiffness of": 0.0})
-    one = next(n for n in springs.misfit.names if n.startswith("stiffness"))
-    sd = springs.misfit.sd[springs.misfit.names.index(one)]
-    told = [moved(at("none", "", {one: s * sd}), springs) for s in (0.0, 2.0, 4.0, 6.0)]
+    two = [n for n in springs.misfit.names if n.startswith("stiffness")][:2]
+    sd = springs.misfit.sd[springs.misfit.names.index(two[0])]
+    sizes = 0.0, 2.0, 4.0, 6.0
+    told = [moved(at("none", "", dict.fromkeys(two, s * sd)), springs) for s in sizes]
     assert told[0] < 0
     assert np.all(np.diff(told) > 0)
     assert told[3] - told[0] > 10
+    # One alone is that joint's own stiffness.
+    alone = [moved(at("none", "", {two[0]: s * sd}), springs) for s in sizes]
+    assert max(alone) < 0
+
+
+def test_of_two_slight_effects_the_likelier_stays(at):
+    from planner.diagnosis.effects.combined import Both
+
+    none = at("none", "", {})
+    first, second = at("added_mass", "link_3", {}), at("added_mass", "link_2", {})
+    both = Fit(Both.of(first.effect, second.effect), first.misfit, first.x, first.data)
+    fits = [none, first, second, both]
+    told = [f.effect.parts() for f in fits]
+    shares, prior = np.array([0.0, 0.0, 0.0, 1.0]), np.ones(4)
+    evidence, left = np.array([-5000.0, -2000.0, -50.0, 0.0]), np.full(4, 0.01)
+    out = without_slight(fits, told, shares, prior, np.zeros(4), left, evidence, 0.03)
+    # What both give on goes by way of the likelier, not to whichever changes a little less.
+    assert out[1] == 0
+    assert out[2] > 0
 
 
 def test_dampers_say_nothing_of_what_is_stated(at):

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.optimize import lsq_linear
 from scipy.stats import multivariate_normal
 
 from planner.diagnosis.linear.discrepancy import InnerProducts, Worth
 from planner.diagnosis.linear.evidence import shares_of
 from planner.diagnosis.thresholds import ALIKE, DISCREPANCIES, NOISE_OVERSTATED
 from planner.identification.measurement_model import OpenNumbers
+from planner.identification.objective import FARTHEST
 from planner.inference.evidence import shared_noise, temper
 
 POSES = 9
@@ -120,7 +122,10 @@ def test_evidence_is_that_of_one_normal_distribution():
     b, d = rng.normal(size=(poses, 2, values)), rng.normal(size=(poses, springs, values))
     c, j = rng.normal(size=(poses, chain, values)), rng.normal(size=(poses, free, values))
     rows = np.concatenate([r[:, None], b, d, c, j], axis=1)
-    misfit = SimpleNamespace(free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([42]))
+    misfit = SimpleNamespace(
+        free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([42]),
+        sides=(np.full(free, -np.inf), np.full(free, np.inf)),
+    )  # fmt: skip
     made = InnerProducts(
         cast(Any, SimpleNamespace(misfit=misfit, x=x)),
         rows @ np.swapaxes(rows, 1, 2), np.array([0, 0, 1.0, 5.0]), OpenNumbers(0, chain),
@@ -140,3 +145,34 @@ def test_evidence_is_that_of_one_normal_distribution():
 
     told = [made._at(size, temper_)[0] - dense(size) for size in (0.0, 0.01, 0.3)]
     assert np.ptp(told) < 1e-8
+
+
+def test_evidence_counts_no_values_beyond_those_that_are_looked_at():
+    """A parameter that the data pull to 30 prior sds: χ² is the least within the range."""
+    rng = np.random.default_rng(5)
+    values, free, poses = 20, 3, 2
+    sd, mean = rng.uniform(0.5, 2, free), np.zeros(free)
+    x = 0.9 * FARTHEST * sd * np.array([-1.0, 0.0, 0.1])
+    j = rng.normal(size=(poses, free, values))
+    pulled = sd * np.array([-30.0, 0.3, -0.2])
+    r = np.einsum("kpv,p->kv", j, x - pulled) + 0.1 * rng.normal(size=(poses, values))
+    rows = np.concatenate([r[:, None], j], axis=1)
+    misfit = SimpleNamespace(
+        free=np.ones(free, bool), sd=sd, mean=mean, counts=np.array([40]),
+        sides=(-FARTHEST * sd, FARTHEST * sd),
+    )  # fmt: skip
+    made = InnerProducts(
+        cast(Any, SimpleNamespace(misfit=misfit, x=x)),
+        rows @ np.swapaxes(rows, 1, 2), np.zeros(0), OpenNumbers(0, 0),
+    )  # fmt: skip
+    white = np.concatenate([np.concatenate(j, axis=1).T * sd, np.eye(free)])
+    away = x / sd
+    target = np.concatenate([-r.ravel(), -away])
+    best = lsq_linear(white, target, (-FARTHEST - away, FARTHEST - away))
+    evidence, scores, chi2, step, _ = made._at(0.0, 1.0)
+    np.testing.assert_allclose(step, best.x, atol=1e-8)
+    assert abs(step[0] + away[0] + FARTHEST) < 1e-9
+    least = 2 * best.cost - np.sum((away + best.x) ** 2)
+    np.testing.assert_allclose([scores.sum(), chi2], least, rtol=1e-9)
+    volume = np.linalg.slogdet(white.T @ white)[1]
+    assert abs(evidence + best.cost + volume / 2) < 1e-6 * best.cost

@@ -7,9 +7,9 @@ import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.places import damping_time, movable, with_blocks
-from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR
+from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR, LOSS_FACTOR_FACTOR
 from planner.dynamics.simulation import Simulation
-from planner.identification.parameters import Priors, place_name
+from planner.identification.parameters import KINDS, Priors, place_name
 from planner.robot.config import Compliance
 
 
@@ -54,38 +54,38 @@ class ExtraCompliance(Effect):
         return replace(self, gives=tuple(gives))
 
     def priors(self, simulation: Simulation, priors: Priors) -> Priors:
-        """Log-uniform ones of the new springs' stiffness and damping."""
+        """Log-uniform ones of the new springs' stiffness, damping and loss factor."""
         time, bounds = damping_time(simulation), dict(priors.bounds)
-        blocks = simulation.robot.config.compliance
-        undamped = {place_name(b) for b in blocks if b.damping == 0}
+        there = {place_name(b): b for b in simulation.robot.config.compliance}
         for give, block in zip(self.gives, self.blocks(time), strict=True):
             place = place_name(block)
             bounds[f"stiffness of {place}"] = (give.lower, give.upper)
-            low, high = give.lower * time, give.upper * time
-            if place not in undamped:
-                bounds[f"damping of {place}"] = (
-                    low / FURTHER_DAMPING_FACTOR,
-                    high * FURTHER_DAMPING_FACTOR,
-                )
+            if there[place].damping:
+                further = FURTHER_DAMPING_FACTOR
+                least, most = give.lower * time / further, give.upper * time * further
+                bounds[f"damping of {place}"] = least, most
+            if median := there[place].loss_factor:
+                further = FURTHER_DAMPING_FACTOR * LOSS_FACTOR_FACTOR
+                bounds[f"loss_factor of {place}"] = median / further, median * further
         return replace(priors, bounds=bounds)
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:
-        """Stiffness and damping of each new degree of freedom."""
+        """Stiffness, damping and loss factor of each new degree of freedom."""
         places = [place_name(b) for b in self.blocks(1.0)]
-        return tuple(f"{kind} of {p}" for p in places for kind in ("stiffness", "damping"))
+        lossy = any(b.loss_factor > 0 for b in simulation.robot.config.compliance)
+        kinds = KINDS if lossy else KINDS[:2]
+        return tuple(f"{kind} of {p}" for p in places for kind in kinds)
 
     def elements(
         self, simulation: Simulation, values: dict[str, tuple[float, float, str]]
     ) -> dict[str, list[dict[str, Any]]]:
         """See `Effect.elements`."""
-        fitted = {place_name(b): b for b in simulation.robot.config.compliance}
         blocks = []
         for block in self.blocks(1.0):
             place = place_name(block)
             entry = {"joint": block.joint, "axis": list(block.axis), "slide": block.slide}
-            entry["stiffness"] = values[f"stiffness of {place}"][0]
-            entry["damping"] = values.get(f"damping of {place}", (0.0, 0.0, ""))[0]
-            blocks.append(entry | {"loss_factor": fitted[place].loss_factor})
+            entry |= {k: values.get(f"{k} of {place}", (0.0, 0.0, ""))[0] for k in KINDS}
+            blocks.append(entry)
         return {"compliance": blocks}
 
 

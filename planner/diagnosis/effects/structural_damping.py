@@ -45,19 +45,17 @@ class StructuralDamping(Effect):
         )
 
 
-def partly_structural(simulation: Simulation, stated: int) -> Simulation:
-    """The simulation with a loss factor beside each damper that has none, of `stated` first blocks.
+def partly_structural(simulation: Simulation) -> Simulation:
+    """The simulation with a loss factor beside each damper that has none.
 
-    Gears dissipate in both ways; how much in which nobody states, and it says nothing of what is
-    wrong with the robot.
+    Gears, bearings and floors dissipate in both ways; how much in which nobody states, and it says
+    nothing of what is wrong with the robot.
     """
-    return _damped(simulation, viscous=1.0, structural=STRUCTURAL_SHARE, most=stated)
+    return _damped(simulation, viscous=1.0, structural=STRUCTURAL_SHARE)
 
 
-def _damped(
-    simulation: Simulation, viscous: float, structural: float, most: int | None = None
-) -> Simulation:
-    """Shares of the first blocks' dampers that stay, and that a loss factor takes mid-band."""
+def _damped(simulation: Simulation, viscous: float, structural: float) -> Simulation:
+    """Shares of the dampers that stay, and that a loss factor takes mid-band."""
     robot: Robot = simulation.robot
     middle = 2 * np.pi * float(np.sqrt(np.prod(robot.config.band_hz)))
 
@@ -67,7 +65,6 @@ def _damped(
         loss = min(1.0, structural * b.damping * middle / b.stiffness)
         return msgspec.structs.replace(b, damping=viscous * b.damping, loss_factor=loss)
 
-    there = robot.config.compliance
-    blocks = (*map(changed, there[:most]), *there[len(there[:most]) :])
+    blocks = tuple(map(changed, robot.config.compliance))
     config = msgspec.structs.replace(robot.config, compliance=blocks)
     return Simulation(replace(robot, config=config))

@@ -26,7 +26,7 @@ from planner.diagnosis.thresholds import (
 )
 from planner.identification.measurement_model import OpenNumbers, real_rows
 from planner.identification.missed_ports import guess
-from planner.identification.objective import FARTHEST
+from planner.inference.least_squares import within_box
 from planner.inference.log_space import log_sum
 
 
@@ -87,11 +87,10 @@ class InnerProducts:
         return Worth(evidence, scores, chi2 / values, size, missed, ends)
 
     def _moved(self, step: np.ndarray) -> np.ndarray:
-        """x (D,) after a step (free,) in prior sds, no farther off than is looked for."""
-        misfit = self.fit.misfit
-        far = (self.fit.x - misfit.mean) / misfit.sd
-        far[misfit.free] += step
-        return misfit.mean + misfit.sd * np.clip(far, -FARTHEST, FARTHEST)
+        """x (D,) after a step (free,) in prior sds."""
+        misfit, x = self.fit.misfit, self.fit.x.copy()
+        x[misfit.free] += misfit.sd[misfit.free] * step
+        return x
 
     def _at(
         self, size: float, temper: float
@@ -118,16 +117,22 @@ class InnerProducts:
         away = np.concatenate([np.zeros(chain), ((self.fit.x - misfit.mean) / misfit.sd)[free]])
         precision = whole[1:, 1:] * np.outer(sd, sd) + np.eye(len(sd))
         gradient = whole[1:, 0] * sd + away
-        step = -np.linalg.solve(precision, gradient)
+        lower, upper = (
+            np.append(np.full(chain, far), ((side - self.fit.x) / misfit.sd)[free])
+            for far, side in zip((-np.inf, np.inf), misfit.sides, strict=True)
+        )
+        step = within_box(precision, -gradient, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
+        gain = -float(gradient @ step + step @ precision @ step / 2)
         # A step too long for what is linear gains at most what there is to gain.
-        gain = min(-0.5 * float(gradient @ step), 0.45 * float(whole[0, 0]))
-        volumes = np.array(volume)
-        evidence = gain - (whole[0, 0] + away @ away + volumes.sum()) / 2
+        most = 0.45 * float(whole[0, 0])
+        step = step * (1 - np.sqrt(1 - most / gain) if gain > most else 1.0)
+        there = np.append(1.0, sd * step)
+        chi2 = np.array([there @ one @ there for one in left])
+        far, volumes = away + step, np.array(volume)
+        evidence = -(chi2.sum() + far @ far + volumes.sum()) / 2
         evidence -= np.linalg.slogdet(precision)[1] / 2
-        chi2 = np.array([one[0, 0] for one in left])
-        score = chi2 * (1 - 2 * gain / max(chi2.sum(), 1e-300)) + volumes
-        own = -np.array(told) @ np.append(1.0, sd * step)
-        return float(evidence), score, temper * float(chi2.sum() - 2 * gain), step, own
+        own = -np.array(told) @ there
+        return float(evidence), chi2 + volumes, temper * float(chi2.sum()), step, own
 
 
 @dataclass(frozen=True, eq=False)

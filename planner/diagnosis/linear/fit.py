@@ -11,7 +11,7 @@ from planner.diagnosis.linear.objective import ByPose, Misfit, MisfitAtPoint, ow
 from planner.diagnosis.linear.problem import CLOSE, COARSE, FINE, GLANCE, Grade, Problem
 from planner.identification.effort import QUICK, STAGES, Effort
 from planner.identification.identify import identify
-from planner.identification.objective import FARTHEST, NEARLY
+from planner.identification.objective import NEARLY
 from planner.inference.evidence import laplace
 from planner.inference.least_squares import Minimum, minimise
 from planner.inference.parallel import side_by_side
@@ -203,8 +203,8 @@ def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
 def _minimise(
     misfit: Misfit, x: np.ndarray, tolerance: float, steps: int, at: MisfitAtPoint | None = None
 ) -> Minimum[MisfitAtPoint]:
-    reach = NEARLY * FARTHEST * misfit.sd
-    box = np.minimum(misfit.mean - reach, x), np.maximum(misfit.mean + reach, x)
+    lower, upper = (misfit.mean + NEARLY * (side - misfit.mean) for side in misfit.sides)
+    box = np.minimum(lower, x), np.maximum(upper, x)
     return minimise(misfit, x, tolerance, steps, longest=misfit.longest, at=at, box=box)
 
 

@@ -99,6 +99,14 @@ class Misfit:
         return np.concatenate([np.full(b, LONGEST), STRIDE * self.sd[b:]])
 
     @cached_property
+    def sides(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest x (D,) that is looked at."""
+        reach, springs = FARTHEST * self.sd, self.split[0]
+        upper = self.mean + reach
+        upper[:springs] = np.minimum(upper[:springs], self.parametrisation.most)
+        return self.mean - reach, upper
+
+    @cached_property
     def weight(self) -> np.ndarray:
         """See `weight_of`."""
         return weight_of(self.measured, self.logarithmic)
@@ -121,9 +129,9 @@ class Misfit:
         h, slope, _ = self.parts(x)
         return h, slope
 
-    def values(self, x: np.ndarray) -> tuple[np.ndarray, Turned]:
+    def values(self, x: np.ndarray, actual: ActualPorts | None = None) -> tuple[np.ndarray, Turned]:
         """As `parts`, without derivatives."""
-        motion, _ = self._motion(x)
+        motion, _ = self._motion(x, actual)
         seen = self.effect.transfer(self.setting, x[self.split[1] :])
         h, left = motion.accelerance, None if seen is None else seen.left
         return h if left is None else recorded(left, h), Turned((motion,), left)

@@ -60,8 +60,8 @@ class Problem:
     """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation.
 
     Where it is `exact`, hits are taken to be on their axes and the measuring chain to be perfect.
-    With `lossy` a part of each stated damper may be a loss factor: every candidate has it, so that
-    none is told by how damping goes with frequency.
+    With `lossy` a part of each damper may be a loss factor: every candidate has it, so that none is
+    told by how damping goes with frequency.
     """
 
     frfs: tuple[Frf, ...]
@@ -118,7 +118,7 @@ class _Prepared:
 def _prepared(problem: Problem, effect: Effect) -> _Prepared:
     simulation = effect.structure(problem.simulation)
     if problem.lossy:
-        simulation = partly_structural(simulation, len(problem.simulation.robot.config.compliance))
+        simulation = partly_structural(simulation)
     p = parametrise(simulation, effect.priors(simulation, problem.priors))
     jacobians = simulation.elastic.body_jacobians(problem.q)
     matrices = matrices_at(simulation.elastic, problem.q, problem.frfs, sloped=True)

@@ -29,6 +29,7 @@ from planner.diagnosis.thresholds import (
 )
 
 FOLLOWED = 1e-3  # shares below it are left where they are
+AS_GOOD = 0.8  # of the largest part that a fit gives on: those that take so much do as well; chosen
 
 
 def without_slight(
@@ -38,16 +39,18 @@ def without_slight(
     prior: Sequence[float],
     bent: np.ndarray,
     left: np.ndarray,
+    evidence: np.ndarray,
     matters: float,
 ) -> np.ndarray:
     """Shares (k,) of fits on the same lines, those of effects that do not matter given on.
 
     The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
     weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`; `left`
-    (k,) is what each leaves of the recordings, relative, see `Mismatch`. A fit gives as much as
-    FRFs say that one of its effects changes less than `matters` of them, and than what every robot
-    has, once the rest is refitted; the fit without it takes it. An effect that takes a good part of
-    all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
+    (k,) is what each leaves of the recordings, relative, see `Mismatch`, `evidence` (k,) the
+    logarithm of what each is worth. A fit gives as much as FRFs say that one of its effects changes
+    less than `matters` of them, and than what every robot has, once the rest is refitted; the fit
+    without it takes it, of several that do as well the likeliest. An effect that takes a good part
+    of all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
     known before which of both it is: the farther the rest had to go, the likelier is an effect that
     pulls at it.
     """
@@ -73,7 +76,8 @@ def without_slight(
             * expit(np.log(prior[j] / prior[i]) + pull[i] - pull[j])
             for j in fewer
         ]
-        most = int(np.argmax(given))
+        as_good = [k for k, g in enumerate(given) if g >= AS_GOOD * max(given)]
+        most = max(as_good, key=lambda k: evidence[fewer[k]])
         shares[fewer[most]] += given[most] * shares[i]
         shares[i] *= 1 - given[most]
     return shares

@@ -14,18 +14,23 @@ def sluggish(fit: Fit, temper: float) -> bool:
     """Whether a spring that an effect adds, and that FRFs tell, is mostly a damper mid-band."""
     misfit = fit.misfit
     added = {n for part in fit.effect.parts() for n in part.springs(misfit.setting.simulation)}
-    damped = [n for n in added if n.startswith("damping of ")]
-    if not damped:
+    springs = [n for n in added if n.startswith("stiffness of ")]
+    if not springs:
         return False
     lines = misfit.measured.frequency_hz
     mid_rad_s = 2 * np.pi * float(np.sqrt(lines.min() * lines.max()))
     sd = np.sqrt(np.diagonal(np.linalg.inv(fit.precision(temper))))
     place = {name: i for i, name in enumerate(misfit.names)}
-    for damping in damped:
-        stiffness = damping.replace("damping", "stiffness", 1)
-        c, k = place.get(damping), place.get(stiffness)
-        if c is None or k is None or sd[k] > STIFFNESS_KNOWN:
+    for stiffness in springs:
+        k = place.get(stiffness)
+        if k is None or sd[k] > STIFFNESS_KNOWN:
             continue
-        if np.exp(fit.x[c] - fit.x[k]) * mid_rad_s > LOSS_OF_NO_STRUCTURE:
+        c, eta = (
+            place.get(stiffness.replace("stiffness", kind, 1))
+            for kind in ("damping", "loss_factor")
+        )
+        viscous = 0.0 if c is None else np.exp(fit.x[c] - fit.x[k]) * mid_rad_s
+        structural = 0.0 if eta is None else np.exp(fit.x[eta])
+        if viscous + structural > LOSS_OF_NO_STRUCTURE:
             return True
     return False

@@ -39,11 +39,15 @@ def pulled(fit: Fit, x: np.ndarray, plain: Fit) -> float:
     """ln of how much likelier the values at x (D,) are where something unknown pulls at some.
 
     What a simulation lacks is made up for by what is free in it: each may then have, with
-    probability PULLED, an sd of PULLED_FACTOR times its prior's.
+    probability PULLED, an sd of PULLED_FACTOR times its prior's. The spring that is farthest off
+    does not count: one alone is that joint's own stiffness, which is no unknown.
     """
-    squares = np.array(list(away(fit, x, plain).values())) ** 2
+    far = away(fit, x, plain)
+    squares = np.array(list(far.values())) ** 2
     wider = np.log(PULLED / PULLED_FACTOR) + squares * (1 - PULLED_FACTOR**-2) / 2
-    return float(np.sum(np.logaddexp(np.log1p(-PULLED), wider)))
+    each = np.logaddexp(np.log1p(-PULLED), wider)
+    springs = np.array([name.startswith("stiffness") for name in far], dtype=bool)
+    return float(np.sum(each) - np.max(each[springs], initial=0.0))
 
 
 def strayed(fit: Fit, effect: Effect) -> bool:

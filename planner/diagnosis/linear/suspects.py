@@ -24,6 +24,7 @@ from planner.inference.parallel import side_by_side
 ROUGH = replace(GLANCE, lines=24, inertial=False)
 POSES = 5
 BANDS = (0.28, 12), (1.0, 30)  # shares of the band, one after the other, and steps in each
+DAMPERS_HELD = 1.6  # e^sd of stated dampers; chosen
 FOLLOWED = 20  # steps of what is left alone
 GAVE = -0.4  # prior sds from stiff at which a spring is said to give
 CARRIED = 0.25  # prior sds of mass at which a link is said to carry something
@@ -86,8 +87,9 @@ def _both_from(problem: Problem, both: tuple[Fit, Effect]) -> Fit:
 
 
 def _few(problem: Problem) -> Problem:
-    """The poses that are farthest apart."""
-    return problem.at(farthest_first(problem.q)[:POSES].tolist())
+    """The poses that are farthest apart, with dampers that are held where few steps have to do."""
+    priors = replace(problem.priors, damping_factor=DAMPERS_HELD)
+    return replace(problem.at(farthest_first(problem.q)[:POSES].tolist()), priors=priors)
 
 
 def _everything(effects: Sequence[Effect]) -> Family:
