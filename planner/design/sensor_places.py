@@ -44,9 +44,9 @@ class BetterPlaces:
         return (
             f"At {self.pose} {' and '.join(what)}, if you can: what the simulation's "
             f"parameters leave open of the frequencies is expected to go from "
-            f"{self.sd_percent_now:.2g} to {self.sd_percent:.2g} % in {self.minutes:.0f} min; with "
+            f"{self.sd_percent_now:.2g} to {self.sd_percent:.2g} % in {self.minutes:.1f} min; with "
             f"hits at the tool and the sensors of the last pose to {self.sd_percent_as_it_is:.2g} "
-            f"% in {self.minutes_as_it_is:.0f} min."
+            f"% in {self.minutes_as_it_is:.1f} min."
         )
 
 

@@ -18,7 +18,7 @@ from planner.recording.records import FrfRecord, Record
 from planner.report.answer import Answer, RefusedFile
 from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN, check_options, sources_of
 from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
 
 FEW = 3  # points of a shape that the table shows
 
@@ -204,7 +204,8 @@ def _draw(
 
     drawn = pictures.write(matrix_figures(matrix, found, geometry, name), name, record)
     if geometry is not None and pictures.folder is not None:
-        moving = animate(found, geometry, pictures.folder.absolute())
+        mark = SIMULATED_TITLE if matrix.simulated else ""
+        moving = animate(found, geometry, pictures.folder.absolute(), mark)
         drawn["plots"] = [*drawn["plots"], *map(str, moving)]
     return drawn
 

@@ -16,6 +16,8 @@ from planner.report.shape_motion import motions, moved
 
 MOST_SINGULAR = 4  # curves of the mode indicator
 MOST_SHOWN = 24  # modes that have a panel of their own
+LONGEST_SIDE = 0.69  # of such a box, in units of the zoom: its axes' labels stay in the picture
+FLATTEST = 0.3  # of its largest extent: the least height of the box that shows a structure
 AHEAD, BESIDE = "tab:red", "tab:blue"
 
 
@@ -139,9 +141,15 @@ def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> F
         Line2D([], [], marker="^", ls="", color=AHEAD, label="felt" if hammer else "hit"),
     ]
     panel.legend(handles=handles, fontsize=8)
-    _finish(panel, geometry.position_m)
-    panel.set_xlabel("x (m)")
-    panel.set_ylabel("y (m)")
+    # With its axes, a flat structure in a cube would be small and the cube cut off.
+    extent = np.ptp(geometry.position_m, axis=0)
+    extent = np.maximum(extent, FLATTEST * np.max(extent))
+    zoom = LONGEST_SIDE * float(np.linalg.norm(extent) / np.max(extent))
+    _finish(panel, geometry.position_m, extent, zoom)
+    panel.locator_params(nbins=6)
+    panel.set_xlabel("x (m)", labelpad=10)
+    panel.set_ylabel("y (m)", labelpad=10)
+    panel.set_zlabel("z (m)")
     return figure
 
 
@@ -150,17 +158,22 @@ def _draw_lines(panel: Any, geometry: Geometry, position: np.ndarray, colour: st
 
     index = {node: k for k, node in enumerate(geometry.nodes)}
     ends = [(position[index[a]], position[index[b]]) for a, b in geometry.lines]
-    panel.add_collection3d(Line3DCollection(ends, colors=colour, lw=0.9))
+    if ends:
+        panel.add_collection3d(Line3DCollection(ends, colors=colour, lw=0.9))
 
 
-def _finish(panel: Any, position: np.ndarray) -> None:
-    """Equal scales on all axes and little besides the structure."""
+def _finish(
+    panel: Any, position: np.ndarray, extent: np.ndarray | None = None, zoom: float = 1.8
+) -> None:
+    """Equal scales on all axes, which show `extent` (3,) or the largest extent each."""
     middle = (position.max(axis=0) + position.min(axis=0)) / 2
-    half = 0.52 * max(float(np.max(np.ptp(position, axis=0))), 1e-9)
-    panel.set_xlim(middle[0] - half, middle[0] + half)
-    panel.set_ylim(middle[1] - half, middle[1] + half)
-    panel.set_zlim(middle[2] - half, middle[2] + half)
-    panel.set_box_aspect((1, 1, 1), zoom=1.8)
+    if extent is None:
+        extent = np.full(3, np.max(np.ptp(position, axis=0)))
+    half = 0.52 * np.maximum(extent, 1e-9)
+    panel.set_xlim(middle[0] - half[0], middle[0] + half[0])
+    panel.set_ylim(middle[1] - half[1], middle[1] + half[1])
+    panel.set_zlim(middle[2] - half[2], middle[2] + half[2])
+    panel.set_box_aspect(half / np.max(half), zoom=zoom)
     panel.view_init(elev=28, azim=-60)
 
 

@@ -39,13 +39,14 @@ def moved(geometry: Geometry, motion: np.ndarray, phase: float) -> np.ndarray:
     return geometry.position_m + LARGEST * span * np.real(motion * np.exp(1j * phase))
 
 
-def animate(found: MatrixModes, geometry: Geometry, folder: Path) -> list[Path]:
-    """One GIF for every mode; their paths."""
+def animate(found: MatrixModes, geometry: Geometry, folder: Path, mark: str = "") -> list[Path]:
+    """One GIF for every mode, whose title begins with `mark`; their paths."""
     files = []
     for k, mode in enumerate(found.modes):
         file = folder / f"mode_{k + 1:02d}.gif"
         title = (
-            f"mode {k + 1}: {mode.frequency_hz:.4g} Hz, damping {100 * mode.damping_ratio:.2f} %"
+            f"{mark}mode {k + 1}: {mode.frequency_hz:.4g} Hz,"
+            f" damping {100 * mode.damping_ratio:.2f} %"
         )
         _gif(geometry, motions(found.dofs, mode.shape, geometry), title, file)
         files.append(file)
