@@ -77,7 +77,11 @@ class InnerProducts:
         return cls(fit, np.array(made), own, numbers)
 
     def worth(
-        self, temper: float, springs: Sequence[str], sizes: Sequence[float] = DISCREPANCIES
+        self,
+        temper: float,
+        springs: Sequence[str],
+        sizes: Sequence[float] = DISCREPANCIES,
+        steps: int = MOST_STEPS,
     ) -> "Worth":
         """Evidence over `sizes` of the discrepancy, χ² counting 1/`temper`.
 
@@ -90,7 +94,7 @@ class InnerProducts:
         ):
             here = self
             for size in way:
-                here, each[size] = here.settled(size, temper, springs)
+                here, each[size] = here.settled(size, temper, springs, steps)
                 if each[size].evidence < max(e.evidence for e in each.values()) - FALLEN:
                     break
         best = max(each.values(), key=lambda one: one.evidence)
@@ -158,7 +162,7 @@ class InnerProducts:
         return np.array(left), np.array(volume), np.array(told)
 
     def settled(
-        self, size: float, temper: float, springs: Sequence[str]
+        self, size: float, temper: float, springs: Sequence[str], steps: int = MOST_STEPS
     ) -> "tuple[InnerProducts, AtSize]":
         """Followed, step by step, to where it is best with a discrepancy of this size.
 
@@ -167,7 +171,7 @@ class InnerProducts:
         """
         here, damping, misfit = self, 0.0, self.fit.misfit
         last = here.at(size, temper)
-        for _ in range(MOST_STEPS):
+        for _ in range(steps):
             if last.evidence - last.stays < NOTHING_GAINED:
                 break
             after = None

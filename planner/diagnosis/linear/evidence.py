@@ -8,7 +8,12 @@ from scipy.special import expit
 from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import InnerProducts, Worth, size_priors
+from planner.diagnosis.linear.discrepancy import (
+    MOST_STEPS,
+    InnerProducts,
+    Worth,
+    size_priors,
+)
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.stated_values import pulled
@@ -26,6 +31,7 @@ from planner.inference.log_space import log_sum
 
 REACH = 40.0  # tempered log evidence behind the best, within which a candidate is followed
 BOOTSTRAPS = 400
+HARDLY = 5000.0  # the same before a fit is followed, beyond which it cannot come close
 CLOSE = 500.0  # log evidence behind the best within which all sizes are looked at
 USUAL = DISCREPANCIES.index(DISCREPANCY_USUAL)  # what every robot has may move as much
 LOG_KNOWN = float(np.log(1 / SOMETHING_UNKNOWN - 1))  # odds, before any data, of nothing unknown
@@ -71,15 +77,18 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     measured = fits[0].misfit.measured
     spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
     shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
-    settled = [p.settled(DISCREPANCY_USUAL, 1.0, springs) for p in products]
-    products, rough = [p for p, _ in settled], np.array([at.evidence for _, at in settled])
+    first = np.array([p.at(DISCREPANCY_USUAL, 1.0).evidence for p in products])
+    rough = first.copy()
+    for i in np.flatnonzero(first > first.max() - HARDLY):
+        products[i], there = products[i].settled(DISCREPANCY_USUAL, 1.0, springs)
+        rough[i] = there.evidence
     close = rough > rough.max() - CLOSE
     close[0] = True
     best = products[int(np.argmax(rough))].worth(1.0, springs)
     t = max(best.per_value, NOISE_OVERSTATED) * shared
     usual = (DISCREPANCY_USUAL,)
     worth = tuple(
-        p.worth(t, springs, DISCREPANCIES if near else usual)
+        p.worth(t, springs, DISCREPANCIES if near else usual, steps=MOST_STEPS if near else 1)
         for p, near in zip(products, close, strict=True)
     )
     mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
