@@ -1,14 +1,13 @@
 """What recordings taught a campaign's simulation: a structure, and its parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.identification.extended_structure import FLOOR, Structure
 from planner.identification.parameters import Priors, parametrise
-from planner.identification.pose_to_pose import pose_to_pose
-from planner.identification.result import Identification, estimates
+from planner.identification.result import Identification
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.evidence import laplace
 
@@ -36,17 +35,6 @@ class Learned:
     def priors(self) -> Priors:
         """Those it was identified with."""
         return self.structure.priors
-
-    def pose_to_pose(self) -> "Learned":
-        """The same with parameters as unsure as they are where springs differ by the pose."""
-        found = self.identified
-        if found.each is None:
-            return self
-        p = parametrise(self.structure.simulation, self.structure.priors)
-        covariance = pose_to_pose(found.each, p, max(found.misfit, 1.0))
-        springs = estimates(p, found.mean[: len(found.estimates)], covariance)
-        wider = replace(found, estimates=springs, covariance=covariance, each=None)
-        return replace(self, identified=wider)
 
     def log_evidence(self, temper: float) -> float:
         """Of this structure, by Laplace's method, χ² counting 1/temper."""

@@ -197,7 +197,7 @@ def learn(
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)
-    return replace(before, learned=learned.pose_to_pose(), left_out=left_out)
+    return replace(before, learned=learned, left_out=left_out)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,6 @@ from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.effort import THOROUGH, Effort
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.left_open import PoseEquations
 from planner.identification.measured_frfs import common_band, matrices_at
 from planner.identification.measurement_model import Tolerances
 from planner.identification.objective import TOO_SOFT, Objective
@@ -34,7 +33,6 @@ class _Refined:
     end: Minimum
     misfit: float
     by_pose: np.ndarray
-    each: PoseEquations | None
 
 
 def identify(
@@ -188,7 +186,7 @@ def _refine(problem: StagedProblem, x: np.ndarray) -> _Refined:
     end, objective = _plain(
         problem, x, 0, effort.last_lines, "all lines", effort.last_completions, near=True
     )
-    return _Refined(end, end.at.chi2 / max(objective.count, 1), *objective.poses(end.x))
+    return _Refined(end, end.at.chi2 / max(objective.count, 1), objective.by_pose(end.x))
 
 
 def _warm(problem: StagedProblem, warm: Identification) -> _Refined | None:
@@ -231,5 +229,4 @@ def _result(
         starts,
         end.converged,
         seconds,
-        each=best.each,
     )

@@ -13,31 +13,13 @@ from planner.identification.measurement_model import OpenNumbers, Tolerances, ba
 
 
 @dataclass(frozen=True, eq=False)
-class PoseEquations:
-    """Half gradients (n, d + k) and normals (n, d + k, d + k) of the poses by themselves.
-
-    By d parameters, then by the chain's numbers, which are at their best for all poses, (k,).
-    `known` is the precision of (θ, φ) without the poses, once it was told.
-    """
-
-    gradient: np.ndarray
-    normal: np.ndarray
-    chain: np.ndarray
-    known: np.ndarray | None = None
-
-
-@dataclass(frozen=True, eq=False)
 class Integrated:
-    """χ² with all η integrated out, in all and of each pose (n,); half gradient, and normal.
-
-    `each` are those of the poses, where a chain was left open.
-    """
+    """χ² with all η integrated out, in all and of each pose (n,); half gradient, and normal."""
 
     chi2: float
     gradient: np.ndarray
     normal: np.ndarray
     by_pose: np.ndarray
-    each: PoseEquations | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,18 +77,17 @@ class LeftOpen:
         residual = residual + self.crossed
         d, k = slope.shape[1], len(self.poses[0].common)
         chi2, gradients = np.empty(len(residual)), np.empty((len(residual), d + k))
-        normals = np.zeros((len(residual), d + k, d + k))
+        whole, shared = np.zeros((d + k, d + k)), np.array([pose.normal for pose in self.poses])
         for i, pose in enumerate(self.poses):
             r, j = pose.values(residual[i, None])[0], pose.values(slope[i])
             onto, moved = pose.own @ r, pose.own @ j.T
             chi2[i] = r @ r - onto @ onto
             gradients[i, :d] = j @ r - moved.T @ onto
             gradients[i, d:] = pose.common @ r
-            own = normals[i]
-            own[:d, :d] = j @ j.T - moved.T @ moved
-            own[:d, d:] = j @ pose.common.T
-            own[d:, :d], own[d:, d:] = own[:d, d:].T, pose.normal
-        pull, whole, shared = gradients.sum(axis=0), normals.sum(axis=0), normals[:, d:, d:]
+            whole[:d, :d] += j @ j.T - moved.T @ moved
+            whole[:d, d:] += j @ pose.common.T
+        whole[d:, :d], whole[d:, d:] = whole[:d, d:].T, shared.sum(axis=0)
+        pull = gradients.sum(axis=0)
         # The common numbers at their best, and what that takes from all else.
         right = np.column_stack([pull[d:], whole[d:, :d]])
         solved = np.linalg.solve(whole[d:, d:] + np.eye(k), right)
@@ -117,7 +98,6 @@ class LeftOpen:
             pull[:d] + whole[:d, d:] @ eta,
             whole[:d, :d] - whole[:d, d:] @ across,
             by_pose,
-            PoseEquations(gradients + normals[:, :, d:] @ eta, normals, eta),
         )
 
     def told(self, residual: np.ndarray) -> Told:

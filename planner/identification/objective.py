@@ -13,7 +13,7 @@ import numpy as np
 from planner.dynamics.gradient import Inertias, motion_slopes, moved
 from planner.dynamics.motion import ActualPorts, Motion, Turned
 from planner.identification.feasible_inertias import Barrier
-from planner.identification.left_open import Integrated, LeftOpen, PoseEquations
+from planner.identification.left_open import Integrated, LeftOpen
 from planner.identification.measured_frfs import Measured
 from planner.identification.measurement_model import Tolerances
 from planner.identification.missed_ports import actual_ports, guess
@@ -107,16 +107,10 @@ class Objective:
         s, mass = self.measured.s, self._mass(x[count:])
         return moved(self.matrices, springs, s, mass, actual=actual)
 
-    def poses(self, x: np.ndarray) -> tuple[np.ndarray, PoseEquations | None]:
-        """χ² per real value (n,) of each pose at x, where that can be, and what each says there."""
+    def by_pose(self, x: np.ndarray) -> np.ndarray:
+        """χ² per real value (n,) of each pose at x, where that can be."""
         counts = 2 * np.count_nonzero(weight_of(self.measured, self.logarithmic), axis=(1, 2, 3))
-        data, each = self._data(x), None
-        if data.each is not None and self.free_inertia:
-            theta, phi = np.split(x, [len(self.parametrisation.parameters)])
-            known = self._prior(theta, phi)[1]
-            known[len(theta) :, len(theta) :] += self._beyond(phi)[2]
-            each = replace(data.each, known=known)
-        return data.by_pose / np.maximum(counts, 1), each
+        return self._data(x).by_pose / np.maximum(counts, 1)
 
     def _mass(self, phi: np.ndarray) -> np.ndarray:
         if not self.free_inertia:

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.simulation import Simulation
-from planner.identification.left_open import PoseEquations
 from planner.identification.parameters import Parametrisation
 
 # The data have told something of a direction once its sd is half of what it was before.
@@ -78,7 +77,6 @@ class Identification:
     converged: bool
     seconds: float
     remarks: tuple[str, ...] = ()
-    each: PoseEquations | None = None  # where hits and chain were left open, and inertias free
 
     def estimate(self, name: str) -> Estimate:
         """The parameter of a name; KeyError if there is none."""
