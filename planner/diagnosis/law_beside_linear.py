@@ -67,7 +67,7 @@ def beside(
     tried = (_with_law(recorded, found, c, tell) for c in _with_parts(linear, possible))
     both = [b for b in tried if b is not None]
     least = min((b.law.misfit for b in both), default=np.inf)
-    if least * LAW_BETTER > min(f.misfit for f in before):
+    if not both or least * LAW_BETTER > min(f.misfit for f in before):
         return None
     chosen = min((b for b in both if b.law.misfit <= PAYS * least), key=lambda b: b.numbers)
     linear, again = chosen.linear, chosen.findings

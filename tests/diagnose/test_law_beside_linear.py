@@ -23,7 +23,7 @@ def fitted(per_value: float) -> Any:
     return SimpleNamespace(per_value=per_value, misfit=misfit)
 
 
-def looked_for(monkeypatch, laws: dict[tuple, float | None]):
+def looked_for(monkeypatch, laws: dict[tuple, float | None], crude: Finding = CRUDE):
     """What is told beside masses at link_4 and link_2, which fit the averages best together.
 
     `laws`: χ² per value of the law beside each explanation; None where no robot has it.
@@ -42,7 +42,7 @@ def looked_for(monkeypatch, laws: dict[tuple, float | None]):
 
     monkeypatch.setattr(law_beside_linear, "possible_simulation", lambda _, c: laws.get(c.effects))
     monkeypatch.setattr(law_beside_linear.force_levels, "screen", screened)
-    return beside(ANYTHING, (CRUDE,), found)
+    return beside(ANYTHING, (crude,), found)
 
 
 @pytest.mark.parametrize(
@@ -66,3 +66,9 @@ def test_the_fewest_effects_beside_which_the_law_fits_are_told(monkeypatch, laws
 def test_where_the_law_fits_beside_none_of_them_nothing_is_told(monkeypatch, misfit):
     laws = dict.fromkeys([(MASS, FALSE), (MASS,), (FALSE,)], misfit)
     assert looked_for(monkeypatch, laws) is None
+
+
+def test_nothing_is_told_beside_levels_of_which_no_law_has_a_misfit(monkeypatch):
+    laws = dict.fromkeys([(MASS, FALSE), (MASS,), (FALSE,)], None)
+    unexplained = Finding("friction", "joint_2", 900.0)
+    assert looked_for(monkeypatch, laws, unexplained) is None
