@@ -56,7 +56,7 @@ class StabilityReport(Answer):
         if self.multiplier is not msgspec.UNSET:
             verdict = "stable" if self.multiplier < 1 else "not stable"
             lines.append(f"At the point |µ| = {self.multiplier:.6f}: {verdict}.")
-        if self.plots is not msgspec.UNSET:
+        if self.plots is not msgspec.UNSET and self.plots:
             lines += ["Pictures:", *(f"  {plot}" for plot in self.plots)]
         said = Group(made, Text("\n".join(lines)))
         return Group(said, SIMULATED) if self.simulated else said

@@ -39,7 +39,10 @@ class SensorGain(Effect):
     def text(self, values: dict[str, tuple[float, float, str]]) -> str:
         """See `Effect.text`."""
         value, sd, _ = values["gain"]
-        return f"Channel {self.at} shows {value:.3g} ± {sd:.1g} times too much: check calibration."
+        return (
+            f"Channel {self.at} shows {value:.3g} ± {sd:.1g} times what it should: check its "
+            f"calibration."
+        )
 
     def usual(self, values: dict[str, tuple[float, float, str]], t: Tolerances) -> bool:
         """See `Effect.usual`."""

@@ -85,7 +85,8 @@ class InnerProducts:
     ) -> "Worth":
         """Evidence over `sizes` of the discrepancy, χ² counting 1/`temper`.
 
-        From the usual size on, each is followed from its neighbour, while it may count.
+        The named `springs` may differ from pose to pose. From the usual size on, each is followed
+        from its neighbour in so many `steps`, while it may count; others are not looked at.
         """
         each: dict[float, AtSize] = {}
         for way in (
@@ -166,8 +167,9 @@ class InnerProducts:
     ) -> "tuple[InnerProducts, AtSize]":
         """Followed, step by step, to where it is best with a discrepancy of this size.
 
-        What is told of misses, and of x, is told around itself: one step from elsewhere is wrong
-        by hundreds of nats where hits miss.
+        Damped Gauss-Newton over x and the chain, the misses of each pose being eliminated; answers
+        products there, and what they say. What is told of misses, and of x, is told around itself:
+        one step from elsewhere is wrong by hundreds of nats where hits miss.
         """
         here, damping, misfit = self, 0.0, self.fit.misfit
         last = here.at(size, temper)

@@ -11,7 +11,10 @@ from planner.diagnosis.thresholds import LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN
 
 
 def sluggish(fit: Fit, temper: float) -> bool:
-    """Whether a spring that an effect adds, and that FRFs tell, is mostly a damper mid-band."""
+    """Whether a spring of an effect, added or loosened, is mostly a damper mid-band.
+
+    Only of springs that FRFs tell, χ² counting 1/`temper`.
+    """
     misfit = fit.misfit
     added = {n for part in fit.effect.parts() for n in part.springs(misfit.setting.simulation)}
     springs = [n for n in added if n.startswith("stiffness of ")]
