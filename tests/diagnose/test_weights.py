@@ -170,8 +170,9 @@ def test_evidence_counts_no_values_beyond_those_that_are_looked_at():
     target = np.concatenate([-r.ravel(), -away])
     best = lsq_linear(white, target, (-FARTHEST - away, FARTHEST - away))
     told = made.at(0.0, 1.0)
-    np.testing.assert_allclose((told.end - x) / sd, best.x, atol=1e-8)
-    assert abs(told.end[0] / sd[0] + FARTHEST) < 1e-9
+    end = made.end(told.best)
+    np.testing.assert_allclose((end - x) / sd, best.x, atol=1e-8)
+    assert abs(end[0] / sd[0] + FARTHEST) < 1e-9
     least = 2 * best.cost - np.sum((away + best.x) ** 2)
     np.testing.assert_allclose([told.scores.sum(), told.chi2], least, rtol=1e-9)
     volume = np.linalg.slogdet(white.T @ white)[1]

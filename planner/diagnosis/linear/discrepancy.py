@@ -16,6 +16,7 @@ import numpy as np
 from planner.diagnosis.linear.around_misses import AroundMisses
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, approached
 from planner.diagnosis.linear.objective import Misfit
+from planner.diagnosis.linear.one_size import AtSize
 from planner.diagnosis.thresholds import (
     CHAIN_VARIES,
     DAMPERS,
@@ -26,11 +27,13 @@ from planner.diagnosis.thresholds import (
 )
 from planner.identification.measurement_model import OpenNumbers, real_rows
 from planner.identification.missed_ports import guess
-from planner.inference.least_squares import within_box
+from planner.inference.least_squares import Damping, Limits, accept, begin, propose
 from planner.inference.log_space import log_sum
 
 MOST_STEPS, NOTHING_GAINED = 16, 0.5  # to where a fit is best; nats that a step is not worth
-HELD_BACK = 0.1  # damping, relative to the diagonal, after a step that led nowhere better
+# Nearly undamped, as fits are close to where they are best; after a step that led nowhere better a
+# hundred times more.
+DAMPING = Damping(first=1e-3, least=1e-3, heavier=100.0)
 FALLEN = 40.0  # nats by which one size is behind another, from which on no farther ones count
 NOT_LOOKED_AT = -1e12  # log evidence of sizes at which a fit was not followed
 
@@ -57,7 +60,8 @@ class InnerProducts:
         """
         misfit = fit.misfit
         first = cls.around(fit, springs, misfit.around_misses(fit.x))
-        told = guess(first.at(DISCREPANCY_USUAL, 1.0).missed)
+        there = first.at(DISCREPANCY_USUAL, 1.0)
+        told = guess(first.missed(there, there.best))
         return cls.around(fit, springs, misfit.around_these(fit.x, told))
 
     @classmethod
@@ -88,61 +92,36 @@ class InnerProducts:
         The named `springs` may differ from pose to pose. From the usual size on, each is followed
         from its neighbour in so many `steps`, while it may count; others are not looked at.
         """
-        each: dict[float, AtSize] = {}
+        each: dict[float, tuple[InnerProducts, AtSize]] = {}
         for way in (
             [size for size in sizes[::-1] if size <= DISCREPANCY_USUAL],
             [size for size in sizes if size > DISCREPANCY_USUAL],
         ):
             here = self
             for size in way:
-                here, each[size] = here.settled(size, temper, springs, steps)
-                if each[size].evidence < max(e.evidence for e in each.values()) - FALLEN:
+                here, one = each[size] = here.settled(size, temper, springs, steps)
+                if one.evidence < max(e.evidence for _, e in each.values()) - FALLEN:
                     break
-        best = max(each.values(), key=lambda one: one.evidence)
-        likeliest = next(size for size, one in each.items() if one is best)
+        likeliest = max(each, key=lambda size: each[size][1].evidence)
+        products, best = each[likeliest]
         values = max(float(self.fit.misfit.counts.sum()), 1.0)
-        known = [each.get(size, best) for size in DISCREPANCIES]
-        evidence = np.array(
-            [each[s].evidence if s in each else NOT_LOOKED_AT for s in DISCREPANCIES]
-        )
-        scores, ends = (np.array([getattr(one, n) for one in known]) for n in ("scores", "end"))
-        return Worth(evidence, scores, best.chi2 / values, likeliest, best.missed, ends)
-
-    def at(self, size: float, temper: float, damping: float = 0.0) -> "AtSize":
-        """With a discrepancy of this size: what a step to the optimum that goes with it promises.
-
-        By Laplace's method; the step is held back where `damping` is above 0, and stays within what
-        is looked at.
-        """
-        misfit = self.fit.misfit
-        left, volumes, told = self._without_own(size, temper)
-        whole = left.sum(axis=0)
-        free, chain = np.flatnonzero(misfit.free), self.numbers.chain
-        sd = np.concatenate([np.ones(chain), misfit.sd[free]])
-        away = np.concatenate([np.zeros(chain), ((self.fit.x - misfit.mean) / misfit.sd)[free]])
-        precision = whole[1:, 1:] * np.outer(sd, sd) + np.eye(len(sd))
-        gradient = whole[1:, 0] * sd + away
-        held = precision.copy()
-        held[range(chain, len(sd)), range(chain, len(sd))] *= 1 + damping
-        lower, upper = (
-            np.append(np.full(chain, far), ((side - self.fit.x) / misfit.sd)[free])
-            for far, side in zip((-np.inf, np.inf), misfit.sides, strict=True)
-        )
-        step = within_box(held, -gradient, np.minimum(lower, 0.0), np.maximum(upper, 0.0))
-        there = np.append(1.0, sd * step)
-        chi2 = np.einsum("i,nij,j->n", there, left, there)
-        far = away + step
-        constant = volumes.sum() + np.linalg.slogdet(precision)[1]
-        # Where x stays, the chain is as it fits best.
-        fixed = -np.linalg.solve(precision[:chain, :chain], gradient[:chain])
-        stays = whole[0, 0] + gradient[:chain] @ fixed + away @ away
-        missed = (-told @ there)[:, : np.count_nonzero(self.own == 0)]
-        of_chain = slice(self.numbers.hits, self.numbers.known)
-        missed[:, of_chain] = CHAIN_VARIES * missed[:, of_chain] + step[:chain]
-        return AtSize(
-            -(float(chi2.sum() + far @ far) + constant) / 2, -(float(stays) + constant) / 2,
-            chi2 + volumes, temper * float(chi2.sum()), self._moved(step[chain:]), missed,
+        known = [each.get(size, each[likeliest]) for size in DISCREPANCIES]
+        return Worth(
+            np.array([each[s][1].evidence if s in each else NOT_LOOKED_AT for s in DISCREPANCIES]),
+            np.array([one.scores for _, one in known]), best.chi2 / values, likeliest,
+            products.missed(best, best.best), np.array([p.end(one.best) for p, one in known]),
         )  # fmt: skip
+
+    def at(self, size: float, temper: float) -> AtSize:
+        """With a discrepancy of this size, χ² counting 1/`temper`."""
+        misfit, free = self.fit.misfit, self.fit.misfit.free
+        left, volumes, told = self._without_own(size, temper)
+        scale = np.concatenate([np.ones(1 + self.numbers.chain), misfit.sd[free]])
+        u, lower, upper = (
+            ((x - misfit.mean) / misfit.sd)[free] for x in (self.fit.x, *misfit.sides)
+        )
+        left = left * np.outer(scale, scale)
+        return AtSize(left, volumes, told * scale, temper, u, lower, upper)
 
     def _without_own(self, size: float, temper: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Products (n, 1 + k + D, …) once what is a pose's own is integrated out.
@@ -167,48 +146,51 @@ class InnerProducts:
     ) -> "tuple[InnerProducts, AtSize]":
         """Followed, step by step, to where it is best with a discrepancy of this size.
 
-        Damped Gauss-Newton over x and the chain, the misses of each pose being eliminated; answers
+        Damped Gauss-Newton over x, the chain and the misses of each pose being eliminated; answers
         products there, and what they say. What is told of misses, and of x, is told around itself:
         one step from elsewhere is wrong by hundreds of nats where hits miss.
         """
-        here, damping, misfit = self, 0.0, self.fit.misfit
-        last = here.at(size, temper)
+        here, last = self, self.at(size, temper)
+        state = begin(last.u, last, DAMPING, Limits(np.inf, last.lower, last.upper))
         for _ in range(steps):
-            if last.evidence - last.stays < NOTHING_GAINED:
+            if last.evidence - last.stays < NOTHING_GAINED or state.stuck:
                 break
-            after = None
-            if misfit.possible(last.end):
-                around = misfit.around_these(last.end, guess(last.missed))
-                there = InnerProducts.around(replace(self.fit, x=last.end), springs, around)
-                after = there, there.at(size, temper)
-            if after is not None and after[1].stays >= last.stays:
-                (here, last), damping = after, 0.0
-            else:
-                damping = max(10 * damping, HELD_BACK)
-                last = here.at(size, temper, damping)
+            u = propose(state)
+            there = here.moved(last, u, springs)
+            after = None if there is None else there.at(size, temper)
+            state = accept(state, u, after)
+            if state.at is last:  # perhaps only as misses were told around others
+                there = here.moved(last, last.u, springs)
+                after = None if there is None else there.at(size, temper)
+                state = replace(state, at=after or last)
+            if there is not None and state.at is after:
+                here, last = there, state.at
         return here, last
 
-    def _moved(self, step: np.ndarray) -> np.ndarray:
-        """x (D,) after a step (free,) in prior sds."""
+    def moved(self, last: AtSize, u: np.ndarray, springs: Sequence[str]) -> "InnerProducts | None":
+        """Products where x is u (free,), in prior sds; None where x cannot be.
+
+        Misses are taken around what `last`, of these products, tells of them there.
+        """
+        misfit, x = self.fit.misfit, self.end(u)
+        if not misfit.possible(x):
+            return None
+        around = misfit.around_these(x, guess(self.missed(last, u)))
+        return InnerProducts.around(replace(self.fit, x=x), springs, around)
+
+    def missed(self, last: AtSize, u: np.ndarray) -> np.ndarray:
+        """What hits, chain and readback missed (n, l), in sds, where x is u (free,)."""
+        own, chain = last.open_at(u)
+        missed = own[:, : np.count_nonzero(self.own == 0)]
+        of_chain = slice(self.numbers.hits, self.numbers.known)
+        missed[:, of_chain] = CHAIN_VARIES * missed[:, of_chain] + chain
+        return missed
+
+    def end(self, u: np.ndarray) -> np.ndarray:
+        """x (D,) whose free entries are u (free,) prior sds from their means."""
         misfit, x = self.fit.misfit, self.fit.x.copy()
-        x[misfit.free] += misfit.sd[misfit.free] * step
+        x[misfit.free] = misfit.mean[misfit.free] + misfit.sd[misfit.free] * u
         return x
-
-
-@dataclass(frozen=True, eq=False)
-class AtSize:
-    """Log evidence of a fit with a discrepancy of one size, after a step and where x `stays`.
-
-    `scores` (n,) are −2 ln likelihood of each pose after the step, `chi2` is that of all, without
-    temper; the step leads to `end` (D,), and `missed` (n, l) is what goes with it, in sds.
-    """
-
-    evidence: float
-    stays: float
-    scores: np.ndarray
-    chi2: float
-    end: np.ndarray
-    missed: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
