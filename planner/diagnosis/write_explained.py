@@ -15,7 +15,8 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
 from planner.robot.config import EffectTable, entry_of, without_effects
-from planner.robot.robot import Robot
+from planner.robot.foot import foot
+from planner.robot.robot import BASE, Robot
 from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
 
@@ -81,7 +82,10 @@ def _changes(diagnosis: Diagnosis, accepted: Candidate) -> _Changes:
     there = accepted.effects if accepted.effects[0].at else ()
     effects = tuple(_entry(diagnosis, accepted, found, effect) for effect in there)
     change = found.misfit.parametrisation.inertia_change(found.x[a:b])
-    return _Changes(springs, effects, found.misfit.setting.simulation.elastic.bodies, change)
+    bodies = found.misfit.setting.simulation.elastic.bodies
+    if BASE in bodies and foot(diagnosis.problem.simulation.robot):
+        change[bodies.index(BASE)] = 0.0  # of a mass that is there so that it can move
+    return _Changes(springs, effects, bodies, change)
 
 
 def _entry(diagnosis: Diagnosis, accepted: Candidate, found: Fit, effect: Effect) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
+import msgspec
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect
@@ -10,7 +11,9 @@ from planner.diagnosis.effects.places import damping_time, movable, with_blocks
 from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR, LOSS_FACTOR_FACTOR
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import KINDS, Priors, place_name
-from planner.robot.config import Compliance
+from planner.robot.config import Compliance, Payload
+from planner.robot.foot import foot
+from planner.robot.robot import BASE
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,11 @@ class ExtraCompliance(Effect):
 
     def structure(self, simulation: Simulation) -> Simulation:
         """The simulation with one more [[compliance]] block for each spring."""
-        return with_blocks(simulation, self.blocks(damping_time(simulation)))
+        blocks = self.blocks(damping_time(simulation))
+        return with_blocks(simulation, blocks, self._carried(simulation))
+
+    def _carried(self, simulation: Simulation) -> tuple[Payload, ...]:
+        return foot(simulation.robot) if self.joint == BASE and self.gives else ()
 
     def blocks(self, time: float) -> tuple[Compliance, ...]:
         """At the prior's median; damping is `time` in s by stiffness."""
@@ -86,7 +93,8 @@ class ExtraCompliance(Effect):
             entry = {"joint": block.joint, "axis": list(block.axis), "slide": block.slide}
             entry |= {k: values.get(f"{k} of {place}", (0.0, 0.0, ""))[0] for k in KINDS}
             blocks.append(entry)
-        return {"compliance": blocks}
+        carried = [msgspec.structs.asdict(block) for block in self._carried(simulation)]
+        return {"compliance": blocks} | ({"payload": carried} if carried else {})
 
 
 def told(values: dict[str, tuple[float, float, str]]) -> str:

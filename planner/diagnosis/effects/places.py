@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.robot.config import Compliance
+from planner.robot.config import Compliance, Payload
 
 
 def joints(simulation: Simulation) -> tuple[tuple[str, str], ...]:
@@ -48,11 +48,16 @@ def missing_axes(simulation: Simulation, joint: str, wanted: np.ndarray) -> np.n
     return np.array(free).reshape(-1, 3)
 
 
-def with_blocks(simulation: Simulation, blocks: tuple[Compliance, ...]) -> Simulation:
-    """The simulation with more [[compliance]] blocks, listed last."""
-    robot = simulation.robot
-    together = (*robot.config.compliance, *blocks)
-    config = msgspec.structs.replace(robot.config, compliance=together)
+def with_blocks(
+    simulation: Simulation, blocks: Sequence[Compliance], payload: Sequence[Payload] = ()
+) -> Simulation:
+    """The simulation with more [[compliance]] and [[payload]] blocks, listed last."""
+    robot, carried = simulation.robot, simulation.robot.config.payload
+    config = msgspec.structs.replace(
+        robot.config,
+        compliance=(*robot.config.compliance, *blocks),
+        payload=(*carried, *(block for block in payload if block not in carried)),
+    )
     return Simulation(replace(robot, config=config))
 
 

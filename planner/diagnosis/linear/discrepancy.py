@@ -69,15 +69,18 @@ class InnerProducts:
         """Of a fit, around known misses."""
         assert there.slope is not None
         numbers, open_ = OpenNumbers.of(there.residual), there.opened()
-        own = multiples(fit.misfit, springs)
-        loose, made = np.flatnonzero(own), []
+        own, count = multiples(fit.misfit, springs), open_.shape[1]
+        loose, chain = np.flatnonzero(own), np.arange(numbers.hits, numbers.known)
+        # Rows of r, of what is open, and of derivatives, some of them twice.
+        first, last = 1 + count, 1 + count + there.slope.shape[1]
+        rows = np.r_[0:first, first + loose, 1 + chain, first:last]
+        scale = np.ones(len(rows))
+        scale[1 + chain] = CHAIN_VARIES
+        made = []
         for one, opened, sloped in zip(there.residual, open_, there.slope, strict=True):
-            r, b, j = real_rows(one[None]), real_rows(opened), real_rows(sloped)
-            varies = b.copy()
-            varies[numbers.hits : numbers.known] *= CHAIN_VARIES
-            rows = np.concatenate([r, varies, j[loose], numbers.shared(b), j])
-            made.append(rows @ rows.T)
-        own = np.concatenate([np.zeros(open_.shape[1]), own[loose]])
+            each = real_rows(np.concatenate([one[None], opened, sloped]))
+            made.append((each @ each.T)[np.ix_(rows, rows)] * np.outer(scale, scale))
+        own = np.concatenate([np.zeros(count), own[loose]])
         return cls(fit, np.array(made), own, numbers)
 
     def worth(

@@ -16,6 +16,7 @@ from planner.diagnosis.thresholds import (
 )
 from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.measured_frfs import Measured, layout_of, matrices_at, stack
 from planner.identification.measurement_model import Tolerances
@@ -96,6 +97,14 @@ class Problem:
         """The simulation with an effect's structure, and its parameters."""
         body = _prepared(self, effect)
         return body.simulation, body.parametrisation
+
+    def able(self, effect: Effect) -> bool:
+        """Whether a robot can have it: each spring moves an inertia of its own, beside others."""
+        try:
+            _prepared(self, effect)
+        except InputError:
+            return False
+        return True
 
     def at(self, poses: Sequence[int]) -> "Problem":
         """The same with some of the poses only."""

@@ -109,7 +109,7 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
     rough = suspects(problem, effects)
     # The softest place comes first: alone it may be all, though more places fit more closely.
     ends = _followed(problem, rough)
-    ends += side_by_side(partial(staged, problem), families(effects))
+    ends += side_by_side(partial(staged, problem), list(filter(problem.able, families(effects))))
     missed = bool(ends) and min(f.per_value for f in ends) > AT_NOISE
     if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
         ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
@@ -279,7 +279,7 @@ def _leaders(found: Found) -> list[Fit]:
 
 def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
     """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
-    none = settle(problem, warm, CLOSE, STEPS)
+    none, effects = settle(problem, warm, CLOSE, STEPS), list(filter(problem.able, effects))
     clearly = none.per_value > CLEARLY_WRONG
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
     look = glance if clearly else unbent if inertias_bent(none) else promise

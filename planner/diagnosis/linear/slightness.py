@@ -98,6 +98,8 @@ def _size(without: Fit, whole: Fit, parts: Sequence[Effect]) -> float:
     simulation, before = misfit.setting.simulation, without.misfit
     far = False
     for name in (n for part in parts if part.absorbed for n in part.springs(simulation)):
+        if name not in before.names:  # of a bearing that gives beside it: not stated
+            continue
         here, stated = misfit.names.index(name), before.names.index(name)
         away = x[here] - before.mean[stated]
         far = far or abs(away) > SPRING_STRAYED * before.sd[stated]

@@ -35,7 +35,7 @@ MASSES = 2  # places that give, at most, beside which each mass is looked at
 def suspects(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """Rough fits of few effects each, from the one of all; none where the library has no such."""
     few = _few(problem)
-    all_ = _everything(effects)
+    all_ = _everything(problem, effects)
     if not all_.members:
         return ()
     low, high = problem.band_hz
@@ -92,17 +92,24 @@ def _few(problem: Problem) -> Problem:
     return replace(problem.at(farthest_first(problem.q)[:POSES].tolist()), priors=priors)
 
 
-def _everything(effects: Sequence[Effect]) -> Family:
-    """Each place once with all that may give there, and all masses."""
+def _everything(problem: Problem, effects: Sequence[Effect]) -> Family:
+    """Each place once with all that may give there beside the others, and all masses."""
     widest: dict[tuple[str, str], ExtraCompliance] = {}
     for e in effects:
         if isinstance(e, ExtraCompliance):
             known = widest.get((e.name, e.at))
             if known is None or len(e.gives) > len(known.gives):
                 widest[e.name, e.at] = e
-    members = *map(_stiff, widest.values()), *(e for e in effects if isinstance(e, AddedMass))
+    soft: list[Effect] = []
+    for one in map(_stiff, widest.values()):
+        if problem.able(_family([*soft, one])):
+            soft.append(one)
+    return _family([*soft, *(e for e in effects if isinstance(e, AddedMass))])
+
+
+def _family(members: Sequence[Effect]) -> Family:
     quantities = tuple(q for m in members for q in m.quantities)
-    return Family(" and ".join(m.at for m in members), quantities, members)
+    return Family(" and ".join(m.at for m in members), quantities, tuple(members))
 
 
 def _stiff(effect: ExtraCompliance) -> ExtraCompliance:
