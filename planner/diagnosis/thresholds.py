@@ -47,6 +47,9 @@ SENSOR_MATRIX_SD = 1.0  # of each entry of the sensor's matrix around those of t
 DELAY_SD_S = 5e-3  # of all channels together
 WINDOW_RATE_1_S, WINDOW_RATE_LOG_SD = 1.0, 2.0  # of a window's rate: median and sd
 WINDOW_RATE_WIDTH_1_S = 5.0  # of the same where the prior is flat: in the noise of the force
+# Of the same faults where each is an effect by itself, beside springs and inertias that are fitted.
+ALONE_GAIN_LOG_SD, ALONE_DELAY_SD_S = 0.5, 2e-3
+ALONE_WINDOW_RATE_1_S, ALONE_WINDOW_RATE_LOG_SD = 1.5, 1.0
 READ_SCALE_SD = 0.2  # of all entries of the sensor's matrix together: that is the robot's mass
 READ_ROTATION_SD, READ_GAIN_LOG_SD = 0.5, 0.5  # rad; of what the matrix is read as
 
