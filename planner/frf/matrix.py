@@ -51,19 +51,6 @@ class FrfMatrix:
         """Which response a degree of freedom is."""
         return self.responses.index(dof)
 
-    def transposed(self) -> "FrfMatrix":
-        """Responses and references exchanged, as Maxwell's reciprocity allows."""
-        return FrfMatrix(
-            self.frequency_hz,
-            self.references,
-            self.responses,
-            np.swapaxes(self.accelerance, 0, 1),
-            np.swapaxes(self.coherence, 0, 1),
-            self.scaled,
-            self.remarks,
-            self.simulated,
-        )
-
 
 def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfMatrix:
     """One matrix of all FRFs of all files, by node and direction.

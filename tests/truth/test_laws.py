@@ -1,6 +1,7 @@
 """Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say."""
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from planner.truth.hits import Hammer
 from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, StruckPose, along, respond
+from planner.truth.nonlinear import Port, StruckPose, respond
 from planner.truth.secret import Secret, frfs, once
 from tests.support.known_robots import KR10
 
@@ -29,6 +30,11 @@ LAWS = {
     "friction": Friction(6e4, 6e4 * ANGLE / 3),
     "contact": Contact(3e4, ANGLE / 3),
 }
+
+
+def along(axes: Sequence[int]) -> np.ndarray:
+    """Wrenches (h, 6) of hits exactly along tcp axes 0..2 (h,) and exactly at the tcp."""
+    return np.eye(6)[list(axes)]
 
 
 @pytest.fixture(scope="module")

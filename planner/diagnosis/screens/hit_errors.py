@@ -28,15 +28,13 @@ PADDING = 4  # records' lengths over which responses die away
 
 @dataclass(frozen=True, eq=False)
 class HitError:
-    """δ (2,) in rad and o (2,) in m of a hit, across its axis in cyclic order, with their sds.
+    """δ (2,) in rad and o (2,) in m of a hit, across its axis in cyclic order.
 
     Relative to what the hits of its pose and axis have in common.
     """
 
     tilt_rad: np.ndarray
     offset_m: np.ndarray
-    tilt_sd_rad: np.ndarray
-    offset_sd_m: np.ndarray
 
 
 HitErrors = tuple[tuple[HitError, ...], ...]  # of every hit of every visit
@@ -78,7 +76,7 @@ def _of_visit(
     s = 2j * np.pi * frequency[lines] + columns[0].rate_1_s
     basis = _basis(plain, number, s, tolerances)
     scale = np.repeat([tolerances.angle_rad, tolerances.offset_m], 2)
-    out: list[HitError] = [HitError(*np.zeros((4, 2)))] * len(columns)
+    out: list[HitError] = [HitError(*np.zeros((2, 2)))] * len(columns)
     # Hits at one point, along one axis, that the same channels heard.
     places = [(c.axis, c.hits[0].hit_point, c.hits[0].responses) for c in columns]
     for place in dict.fromkeys(places):
@@ -91,9 +89,9 @@ def _of_visit(
         variance = np.array([columns[i].variance[own][:, lines] for i in group])
         variance = variance + (RELATIVE * np.abs(h)) ** 2
         weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
-        eta, sd = _solved(h, weight, basis[column][:, rows])
-        for i, e, own in zip(group, eta * scale, sd * scale, strict=True):
-            out[i] = HitError(e[:2], e[2:], own[:2], own[2:])
+        eta = _solved(h, weight, basis[column][:, rows])
+        for i, e in zip(group, eta * scale, strict=True):
+            out[i] = HitError(e[:2], e[2:])
     return tuple(out)
 
 
@@ -114,8 +112,8 @@ def _basis(plain: Fit, number: int, s: np.ndarray, tolerances: Tolerances) -> np
     return hit_basis(h, turned.moment, tolerances)[0]
 
 
-def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """η and its sd (n, 4) of n columns h (n, r, F), in sds, and Σ η = 0.
+def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """η (n, 4) of n columns h (n, r, F), in sds, and Σ η = 0.
 
     Least squares with prior N(0, 1) of h = common + B η, `common` being free at every line.
     """
@@ -132,8 +130,7 @@ def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.nd
             normal[4 * i : 4 * i + 4, 4 * k : 4 * k + 4] = _inner(basis, w * basis)
     covariance = np.linalg.inv(normal + np.eye(4 * n))
     apart = np.kron(np.eye(n) - 1 / n, np.eye(4))
-    covariance, eta = apart @ covariance @ apart, apart @ covariance @ right
-    return eta.reshape(n, 4), np.sqrt(np.diagonal(covariance)).reshape(n, 4)
+    return (apart @ covariance @ right).reshape(n, 4)
 
 
 def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
