@@ -46,7 +46,7 @@ class LeftOpen:
     would seem to fit better, having larger B.
     """
 
-    poses: tuple["_Pose", ...]
+    poses: tuple["_PoseNumbers", ...]
     crossed: np.ndarray
     hits: int
     actual: ActualPorts | None = None
@@ -67,7 +67,9 @@ class LeftOpen:
         crossed = np.zeros_like(h) if eta is None else -np.einsum("nl,nlijf->nijf", eta, made)
         numbers, used = OpenNumbers.of(h), np.repeat(weight > 0, 2, axis=-1)
         poses = (
-            _Pose.of(real_rows(numbers.own(pose)), real_rows(numbers.shared(pose)), there.ravel())
+            _PoseNumbers.of(
+                real_rows(numbers.own(pose)), real_rows(numbers.shared(pose)), there.ravel()
+            )
             for pose, there in zip(made, used, strict=True)
         )
         return cls(tuple(poses), crossed, numbers.hits, turned.actual)
@@ -117,7 +119,7 @@ class LeftOpen:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pose:
+class _PoseNumbers:
     """B of one pose on the m real values that were measured there, which `used` marks.
 
     `own` (l, m) is whitened (by `factor`), so that integrating out subtracts the square of what is
@@ -133,7 +135,7 @@ class _Pose:
     normal: np.ndarray
 
     @classmethod
-    def of(cls, mine: np.ndarray, shared: np.ndarray, used: np.ndarray) -> "_Pose":
+    def of(cls, mine: np.ndarray, shared: np.ndarray, used: np.ndarray) -> "_PoseNumbers":
         if not used.all():
             mine, shared = mine[:, used], shared[:, used]
         factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)

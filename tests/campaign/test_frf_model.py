@@ -16,7 +16,7 @@ from planner.demo import NAME, shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
 from planner.frf.metrics import agreement, direct_mean
-from planner.identification.extended_structure import Structure
+from planner.identification.extended_structure import ExtendedModel
 from planner.identification.parameters import parametrise, place_name
 from planner.identification.truncated_decay import cut_off
 from planner.robot.robot import Robot
@@ -105,7 +105,7 @@ def test_a_record_cut_off_is_completed(tmp_path):
 
 def test_a_wider_structure_lists_every_spring_once_and_can_be_identified(tmp_path):
     simulation = Simulation(Robot.load(KR210.write(tmp_path)))
-    wide = widened(Structure(simulation, OF_EXACT_HITS))
+    wide = widened(ExtendedModel(simulation, OF_EXACT_HITS))
     places = [place_name(block) for block in wide.simulation.robot.config.compliance]
     assert len(set(places)) == len(places)
     assert {"base along x", "base along y", "base along z", "base about z"} <= set(places)
