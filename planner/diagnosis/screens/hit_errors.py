@@ -13,6 +13,7 @@ from planner.dataset.dataset import LAID, Dataset, Visit
 from planner.dataset.level_columns import Column, column
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.laws.open_misses import relative_misfit
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.diagnosis.linear.problem import tolerances_of
@@ -140,20 +141,12 @@ def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def corrected(recorded: Dataset, plain: Fit, errors: HitErrors) -> Dataset:
     """Hits as they would have been answered without their own misses."""
-    off = _relative_misfit(plain)
+    off = relative_misfit(plain)
     visits = tuple(
         _corrected(visit, number, plain, own, float(off[number]))
         for number, (visit, own) in enumerate(zip(recorded.visits, errors, strict=True))
     )
     return recorded.corrected(visits)
-
-
-def _relative_misfit(plain: Fit) -> np.ndarray:
-    """(n,): by which share the fitted simulation misses the FRFs of each visit."""
-    measured, h = plain.misfit.measured, plain.misfit.response(plain.x)[0]
-    off = np.where(measured.used, np.abs(h - measured.accelerance) ** 2, 0.0)
-    size = np.where(measured.used, np.abs(measured.accelerance) ** 2, 0.0)
-    return np.sqrt(off.sum(axis=(1, 2, 3)) / size.sum(axis=(1, 2, 3)))
 
 
 def _corrected(
