@@ -39,11 +39,12 @@ class Told:
 
 @dataclass(frozen=True, eq=False)
 class LeftOpen:
-    """B of n poses, weighted, as it is somewhere and held there.
+    """B of n poses, weighted, evaluated at one point and constant from there on.
 
-    FRFs are those between `actual` ports, and `crossed` (n, r, c, F), weighted, takes what they
-    were told to make of them back to first order. Were B to follow the parameters, larger FRFs
-    would seem to fit better, having larger B.
+    A B that changed with the parameters would favour those that make FRFs large, as their B, and
+    with it the error that is allowed, is large too. Simulated FRFs are those between the `actual`
+    ports, so that they contain the misses found so far; `crossed` (n, r, c, F), weighted, subtracts
+    these to first order, because `told` counts misses from zero.
     """
 
     poses: tuple["_PoseNumbers", ...]
