@@ -1,7 +1,6 @@
 """Nonlinear joints: an ODE solver, the linear limit, laws of energy, and what textbooks say."""
 
 import itertools
-from collections.abc import Sequence
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from planner.truth.model import Truth
 from planner.truth.nonlinear import Port, StruckPose, respond
 from planner.truth.secret import Secret, frfs, once
 from tests.support.known_robots import KR10
+from tests.support.wrenches import along
 
 STEP, N = 1 / 6400, 3200
 Q = KR10.poses(1)[0]
@@ -30,11 +30,6 @@ LAWS = {
     "friction": Friction(6e4, 6e4 * ANGLE / 3),
     "contact": Contact(3e4, ANGLE / 3),
 }
-
-
-def along(axes: Sequence[int]) -> np.ndarray:
-    """Wrenches (h, 6) of hits exactly along tcp axes 0..2 (h,) and exactly at the tcp."""
-    return np.eye(6)[list(axes)]
 
 
 @pytest.fixture(scope="module")
