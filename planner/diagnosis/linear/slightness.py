@@ -48,8 +48,8 @@ def without_slight(
     data, `bent` (k,) how far each fit moved the stated values (see `Weights`), `left` (k,) the
     relative misfit that it leaves (see `Mismatch`), `evidence` (k,) its log evidence. An effect is
     too small if, with everything else refitted, it changes the FRFs by less than `matters` and what
-    every robot has, added in squares. The more surely that is so, the more of the fit's share moves to
-    the fit without the effect; of several that do as well, to the likeliest. An effect that
+    every robot has, added in squares. The more surely that is so, the more of the fit's share moves
+    to the fit without the effect; of several that do as well, to the likeliest. An effect that
     explains a good part of all that refitting leaves may be smaller. Where both fits have nearly
     the same FRFs, the prior decides between them: the farther the simpler fit had to move the
     stated values, the likelier is the effect.
