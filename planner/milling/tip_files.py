@@ -154,7 +154,7 @@ def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
     found = replace(found, simulated=any(record.simulated for record in records))
     if noise > 0:
         return smoothed(found)
-    text = "How noisy the FRFs are is not stated: no sd counts it; say so by --noise PERCENT."
+    text = "The file gives no noise level, so results carry no sd; pass --noise PERCENT."
     return replace(found, remarks=(text,))
 
 
