@@ -151,11 +151,14 @@ class LowFidelity:
             more = lacking(learned.found) if learned.structure.added else ""
             return " ".join(filter(None, (swinging, more)))
         text = (
-            f"Identified from the recordings, the simulation still misses them by "
+            f"Fitted to the recordings, the simulation still differs from them by "
             f"{np.sqrt(learned.identified.misfit):.2g} times their noise: it lacks physics"
         )
         if self.learned is None:
-            return f"{text}, so that it is used as robot.toml states it, or not at all."
+            how = "the campaign goes on without it"
+            if self.nominal is not None:
+                how = "the campaign uses it unfitted, with the values of robot.toml"
+            return f"{text}; {how}."
         return f"{text}, or its geometry is off."
 
     @property

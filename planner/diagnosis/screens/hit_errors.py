@@ -180,6 +180,6 @@ def describe(errors: HitErrors) -> str:
     tilt = float(np.rad2deg(np.sqrt(np.mean([e.tilt_rad**2 for e in each]))))
     offset = 1e3 * float(np.sqrt(np.mean([e.offset_m**2 for e in each])))
     return (
-        f"Hits of a pose and axis differ as hand-held ones do, by {tilt:.1f}° in each direction "
-        f"and {offset:.1f} mm beside the point (rms): that was taken out of the recordings."
+        f"Hits along one axis of a pose differ by {tilt:.1f}° in each direction and by "
+        f"{offset:.1f} mm in place (rms), as hand-held hits do; the recordings were corrected."
     )
