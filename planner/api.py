@@ -19,7 +19,7 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
-from planner.identification.extended_structure import Structure, extended
+from planner.identification.extended_structure import ExtendedModel, extended
 from planner.identification.held_out import identify_judged
 from planner.identification.measurement_model import Tolerances
 from planner.identification.parameters import CAD_INERTIAS, Priors
@@ -135,7 +135,7 @@ def identify(
     check_options(band_hz)
     nominal, priors = Simulation(robot), CAD_INERTIAS if inertias else Priors()
     with threadpool_limits(1):
-        fitted = extended(nominal, priors) if extend else Structure(nominal, priors)
+        fitted = extended(nominal, priors) if extend else ExtendedModel(nominal, priors)
         judged = identify_judged(
             dataset.one_hit_frfs,
             dataset.q,

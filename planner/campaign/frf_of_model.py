@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.frf_model import FrfModel, frf_model
 from planner.campaign.frf_posterior import closely
 from planner.campaign.frf_simulation import learned_simulation
-from planner.identification.extended_structure import Structure
+from planner.identification.extended_structure import ExtendedModel
 from planner.identification.measured_frfs import common_band, stack
 from planner.surrogate.frf_bands import ModalPrediction
 from planner.surrogate.left_out_modes import left_out_modes
@@ -31,7 +31,7 @@ def _frf_model(model: "Model") -> FrfModel:
     if learned is not None:
         frozen = model.cell.frozen
         assert frozen.nominal is not None
-        stated = Structure(frozen.nominal, frozen.priors)
+        stated = ExtendedModel(frozen.nominal, frozen.priors)
         simulated = learned_simulation(learned, stated, model.frfs, q, band)
     if simulated is not None:
         measured = simulated.objective.misfit.measured

@@ -21,7 +21,7 @@ from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.gradient import laplace
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.extended_structure import Structure
+from planner.identification.extended_structure import ExtendedModel
 from planner.identification.measured_frfs import common_band
 from planner.identification.truncated_decay import cut_off
 
@@ -32,7 +32,7 @@ FOLLOWED, TRIED_STEPS = 3, 10  # places of a resonator that are tried, and in ho
 
 def learned_simulation(
     learned: Learned,
-    stated: Structure,
+    stated: ExtendedModel,
     frfs: Sequence[Frf],
     q: np.ndarray,
     band_hz: tuple[float, float],

@@ -226,7 +226,7 @@ def lacking(state: CampaignState, measurement: Measurement) -> tuple[str, ...]:
         )
     if once := [axis for axis in wanted if counts[axis] == 1]:
         said.append(
-            f"{measurement.pose} has one hit only along {' and '.join(once)}: nothing tells "
-            f"whether it was good; hit again."
+            f"{measurement.pose} has one hit only along {' and '.join(once)}, which no repeat "
+            f"confirms; hit again."
         )
     return tuple(said)

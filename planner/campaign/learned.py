@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.identification.extended_structure import FLOOR, Structure
+from planner.identification.extended_structure import FLOOR, ExtendedModel
 from planner.identification.parameters import Priors, parametrise
 from planner.identification.result import Identification
 from planner.inference.block_diagonal import block_diagonal
@@ -22,7 +22,7 @@ KNOWN, MATTERS, NAMED = 0.3, 1.0, 4
 class Learned:
     """What the recordings taught the simulation; `suspect` is the misfit that is too large."""
 
-    structure: Structure
+    structure: ExtendedModel
     identified: Identification
     suspect: float = SUSPECT
 

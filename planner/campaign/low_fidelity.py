@@ -12,7 +12,7 @@ from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
 from planner.frf.frf import Frf
 from planner.identification.effort import QUICK, Effort
-from planner.identification.extended_structure import Structure
+from planner.identification.extended_structure import ExtendedModel
 from planner.identification.frequency_uncertainty import frequency_sd
 from planner.identification.identify import identify
 from planner.identification.measured_frfs import layout_of
@@ -151,11 +151,14 @@ class LowFidelity:
             more = lacking(learned.found) if learned.structure.added else ""
             return " ".join(filter(None, (swinging, more)))
         text = (
-            f"Identified from the recordings, the simulation still misses them by "
+            f"Fitted to the recordings, the simulation still differs from them by "
             f"{np.sqrt(learned.identified.misfit):.2g} times their noise: it lacks physics"
         )
         if self.learned is None:
-            return f"{text}, so that it is used as robot.toml states it, or not at all."
+            how = "the campaign goes on without it"
+            if self.nominal is not None:
+                how = "the campaign uses it unfitted, with the values of robot.toml"
+            return f"{text}; {how}."
         return f"{text}, or its geometry is off."
 
     @property
@@ -186,7 +189,7 @@ def learn(
     if nominal is None or not frfs:
         return before
     lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
-    structure = Structure(nominal, before.priors)
+    structure = ExtendedModel(nominal, before.priors)
     stated = lesson.glanced(structure)
     learned = with_springs(stated, lesson)
     if stated.identified.misfit > HOPELESS and learned.identified.misfit > SWINGS:
@@ -211,17 +214,17 @@ class Lesson:
 
     def identified(
         self,
-        structure: Structure,
+        structure: ExtendedModel,
         warm: Identification | None = None,
         starts: int | np.ndarray = 1,
     ) -> Learned:
         found = self._identify(structure, warm, _effort(self.frfs), starts)
         return self._learned(structure, found)
 
-    def _learned(self, structure: Structure, found: Identification) -> Learned:
+    def _learned(self, structure: ExtendedModel, found: Identification) -> Learned:
         return Learned(structure, found, EXACT_SUSPECT if self.tolerances is None else SUSPECT)
 
-    def glanced(self, structure: Structure) -> Learned:
+    def glanced(self, structure: ExtendedModel) -> Learned:
         """As `identified`; not followed to the end where it is far from the recordings."""
         effort = replace(_effort(self.frfs), hopeless=HOPELESS)
         return self._learned(structure, self._identify(structure, None, effort))
@@ -236,7 +239,7 @@ class Lesson:
 
     def _identify(
         self,
-        structure: Structure,
+        structure: ExtendedModel,
         warm: Identification | None,
         effort: Effort,
         starts: int | np.ndarray = 1,

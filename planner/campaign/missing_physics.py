@@ -12,7 +12,7 @@ import numpy as np
 
 from planner.campaign.learned import Learned, likeliest
 from planner.errors import InputError
-from planner.identification.extended_structure import Structure, added_softer, extended
+from planner.identification.extended_structure import ExtendedModel, added_softer, extended
 
 if TYPE_CHECKING:
     from planner.campaign.low_fidelity import Lesson
@@ -47,7 +47,7 @@ def with_springs(stated: Learned, lesson: "Lesson") -> Learned:
     return likeliest(found)
 
 
-def _from(structure: Structure, starts: Sequence[float], lesson: "Lesson") -> list[Learned]:
+def _from(structure: ExtendedModel, starts: Sequence[float], lesson: "Lesson") -> list[Learned]:
     """Identified from springs that begin softer or stiffer, until two met or one fits."""
     found: list[Learned] = []
     for softer in starts:

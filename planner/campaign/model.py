@@ -260,7 +260,7 @@ class Model:
             left = [str(k + 1) for k, w in enumerate(self.surrogate.frequency_trust) if w < 0.5]
             if left:
                 found.append(
-                    f"The measurements speak against the simulation of mode {', '.join(left)}: "
+                    f"The simulation disagrees with the measurements of mode {', '.join(left)}: "
                     f"predicted without it."
                 )
         if self.cell.visit_scatter and len(self.labelled) >= SCATTER_POSES:

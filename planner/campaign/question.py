@@ -226,7 +226,7 @@ def _asked(pose: str, here: Comparison, fits: str) -> Question:
     if not here.far.any():
         mean = 100 * here.difference
         what = (
-            f"ring at the frequencies expected at {pose}, but move the tool otherwise (their "
+            f"have the frequencies expected at {pose}, but other mode shapes at the tool (their "
             f"residues differ by {mean:.0f} %)"
         )
     text = f"These hits {what}; {instead}. Is the robot at {pose}?"

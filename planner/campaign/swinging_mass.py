@@ -14,7 +14,7 @@ from planner.diagnosis.linear.fit import Fit, approached, settle
 from planner.diagnosis.linear.problem import CLOSE, GLANCE, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.extended_structure import Structure
+from planner.identification.extended_structure import ExtendedModel
 from planner.identification.held_out import farthest_first
 from planner.identification.parameters import parametrise
 from planner.identification.result import Identification
@@ -27,12 +27,12 @@ FIRST_STEPS, PROMISING, LOG_STEPS, FEW, MET = 4, 4, 10, 3, 1e-4
 
 
 def swinging(
-    structure: Structure,
+    structure: ExtendedModel,
     identified: Identification,
     frfs: Sequence[Frf],
     q: np.ndarray,
     band_hz: tuple[float, float],
-) -> tuple[Structure, np.ndarray]:
+) -> tuple[ExtendedModel, np.ndarray]:
     """The structure with a mass on a spring at the link where it explains most.
 
     And starts (1, P) of its springs, in their units.
@@ -96,7 +96,7 @@ def _at_frequency(problem: Problem, effect: LocalResonator, found: Fit, hertz: f
     return fits
 
 
-def _with(structure: Structure, found: Fit) -> Structure:
+def _with(structure: ExtendedModel, found: Fit) -> ExtendedModel:
     effect = found.effect
     assert isinstance(effect, LocalResonator)
     psi = found.x[found.misfit.split[1] :]

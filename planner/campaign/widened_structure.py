@@ -12,7 +12,7 @@ from planner.identification.extended_structure import (
     DAMPING_S,
     FLOOR,
     STIFFNESS,
-    Structure,
+    ExtendedModel,
     extended,
 )
 from planner.identification.parameters import place_name
@@ -24,7 +24,7 @@ SHORT = 0.1  # of the longest link: what is shorter does not bend
 BEND = 0.3  # of the joint's stiffness: the scale of a link's, whose prior is STIFFNESS times this
 
 
-def widened(structure: Structure) -> Structure:
+def widened(structure: ExtendedModel) -> ExtendedModel:
     """Beside tilts of joints and floor the base's turn and shifts, and links that bend."""
     if not structure.added:
         structure = extended(structure.simulation, structure.priors)
@@ -53,7 +53,7 @@ def widened(structure: Structure) -> Structure:
     added = tuple(block for block, _ in springs)
     config = msgspec.structs.replace(robot.config, compliance=(*robot.config.compliance, *added))
     simulation = Simulation(replace(robot, config=config))
-    return Structure(
+    return ExtendedModel(
         simulation, replace(structure.priors, bounds=bounds), structure.added + len(added)
     )
 

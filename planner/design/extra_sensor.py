@@ -8,6 +8,7 @@ import numpy as np
 
 from planner.design.discrimination import MOST_CANDIDATES, separation
 from planner.design.next_hit import in_words
+from planner.design.odds import as_ratio
 from planner.diagnosis.diagnose import Explained
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout
@@ -41,9 +42,9 @@ class ExtraSensor:
         names = [""] * len(self.joints_deg)
         angles = JointUnits.declared_as(names, self.joint_units).listed(self.joints_deg)
         return (
-            f"A sensor at {self.point} would part {' from '.join(self.between)}: hit along "
-            f"{self.hit} at {self.pose} ({angles}); the odds are expected to become "
-            f"e^{self.log_odds:.1f}, without it e^{self.log_odds_without:.1f}."
+            f"A sensor at {self.point} would tell {' from '.join(self.between)}: hit along "
+            f"{self.hit} at {self.pose} ({angles}); this should separate them "
+            f"{as_ratio(self.log_odds)}, without the sensor {as_ratio(self.log_odds_without)}."
         )
 
 

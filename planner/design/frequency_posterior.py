@@ -77,10 +77,12 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Margins:
-    """u answers that hang on frequencies: yes where a margin (u,), known to `sd` (u,), is above 0.
+    """u yes-or-no questions that depend on frequencies, such as "is this cut stable here?".
 
-    `slope` (u, k) is how each margin changes per relative change of each label's frequency at
-    `poses`; `variance` (u,) what the frequencies' own uncertainty makes of that at first.
+    The answer is yes where `margin` (u,), with standard deviation `sd` (u,), is above 0. `slope`
+    (u, k) is the change of each margin per relative change of each label's frequency at `poses`;
+    `variance` (u,) is the part of the margin's variance that comes from the frequencies, before any
+    further measurement.
     """
 
     poses: Poses

@@ -8,6 +8,7 @@ import numpy as np
 
 from planner.design.discrimination import Telling, most_telling
 from planner.design.law_discrimination import most_telling_forces, undecided
+from planner.design.odds import as_ratio
 from planner.diagnosis.diagnose import Explained
 from planner.diagnosis.laws.law_at_joints import Laws
 from planner.recording.joints import JointUnits
@@ -37,7 +38,7 @@ class NextHit:
         force = f" with about {force} N" if force else ""
         return (
             f"To tell apart {' from '.join(self.between)}: hit{force} along {self.hit} at "
-            f"{self.pose} ({angles}); the odds are expected to become e^{self.log_odds:.1f}."
+            f"{self.pose} ({angles}); this hit should separate them {as_ratio(self.log_odds)}."
         )
 
 

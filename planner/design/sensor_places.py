@@ -42,11 +42,9 @@ class BetterPlaces:
         what = [f"put a sensor at {self.added} too"] if self.added else []
         what += [f"hit at {self.hit_point} too"] if self.hit_point else []
         return (
-            f"At {self.pose} {' and '.join(what)}, if you can: what the simulation's "
-            f"parameters leave open of the frequencies is expected to go from "
-            f"{self.sd_percent_now:.2g} to {self.sd_percent:.2g} % in {self.minutes:.1f} min; with "
-            f"hits at the tool and the sensors of the last pose to {self.sd_percent_as_it_is:.2g} "
-            f"% in {self.minutes_as_it_is:.1f} min."
+            f"At {self.pose} {' and '.join(what)}, if you can: the frequencies' sd should fall "
+            f"from {self.sd_percent_now:.2g} to {self.sd_percent:.2g} % in {self.minutes:.1f} min. "
+            f"Without that: to {self.sd_percent_as_it_is:.2g} % in {self.minutes_as_it_is:.1f} min."
         )
 
 

@@ -58,7 +58,7 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
     if counts:
         kept, found = taken_back(findings, judged.diagnosis)
         if len(kept) < len(findings):
-            said = "What explains them takes a correction back: there was no such artefact."
+            said = "A correction was undone: by the explanation found there was no such artefact."
             recorded = replace(recorded, remarks=(*recorded.remarks, said))
         findings, judged = kept, replace(judged, diagnosis=found)
     whole = together(findings, judged.diagnosis, counts)
@@ -87,7 +87,7 @@ class _Looked:
     @property
     def doubtful(self) -> bool:
         """Whether an artefact was told by a simulation that even then lacks what matters."""
-        matters = self.found.problem.simulation.robot.config.diagnose.matters_percent / 100
+        matters = self.found.problem.simulation.robot.config.diagnose.matters
         return (
             bool(self.of_chain)
             and linear_effects_apply(self.findings)

@@ -47,6 +47,9 @@ SENSOR_MATRIX_SD = 1.0  # of each entry of the sensor's matrix around those of t
 DELAY_SD_S = 5e-3  # of all channels together
 WINDOW_RATE_1_S, WINDOW_RATE_LOG_SD = 1.0, 2.0  # of a window's rate: median and sd
 WINDOW_RATE_WIDTH_1_S = 5.0  # of the same where the prior is flat: in the noise of the force
+# Of the same faults where each is an effect by itself, beside springs and inertias that are fitted.
+ALONE_GAIN_LOG_SD, ALONE_DELAY_SD_S = 0.5, 2e-3
+ALONE_WINDOW_RATE_1_S, ALONE_WINDOW_RATE_LOG_SD = 1.5, 1.0
 READ_SCALE_SD = 0.2  # of all entries of the sensor's matrix together: that is the robot's mass
 READ_ROTATION_SD, READ_GAIN_LOG_SD = 0.5, 0.5  # rad; of what the matrix is read as
 
@@ -70,13 +73,14 @@ DISCREPANCIES = 0.0, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1
 DISCREPANCY_USUAL, DISCREPANCY_UNKNOWN, DISCREPANCY_FACTOR = 3e-3, 1e-2, 2.0
 DAMPERS = 10.0
 CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose to pose; chosen
-# How much may be left, relative to what was recorded and once misses are out, where nothing unknown
-# is there: without any effect what does not matter ([diagnose] matters_percent); with one, this
-# share of what refitting left. Beyond, it is less likely by a normal law of ln(left), sd ln
-# LEFT_FACTOR. Chosen.
+# The misfit, relative to the recordings and without misses of hits, that a fit may leave if no
+# unknown effect is there: [diagnose] matters_percent for the fit without effects; for one with
+# effects this share of what the fit without effects leaves. A larger misfit is penalised by a
+# normal law of ln(misfit) with sd ln LEFT_FACTOR. Chosen.
 LEFT_SHARE = 0.15
-# Of the squares of what refitting leaves: an effect that takes so much of it is no part of what
-# every robot has a little of, and is named from this share of what matters on. Chosen.
+# An effect that explains GOOD_PART of the squared misfit of the fit without effects is more than
+# what every robot has a little of: it is named even if it changes the FRFs by only CLEARLY_MATTERS
+# times what matters. Chosen.
 GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.2
 LEFT_FACTOR = 1.5
 # c·ω/k mid-band from which a spring that gives is no bearing, link or foot (welded frames: 0.01,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.errors import InputError, RefusedError
+from planner.frf.labelled import common_lines
 from planner.frf.quantities import DERIVATIVE, convert
 from planner.recording.dof import Dof
 from planner.recording.records import FrfRecord
@@ -50,19 +51,6 @@ class FrfMatrix:
         """Which response a degree of freedom is."""
         return self.responses.index(dof)
 
-    def transposed(self) -> "FrfMatrix":
-        """Responses and references exchanged, as Maxwell's reciprocity allows."""
-        return FrfMatrix(
-            self.frequency_hz,
-            self.references,
-            self.responses,
-            np.swapaxes(self.accelerance, 0, 1),
-            np.swapaxes(self.coherence, 0, 1),
-            self.scaled,
-            self.remarks,
-            self.simulated,
-        )
-
 
 def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfMatrix:
     """One matrix of all FRFs of all files, by node and direction.
@@ -70,7 +58,8 @@ def matrix_of(records: Sequence[FrfRecord], quantity: str | None = None) -> FrfM
     `quantity` says what FRFs are whose file does not. An FRF that is there several times is
     averaged. Raises RefusedError for lines that differ, InputError for an unknown direction.
     """
-    frequency, remarks = _lines(records), [r for record in records for r in record.remarks]
+    frequency = common_lines(records, RefusedError)
+    remarks = [r for record in records for r in record.remarks]
     sums: dict[tuple[Dof, Dof], list[np.ndarray]] = {}
     coherences: dict[tuple[Dof, Dof], np.ndarray] = {}
     scaled, keep, dead = True, frequency > 0, []
@@ -136,20 +125,6 @@ def _places(record: FrfRecord) -> list[tuple[Dof, Dof]]:
         for nodes, directions in ends
     )
     return list(zip(felt, hit, strict=True))
-
-
-def _lines(records: Sequence[FrfRecord]) -> np.ndarray:
-    """The frequency lines that all have."""
-    first = np.asarray(records[0].frequency_hz, float)
-    for record in records[1:]:
-        other = np.asarray(record.frequency_hz, float)
-        # Headers state the spacing to five digits or so.
-        if other.size != first.size or not np.allclose(other, first, rtol=1e-4, atol=1e-9):
-            raise RefusedError(
-                f"{record.source} has other frequency lines than {records[0].source}; export one "
-                "grid."
-            )
-    return first
 
 
 def _kind(record: FrfRecord, quantity: str | None, remarks: list[str]) -> tuple[str, bool]:

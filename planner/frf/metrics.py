@@ -37,19 +37,6 @@ def complex_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
     return np.where(both_zero, 1.0, np.minimum(inner, 1.0))
 
 
-def global_frac(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
-    """Global FRAC G_d, (pose, ..., F) to (...): the mean of the poses' FRAC (appendix B.1)."""
-    return mean_known(frac(measured, simulated), axis=0)
-
-
-def frobenius_similarity(measured: np.ndarray, simulated: np.ndarray) -> np.ndarray:
-    """Frobenius similarity S_d over magnitudes, (pose, ..., F) to (...), in [0, 1].
-
-    max(0, 1 − ‖|M_meas| − |M_sim|‖ / ‖|M_meas|‖), the norms over poses and lines (appendix B.2).
-    """
-    return _similarity(*_norms(measured, simulated))
-
-
 @dataclass(frozen=True, eq=False)
 class Agreement:
     """Agreement of n poses in one band, per pose and direction: all (n, response, hit).
@@ -70,17 +57,16 @@ class Agreement:
 
     @property
     def global_frac(self) -> np.ndarray:
-        """Global FRAC (response, hit) over magnitudes (Birk et al. 2025, appendix B.1)."""
+        """Global FRAC G_d (response, hit): the mean of the poses' FRAC (appendix B.1)."""
         return mean_known(self.frac, axis=0)
 
     @property
-    def global_complex_frac(self) -> np.ndarray:
-        """The same (response, hit) with phase."""
-        return mean_known(self.complex_frac, axis=0)
-
-    @property
     def frobenius(self) -> np.ndarray:
-        """Frobenius similarity (response, hit) over magnitudes (Birk et al. 2025, appendix B.2)."""
+        """Frobenius similarity S_d (response, hit) over magnitudes, in [0, 1].
+
+        max(0, 1 − ‖|M_meas| − |M_sim|‖ / ‖|M_meas|‖), the norms over poses and lines (Birk et al.
+        2025, appendix B.2).
+        """
         return _similarity(self.error, self.size)
 
 

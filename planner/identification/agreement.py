@@ -1,4 +1,4 @@
-"""How well a simulation, identified or not, agrees with FRFs, and where it does not."""
+"""How well a simulation, identified or not, agrees with FRFs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,26 +22,6 @@ class Similarity:
 
     frac: float
     frobenius: float
-
-
-@dataclass(frozen=True, eq=False)
-class Residuals:
-    """Simulated minus measured FRFs in sds of the noise: complex (n, 3, 3, F), NaN where unused.
-
-    Real and imaginary parts have variance 1 where the simulation is right. Lines (n, F) in Hz are
-    each pose's own.
-    """
-
-    frequency_hz: np.ndarray
-    values: np.ndarray
-
-    @property
-    def by_pose(self) -> np.ndarray:
-        """(n,) misfits: mean square of the real values, 1 at the noise."""
-        flat = self.values.reshape(len(self.values), -1)
-        used = np.isfinite(flat)
-        square = np.where(used, np.abs(np.where(used, flat, 0)) ** 2, 0.0)
-        return np.sum(square, axis=1) / np.maximum(2 * np.sum(used, axis=1), 1)
 
 
 def fit_similarity(
@@ -70,28 +50,11 @@ def similarity_of(measured: Measured, h: np.ndarray) -> Similarity:
     return Similarity(metrics.direct_mean(whole.global_frac), metrics.direct_mean(whole.frobenius))
 
 
-def residuals(
-    simulation: Simulation,
-    frfs: Sequence[Frf],
-    q: np.ndarray,
-    band_hz: tuple[float, float] | None = None,
-) -> Residuals:
-    """What a simulation leaves unexplained of FRFs at q (n, dof) in rad, in robot.toml's band."""
-    measured = _stacked(simulation, frfs, band_hz)
-    return _residuals_of(measured, _simulated(simulation, measured, q))
-
-
-def _residuals_of(measured: Measured, h: np.ndarray) -> Residuals:
-    difference = h - measured.accelerance
-    values = np.where(measured.used, np.sqrt(2) * difference / measured.sd, np.nan)
-    return Residuals(measured.frequency_hz, values)
-
-
 def _stacked(
     simulation: Simulation,
     frfs: Sequence[Frf],
     band_hz: tuple[float, float] | None,
-    lines: int = MOST_LINES,
+    lines: int,
 ) -> Measured:
     band = common_band(frfs, band_hz or simulation.robot.config.band_hz)
     return stack(frfs, band, lines, MODEL_ERROR)

@@ -22,7 +22,7 @@ FLOOR = "base"
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class ExtendedModel:
     """A simulation whose parameters can be identified, and what is known of them before.
 
     Its last `added` springs are not in robot.toml, nor is what `swinging` tells of.
@@ -34,7 +34,7 @@ class Structure:
     swinging: str = ""
 
 
-def extended(simulation: Simulation, priors: Priors) -> Structure:
+def extended(simulation: Simulation, priors: Priors) -> ExtendedModel:
     """Three rotations at every joint that has any, and two tilts of the floor."""
     config, slides = simulation.robot.config, simulation.robot.slides_along
     # The own springs of joints that slide say nothing of rotations there.
@@ -56,10 +56,10 @@ def extended(simulation: Simulation, priors: Priors) -> Structure:
             bounds |= limits
     wider = msgspec.structs.replace(config, compliance=(*stated, *added))
     robot = replace(simulation.robot, config=wider)
-    return Structure(Simulation(robot), replace(priors, bounds=bounds), len(added))
+    return ExtendedModel(Simulation(robot), replace(priors, bounds=bounds), len(added))
 
 
-def added_softer(structure: Structure, factor: float) -> np.ndarray:
+def added_softer(structure: ExtendedModel, factor: float) -> np.ndarray:
     """Starts (1, P), in the parameters' units: stated springs as stated, added ones so much softer.
 
     They keep the relation of damping to stiffness.

@@ -39,14 +39,15 @@ class Told:
 
 @dataclass(frozen=True, eq=False)
 class LeftOpen:
-    """B of n poses, weighted, as it is somewhere and held there.
+    """B of n poses, weighted, evaluated at one point and constant from there on.
 
-    FRFs are those between `actual` ports, and `crossed` (n, r, c, F), weighted, takes what they
-    were told to make of them back to first order. Were B to follow the parameters, larger FRFs
-    would seem to fit better, having larger B.
+    A B that changed with the parameters would favour those that make FRFs large, as their B, and
+    with it the error that is allowed, is large too. Simulated FRFs are those between the `actual`
+    ports, so that they contain the misses found so far; `crossed` (n, r, c, F), weighted, subtracts
+    these to first order, because `told` counts misses from zero.
     """
 
-    poses: tuple["_Pose", ...]
+    poses: tuple["_PoseNumbers", ...]
     crossed: np.ndarray
     hits: int
     actual: ActualPorts | None = None
@@ -67,7 +68,9 @@ class LeftOpen:
         crossed = np.zeros_like(h) if eta is None else -np.einsum("nl,nlijf->nijf", eta, made)
         numbers, used = OpenNumbers.of(h), np.repeat(weight > 0, 2, axis=-1)
         poses = (
-            _Pose.of(real_rows(numbers.own(pose)), real_rows(numbers.shared(pose)), there.ravel())
+            _PoseNumbers.of(
+                real_rows(numbers.own(pose)), real_rows(numbers.shared(pose)), there.ravel()
+            )
             for pose, there in zip(made, used, strict=True)
         )
         return cls(tuple(poses), crossed, numbers.hits, turned.actual)
@@ -117,7 +120,7 @@ class LeftOpen:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pose:
+class _PoseNumbers:
     """B of one pose on the m real values that were measured there, which `used` marks.
 
     `own` (l, m) is whitened (by `factor`), so that integrating out subtracts the square of what is
@@ -133,7 +136,7 @@ class _Pose:
     normal: np.ndarray
 
     @classmethod
-    def of(cls, mine: np.ndarray, shared: np.ndarray, used: np.ndarray) -> "_Pose":
+    def of(cls, mine: np.ndarray, shared: np.ndarray, used: np.ndarray) -> "_PoseNumbers":
         if not used.all():
             mine, shared = mine[:, used], shared[:, used]
         factor = np.linalg.cholesky(np.eye(len(mine)) + mine @ mine.T)

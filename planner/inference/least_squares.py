@@ -111,10 +111,6 @@ class Iterate(Generic[Q]):
         """Whether no step, however short, has gained anything."""
         return self.damping > self.rule.most
 
-    def restarted(self, at: Q, rule: Damping) -> "Iterate[Q]":
-        """The same point with a new objective, as after a change of the data or of the rule."""
-        return begin(self.x, at, rule, self.limits)
-
 
 def begin(
     x: np.ndarray, at: Q, rule: Damping | None = None, limits: Limits | None = None
@@ -203,7 +199,6 @@ class Minimum(Generic[Q]):
 
     x: np.ndarray
     at: Q
-    iterations: int
     converged: bool
 
 
@@ -243,14 +238,14 @@ def minimise(
             progress(iteration, state.at.value)
         x = propose(state)
         if expected(state, x) <= tolerance * state.at.value:
-            return Minimum(state.x, state.at, iteration, True)
+            return Minimum(state.x, state.at, True)
         trial, before = objective(x), state
         state = accept(state, x, trial)
         if trial is not None and settled is not None and settled(before, x, trial):
-            return Minimum(state.x, state.at, iteration, True)
+            return Minimum(state.x, state.at, True)
         if state.stuck:
-            return Minimum(state.x, state.at, iteration, False)
-    return Minimum(state.x, state.at, most, False)
+            return Minimum(state.x, state.at, False)
+    return Minimum(state.x, state.at, False)
 
 
 def inverse(precision: np.ndarray) -> np.ndarray:

@@ -59,7 +59,7 @@ def lagrange(nodes: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Engagement:
     """Elements of one period in which teeth cut, as angles (rad) of the first tooth's tip.
 
     `start`, `end` (e,): of each element, within [0, `period`] after the first entry. `teeth`: which
@@ -79,7 +79,7 @@ def tooth_angles(cut: Cut) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(cut.pitches_rad)[:-1]])
 
 
-def contact(cut: Cut, depth_m: float, longest_rad: float) -> Contact:
+def contact(cut: Cut, depth_m: float, longest_rad: float) -> Engagement:
     """Elements no longer than `longest_rad`; with a helix they depend on the depth.
 
     One tooth's period if all teeth follow alike, else a turn of the spindle.
@@ -99,7 +99,7 @@ def contact(cut: Cut, depth_m: float, longest_rad: float) -> Contact:
         if cutting:
             cuts = np.linspace(a, b, 1 + max(1, int(np.ceil((b - a) / longest_rad))))
             found += [(x, y, cutting, k) for x, y in pairwise(cuts)]
-    return Contact(
+    return Engagement(
         float(period),
         start,
         np.array([f[0] for f in found]),

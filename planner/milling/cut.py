@@ -54,12 +54,6 @@ class Cut(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return np.linspace(low, high, count)
 
     @property
-    def depths_m(self) -> np.ndarray:
-        """(n,) axial depths that are asked for."""
-        low, high, count = self.depth_m
-        return np.linspace(low, high, count)
-
-    @property
     def plane(self) -> np.ndarray:
         """(2, 3) unit vectors of the cut in the frame of the FRFs: feed, and axis × feed."""
         feed, axis = _unit(self.feed), _unit(self.axis)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
+from planner.frf.labelled import labelled_frfs
 from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
@@ -192,26 +193,8 @@ def _exported(path: Path) -> CutterFrf:
     records = [record for record in read(path) if isinstance(record, FrfRecord)]
     if not records:
         raise InputError(f"{path} holds no FRFs; export FRFs, or give modes as TOML.")
-    first = records[0]
-    h = np.full((3, 3, len(first.frequency_hz)), np.nan + 0j)
-    for record in records:
-        if record.quantity == "unknown" or not record.unit:
-            raise InputError(
-                f"{path}: it is not stated whether these FRFs are accelerance, mobility or "
-                f"receptance, and in which unit; label them."
-            )
-        if not np.array_equal(record.frequency_hz, first.frequency_hz):
-            raise InputError(f"{path} mixes frequency lines; export one grid.")
-        above = record.frequency_hz > 0
-        values = np.zeros_like(record.values)
-        values[:, above] = convert(
-            record.frequency_hz[above], record.values[:, above], record.quantity, "accelerance"
-        )
-        pairs = zip(record.response_direction, record.reference_direction, strict=True)
-        for row, (i, j) in enumerate(pairs):
-            if not (1 <= abs(i) <= 3 and 1 <= abs(j) <= 3):
-                raise InputError(
-                    f"{path}: FRF {row + 1} does not state its directions; label them."
-                )
-            h[abs(i) - 1, abs(j) - 1] = np.sign(i) * np.sign(j) * values[row]
-    return of_accelerance(str(path), np.asarray(first.frequency_hz, dtype=float), h, None)
+    frequency, frfs = labelled_frfs(records, "accelerance", InputError)
+    h = np.full((3, 3, len(frequency)), np.nan + 0j)
+    for one in frfs:
+        h[one.felt[1], one.hit[1]] = one.values
+    return of_accelerance(str(path), frequency, h, None)

@@ -26,7 +26,7 @@ CLOSER = 9  # depths that then are looked at
 
 
 @dataclass(frozen=True)
-class Level:
+class GrowthAtDepth:
     """A depth in m and log |µ| there."""
 
     depth: float
@@ -42,13 +42,13 @@ def scanned_depths(floor_m: float, most_m: float) -> np.ndarray:
     return np.append(depths[depths < most_m * (1 - 1e-9)], most_m)
 
 
-def levels(at: Monodromies, depths: np.ndarray) -> list[Level]:
+def levels(at: Monodromies, depths: np.ndarray) -> list[GrowthAtDepth]:
     """Of depths (B,)."""
     sizes = np.log(np.maximum(np.abs(multipliers(at(depths))), 1e-300))
-    return [Level(float(b), float(s)) for b, s in zip(depths, sizes, strict=True)]
+    return [GrowthAtDepth(float(b), float(s)) for b, s in zip(depths, sizes, strict=True)]
 
 
-def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[Level, Level] | None:
+def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[GrowthAtDepth, GrowthAtDepth] | None:
     """The last stable depth before the first that is not."""
     seen = levels(at, np.array([0.0]))
     for first in range(0, len(scan), CHUNK):
@@ -61,9 +61,9 @@ def first_unstable(at: Monodromies, scan: np.ndarray) -> tuple[Level, Level] | N
     return None
 
 
-def _with_peaks(at: Monodromies, seen: list[Level]) -> list[Level]:
+def _with_peaks(at: Monodromies, seen: list[GrowthAtDepth]) -> list[GrowthAtDepth]:
     """With more depths where |µ| has a maximum below one that may reach it between."""
-    more: list[Level] = []
+    more: list[GrowthAtDepth] = []
     for a, b, c in zip(seen, seen[1:], seen[2:], strict=False):
         if b.size > 0:
             break
@@ -73,7 +73,7 @@ def _with_peaks(at: Monodromies, seen: list[Level]) -> list[Level]:
 
 
 def refined(
-    at: Monodromies, low: Level, high: Level, width: float = REFINED
+    at: Monodromies, low: GrowthAtDepth, high: GrowthAtDepth, width: float = REFINED
 ) -> tuple[float, float]:
     """Depth at which |µ| is one between two, and the slope of log |µ| there (Illinois rule).
 

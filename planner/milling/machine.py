@@ -10,8 +10,8 @@ from planner.milling.cut import Cut
 from planner.milling.cutter_frf import PlaneFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients, mean_matrix
-from planner.milling.period import Grid, Period, period
-from planner.milling.zeroth_order import Curves, curves
+from planner.milling.period import Discretisation, Period, period
+from planner.milling.zeroth_order import LobeCurves, curves
 
 Monodromies = Callable[[np.ndarray], list[np.ndarray]]  # of depths (B,) in m
 
@@ -34,7 +34,7 @@ class Machine:
     coefficients: Coefficients
     frf: PlaneFrf | None = None
 
-    def grid(self, rpm: float, factor: float = 1.0) -> Grid:
+    def grid(self, rpm: float, factor: float = 1.0) -> Discretisation:
         """As fine as the fastest mode asks for at this speed, times a factor."""
         start, end = self.cut.immersion_rad
         arc = min(end - start, 2 * np.pi / self.cut.teeth)
@@ -46,14 +46,14 @@ class Machine:
                 f'{slowest:.0f} rpm or more, or choose the method "zeroth_order".'
             )
         elements = int(np.ceil(points / MOST_DEGREE))
-        return Grid(int(np.ceil(points / elements)), arc / elements * (1 + 1e-9))
+        return Discretisation(int(np.ceil(points / elements)), arc / elements * (1 + 1e-9))
 
     @property
     def fastest(self) -> float:
         """The highest pole's size in rad/s."""
         return float(np.max(np.abs(self.modes.poles)))
 
-    def period(self, rpm: float, grid: Grid, depth_m: float) -> Period:
+    def period(self, rpm: float, grid: Discretisation, depth_m: float) -> Period:
         """Matrices of a period; `depth_m` matters with a helix only."""
         return period(self.modes, self.cut, self.coefficients, rpm, grid, depth_m)
 
@@ -67,7 +67,7 @@ class Machine:
             self.period(rpm, grid, float(b)).monodromy(np.array([b]))[0] for b in depths
         ]
 
-    def floor(self) -> Curves:
+    def floor(self) -> LobeCurves:
         """Zeroth-order curves: of the FRFs, or over lines that resolve every mode."""
         mean = mean_matrix(self.cut, self.coefficients)
         if self.frf is not None:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.milling.contact import (
-    Contact,
+    Engagement,
     contact,
     directions,
     each_tooth,
@@ -24,7 +24,7 @@ from planner.milling.directional import Coefficients
 
 
 @dataclass(frozen=True, eq=False)
-class Grid:
+class Discretisation:
     """How finely the force is resolved: degree of its polynomials, length of an element in rad."""
 
     degree: int
@@ -99,7 +99,12 @@ class _Points:
 
 
 def period(
-    modes: CutterModes, cut: Cut, k: Coefficients, rpm: float, grid: Grid, depth_m: float = 0.0
+    modes: CutterModes,
+    cut: Cut,
+    k: Coefficients,
+    rpm: float,
+    grid: Discretisation,
+    depth_m: float = 0.0,
 ) -> Period:
     """Of modes in the cut's plane at a speed; `depth_m` counts where the cutter has a helix."""
     speed = rpm * 2 * np.pi / 60
@@ -118,7 +123,7 @@ def _seen(modes: CutterModes) -> np.ndarray | None:
 
 
 def _points(
-    found: Contact, cut: Cut, k: Coefficients, speed: float, degree: int, depth_m: float,
+    found: Engagement, cut: Cut, k: Coefficients, speed: float, degree: int, depth_m: float,
     seen: np.ndarray | None,
 ) -> _Points:  # fmt: skip
     nodes = lobatto(degree).nodes
@@ -147,7 +152,7 @@ def _points(
 
 
 def _build(
-    modes: CutterModes, found: Contact, points: _Points, speed: float, degree: int
+    modes: CutterModes, found: Engagement, points: _Points, speed: float, degree: int
 ) -> Period:
     rule, weight = lobatto(degree), modes.weight
     duration = found.period / speed
@@ -205,7 +210,7 @@ def _rotations(e: np.ndarray) -> np.ndarray:
 
 
 def _uneven(
-    built: Period, found: Contact, points: _Points, cut: Cut, k: Coefficients, speed: float,
+    built: Period, found: Engagement, points: _Points, cut: Cut, k: Coefficients, speed: float,
     degree: int, depth_m: float,
 ) -> Period:  # fmt: skip
     """The same where teeth follow at different angles: each has a delay of its own.
@@ -238,6 +243,6 @@ def _uneven(
     )  # fmt: skip
 
 
-def _element_at(found: Contact, angle: float) -> int:
+def _element_at(found: Engagement, angle: float) -> int:
     inside = np.flatnonzero((found.start <= angle + 1e-9) & (angle <= found.end + 1e-9))
     return int(inside[0])

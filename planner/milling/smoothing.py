@@ -76,7 +76,9 @@ def fit(frequency_hz: np.ndarray, values: np.ndarray, sd: np.ndarray) -> Smoothe
     """
     square = (2 * np.pi * frequency_hz) ** 2
     receptance = np.moveaxis(values, 0, -1)
-    problem = _Problem(frequency_hz, -receptance * square, (np.moveaxis(sd, 0, -1) * square) ** 2)
+    problem = _SmoothingProblem(
+        frequency_hz, -receptance * square, (np.moveaxis(sd, 0, -1) * square) ** 2
+    )
     best: Refined | None = None
     for pairs in PAIRS:
         if 2 * len(values) < LINES_PER_NUMBER * (2 * pairs + TERMS):
@@ -109,7 +111,7 @@ def _swinging(poles: np.ndarray, highest_hz: float) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _SmoothingProblem:
     """Accelerance and its variance (n, n, F) at lines (F,) in Hz."""
 
     frequency_hz: np.ndarray

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from planner.errors import InputError
-from planner.frf.quantities import convert
+from planner.frf.labelled import labelled_frfs
 from planner.frf.synthesis import pole
 from planner.milling.coupling import TipReceptance
 from planner.milling.rotations import TwoPoints, two_point_receptance
@@ -140,7 +140,9 @@ def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
     tip, back = sorted(tool.points, key=lambda p: p.from_tip)[:2]
     if tip.from_tip > 0:
         raise InputError(f"No [[point]] of {tool.name} is at its tip; give one from_tip_m = 0.")
-    frequency, found = _entries(records, (tip.node, back.node))
+    nodes = frozenset((tip.node, back.node))
+    frequency, frfs = labelled_frfs(records, "receptance", InputError, nodes)
+    found = {(*one.felt, *one.hit): one.values for one in frfs}
     directions = tuple(k for k in range(3) if any(key[1] == k for key in found))
     wanted = [(node, k) for node in (tip.node, back.node) for k in directions]
     lacking = [(a, b) for a in wanted for b in wanted if (*a, *b) not in found]
@@ -152,7 +154,7 @@ def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
     found = replace(found, simulated=any(record.simulated for record in records))
     if noise > 0:
         return smoothed(found)
-    text = "How noisy the FRFs are is not stated: no sd counts it; say so by --noise PERCENT."
+    text = "The file gives no noise level, so results carry no sd; pass --noise PERCENT."
     return replace(found, remarks=(text,))
 
 
@@ -164,33 +166,6 @@ def _lacks(lacking: list[tuple]) -> str:
         f"{len(lacking)} FRFs lack, first the one at node {response} along {AXES[i]} from a hit at "
         f"node {hit} along {AXES[j]}, so there are no rotations"
     )
-
-
-def _entries(
-    records: list[FrfRecord], nodes: tuple[str, str]
-) -> tuple[np.ndarray, dict[tuple, np.ndarray]]:
-    """Lines above 0 Hz, and receptances by (node, direction, hit node, hit direction)."""
-    frequency = np.asarray(records[0].frequency_hz, float)
-    keep = frequency > 0
-    found: dict[tuple, np.ndarray] = {}
-    for record in records:
-        if record.quantity == "unknown" or not record.unit:
-            raise InputError(
-                f"{record.source}: it is not stated whether these FRFs are accelerance, mobility "
-                f"or receptance, and in which unit; label them."
-            )
-        if len(record.frequency_hz) != len(frequency):
-            raise InputError(f"{record.source} has other frequency lines; export one grid.")
-        places = zip(
-            record.response_node, record.response_direction, record.reference_node,
-            record.reference_direction, record.values, strict=True,
-        )  # fmt: skip
-        for node, i, hit, j, values in places:
-            if not (1 <= abs(i) <= 3 and 1 <= abs(j) <= 3 and {node, hit} <= set(nodes)):
-                continue
-            moved = convert(frequency[keep], values[keep], record.quantity, "receptance")
-            found[(node, abs(i) - 1, hit, abs(j) - 1)] = np.sign(i) * np.sign(j) * moved
-    return frequency[keep], found
 
 
 Pair = tuple[float, float]

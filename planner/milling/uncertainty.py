@@ -8,7 +8,13 @@ import numpy as np
 from planner.inference.parallel import side_by_side
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients
-from planner.milling.first_loss import Level, first_unstable, levels, refined, scanned_depths
+from planner.milling.first_loss import (
+    GrowthAtDepth,
+    first_unstable,
+    levels,
+    refined,
+    scanned_depths,
+)
 from planner.milling.lobes import Loss, losses
 from planner.milling.machine import Machine
 from planner.progress import Tell, quietly
@@ -106,9 +112,9 @@ def _limits(machine: Machine, rpm: np.ndarray, around: np.ndarray) -> np.ndarray
     return found
 
 
-def _bracket(seen: list[Level]) -> tuple[Level, Level] | None:
+def _bracket(seen: list[GrowthAtDepth]) -> tuple[GrowthAtDepth, GrowthAtDepth] | None:
     """The first loss among levels that are coarse; before the first of them it is stable."""
-    before = Level(0.0, -1.0)
+    before = GrowthAtDepth(0.0, -1.0)
     for level in seen:
         if level.size > 0:
             return before, level

@@ -19,7 +19,7 @@ class Zeroth:
 
 
 @dataclass(frozen=True, eq=False)
-class Curves:
+class LobeCurves:
     """Per line (f,) and eigenvalue (2,): depth of the limit (inf: none) and phase of a period."""
 
     frequency_hz: np.ndarray
@@ -37,7 +37,7 @@ class Curves:
         return float(self.frequency_hz[np.argmin(np.min(self.depth_m, axis=1))])
 
 
-def curves(frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> Curves:
+def curves(frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> LobeCurves:
     """Of receptances (F, 2, 2) in the cut's plane, in m/N, and the mean matrix (2, 2) in N/m²."""
     values = _followed(np.linalg.eigvals(mean @ receptance))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -45,7 +45,7 @@ def curves(frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -
         depth = np.abs(inverse) ** 2 / (2 * inverse.real)
         depth = np.where((inverse.real > 0) & np.isfinite(depth), depth, np.inf)
     phase = np.unwrap(np.pi - 2 * np.angle(inverse), axis=0)
-    return Curves(np.asarray(frequency_hz, dtype=float), depth, phase)
+    return LobeCurves(np.asarray(frequency_hz, dtype=float), depth, phase)
 
 
 def _followed(values: np.ndarray) -> np.ndarray:
@@ -59,7 +59,7 @@ def _followed(values: np.ndarray) -> np.ndarray:
     return np.where(odd[:, None], values[:, ::-1], values)
 
 
-def limits(found: Curves, rpm: np.ndarray, teeth: int) -> Zeroth:
+def limits(found: LobeCurves, rpm: np.ndarray, teeth: int) -> Zeroth:
     """First loss of stability at speeds (n,) in rpm."""
     omega = 2 * np.pi * found.frequency_hz
     depth, hertz = np.full(len(rpm), np.nan), np.full(len(rpm), np.nan)

@@ -117,7 +117,8 @@ def _turned_row(dof: Dof, hit: bool) -> str:
     done = "hit" if hit else "felt"
     return (
         f"The sign at {place(dof)} is turned where it was {done}: in all modes it moves against the"
-        f" points around it. All FRFs {done} there are taken turned back."
+        f" points around it. The sign of all FRFs {done} there was "
+        "inverted before the analysis."
     )
 
 
@@ -172,7 +173,8 @@ def _turned(
     if len(wrong) == driving > 1:
         return [
             "All driving points have the wrong sign (Im H < 0 at resonances): the force, or all "
-            "responses, were measured with a turned sign. They are taken turned back."
+            "responses, were measured with a turned sign. Their sign was inverted before the "
+            "analysis."
         ]
     sentences = []
     for dof in wrong:
@@ -180,7 +182,8 @@ def _turned(
         more = f" and {len(others)} × H_ij = −H_ji" if others else ""
         sentences.append(
             f"The sign of the channel at {place(dof)} is turned: its driving point has Im H < 0 "
-            f"at resonances{more}. All FRFs with this reference are taken turned back."
+            f"at resonances{more}. The sign of all FRFs with this reference was inverted before "
+            "the analysis."
         )
     return sentences
 

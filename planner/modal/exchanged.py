@@ -38,15 +38,14 @@ class Exchange:
         a, b = self.first, self.second
         if np.isnan(self.stated):
             return (
-                f"Node {a.node}'s and node {b.node}'s rows fit each other's places: as stated they"
-                " move against the points around them in the modes, with them exchanged like them;"
-                " were the two exchanged?"
+                f"Nodes {a.node} and {b.node} are probably swapped: as labelled they move against "
+                "the points around them in the modes, swapped they move with them. Check the "
+                "labels."
             )
         return (
-            f"Node {a.node}'s and node {b.node}'s rows ({a.direction}) fit each other's places: "
-            f"with them exchanged, hitting there and feeling there agree to"
-            f" {100 * self.exchanged:.0f} %, as stated they differ by {100 * self.stated:.0f} %;"
-            " were the two exchanged?"
+            f"Nodes {a.node} and {b.node} ({a.direction}) are probably swapped: as labelled, "
+            f"hitting and listening there differ by {100 * self.stated:.0f} %, swapped by "
+            f"{100 * self.exchanged:.0f} %. Check the labels."
         )
 
 

@@ -68,8 +68,8 @@ class Homogeneity:
         if not self.told and self.difference >= SHARE:
             return (
                 f"FRFs at {low.peak_force_n:.0f} N and {high.peak_force_n:.0f} N differ by "
-                f"{100 * self.difference:.0f} %, as hits that miss do too: whether the response is "
-                "proportional to the force can't be told without repeats; hit twice at each level."
+                f"{100 * self.difference:.0f} %. Either the response is not proportional to the "
+                "force, or hits missed the point or the axis; hit twice at each level to see which."
             )
         if self.homogeneous:
             return ""

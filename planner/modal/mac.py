@@ -1,26 +1,15 @@
-"""Comparing modes: MAC, and the alignment of measured modes with expected ones."""
+"""Comparing modes: MAC, and how well measured modes match expected ones."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.mode_matching import best, chances
-from planner.modal.modes import ModalModel, Mode
+from planner.modal.modes import Mode
 
 # Odds, in units of −2 log likelihood, of an expected mode that was not found and of a measured
 # mode that nobody expects; and the weight of 1 − MAC beside squared standard deviations.
 MISSING_COST, SPURIOUS_COST, MAC_WEIGHT = 9.0, 9.0, 8.0
-DEFAULT_SD = 0.1
-
-
-@dataclass(frozen=True, eq=False)
-class Alignment:
-    """Which measured mode carries which label; `probability[k]` that label k is right."""
-
-    modes: tuple[Mode | None, ...]
-    probability: np.ndarray  # (k,)
 
 
 def mac(a: np.ndarray, b: np.ndarray) -> float:
@@ -42,37 +31,13 @@ def _unit(shapes: np.ndarray) -> np.ndarray:
     return np.divide(shapes, norm, out=np.zeros_like(shapes), where=norm > 0)
 
 
-def align(
-    measured: ModalModel,
-    expected_frequency_hz: np.ndarray,
-    expected_shape: np.ndarray | None = None,
-    expected_sd: np.ndarray | float = DEFAULT_SD,
-) -> Alignment:
-    """Label measured modes 1…k by what is expected.
-
-    expected_frequency_hz (k,), increasing; expected_shape (k, 3) complex or None; expected_sd
-    (k,) or one number: standard deviation of the log frequency. The order of frequencies is
-    kept; an expected mode may be missing and a measured one unexpected, so one missing mode
-    costs one label and shifts none. The probabilities sum over all alignments (forward and
-    backward), not only the best.
-    """
-    expected = np.asarray(expected_frequency_hz, float)
-    sd = np.broadcast_to(np.asarray(expected_sd, float), expected.shape)
-    modes = sorted(measured.modes, key=lambda mode: mode.frequency_hz)
-    gain = match_gain(modes, expected, expected_shape, sd)
-    choice = best(gain, ordered=True)
-    chance = chances(gain, ordered=True)
-    labelled = tuple(None if j < 0 else modes[j] for j in choice)
-    column = np.where(choice < 0, len(modes), choice)
-    return Alignment(labelled, chance[np.arange(len(expected)), column])
-
-
 def match_gain(
     modes: Sequence[Mode], expected: np.ndarray, shape: np.ndarray | None, sd: np.ndarray
 ) -> np.ndarray:
     """(k, modes): what each match is better than a missing mode and an unexpected one.
 
-    Arguments as of `align`, of modes in any order.
+    Frequencies `expected` (k,) and shapes (k, 3), complex, or None; sd (k,) of the logarithm of the
+    frequency.
     """
     spurious = np.array([unexpected_cost(mode) for mode in modes])
     return MISSING_COST + spurious - _match_cost(modes, expected, shape, sd)

@@ -35,8 +35,8 @@ def odd_entries(sides: Sides) -> tuple[list[str], list[tuple[int, int]]]:
             if np.all(off < FITS * size[[b, a], column]):
                 wrong += [(a, column), (b, column)]
                 sentences.append(
-                    f"The FRFs {_named(sides, a, column)} and {_named(sides, b, column)} fit each "
-                    "other's places and were left out; were the two exchanged?"
+                    f"The FRFs {_named(sides, a, column)} and {_named(sides, b, column)} are "
+                    "probably swapped and were left out. Check the labels."
                 )
     few = len(sentences) <= MOST * np.count_nonzero(np.isfinite(stated))
     return (sentences, wrong) if few else ([], [])

@@ -120,9 +120,7 @@ def _normal(
         s = _two_sided(lags, (w[o] * h).T).real  # (2n+1, i) for lags −n…n
         products = (w[o] * h.conj()[:, None] * h[None]).reshape(inputs * inputs, lines)
         t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
-        gram = r[np.abs(lag)]
-        gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
-        factor = np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(order + 1))
+        factor = _numerator_factor(r, lag)
         coupled = -s[lag + order].reshape(order + 1, -1)
         reduced[o] = np.linalg.solve(factor, coupled).reshape(order + 1, order + 1, inputs)
         total += t[lag + order].transpose(0, 2, 1, 3)
@@ -138,9 +136,7 @@ def _normal_of_one_profile(
     index = np.arange(order + 1)
     lag = index[None, :] - index[:, None]
     r = (lags @ weight).real
-    gram = r[np.abs(lag)]
-    gram[np.diag_indices(order + 1)] *= 1 + RIDGE * (order + 1)
-    factor = np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(order + 1))
+    factor = _numerator_factor(r, lag)
     weighted = (weight * frf).reshape(-1, lines)
     s = _two_sided(lags, weighted.T).real.reshape(-1, outputs, inputs)
     coupled = -s[lag + order].reshape(order + 1, -1)  # rows, then columns × outputs × inputs
@@ -149,6 +145,13 @@ def _normal_of_one_profile(
     products = np.einsum("oif,ojf->ijf", frf.conj(), weight * frf).reshape(-1, lines)
     t = _two_sided(lags, products.T).real.reshape(-1, inputs, inputs)
     return t[lag + order].transpose(0, 2, 1, 3), np.ascontiguousarray(reduced)
+
+
+def _numerator_factor(r: np.ndarray, lag: np.ndarray) -> np.ndarray:
+    """L (n+1, n+1) of R = LLᵀ, the Toeplitz matrix of sums r (n+1,) by lag, with its ridge."""
+    gram, size = r[np.abs(lag)], len(r)
+    gram[np.diag_indices(size)] *= 1 + RIDGE * size
+    return np.linalg.cholesky(gram + RIDGE * r[0] * np.eye(size))
 
 
 def _two_sided(lags: np.ndarray, data: np.ndarray) -> np.ndarray:

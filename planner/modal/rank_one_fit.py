@@ -99,7 +99,7 @@ def fit_shape(
     noise = 2 * variance * (2 * damped_1_s) ** 2
     even = noise + START_SHARE**2 * np.mean(np.abs(values) ** 2)
     tied = np.intersect1d(entries.rows, entries.columns) if gain else np.zeros(0, int)
-    problem = _Problem(entries, values, tied, max(gain, 1e-12))
+    problem = _RankOneProblem(entries, values, tied, max(gain, 1e-12))
     near = _start(entries, values, 1 / even) if near is None else near
     found = np.append(near, np.zeros(tied.size))
     spread, proportional = even, np.zeros(even.size)
@@ -153,7 +153,7 @@ def _spread(
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _RankOneProblem:
     """φ_row φ_column (1 + g_row) beside values (e,); unknowns: all φ, g of the `tied` points."""
 
     entries: Entries
@@ -208,7 +208,7 @@ class _Problem:
 
 
 def _fitted(
-    problem: _Problem, weight: np.ndarray, found: np.ndarray, still: float = STILL
+    problem: _RankOneProblem, weight: np.ndarray, found: np.ndarray, still: float = STILL
 ) -> np.ndarray:
     """The unknowns that fit best, from first ones (Gauss-Newton)."""
     n = problem.entries.points
@@ -227,7 +227,7 @@ def _fitted(
 
 
 def _shortened(
-    problem: _Problem, weight: np.ndarray, found: np.ndarray, step: np.ndarray
+    problem: _RankOneProblem, weight: np.ndarray, found: np.ndarray, step: np.ndarray
 ) -> np.ndarray:
     """The unknowns after the longest part of a step that does not make the fit worse."""
     now = problem.error(found, weight)

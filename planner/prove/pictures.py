@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from planner.prove.curves import CLEARLY_NATS, EDGES_NATS, MEASURES, CurveBin, curve, nameable
-from planner.prove.score import BINS, Scored
+from planner.prove.score import Scored, by_probability
 
 OPEN_DECADES = 10.0  # factor by which the first and last bin are drawn beyond their inner edge
 KNOWN = {"nats": "hits and chain known", "nats_open": "hits and chain open"}
@@ -78,17 +78,13 @@ def confusion(scored: Sequence[Scored]) -> Figure:
 
 def calibration(scored: Sequence[Scored]) -> Figure:
     """How often what was said first is right, over its stated probability."""
-    p = np.array([s.probability for s in scored])
-    right = np.array([s.right for s in scored], dtype=float)
-    place = np.minimum((p * BINS).astype(int), BINS - 1)
     figure = Figure(figsize=(5, 5), layout="constrained")
     FigureCanvasAgg(figure)
     panel = figure.subplots()
     panel.plot([0, 1], [0, 1], color="black", lw=0.8, ls=":")
-    for k in np.unique(place):
-        there = place == k
-        panel.plot(p[there].mean(), right[there].mean(), "o", ms=3 + np.sqrt(there.sum()))
-        panel.annotate(str(there.sum()), (p[there].mean(), right[there].mean()))
+    for p, right in by_probability(scored):
+        panel.plot(p.mean(), right.mean(), "o", ms=3 + np.sqrt(len(p)))
+        panel.annotate(str(len(p)), (p.mean(), right.mean()))
     panel.set_xlabel("stated probability")
     panel.set_ylabel("share that is right")
     return figure

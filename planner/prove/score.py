@@ -187,14 +187,17 @@ def _frac(answer: dict[str, Any], told: dict[str, Any]) -> float:
     return metrics.direct_mean(metrics.agreement(size[..., inside], simulated).global_frac)
 
 
-def calibration_error(scored: Sequence[Scored]) -> float:
-    """Expected calibration error of what was said first, in BINS equal bins of probability."""
+def by_probability(scored: Sequence[Scored]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Stated probabilities and what of it was right, by those of BINS equal bins that hold any."""
     p = np.array([s.probability for s in scored])
     right = np.array([s.right for s in scored], dtype=float)
     place = np.minimum((p * BINS).astype(int), BINS - 1)
+    return [(p[place == k], right[place == k]) for k in np.unique(place)]
+
+
+def calibration_error(scored: Sequence[Scored]) -> float:
+    """Expected calibration error of what was said first."""
     gaps = [
-        abs(p[place == k].mean() - right[place == k].mean()) * np.mean(place == k)
-        for k in range(BINS)
-        if np.any(place == k)
+        abs(p.mean() - right.mean()) * (len(p) / len(scored)) for p, right in by_probability(scored)
     ]
     return float(np.sum(gaps))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from planner.recording.band_spectra import band_spectra
 from planner.recording.points import SENSOR, TCP
 from planner.recording.records import AXES, Fault, Hit
 
@@ -29,11 +30,8 @@ def driving_point(hit: Hit, band_hz: tuple[float, float]) -> tuple[Fault, ...]:
 
 def positive_share(hit: Hit, band_hz: tuple[float, float]) -> float:
     """Share of |Im H|, in [0, 1], with the right sign; H of the hit's own axis, x, y, z heard."""
-    frequency = np.fft.rfftfreq(len(hit.force_n), 1 / hit.sampling_rate_hz)
-    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    force = np.fft.rfft(hit.sign * (hit.force_n - hit.pulse.offset_n))[inside]
-    samples = hit.acceleration_m_s2[hit.axis_index]
-    answer = np.fft.rfft(samples - np.median(samples))[inside]
+    force, answers = band_spectra(hit, band_hz, hit.pulse.offset_n)
+    answer = answers[hit.axis_index]
     power = np.abs(force) ** 2
     strong = power > FLOOR**2 * np.max(power, initial=0.0)
     imag = np.imag(answer[strong] * force[strong].conj()) / power[strong]

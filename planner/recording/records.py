@@ -80,10 +80,9 @@ class Hit:
     acts on the structure along that signed axis, so that H_xx of a "-x" hit is −a_x/F. Rows of
     `acceleration_m_s2` are `responses`, point and axis of its frame; of the tool's sensor alone
     they are x, y and z (parallel to those of the tcp). `hit_point` and the responses' nodes are
-    names of points as in `points.Layout`. `direction_sd_rad` is how far the hand may have missed
-    the axis (sd of the angle), `gain_sd` the relative sd of the force's calibration: 0 where
-    nothing is known of it. `taken_out_m_s2` (r, n) is what was taken out of the accelerations as
-    the answer to the hit's own miss, and `taken_out_sd` which share of that is uncertain.
+    names of points as in `points.Layout`. `taken_out_m_s2` (r, n) is what was taken out of the
+    accelerations as the answer to the hit's own miss, and `taken_out_sd` which share of that is
+    uncertain.
     """
 
     source: Path
@@ -96,8 +95,6 @@ class Hit:
     simulated: bool = False
     hit_point: str = TCP
     responses: tuple[Dof, ...] = OF_TOOL
-    direction_sd_rad: float = 0.0
-    gain_sd: float = 0.0
     taken_out_m_s2: np.ndarray | None = None
     taken_out_sd: float = 0.0
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.recording.band_spectra import band_spectra
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.screening import NOTHING
@@ -154,12 +155,8 @@ def _centre(frfs: np.ndarray) -> np.ndarray:
 
 def _frf(hit: Hit, samples: int, band_hz: tuple[float, float]) -> np.ndarray:
     """FRF (3·F,) of a hit's first samples over the band's lines."""
-    frequency = np.fft.rfftfreq(samples, 1 / hit.sampling_rate_hz)
-    inside = (frequency >= band_hz[0]) & (frequency <= band_hz[1])
-    force = hit.sign * (hit.force_n - np.median(hit.force_n))
-    force = np.fft.rfft(force[:samples])[inside]
-    mean = np.median(hit.acceleration_m_s2, axis=1, keepdims=True)
-    response = np.fft.rfft((hit.acceleration_m_s2 - mean)[:, :samples], axis=1)[:, inside]
+    rest_n = float(np.median(hit.force_n))
+    force, response = band_spectra(hit, band_hz, rest_n, samples)
     floor = 1e-3 * np.max(np.abs(force))
     return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
 

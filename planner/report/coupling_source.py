@@ -33,8 +33,8 @@ def tip_of(
         return found, pose or source.stem
     if robot is None:
         raise InputError(
-            f"{source} holds motions alone, no rotations; {MEASURE}, or let the robot's "
-            f"simulation tell them: --robot ROBOT_TOML."
+            f"{source} holds motions alone, no rotations; {MEASURE}, or have the rotations "
+            f"simulated: --robot ROBOT_TOML."
         )
     loaded = Robot.load(robot)
     q = found.joints_rad
@@ -71,7 +71,7 @@ def tip_at(
     """Of a campaign's accelerance (3, 3, F) and its sd at q (dof,), with its simulation's turns."""
     simulation = campaign.model.low.simulation
     if simulation is None:
-        raise InputError(f"{campaign.directory} has no simulation to tell rotations by; {MEASURE}.")
+        raise InputError(f"{campaign.directory} has no simulation for the rotations; {MEASURE}.")
     s2 = (2j * np.pi * lines) ** 2
     return completed(TipMotion(pose, lines, mean / s2, sd / np.abs(s2), q), simulation, q)
 

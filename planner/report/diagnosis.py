@@ -200,10 +200,10 @@ class DiagnosisReport(Answer):
         near = in_words([(e.effect, e.at) for e in known[0].effects], known[0].probability)
         agrees = self.fit.explained.frac
         return (
-            f"With {100 * first.probability:.0f} % probability something is there that no effect "
-            f"of the library describes to within the noise. Of what it has, {near} comes nearest; "
-            f"the best fit has FRAC {agrees:.4f}. Most of the mismatch may be that, with something "
-            f"else beside it."
+            f"With {100 * first.probability:.0f} % probability no effect known here explains the "
+            f"recordings to within the noise. The closest is {near}; the best fit has FRAC "
+            f"{agrees:.4f}. It may be the larger part of the cause, with something unknown beside "
+            f"it."
         )
 
     def _agreement(self) -> RenderableType:

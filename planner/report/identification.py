@@ -177,7 +177,7 @@ class IdentificationReport(Answer):
             made.add_row(*spring.cells)
         parts: list[RenderableType] = [made, Text("  known: identified by the recordings.")]
         if self.undetermined:
-            parts.append(Text("What these recordings cannot tell:"))
+            parts.append(Text("Not determined by these recordings:"))
             parts += [Text(f"  {text}") for text in self.undetermined]
         parts += [self._agreement(), *remarks(self.remarks), *drawn(self.plots, self.rrd)]
         if self.out and isinstance(self.written, FrfSimilarity):
@@ -236,8 +236,8 @@ def _doubts(judged: "Judged") -> list[str]:
     final, said = judged.final, []
     if final.misfit > LARGE:
         said.append(
-            f"The misfit is {final.misfit:.1f}, 1 being the noise: the simulation lacks more than "
-            f"springs can make up for, and what it lacks is hidden in them; try --extend."
+            f"The misfit is {final.misfit:.1f}, where noise alone would leave 1: something that is "
+            f"no spring is missing in the simulation and distorts the springs; try --extend."
         )
     if not final.converged:
         said.append("The last fit had not come to rest; try more --starts.")

@@ -20,8 +20,6 @@ from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN, check_options
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
 
-FEW = 3  # points of a shape that the table shows
-
 
 @dataclass(frozen=True)
 class ModeOverPoints:

@@ -21,10 +21,10 @@ class MismatchPlaces:
     def sentence(self) -> str:
         """For the engineer."""
         if not self.bands_hz:
-            return "Refitted, the simulation misses the recordings in no band clearly."
+            return "Once refitted, the simulation is clearly off in no frequency band."
         bands = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in self.bands_hz)
         return (
-            f"Refitted without any effect, the simulation misses the recordings at {bands} Hz, at "
+            f"Refitted without any effect, the simulation is clearly off at {bands} Hz, at "
             f"poses {', '.join(self.poses) or '–'}, along {', '.join(self.directions) or '–'}."
         )
 
@@ -69,7 +69,7 @@ class MismatchShares:
     def sentence(self) -> str:
         """For the engineer."""
         return (
-            f"Mismatch to what was recorded: {self.stated:.1f} dB as stated, {self.refitted:.1f} "
-            f"refitted, {self.explained:.1f} explained; {self.left:.1f} once misses of hits and "
-            f"sensor are taken out."
+            f"Mismatch to the recordings: {self.stated:.1f} dB as stated, {self.refitted:.1f} "
+            f"refitted, {self.explained:.1f} explained; {self.left:.1f} without the errors of hits "
+            f"and sensor."
         )

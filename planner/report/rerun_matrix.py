@@ -8,7 +8,6 @@ import rerun.blueprint as rrb
 from matplotlib import colormaps
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.mac import mac_matrix
 from planner.modal.matrix_modes import MatrixModes
 from planner.recording.geometry import Geometry
 from planner.report.rerun_chart import (
@@ -26,10 +25,11 @@ from planner.report.rerun_modal import (
     FIT,
     WIDE,
     WIDER,
-    draw_mac,
+    draw_auto_mac,
     draw_stabilisation,
     mac_view,
     mode_lines,
+    mode_names,
 )
 from planner.report.rerun_stream import open_stream
 from planner.report.shape_motion import FRAMES, motions, moved
@@ -59,10 +59,8 @@ def record_matrix(
     )
     for number, (o, i) in enumerate(driven):
         draw(stream, f"modes/driving/{number}", _driven(matrix, found, o, i))
-    shapes = np.array([mode.shape for mode in found.modes])
-    names = [f"{k + 1}: {mode.frequency_hz:.4g} Hz" for k, mode in enumerate(found.modes)]
-    about = f"AutoMAC, shapes of {shapes.shape[1]} degrees of freedom"
-    draw_mac(stream, "modes/mac", mac_matrix(shapes, shapes), names, names, about)
+    names = mode_names(found.modes, ".4g")
+    draw_auto_mac(stream, "modes/mac", found.modes, names, "shapes of {} degrees of freedom")
     for k, mode in enumerate(shown):
         if geometry is None:
             draw(stream, f"modes/shape/{k + 1}", _listed(names[k], mode.shape, mode.shape_sd))

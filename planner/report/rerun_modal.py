@@ -1,5 +1,6 @@
 """A modal analysis as a Rerun recording: poles of all orders, FRFs with their fit, MAC."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,11 @@ from matplotlib import colormaps
 
 from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
-from planner.modal.matrix_modes import MatrixModes
+from planner.modal.matrix_modes import MatrixMode, MatrixModes
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.mode_selection import model
-from planner.modal.modes import ModalModel
+from planner.modal.modes import ModalModel, Mode
+from planner.modal.operating import OperatingMode
 from planner.modal.pole_identification import PoleIdentification
 from planner.report.frf_plots import AXES
 from planner.report.modal_plots import poles_by_stability
@@ -35,6 +37,7 @@ STABLE, UNSTABLE = (110, 220, 110), (240, 160, 60)
 RESPONSES = ((255, 110, 110), (120, 220, 120), (110, 160, 255))
 MOST_VALUES, WORTH_A_VALUE = 8, 0.1  # modes of whose MAC all values are written; of more, which
 WIDE, WIDER = 2.0, 5.0  # times the height; where charts lie one above the other
+ShapedMode = Mode | MatrixMode | OperatingMode
 
 
 def record_modes(
@@ -57,12 +60,24 @@ def record_modes(
             for i in range(3):
                 _frf(stream, frf, found.data.frequency_hz, fitted[i, k], modal, i, column)
             _coherence(stream, frf, modal, column)
-    shapes = np.array([mode.shape for mode in modal.modes])
-    names = [f"{k + 1}: {mode.frequency_hz:.2f} Hz" for k, mode in enumerate(modal.modes)]
-    about = f"AutoMAC, shapes of {shapes.shape[-1]} coordinates: different modes can look alike"
-    draw_mac(stream, "modes/mac", mac_matrix(shapes, shapes), names, names, about)
+    about = "shapes of {} coordinates: different modes can look alike"
+    draw_auto_mac(stream, "modes/mac", modal.modes, mode_names(modal.modes), about)
     stream.flush(timeout_sec=10.0)
     stream.disconnect()
+
+
+def mode_names(modes: Sequence[ShapedMode], digits: str = ".2f") -> list[str]:
+    """Number and frequency of each mode."""
+    return [f"{k + 1}: {mode.frequency_hz:{digits}} Hz" for k, mode in enumerate(modes)]
+
+
+def draw_auto_mac(
+    stream: rr.RecordingStream, path: str, modes: Sequence[ShapedMode], names: list[str], about: str
+) -> None:
+    """Log how alike modes are to each other; `about` says of what shapes are, {} of how many."""
+    shapes = np.array([mode.shape for mode in modes])
+    note = f"AutoMAC, {about.format(shapes.shape[-1])}"
+    draw_mac(stream, path, mac_matrix(shapes, shapes), names, names, note)
 
 
 def draw_mac(

@@ -6,7 +6,6 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from planner.modal.mac import mac_matrix
 from planner.modal.operating import OperatingModes
 from planner.modal.stabilisation import stable
 from planner.report.rerun_chart import BRIGHT, GREY, Chart, ChartAxis, Colour, Curve, log_range
@@ -15,8 +14,9 @@ from planner.report.rerun_modal import (
     STABLE,
     UNSTABLE,
     WIDE,
-    draw_mac,
+    draw_auto_mac,
     mac_view,
+    mode_names,
 )
 from planner.report.rerun_sheet import record_sheets
 
@@ -28,10 +28,8 @@ def record_operating(found: OperatingModes, name: str, mark: str, rrd: Path) -> 
     """Write the recording, `mark` before what it says. InputError if it cannot be written."""
 
     def mac(stream: rr.RecordingStream) -> rrb.View:
-        shapes = np.array([mode.shape for mode in found.modes])
-        names = [f"{k + 1}: {mode.frequency_hz:.2f} Hz" for k, mode in enumerate(found.modes)]
-        about = f"AutoMAC, unscaled shapes of {shapes.shape[-1]} responses"
-        draw_mac(stream, "operating/mac", mac_matrix(shapes, shapes), names, names, about)
+        names, about = mode_names(found.modes), "unscaled shapes of {} responses"
+        draw_auto_mac(stream, "operating/mac", found.modes, names, about)
         return mac_view("operating/mac", "AutoMAC", len(found.modes))
 
     note = (

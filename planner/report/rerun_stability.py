@@ -141,7 +141,7 @@ def map_sheets(
         ends = np.array([over.low, over.high])
         curves.append(Curve("wanted", ends, np.full(2, 1e3 * wanted_m), WANTED))
     y = ChartAxis(*log_range([depth]), "depth stable with 95 % (mm)", log=True)
-    title = f"Over {name}, on which it hangs most"
+    title = f"Over {name}, which matters most"
     return {
         "From above": (seen(0, 1, "From above"),),
         "From the side": (seen(0, 2, "From the side"),),

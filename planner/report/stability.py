@@ -18,9 +18,9 @@ MOST_ROWS = 24  # of speeds that the text shows
 class StabilityReport(Answer):
     """Answer of `stability`, per speed (n,).
 
-    `depth_limit_m` is the depth at which stability is first lost coming from zero, null where it is
-    not lost up to the largest depth; `depth_error` how far more points per period still moved it,
-    as a share. `multiplier` is the largest |µ| at the asked point, with what it is still off.
+    `depth_limit_m` is the smallest depth that chatters, null where none up to the largest depth
+    does. `depth_error` is its relative change when more points per period are computed.
+    `multiplier` is the largest |µ| at the asked point, `multiplier_error` its numerical error.
     """
 
     spindle_rpm: np.ndarray

@@ -195,6 +195,11 @@ class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     matters_percent: float = 3.0
 
+    @property
+    def matters(self) -> float:
+        """The same as a fraction of |H|."""
+        return self.matters_percent / 100
+
 
 class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the robot's controller counts its axes: its angle is sign · the URDF's + offset.

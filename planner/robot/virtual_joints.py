@@ -13,7 +13,6 @@ from planner.robot.robot import BASE, Robot
 SMALL = "resonator"  # and its number: a body of its own too
 BETWEEN = 0.75  # share of a rod's second moment that its halves' centres have
 OUTER = ", outer half"  # of a link that bends: a body of its own
-INERTIA_NAMES = ("m", "mx", "my", "mz", "xx", "xy", "yy", "xz", "yz", "zz")  # Pinocchio's order
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +29,8 @@ class VirtualModel:
     elastic: np.ndarray
     bodies: tuple[str, ...]
     carriers: tuple[int, ...]
-    inertia: np.ndarray  # (bodies, 10) about the joints' frames, as INERTIA_NAMES lists them
+    # (bodies, 10) about the joints' frames: m, mx, my, mz, xx, xy, yy, xz, yz, zz, as in Pinocchio
+    inertia: np.ndarray
     frames: tuple[int, ...]
 
 

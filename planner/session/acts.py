@@ -12,7 +12,7 @@ from planner.errors import NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
 from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
-from planner.session.course import Course, Visit
+from planner.session.course import Course, PoseInProgress
 from planner.session.page import page_with_hits, page_without_hits
 from planner.session.station import Station
 from planner.session.verdicts import PoseBefore
@@ -45,7 +45,7 @@ def arrive(station: Station, course: Course) -> Course:
     page = page_with_hits(page, (), (), undoable(station), station.auto, course)
     station.screen.show(page.page)
     station.teller.tell()
-    return replace(course, visit=Visit(proposal, page, time.monotonic()))
+    return replace(course, visit=PoseInProgress(proposal, page, time.monotonic()))
 
 
 def undoable(station: Station) -> bool:
@@ -54,7 +54,7 @@ def undoable(station: Station) -> bool:
     return bool(state.recorded or state.events > 2)  # the campaign's start and a first proposal
 
 
-def on_key(station: Station, course: Course, visit: Visit, key: str | None) -> Course:
+def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     """Act on a key at a pose; without a visit the pose is over."""
     try:
         return _act(station, course, visit, key)
@@ -63,7 +63,7 @@ def on_key(station: Station, course: Course, visit: Visit, key: str | None) -> C
         return course
 
 
-def _act(station: Station, course: Course, visit: Visit, key: str | None) -> Course:
+def _act(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     campaign, pose = station.campaign, visit.proposal.pose
     over = replace(course, visit=None)
     match key:
@@ -102,7 +102,9 @@ def _act(station: Station, course: Course, visit: Visit, key: str | None) -> Cou
     return course
 
 
-def import_waiting(station: Station, course: Course, visit: Visit, files: Sequence[Path]) -> Course:
+def import_waiting(
+    station: Station, course: Course, visit: PoseInProgress, files: Sequence[Path]
+) -> Course:
     """Import the waiting hits; the pose is over when it gave modes."""
     if not files:
         station.say("No whole new file waits yet.", "yellow")

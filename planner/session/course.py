@@ -14,7 +14,7 @@ from planner.session.verdicts import HitVerdict, PoseBefore
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class PoseInProgress:
     """A pose while the robot stands there: what is on the page, and which files wait.
 
     `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
@@ -49,7 +49,7 @@ class Course:
     `history` the overall sd (%) after each measurement; `announced`: the target was.
     """
 
-    visit: Visit | None = None
+    visit: PoseInProgress | None = None
     asking: str = ""
     before: PoseBefore = field(default_factory=PoseBefore)
     here: frozenset[Path] = frozenset()

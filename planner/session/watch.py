@@ -15,7 +15,7 @@ from planner.report import session_text
 from planner.report.answer import Answer
 from planner.report.rerun_story import Story
 from planner.session.acts import answer, arrive, import_waiting, interrupted, on_key, undoable
-from planner.session.course import Course, Visit
+from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
@@ -137,7 +137,7 @@ def _asked(station: Station, course: Course) -> Course:
     return _unless_late(station, course) if course.asking else course
 
 
-def _at_pose(station: Station, course: Course, visit: Visit) -> Course:
+def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     """See what waits at a pose, and act on a key, until it is measured, skipped or superseded."""
     station.say_diagnosis()
     visit = _looked(station, course, visit)
@@ -149,7 +149,7 @@ def _at_pose(station: Station, course: Course, visit: Visit) -> Course:
     return _unless_late(station, course) if course.visit is not None else course
 
 
-def _looked(station: Station, course: Course, visit: Visit) -> Visit:
+def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
     whole, waiting = station.inbox.scan(course.known(station.campaign.state))
     verdicts = station.verdicts.of(whole, course.before.hits, course.here)

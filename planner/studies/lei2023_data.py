@@ -22,8 +22,6 @@ START_DEG = (14.0, -105.0, 115.0, -132.0, -18.0, 133.0)  # joint 5 negative, as 
 MODES = 9
 LIGHT = 0.15  # of the stated damping, which would leave no peak of the ninth mode
 TIP, BACK = (-0.3, 0.0, 0.157), (-0.25, 0.0, 0.157)  # points 1 and 1a in link_6, in m
-SCATTER = (0.002, 0.05, 0.05)  # relative sd of f, of ζ, and of L and R
-POINTS = ("1X", "1aX", "1Y", "1aY")
 LEFT, RIGHT = slice(2, 8), slice(8, 16)  # of the parameters: L and R; 0 is f, 1 is ζ
 
 
@@ -79,16 +77,8 @@ def parameters(truth: Truth, q: np.ndarray, reference: np.ndarray | None = None)
     return rows
 
 
-def scatter(clean: np.ndarray) -> np.ndarray:
-    """Sd (n, 9, 16) of a modal analysis: of f and ζ relative, of L and R to their mode's size."""
-    size = np.abs(clean)
-    for side in (LEFT, RIGHT):
-        size[..., side] = np.sqrt(np.mean(clean[..., side] ** 2, axis=-1))[..., None]
-    return size * np.repeat(list(SCATTER), (1, 1, 14))
-
-
 def _modes(truth: Truth, q: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Poles (9,), L and R (9, 4) of one posture by rising frequency, points as POINTS."""
+    """Poles (9,), L and R (9, 4) of one posture by rising frequency, points as 1X, 1aX, 1Y, 1aY."""
     poles, shapes, entry, *_ = truth.modal(q)
     axes = truth.tcp(q)[0].T[:2]
     points = [truth.along(q, "link_6", np.array(p), axis) for axis in axes for p in (TIP, BACK)]

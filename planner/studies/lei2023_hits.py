@@ -29,7 +29,6 @@ LEVELS = 0.4, 1.0, 2.5
 BRAKES = 0.2  # log-sd of each joint's damping from visit to visit
 OFTEN = 0.8  # of the postures, in which a mode is found that is modelled
 SENSORS = ((0, 2), (1, 3))  # channels of the tip's and the back's sensor: X and Y of each
-Point = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,11 +54,6 @@ class StruckPose:
     wrench: np.ndarray
 
 
-def along(axes: Sequence[int]) -> np.ndarray:
-    """Wrenches (h, 6) of hits exactly along tcp axes 0..2 (h,) and exactly at the tcp."""
-    return np.eye(6)[list(axes)]
-
-
 @dataclass(frozen=True, eq=False)
 class _Linear:
     """A pose's linear system, seen from P ports; of conjugate poles one is kept."""

@@ -34,7 +34,7 @@ class Columns:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pose:
+class _PoseChanges:
     """Receptances (F, 3, 6) from wrenches at the tcp, and their changes, one a column."""
 
     receptance: np.ndarray
@@ -77,7 +77,7 @@ def columns(
 
 
 def _of_hit(
-    pose: _Pose,
+    pose: _PoseChanges,
     axis: int,
     aim: Aim,
     drive: np.ndarray,
@@ -127,7 +127,7 @@ def _matrix(raw: np.ndarray, handling: Handling) -> list[np.ndarray]:
 
 def _pose(
     truth: Truth, q: np.ndarray, s: np.ndarray, scatter: Scatter, handling: Handling
-) -> _Pose:
+) -> _PoseChanges:
     mass, damping, stiffness, drive, sensor = _matrices(truth, q)
     own = truth.factors(q) * [spring.stiffness for spring in truth.springs]
     relaxing = np.zeros((len(s), len(own)), dtype=complex)  # what loss factors add to each spring
@@ -164,7 +164,7 @@ def _pose(
         x, y, z = shift + truth.sensor_offset_m
         there = replace(truth, sensor_offset_m=(float(x), float(y), float(z)))
         place.append((_matrices(there, q)[4] - sensor) @ right / METRE)
-    return _Pose(left @ drive, robot, place, readback)
+    return _PoseChanges(left @ drive, robot, place, readback)
 
 
 def _matrices(truth: Truth, q: np.ndarray) -> tuple[np.ndarray, ...]:

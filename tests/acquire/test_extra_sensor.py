@@ -57,7 +57,7 @@ def test_a_sensor_at_the_foot_parts_floor_and_first_joint(tied: tuple[Problem, l
     found = told(problem, fits)
     assert found.point == "foot"  # the floor moves it, the joint does not
     assert found.log_odds > found.log_odds_without + WORTH
-    assert "A sensor at foot would part base compliance at base" in found.sentence
+    assert "A sensor at foot would tell base compliance at base" in found.sentence
     row = problem.q[["P1", "P2"].index(found.pose)]
     layout = Layout(("tcp",), ("sensor", "foot"))
     alone = separation(problem, fits, [0.5, 0.5], row, 1.0, layout)

@@ -22,11 +22,12 @@ from planner.dynamics.simulation import Simulation
 from planner.robot.robot import Robot
 from planner.studies.models.fidelity_levels import Samples
 from planner.studies.models.likelihood_gp import Normalisation, at_hyperparameters
-from planner.studies.models.nargp import NARGP, fit_low, fit_nargp, perdikaris
+from planner.studies.models.nargp import NARGP, fit_nargp, perdikaris
 from planner.truth.deviation import Deviation
 from planner.truth.load import load_truth
 from tests.support import published_peers
 from tests.support.fusion_problems import PROBLEMS, Design, Problem, design
+from tests.support.nargp_levels import fit_low
 
 SEEDS = int(os.environ.get("PEERS_SEEDS", "10"))
 NOISE = 1e-3  # sd over the cheap values' sd: the variance of 1e-6 that emukit's is given

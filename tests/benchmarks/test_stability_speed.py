@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from planner.milling.cutter_modes import real_modes
 from planner.milling.lobes import losses
 from planner.milling.machine import Machine, multipliers
-from planner.milling.period import Grid
+from planner.milling.period import Discretisation
 from planner.milling.semi_discretisation import semi_monodromy
 from tests.support.milling_cases import MULTIPLIERS, cut, machine, one_mode
 
@@ -18,7 +18,7 @@ RPM, DEPTH_MM = 5000.0, 0.5
 
 def full_error(asked: Machine, degree: int, elements: int) -> float:
     """Of |µ|, with polynomials of a degree on so many elements."""
-    built = asked.period(RPM, Grid(degree, np.pi / elements * (1 + 1e-9)), 0.0)
+    built = asked.period(RPM, Discretisation(degree, np.pi / elements * (1 + 1e-9)), 0.0)
     size = abs(multipliers(list(built.monodromy(np.array([DEPTH_MM * 1e-3]))))[0])
     return abs(size - MULTIPLIERS[DEPTH_MM])
 

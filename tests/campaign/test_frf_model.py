@@ -15,8 +15,8 @@ from planner.dataset.store import Store
 from planner.demo import NAME, shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.frf.metrics import direct_mean, global_frac
-from planner.identification.extended_structure import Structure
+from planner.frf.metrics import agreement, direct_mean
+from planner.identification.extended_structure import ExtendedModel
 from planner.identification.parameters import parametrise, place_name
 from planner.identification.truncated_decay import cut_off
 from planner.robot.robot import Robot
@@ -105,7 +105,7 @@ def test_a_record_cut_off_is_completed(tmp_path):
 
 def test_a_wider_structure_lists_every_spring_once_and_can_be_identified(tmp_path):
     simulation = Simulation(Robot.load(KR210.write(tmp_path)))
-    wide = widened(Structure(simulation, OF_EXACT_HITS))
+    wide = widened(ExtendedModel(simulation, OF_EXACT_HITS))
     places = [place_name(block) for block in wide.simulation.robot.config.compliance]
     assert len(set(places)) == len(places)
     assert {"base along x", "base along y", "base along z", "base about z"} <= set(places)
@@ -160,7 +160,7 @@ def test_before_any_measurement_the_simulation_as_stated_says_what_to_expect(bas
     mean, sd = model.frf(base.unseen[:1], base.lines_hz)
     stated = base.cell.simulation.accelerance(base.unseen[:1], base.lines_hz)
     low = base.lines_hz < 20
-    assert direct_mean(global_frac(stated[..., low], mean[..., low])) > 0.6
+    assert direct_mean(agreement(stated[..., low], mean[..., low]).global_frac) > 0.6
     assert np.all(sd > 0)
 
 

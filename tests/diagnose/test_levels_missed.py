@@ -85,7 +85,7 @@ def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     assert found.effect == UNKNOWN
     told, (remark,) = abstained((found,))
     assert told == ()
-    assert "can't be told without repeats" in remark
+    assert "only repeats show which" in remark
     assert "Hit twice at each level at pose P1 along xyz" in remark
 
 
@@ -123,7 +123,7 @@ def test_fifty_linear_robots_are_proportional(tmp_path):
         others = [(f.effect, f.at) for f in told if f.effect not in (*LAWS_OF_JOINTS, UNKNOWN)]
         print(5001 + number, case.robot, LACKING[number % len(LACKING)] or "as stated",
               f"repeats {how.repeats}", said or "proportional", others or "",
-              "can't be told" if remarks else "", flush=True)  # fmt: skip
+              "undecided" if remarks else "", flush=True)  # fmt: skip
     print(f"not proportional: {len(wrong)} of 50")
     assert not wrong
 

@@ -31,7 +31,7 @@ def best(tmp_path_factory) -> Fit:
     simulation = Simulation(Robot.load(kr210_folder(tmp_path_factory.mktemp("kr210"))))
     rng = np.random.default_rng(8)
     q = np.array([[0.3, -1.5, 1.4, 0.4, -1.0, 0.7], [-0.6, -1.1, 1.0, -0.5, -1.3, -0.2]])
-    q = np.concatenate([q, q[:1] + [[0.5, 0.3, -0.2, 0.6, 0.3, 0.5]]])
+    q = np.concatenate([q, np.add(q[:1], [0.5, 0.3, -0.2, 0.6, 0.3, 0.5])])
     frequency, nan = np.linspace(*BAND, 48), np.full((3, 3, 48), np.nan)
 
     def problem_of(h: np.ndarray) -> Problem:

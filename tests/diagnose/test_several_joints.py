@@ -11,7 +11,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.law_beside_linear import leaves_room
 from planner.diagnosis.laws.equivalent_stiffness import receptances
 from planner.diagnosis.laws.one_joint_response import seen, spectra, strokes, torques
-from planner.diagnosis.laws.several_joint_response import course, joints_of, rates
+from planner.diagnosis.laws.several_joint_response import joints_of, rates, torque_spectra
 from planner.diagnosis.laws.torque_laws import LAWS, Law
 from planner.diagnosis.screens.screen import screen
 from planner.dynamics.simulation import Elasticity, Simulation
@@ -53,7 +53,7 @@ def test_linear_torques_at_all_joints_are_stiffer_springs(struck):
     joints = joints_of(system, hits, 500.0)
     more = np.array([0.4, 0.2, 0.5, 0.3, 0.1, 0.2]) * joints.stiffness
     one = np.ones(6)
-    found = course(with_spring(STIFFENING, more), 0 * one, one, joints, hits, s)
+    found = torque_spectra(with_spring(STIFFENING, more), 0 * one, one, joints, hits, s)
     k = system.elasticity.stiffness.copy()
     k[system.blocks] += more
     springs = Elasticity(k, system.elasticity.damping, system.elasticity.loss_factor)
@@ -74,7 +74,7 @@ def test_a_law_at_one_joint_is_what_it_is_by_itself(struck, law):
     joints, port = joints_of(system, hits, 500.0), 2
     k, a = np.full(6, 1e-6 * joints.stiffness[0]), np.full(6, 3e-4)
     k[port] = 0.5 * joints.stiffness[port]
-    together = course(law, k, a, joints, hits, s).spectrum[port]
+    together = torque_spectra(law, k, a, joints, hits, s).spectrum[port]
     view = seen(system, port, hits, 500.0)
     alone = torques([(law, slice(0, 6))], np.full(6, k[port]), np.full(6, 3e-4), np.zeros(6), view)
     expected = spectra(alone, hits, s)
@@ -96,7 +96,7 @@ def test_derivatives_follow_the_swings_in_time(struck, law):
             2: [(with_spring(law, sign * bump * joints.stiffness), k, a) for sign in (1, -1)],
         }
         for kind, (up, down) in ends.items():
-            over, under = (course(*end, joints, hits, s).spectrum for end in (up, down))
+            over, under = (torque_spectra(*end, joints, hits, s).spectrum for end in (up, down))
             slope = (over - under) / 2e-4
             assert np.allclose(found[kind, joint], slope, atol=0.02 * np.abs(slope).max())
 

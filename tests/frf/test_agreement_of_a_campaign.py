@@ -12,7 +12,7 @@ from planner.dataset.screened_files import Source
 from planner.demo import Pool, shipped
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.frf.metrics import Agreement, agreement, direct_mean, stack
+from planner.frf.metrics import Agreement, agreement, direct_mean, mean_known, stack
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import save
 from planner.robot.robot import Robot
@@ -75,7 +75,8 @@ def drawn(name: str, frfs: list[Frf], simulated: list[np.ndarray]) -> Figure:
 
 
 def figures(found: Agreement) -> list[float]:
-    return [direct_mean(v) for v in (found.global_frac, found.frobenius, found.global_complex_frac)]
+    with_phase = mean_known(found.complex_frac, axis=0)
+    return [direct_mean(v) for v in (found.global_frac, found.frobenius, with_phase)]
 
 
 @pytest.fixture

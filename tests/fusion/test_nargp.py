@@ -10,8 +10,9 @@ from planner.studies.models.likelihood_gp import (
     fit_growing,
     fit_likelihood,
 )
-from planner.studies.models.nargp import fit_low, fit_nargp
+from planner.studies.models.nargp import fit_nargp
 from planner.surrogate.kernels import parse
+from tests.support.nargp_levels import fit_low
 
 
 def samples(n, seed=0):

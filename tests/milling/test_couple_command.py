@@ -3,6 +3,7 @@
 import io
 import json
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pyuff
 
 from planner.cli.run import run
 from planner.milling.tip_files import read_tip
+from tests.milling.test_stability_command import CUT
 from tests.support.rerun_columns import columns_of, of
 
 LEI = Path(__file__).parents[2] / "campaigns" / "irb6660_lei2023"
@@ -148,6 +150,22 @@ def test_a_missing_point_is_named(few, tmp_path):
     assert code == 2
     assert "node 5" in said
     assert "no rotations" in said
+
+
+def test_another_grid_of_the_same_length_is_refused(few, tmp_path):
+    """In one file the reader sees it; in records of several, what unites them."""
+    path, shifted = tmp_path / "frfs.uff", replace(few, frequency_hz=few.frequency_hz + 1.0)
+    exported(path, few, ((1, 0.0),))
+    exported(path, shifted, ((5, 0.02),))
+    cut = tmp_path / "cut.toml"
+    cut.write_text(CUT)
+    couple = ["couple", path, "--tool", LEI / "target.toml", "--reference", rod(tmp_path)]
+    for command in ([*couple, "--out", tmp_path / "a.npz"], ["stability", path, "--cut", cut]):
+        err = io.StringIO()
+        with redirect_stderr(err):
+            assert run([*map(str, command), "--json"]) == 2
+        assert "frfs.uff" in err.getvalue()
+        assert "export one grid" in err.getvalue()
 
 
 def test_motions_alone_are_refused_with_what_to_measure(coupled, tmp_path):

@@ -97,4 +97,4 @@ def test_without_repeats_it_is_said_what_would_tell():
     assert not found.told
     assert found.homogeneous
     assert found.difference > 0.03
-    assert "can't be told without repeats; hit twice" in found.remark
+    assert "hit twice at each level" in found.remark

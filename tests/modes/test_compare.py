@@ -5,8 +5,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from planner.modal.mac import align, mac, mac_matrix
+from planner.modal.mac import mac, mac_matrix
 from planner.modal.modes import ModalModel, Mode
+from tests.support.alignment import align
 
 numbers = st.floats(-1e3, 1e3).filter(lambda x: x == 0 or abs(x) > 1e-3)
 shapes = st.builds(

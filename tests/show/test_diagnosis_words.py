@@ -30,7 +30,7 @@ def report(verdict: str, *ranked) -> DiagnosisReport:
 
 def test_what_comes_nearest_is_named_beside_the_unknown():
     said = report("unexplained", (UNKNOWN, 0.92), (BASE, 0.08)).verdict_text
-    assert "92 % probability something is there" in said
+    assert "92 % probability no effect known here" in said
     assert "base compliance at base and transverse compliance at joint_1 (8 %)" in said
     assert "0.9999" in said
 

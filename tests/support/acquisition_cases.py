@@ -15,7 +15,7 @@ from planner.campaign.model import Model
 from planner.campaign.proposals import propose
 from planner.campaign.state import CampaignState, Measurement
 from planner.frf.frf import Frf
-from planner.frf.metrics import global_frac
+from planner.frf.metrics import agreement
 from planner.modal.modes import Mode
 from planner.truth.deviation import Deviation, Spring
 from planner.truth.load import load_truth
@@ -178,5 +178,5 @@ def campaign(
         model = build(case.cell, state, frf_of)
         found = np.sort(model.predict(case.unused).frequency_hz, axis=1)
         frf, _ = model.frf(case.unused[:OF_FRFS], case.lines_hz)
-        frac = float(np.mean(global_frac(case.true_frf, frf)))
+        frac = float(np.mean(agreement(case.true_frf, frf).global_frac))
         yield Step(n, model, np.log(found / case.true_hz), minutes, frac)

@@ -18,10 +18,11 @@ from planner.truth.hits import AXES, OVERSAMPLING, Hammer, pulse
 from planner.truth.laws import Elastic, Friction, JointLaw
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, StruckPose, _linear, along
+from planner.truth.nonlinear import Port, StruckPose, _linear
 from planner.truth.propagate import driven
 from planner.truth.scene import Scene
 from planner.truth.secret import HitVisit, Secret, StiffnessDrift, hit_poses
+from tests.support.wrenches import along
 
 SCATTER = Deviation(stiffness=0.15, damping=0.15, inertia=0.04, com_m=0.005)  # as stated ones do
 

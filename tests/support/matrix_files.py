@@ -1,6 +1,7 @@
 """Universal files of a matrix of FRFs, as analysers export them."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,3 +52,14 @@ def write_matrix(
             file.write(piece.read_bytes())
         piece.unlink()
     return path
+
+
+def transposed(matrix: FrfMatrix) -> FrfMatrix:
+    """Responses and references exchanged, as Maxwell's reciprocity allows."""
+    return replace(
+        matrix,
+        responses=matrix.references,
+        references=matrix.responses,
+        accelerance=np.swapaxes(matrix.accelerance, 0, 1),
+        coherence=np.swapaxes(matrix.coherence, 0, 1),
+    )

@@ -14,11 +14,12 @@ from planner.truth.imperfections import imperfect
 from planner.truth.load import load_truth
 from planner.truth.mishaps import OUTSIDERS
 from planner.truth.nats import lacking
-from planner.truth.nonlinear import StruckPose, along, respond
+from planner.truth.nonlinear import StruckPose, respond
 from planner.truth.outsiders import MORE_OUTSIDERS
 from planner.truth.scene import Scene
 from planner.truth.secret import Secret
 from planner.truth.world import CLEAN, REAL
+from tests.support.wrenches import along
 
 STEP_S, N = 1 / 3200, 240
 

@@ -14,9 +14,10 @@ from planner.truth.hits import Hammer
 from planner.truth.laws import Backlash, Contact, Friction, Hardening, JointLaw
 from planner.truth.load import load_truth
 from planner.truth.model import Truth
-from planner.truth.nonlinear import Port, StruckPose, along, respond
+from planner.truth.nonlinear import Port, StruckPose, respond
 from planner.truth.secret import Secret, frfs, once
 from tests.support.known_robots import KR10
+from tests.support.wrenches import along
 
 STEP, N = 1 / 6400, 3200
 Q = KR10.poses(1)[0]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity
+from planner.diagnosis.thresholds import ALONE_WINDOW_RATE_1_S, ALONE_WINDOW_RATE_LOG_SD
 from planner.dynamics.simulation import Simulation
 
 
@@ -18,7 +19,8 @@ class ExponentialWindow(Effect):
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["ExponentialWindow", ...]:
         """The effect at the sensor, whose channels share one window."""
-        return (cls("sensor", (Quantity("rate", "1/s", float(np.log(1.5)), 1.0, True),)),)
+        median = float(np.log(ALONE_WINDOW_RATE_1_S))
+        return (cls("sensor", (Quantity("rate", "1/s", median, ALONE_WINDOW_RATE_LOG_SD, True),)),)
 
     def rate(self, psi: np.ndarray) -> float:
         """The window's decay rate e^ψ in 1/s."""

@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
-from planner.diagnosis.thresholds import DELAY_SD_S, SENSOR_MATRIX_SD
+from planner.diagnosis.thresholds import (
+    DELAY_SD_S,
+    SENSOR_MATRIX_SD,
+    WINDOW_RATE_1_S,
+    WINDOW_RATE_LOG_SD,
+)
 from planner.recording.points import SENSOR
-
-RATE_1_S = 1.0, 2.0  # median and log sd of a window's rate
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,8 @@ class SensorChain(Effect):
         sensor: str = SENSOR,
     ) -> "SensorChain":
         """From several starts of A (3, 3), and of the delay where A changes nothing."""
-        rate = [Quantity("rate", "1/s", float(np.log(RATE_1_S[0])), RATE_1_S[1], True)]
+        median = float(np.log(WINDOW_RATE_1_S))
+        rate = [Quantity("rate", "1/s", median, WINDOW_RATE_LOG_SD, True)]
         delay = Quantity("delay", "s", 0.0, DELAY_SD_S)
         entries = [Quantity(f"a_{i}{j}", "1", 0.0, SENSOR_MATRIX_SD) for i in "xyz" for j in "xyz"]
         quantities = (*(rate if windowed else []), delay, *entries)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Quantity, Setting, Transfer
-from planner.diagnosis.thresholds import USUAL
+from planner.diagnosis.thresholds import ALONE_DELAY_SD_S, ALONE_GAIN_LOG_SD, USUAL
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
 from planner.recording.points import SENSOR
@@ -25,7 +25,7 @@ class SensorGain(Effect):
         cls, simulation: Simulation, sensors: tuple[str, ...] = (SENSOR,)
     ) -> tuple["SensorGain", ...]:
         """One effect for each channel."""
-        gain = Quantity("gain", "1", 0.0, 0.5, True)
+        gain = Quantity("gain", "1", 0.0, ALONE_GAIN_LOG_SD, True)
         return tuple(cls(at, (gain,)) for at in _channels(simulation, sensors))
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
@@ -85,7 +85,7 @@ class ChannelDelay(Effect):
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["ChannelDelay", ...]:
         """The effect at the sensor, whose channels share one delay."""
-        return (cls("sensor", (Quantity("delay", "s", 0.0, 2e-3),)),)
+        return (cls("sensor", (Quantity("delay", "s", 0.0, ALONE_DELAY_SD_S),)),)
 
     def transfer(self, setting: Setting, psi: np.ndarray) -> Transfer:
         """e^(−sτ) times the identity."""

@@ -21,7 +21,7 @@ from planner.diagnosis.laws.level_data import (
 )
 from planner.diagnosis.laws.one_joint_response import Strokes, seen, side_by_side_views, spectra
 from planner.diagnosis.laws.one_joint_response import torques as one_joint_torques
-from planner.diagnosis.laws.several_joint_response import course, joints_of, rates
+from planner.diagnosis.laws.several_joint_response import joints_of, rates, torque_spectra
 from planner.diagnosis.linear.fit import Fit
 from planner.inference.least_squares import Damping, Iterate, accept, begin, propose
 from planner.inference.parallel import side_by_side
@@ -127,7 +127,7 @@ def _misfit_of_several(problem: LawProblem, law: LawAtJoints) -> LawMisfit:
     joints = joints_of(system, problem.hits, data.fastest_hz)
     with np.errstate(over="ignore", invalid="ignore"):
         try:
-            found = course(law.kind, law.k, law.a, joints, problem.hits, data.s)
+            found = torque_spectra(law.kind, law.k, law.a, joints, problem.hits, data.s)
         except np.linalg.LinAlgError:  # swings without bounds
             return LawMisfit(law)
         h = frfs(data, system, law.ports, found.spectrum[None])[0]

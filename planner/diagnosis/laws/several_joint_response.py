@@ -130,7 +130,7 @@ def instants(law: Law, k: np.ndarray, a: np.ndarray, joints: Joints) -> Iterator
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class TorqueSpectra:
     """Spectra (m, c, F) of torques in N·m·s, and what they add to springs (c, m) in N·m/rad.
 
     That is the mean of a hit's torque over its angle, weighed by the square of the angle.
@@ -140,9 +140,9 @@ class Course:
     stiffer: np.ndarray
 
 
-def course(
+def torque_spectra(
     law: Law, k: np.ndarray, a: np.ndarray, joints: Joints, hits: Strokes, s: np.ndarray
-) -> Course:
+) -> TorqueSpectra:
     """Torques' spectra and added stiffness, for every hit."""
     angle, torque = np.empty(joints.free.shape), np.empty(joints.free.shape)
     for i, at in enumerate(instants(law, k, a, joints)):
@@ -151,7 +151,7 @@ def course(
     fade = np.exp(-2 * s[0].real * hits.step_s * np.arange(len(angle)))
     power = np.einsum("n,ncm,ncm->cm", fade, angle, angle)
     work = np.einsum("n,ncm,ncm->cm", fade, angle, torque)
-    return Course(spectrum, work / np.maximum(power, 1e-300))
+    return TorqueSpectra(spectrum, work / np.maximum(power, 1e-300))
 
 
 def rates(

@@ -123,11 +123,11 @@ def shares_of(
 ) -> np.ndarray:
     """Probabilities (k + 1,) of k fits, each of them all there is, and of "unknown".
 
-    Something unknown may be there alone, as it were beside the first fit, or beside any other. How
-    large the discrepancy is tells, how much is `left` (k,), relative to the recordings (noise lets
-    `seen` be seen), and how far what is stated had to go (`bent` (k, sizes), see `pulled`). Where
-    refitting leaves less than `matters`, and bends little, what is unknown does not matter: the
-    first fit will do.
+    "Unknown" is an effect of no library, alone (with the first fit, which has no effect) or in
+    addition to another fit's effects. Three things speak for it: a large discrepancy, a large
+    misfit `left` (k,), relative to the recordings and not below `seen`, which noise hides, and
+    stated values that had to move far (`bent` (k, sizes), see `pulled`). Where refitting leaves
+    less than `matters` and moves stated values little, its share goes to the first fit.
     """
     left = np.maximum(left, seen)
     both = _log_joint(worth, left, prior, matters, seen, bent)

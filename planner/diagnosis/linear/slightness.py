@@ -42,17 +42,17 @@ def without_slight(
     evidence: np.ndarray,
     matters: float,
 ) -> np.ndarray:
-    """Shares (k,) of fits on the same lines, those of effects that do not matter given on.
+    """Shares (k,) of fits to the same lines, moved to simpler fits where an effect is too small.
 
-    The first fit is "none"; `told` are the effects by which each is called, `prior` (k,) their
-    weights before any data, `bent` (k,) how far each moved what is stated, see `Weights`; `left`
-    (k,) is what each leaves of the recordings, relative, see `Mismatch`, `evidence` (k,) the
-    logarithm of what each is worth. A fit gives as much as FRFs say that one of its effects changes
-    less than `matters` of them, and than what every robot has, once the rest is refitted; the fit
-    without it takes it, of several that do as well the likeliest. An effect that takes a good part
-    of all that refitting leaves may be smaller. FRFs that are nearly the same leave it to what was
-    known before which of both it is: the farther the rest had to go, the likelier is an effect that
-    pulls at it.
+    The first fit is "none"; `told` are each fit's effects, `prior` (k,) their weights before any
+    data, `bent` (k,) how far each fit moved the stated values (see `Weights`), `left` (k,) the
+    relative misfit that it leaves (see `Mismatch`), `evidence` (k,) its log evidence. An effect is
+    too small if, with everything else refitted, it changes the FRFs by less than `matters` and what
+    every robot has, added in squares. The more surely that is so, the more of the fit's share moves
+    to the fit without the effect; of several that do as well, to the likeliest. An effect that
+    explains a good part of all that refitting leaves may be smaller. Where both fits have nearly
+    the same FRFs, the prior decides between them: the farther the simpler fit had to move the
+    stated values, the likelier is the effect.
     """
     pull = np.logaddexp(np.log1p(-SOMETHING_UNKNOWN), np.log(SOMETHING_UNKNOWN) + bent)
     enough = matters * CLEARLY_MATTERS
@@ -175,8 +175,8 @@ def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:
 def change(without: Fit, whole: Fit) -> float:
     """Root mean square by which two fits' FRFs differ, relative to those that were measured.
 
-    Of what they say of the recordings, each with the misses that it takes to be likeliest: by what
-    a tilted hit or a gain can be, no effect is seen.
+    Each fit's FRFs include the tilts, offsets and gains that are likeliest for it. What those can
+    imitate therefore does not count as a difference.
     """
     return _apart(_left(without), whole)
 

@@ -13,6 +13,7 @@ from planner.dataset.dataset import LAID, Dataset, Visit
 from planner.dataset.level_columns import Column, column
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.laws.open_misses import relative_misfit
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.diagnosis.linear.problem import tolerances_of
@@ -28,15 +29,13 @@ PADDING = 4  # records' lengths over which responses die away
 
 @dataclass(frozen=True, eq=False)
 class HitError:
-    """δ (2,) in rad and o (2,) in m of a hit, across its axis in cyclic order, with their sds.
+    """δ (2,) in rad and o (2,) in m of a hit, across its axis in cyclic order.
 
     Relative to what the hits of its pose and axis have in common.
     """
 
     tilt_rad: np.ndarray
     offset_m: np.ndarray
-    tilt_sd_rad: np.ndarray
-    offset_sd_m: np.ndarray
 
 
 HitErrors = tuple[tuple[HitError, ...], ...]  # of every hit of every visit
@@ -78,7 +77,7 @@ def _of_visit(
     s = 2j * np.pi * frequency[lines] + columns[0].rate_1_s
     basis = _basis(plain, number, s, tolerances)
     scale = np.repeat([tolerances.angle_rad, tolerances.offset_m], 2)
-    out: list[HitError] = [HitError(*np.zeros((4, 2)))] * len(columns)
+    out: list[HitError] = [HitError(*np.zeros((2, 2)))] * len(columns)
     # Hits at one point, along one axis, that the same channels heard.
     places = [(c.axis, c.hits[0].hit_point, c.hits[0].responses) for c in columns]
     for place in dict.fromkeys(places):
@@ -91,9 +90,9 @@ def _of_visit(
         variance = np.array([columns[i].variance[own][:, lines] for i in group])
         variance = variance + (RELATIVE * np.abs(h)) ** 2
         weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
-        eta, sd = _solved(h, weight, basis[column][:, rows])
-        for i, e, own in zip(group, eta * scale, sd * scale, strict=True):
-            out[i] = HitError(e[:2], e[2:], own[:2], own[2:])
+        eta = _solved(h, weight, basis[column][:, rows])
+        for i, e in zip(group, eta * scale, strict=True):
+            out[i] = HitError(e[:2], e[2:])
     return tuple(out)
 
 
@@ -114,8 +113,8 @@ def _basis(plain: Fit, number: int, s: np.ndarray, tolerances: Tolerances) -> np
     return hit_basis(h, turned.moment, tolerances)[0]
 
 
-def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """η and its sd (n, 4) of n columns h (n, r, F), in sds, and Σ η = 0.
+def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """η (n, 4) of n columns h (n, r, F), in sds, and Σ η = 0.
 
     Least squares with prior N(0, 1) of h = common + B η, `common` being free at every line.
     """
@@ -132,8 +131,7 @@ def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> tuple[np.nd
             normal[4 * i : 4 * i + 4, 4 * k : 4 * k + 4] = _inner(basis, w * basis)
     covariance = np.linalg.inv(normal + np.eye(4 * n))
     apart = np.kron(np.eye(n) - 1 / n, np.eye(4))
-    covariance, eta = apart @ covariance @ apart, apart @ covariance @ right
-    return eta.reshape(n, 4), np.sqrt(np.diagonal(covariance)).reshape(n, 4)
+    return (apart @ covariance @ right).reshape(n, 4)
 
 
 def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -143,20 +141,12 @@ def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def corrected(recorded: Dataset, plain: Fit, errors: HitErrors) -> Dataset:
     """Hits as they would have been answered without their own misses."""
-    off = _relative_misfit(plain)
+    off = relative_misfit(plain)
     visits = tuple(
         _corrected(visit, number, plain, own, float(off[number]))
         for number, (visit, own) in enumerate(zip(recorded.visits, errors, strict=True))
     )
     return recorded.corrected(visits)
-
-
-def _relative_misfit(plain: Fit) -> np.ndarray:
-    """(n,): by which share the fitted simulation misses the FRFs of each visit."""
-    measured, h = plain.misfit.measured, plain.misfit.response(plain.x)[0]
-    off = np.where(measured.used, np.abs(h - measured.accelerance) ** 2, 0.0)
-    size = np.where(measured.used, np.abs(measured.accelerance) ** 2, 0.0)
-    return np.sqrt(off.sum(axis=(1, 2, 3)) / size.sum(axis=(1, 2, 3)))
 
 
 def _corrected(
@@ -190,6 +180,6 @@ def describe(errors: HitErrors) -> str:
     tilt = float(np.rad2deg(np.sqrt(np.mean([e.tilt_rad**2 for e in each]))))
     offset = 1e3 * float(np.sqrt(np.mean([e.offset_m**2 for e in each])))
     return (
-        f"Hits of a pose and axis differ as hand-held ones do, by {tilt:.1f}° in each direction "
-        f"and {offset:.1f} mm beside the point (rms): that was taken out of the recordings."
+        f"Hits along one axis of a pose differ by {tilt:.1f}° in each direction and by "
+        f"{offset:.1f} mm in place (rms), as hand-held hits do; the recordings were corrected."
     )

@@ -51,8 +51,8 @@ def wanted(recorded: Dataset) -> str:
         if (axes := _once(v.hits, recorded))
     ]
     return (
-        "FRFs of different force levels differ by more than noise, which misses of the hits would "
-        "do as well as a structure that is not linear: that can't be told without repeats. Hit "
+        "FRFs of different force levels differ by more than noise. Either the structure is not "
+        "linear, or hits missed the point or the axis; only repeats show which. Hit "
         f"twice at each level at {'; '.join(few[:3])}{' …' if len(few) > 3 else ''}."
     )
 

@@ -35,7 +35,7 @@ def screen(
     clean = artefacts.correct(recorded, found)
     by_level, missed, errors = force_levels.screen(clean, nominal, tell=tell), clean, ()
     if not by_level and force_levels.differ(clean, nominal):
-        tell("telling how each hit missed its axis and point", 0.3)
+        tell("estimating by how much each hit missed its axis and point", 0.3)
         clean, errors = taken_out(clean, nominal)
     by_time = () if by_level else drift.screen(clean, nominal)
     return Screened((*found, *by_level, *by_time), clean, missed, errors)

@@ -11,7 +11,7 @@ import numpy as np
 
 from planner.inference.quasi_newton import maximise
 from planner.studies.models.fidelity_levels import spread
-from planner.studies.models.multitask import Solved, pull, solve_kronecker
+from planner.studies.models.multitask import KroneckerSolution, pull, solve_kronecker
 from planner.surrogate.kernels import parse
 
 NOISE, NOISE_SPREAD = 0.03, 2.0  # median sd of the noise over the output's, its log-sd
@@ -30,7 +30,7 @@ class GridGP:
     kernels: tuple[str, str]
     theta_a: np.ndarray
     theta_b: np.ndarray
-    solved: Solved
+    solved: KroneckerSolution
     centre: float
     scale: float
     log_evidence: float
@@ -64,7 +64,7 @@ def fit_grid(
     width[1] = NOISE_SPREAD  # the nugget's place in θ_a holds the noise
     width[sizes[0] : sizes[0] + 2] = 1e-6  # θ_b's amplitude and nugget: θ_a's are enough
 
-    def solve(theta: np.ndarray) -> tuple[Solved, np.ndarray, np.ndarray]:
+    def solve(theta: np.ndarray) -> tuple[KroneckerSolution, np.ndarray, np.ndarray]:
         theta_a, theta_b = np.split(theta, [sizes[0]])
         ka, kb = (
             parse(k, 1).covariance(np, t, p, p) + JITTER * np.eye(len(p))

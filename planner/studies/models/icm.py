@@ -19,8 +19,8 @@ from planner.studies.models.multitask import (
     NOISE,
     NOISE_SPREAD,
     RELATIVE_JITTER,
+    KroneckerSolution,
     Normalised,
-    Solved,
     normalised,
     pull,
     solve_kronecker,
@@ -68,7 +68,7 @@ class ICM:
     data: Normalised
     kernel: str
     found: Coregionalisation
-    solved: Solved
+    solved: KroneckerSolution
 
     def predict(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Mean and sd (q, m) of the noise-free outputs at x (q, d)."""
@@ -111,7 +111,7 @@ def log_density(data: Normalised, kernel: str, h: Coregionalisation) -> tuple[fl
     )
 
 
-def solve(data: Normalised, kernel: str, h: Coregionalisation) -> Solved:
+def solve(data: Normalised, kernel: str, h: Coregionalisation) -> KroneckerSolution:
     """K⁻¹y and all slopes, by Kronecker's structure."""
     k = parse(kernel, data.x.shape[1]).covariance(np, h.theta, data.x, data.x)
     k = k + RELATIVE_JITTER * np.mean(np.diag(k)) * np.eye(len(k))

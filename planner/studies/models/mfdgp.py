@@ -116,7 +116,6 @@ class MFDGP:
 
     layers: tuple[Layer, Layer]
     data: TwoLevelData
-    low_units: Normalisation
     high_units: Normalisation
     bound: float  # of the normalised data, with many samples
 
@@ -124,12 +123,6 @@ class MFDGP:
         """Mean and sd (q,) of the noise-free expensive output at x (q, d)."""
         mean, variance = _predicted(self.layers, self.data, np.asarray(x, dtype=float))
         units = self.high_units
-        return units.centre + units.scale * mean, units.scale * np.sqrt(variance)
-
-    def predict_low(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same of the cheap output."""
-        mean, variance = _predicted_low(self.layers[0], self.data.z_low, np.asarray(x, dtype=float))
-        units = self.low_units
         return units.centre + units.scale * mean, units.scale * np.sqrt(variance)
 
 
@@ -161,7 +154,7 @@ def fit_mfdgp(
         layers = _climbed(layers, data, stage, rate, free, steps, how.batch, how.draws)
     draws = max(1, min(DRAWS, MOST_DRAWN // len(y_high)))
     value = float(bound(layers, data, 3 * seed + 2, draws))
-    return MFDGP(layers, data, low_units, high_units, value)
+    return MFDGP(layers, data, high_units, value)
 
 
 def _at_the_data(
@@ -272,11 +265,6 @@ def _climbed(
 
     zeros = jax.tree.map(jnp.zeros_like, layers)
     return jax.lax.fori_loop(0, steps, step, (layers, zeros, zeros))[0]
-
-
-@jax_setup.compiled()
-def _predicted_low(layer: Layer, z: Array, x: Array) -> tuple[Array, Array]:
-    return _marginal(parse("rbf", x.shape[1]), layer, z, x)
 
 
 @jax_setup.compiled()

@@ -83,7 +83,7 @@ class MultiTaskGP:
 
     tasks: Tasks
     hyperparameters: Hyperparameters
-    solved: "Solved"
+    solved: "KroneckerSolution"
     centre: np.ndarray
     scale: np.ndarray
 
@@ -106,7 +106,7 @@ class MultiTaskGP:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class KroneckerSolution:
     """log-likelihood, α = K⁻¹y (n, t) and its slopes in B, K_x and log D.
 
     `rotation` holds eigenvectors (n, n), eigenvalues (n, t) of K over D, and task vectors (t, t).
@@ -125,7 +125,9 @@ class Solved:
         return ((cross @ v) ** 2 @ (1 / w)) @ ((b @ u) ** 2).T
 
 
-def solve_kronecker(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarray) -> Solved:
+def solve_kronecker(
+    y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarray
+) -> KroneckerSolution:
     """For y (n, t) without gaps, k (n, n), b (t, t), noise variances (t,): O(n³ + t³)."""
     n, t = y.shape
     root = np.sqrt(noise)
@@ -146,7 +148,7 @@ def solve_kronecker(y: np.ndarray, k: np.ndarray, b: np.ndarray, noise: np.ndarr
     in_noise = in_noise - 2 * np.sum(
         slope_b * b / np.outer(root, root), axis=1
     )  # fmt: skip
-    return Solved(
+    return KroneckerSolution(
         value - 0.5 * n * t * np.log(2 * np.pi),
         alpha / root,
         slope_b / np.outer(root, root),
@@ -208,7 +210,7 @@ def log_density(tasks: Tasks, h: Hyperparameters) -> tuple[float, np.ndarray]:
     )
 
 
-def solve(tasks: Tasks, h: Hyperparameters) -> Solved:
+def solve(tasks: Tasks, h: Hyperparameters) -> KroneckerSolution:
     """K⁻¹y and all slopes at hyperparameters, by Kronecker's structure."""
     k = parse(tasks.kernel, tasks.x.shape[1]).covariance(np, h.theta, tasks.x, tasks.x)
     k = k + RELATIVE_JITTER * np.mean(np.diag(k)) * np.eye(len(k))

@@ -62,7 +62,7 @@ def fit_nargp(
 
     Args:
         measured: expensive values at x (n, d).
-        low: the cheap level; `fit_low` fits one to samples.
+        low: the cheap level.
         low_units: by what the cheap level's value is normalised as an input.
         noise, units, starts, seed, isotropic: as of `fit_likelihood`.
     """
@@ -71,16 +71,6 @@ def fit_nargp(
     kernel = perdikaris(measured.x.shape[1])
     high = fit_likelihood(wide, kernel, noise, units, starts, seed, isotropic=isotropic)
     return NARGP(low, high, low_units)
-
-
-def fit_low(
-    samples: Samples, noise: float = 1e-2, starts: int = STARTS, seed: int = 0
-) -> LikelihoodGP:
-    """The lowest level: an RBF GP of the cheap samples.
-
-    Its noise is held, as in emukit, whose intermediate levels have a variance of 1e-4.
-    """
-    return fit_likelihood(samples, "rbf", noise, starts=starts, seed=seed)
 
 
 def widened(x: np.ndarray, below: np.ndarray, units: Normalisation) -> np.ndarray:

@@ -1,0 +1,91 @@
+"""FRFs of files with their places: what is checked before any of them is used."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.errors import PlannerError
+from planner.frf.quantities import convert
+from planner.recording.records import FrfRecord
+
+# Relative, of one line in two files: headers state the spacing to five digits or so.
+SAME_LINE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledFrf:
+    """One FRF at lines above 0 Hz, and where it was felt and hit.
+
+    Nodes are "" where the format knows none. `values` and `coherence` (F,) are along positive axes
+    (0, 1, 2 for x, y, z).
+    """
+
+    felt: tuple[str, int]
+    hit: tuple[str, int]
+    values: np.ndarray
+    coherence: np.ndarray
+
+
+def labelled_frfs(
+    records: Sequence[FrfRecord],
+    quantity: str,
+    refusal: type[PlannerError],
+    nodes: frozenset[str] | None = None,
+) -> tuple[np.ndarray, list[LabelledFrf]]:
+    """Lines (F,) above 0 Hz that all records share, and every FRF as `quantity` in SI units.
+
+    Raises `refusal`, in one sentence, where units, lines or directions do not allow it. With
+    `nodes`, FRFs between other nodes, or along no axis, are left out instead.
+    """
+    for record in records:
+        if record.quantity == "unknown" or not record.unit:
+            raise refusal(
+                f"{record.source}: it is not stated whether these FRFs are accelerance, mobility "
+                f"or receptance, and in which unit; label them."
+            )
+    frequency = common_lines(records, refusal)
+    keep, found = frequency > 0, []
+    for record in records:
+        values = convert(frequency[keep], record.values[:, keep], record.quantity, quantity)
+        for k, (felt, i, hit, j) in enumerate(_places(record)):
+            along_axes = 1 <= abs(i) <= 3 and 1 <= abs(j) <= 3
+            if nodes is not None and not (along_axes and {felt, hit} <= nodes):
+                continue
+            if not along_axes:
+                raise refusal(
+                    f"{record.source}: FRF {k + 1} does not state its directions; label them."
+                )
+            turned = np.sign(i) * np.sign(j) * values[k]
+            places = (felt, abs(i) - 1), (hit, abs(j) - 1)
+            found.append(LabelledFrf(*places, turned, record.coherence[k][keep]))
+    return frequency[keep], found
+
+
+def common_lines(records: Sequence[FrfRecord], refusal: type[PlannerError]) -> np.ndarray:
+    """The frequency lines that all records have; `refusal` where they differ."""
+    first = records[0]
+    lines = np.asarray(first.frequency_hz, float)
+    for record in records[1:]:
+        other = np.asarray(record.frequency_hz, float)
+        if other.size != lines.size or not np.allclose(other, lines, rtol=SAME_LINE, atol=1e-9):
+            if record.source == first.source:
+                raise refusal(f"{record.source} mixes frequency lines; export one grid.")
+            raise refusal(
+                f"{record.source} has other frequency lines than {first.source}; export one grid."
+            )
+    return lines
+
+
+def _places(record: FrfRecord) -> list[tuple[str, int, str, int]]:
+    """Node and direction where each FRF was felt, then where it was hit."""
+    none = ("",) * len(record.values)
+    return list(
+        zip(
+            record.response_node or none,
+            record.response_direction,
+            record.reference_node or none,
+            record.reference_direction,
+            strict=True,
+        )
+    )

@@ -1,0 +1,82 @@
+"""FRFs of files are used only with units, one grid and directions."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.errors import InputError, RefusedError
+from planner.frf.exported import from_records
+from planner.frf.labelled import labelled_frfs
+from planner.frf.matrix import matrix_of
+from planner.milling import cutter_frf, tip_files
+from planner.milling.tool import Point, Tool
+from planner.recording.records import FrfRecord
+
+LINES = np.arange(0.0, 100.0, 2.0)
+TOOL = Tool("rod", (0.0, 0.0, 1.0), (), (Point("1", 0.0), Point("5", 0.02)))
+
+
+def record(name: str, lines: np.ndarray = LINES, **changes) -> FrfRecord:
+    """x and y, hit and felt at node 1."""
+    directions = [(i, j) for i in (1, -2) for j in (1, 2)]
+    return replace(
+        FrfRecord(
+            Path(name), lines, np.ones((4, len(lines)), complex), *zip(*directions, strict=True),
+            "accelerance", "m/s^2/N", np.ones((4, len(lines))), (), False, ("1",) * 4, ("1",) * 4,
+        ), **changes,
+    )  # fmt: skip
+
+
+SHIFTED = record("b.uff", LINES + 0.5)
+
+
+@pytest.mark.parametrize(
+    ("second", "words"),
+    [
+        (SHIFTED, "b.uff has other frequency lines than a.uff; export one grid."),
+        (record("b.uff", LINES[1:]), "export one grid"),
+        (record("a.uff", LINES + 0.5), "a.uff mixes frequency lines; export one grid."),
+        (record("b.uff", unit=""), "b.uff: it is not stated .* label them."),
+        (record("b.uff", quantity="unknown"), "b.uff: it is not stated .* label them."),
+        (record("b.uff", response_direction=(1, 0, 1, 2)), "b.uff: FRF 2 does not .* label them."),
+        (record("b.uff", reference_direction=(4, 1, 1, 2)), "b.uff: FRF 1 does not .* label them."),
+    ],
+)
+def test_what_is_not_as_it_must_be_is_refused(second, words):
+    for refusal in (InputError, RefusedError):
+        with pytest.raises(refusal, match=words):
+            labelled_frfs((record("a.uff"), second), "receptance", refusal)
+
+
+def test_every_use_refuses_another_grid_of_the_same_length(tmp_path, monkeypatch):
+    records = record("a.uff"), SHIFTED
+    for made_of in (from_records, matrix_of):
+        with pytest.raises(RefusedError, match="export one grid"):
+            made_of(records)
+    path = tmp_path / "a.uff"
+    path.touch()
+    for module in (tip_files, cutter_frf):
+        monkeypatch.setattr(module, "read", lambda _: records)
+    with pytest.raises(InputError, match="export one grid"):
+        tip_files.read_tip(path, TOOL, None, 0.0)
+    with pytest.raises(InputError, match="export one grid"):
+        cutter_frf.read_frf(path, None)
+
+
+def test_lines_as_headers_round_them_are_the_same():
+    lines, frfs = labelled_frfs(
+        (record("a.uff"), record("b.uff", LINES * (1 + 1e-5))), "receptance", InputError
+    )
+    assert lines == pytest.approx(LINES[1:])
+    assert [(one.felt, one.hit) for one in frfs[1:3]] == [
+        (("1", 0), ("1", 1)), (("1", 1), ("1", 0)),
+    ]  # fmt: skip
+    assert frfs[2].values == pytest.approx(1 / (2 * np.pi * lines) ** 2)
+
+
+def test_what_other_nodes_and_rotations_have_is_left_out_where_nodes_are_named():
+    others = record("a.uff", response_node=("1", "7", "1", "5"), response_direction=(1, 1, 5, 2))
+    _, frfs = labelled_frfs((others,), "receptance", InputError, frozenset(("1", "5")))
+    assert [one.felt for one in frfs] == [("1", 0), ("5", 1)]
