@@ -14,13 +14,14 @@ from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
+from planner.report.established_effects import EstablishedEffect, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
+from planner.report.place_names import place_names, with_names
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Explained
-    from planner.diagnosis.finding import Finding
-    from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
+    from planner.diagnosis.linear_diagnosis import Diagnosis
     from planner.diagnosis.verdict import Ranked
 
 SHOWN = 6  # candidates in the table
@@ -30,26 +31,6 @@ VERDICTS = {
     "explained": "The simulation lacks something, and this explains the recordings:",
     "unexplained": "Something is there that no effect of the library describes.",
 }
-
-
-@dataclass(frozen=True)
-class ParameterValue:
-    """A parameter of an effect with its standard deviation and unit."""
-
-    value: float
-    sd: float
-    unit: str
-
-
-@dataclass(frozen=True)
-class EstablishedEffect:
-    """An effect at its place, the probability that it is there, and its parameters by name."""
-
-    effect: str
-    at: str | None
-    probability: float
-    parameters: Mapping[str, ParameterValue]
-    text: str
 
 
 @dataclass(frozen=True)
@@ -101,6 +82,7 @@ class DiagnosisReport(Answer):
     refused: tuple[RefusedFile, ...]
     remarks: tuple[str, ...]
     simulated: bool
+    place_names: Mapping[str, str]
     npz: str | None = None
     robot: str | None = None
     plots: tuple[str, ...] = ()
@@ -176,7 +158,8 @@ class DiagnosisReport(Answer):
         parts.append(Text(self.where.sentence))
         made = table("What was considered", "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
-            made.add_row(c.effect.replace("_", " "), c.at or "–", _percent(c.probability))
+            at = with_names(c.at or "–", self.place_names)
+            made.add_row(c.effect.replace("_", " "), at, _percent(c.probability))
         parts += [made, self._agreement(), Text(self.shares.sentence)]
         more = (self.next, self.next_sensor)
         parts += [Text(one.sentence, style="bold") for one in more if one]
@@ -198,6 +181,7 @@ class DiagnosisReport(Answer):
         if self.verdict != "unexplained" or not known or first is None:
             return VERDICTS[self.verdict]
         near = in_words([(e.effect, e.at) for e in known[0].effects], known[0].probability)
+        near = with_names(near, self.place_names)
         agrees = self.fit.explained.frac
         return (
             f"With {100 * first.probability:.0f} % probability no effect known here explains the "
@@ -229,10 +213,11 @@ def diagnosis_report(explained: "Explained") -> DiagnosisReport:
     found = judged.diagnosis
     place = where(found.problem, found.refitted)
     aside = tuple(recorded.poses[i] for i in judged.aside)
-    screened = tuple(_of_screen(finding, p) for finding, p in whole.established)
+    names = place_names(found.problem.simulation.robot)
     return DiagnosisReport(
         verdict=whole.verdict,
-        findings=screened + (_of_fits(found) if whole.linear else ()),
+        findings=established_effects(explained, names),
+        place_names=names,
         candidates=tuple(RankedExplanation.of(c.places, c.probability) for c in whole.candidates),
         undecided=tuple(c.places for c in found.undecided),
         sets=alternatives(whole.candidates),
@@ -270,41 +255,3 @@ def alternatives(candidates: Sequence["Ranked"]) -> tuple[tuple[EffectAtPlace, .
 
 def _percent(probability: float) -> str:
     return f"{100 * probability:.1f} %" if probability >= LEAST_SAID else "below 0.1 %"
-
-
-def _of_fits(found: "Diagnosis") -> tuple[EstablishedEffect, ...]:
-    """The effects of the best candidate, where there is one better than "none" and "unknown"."""
-    if found.verdict != "explained":
-        return ()
-    first = found.candidates[0]
-    assert first.fit is not None
-    entries = []
-    for effect in first.effects:
-        values = first.fit.parameters(found.temper, effect)
-        there = (c.probability for c in found.candidates if (effect.name, effect.at) in c.places)
-        text = _text(found, first, effect.text(values))
-        entries.append(
-            EstablishedEffect(
-                effect.name, effect.at, min(1.0, sum(there)), _parameters(values), text
-            )
-        )
-    return tuple(entries)
-
-
-def _of_screen(finding: "Finding", probability: float) -> EstablishedEffect:
-    text = f"{finding.text} ({100 * probability:.0f} %)"
-    values = _parameters(finding.parameters)
-    return EstablishedEffect(finding.effect, finding.at, probability, values, text)
-
-
-def _parameters(values: Mapping[str, tuple[float, float, str]]) -> dict[str, ParameterValue]:
-    return {name: ParameterValue(*value) for name, value in values.items()}
-
-
-def _text(found: "Diagnosis", first: "Candidate", text: str) -> str:
-    others = [c for c in found.undecided if c is not first]
-    said = f"{text} ({100 * first.probability:.0f} %)"
-    if not others:
-        return said
-    names = "; ".join(in_words(c.places, c.probability) for c in others)
-    return f"{said} These recordings cannot tell it from: {names}."

@@ -1,6 +1,6 @@
 """A diagnosis does not contradict itself: words, table and file say the same."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from io import StringIO
 
 import numpy as np
@@ -11,6 +11,9 @@ from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
 from planner.report.diagnosis_plots import _residuals
+from planner.report.place_names import place_names, with_names
+from planner.robot.robot import Robot
+from tests.support.plain_arm import make_plain_arm
 
 UNKNOWN = (("unknown", None),)
 BASE = (("base_compliance", "base"), ("transverse_compliance", "joint_1"))
@@ -23,7 +26,7 @@ def report(verdict: str, *ranked) -> DiagnosisReport:
     given = {
         "verdict": verdict, "findings": (), "remarks": (), "plots": (), "simulated": False,
         "candidates": tuple(RankedExplanation.of(p, q) for p, q in ranked),
-        "fit": ThreeSimilarities(*sides),
+        "fit": ThreeSimilarities(*sides), "place_names": {},
     }  # fmt: skip
     return DiagnosisReport(**(empty | given))
 
@@ -33,6 +36,18 @@ def test_what_comes_nearest_is_named_beside_the_unknown():
     assert "92 % probability no effect known here" in said
     assert "base compliance at base and transverse compliance at joint_1 (8 %)" in said
     assert "0.9999" in said
+
+
+def test_joints_have_the_names_that_the_robot_has_for_them(tmp_path):
+    robot_toml = make_plain_arm(tmp_path)
+    assert place_names(Robot.load(robot_toml)) == {}
+    for path in (robot_toml, tmp_path / "plain.urdf"):
+        path.write_text(path.read_text().replace("joint_1", "swing").replace("link_2", "arm"))
+    assert place_names(Robot.load(robot_toml)) == {"joint_1": "swing", "link_2": "arm"}
+    named = with_names("joint_1 gives; joint_10 and link_2", {"joint_1": "swing", "link_2": "arm"})
+    assert named == "joint_1 (swing) gives; joint_10 and link_2 (arm)"
+    answer = replace(report("unexplained", (BASE, 0.08)), place_names={"joint_1": "swing"})
+    assert "joint_1 (swing)" in answer.verdict_text
 
 
 def test_where_nothing_is_near_nothing_is_named():

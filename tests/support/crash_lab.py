@@ -166,7 +166,8 @@ def kill(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
         replayed = forked(doing(["replay", str(cell.campaign)]), log)
         shutil.rmtree(cell.campaign)
         if replayed.code or {s["check"] for s in replayed.answer["steps"]} - {"identical", "kept"}:
-            return {"command": ["replay"], "faults": ["not reproduced", replayed.out[-500:]]}
+            said = replayed.out[-500:] or f"code {replayed.code}: {replayed.err[-500:]}"
+            return {"command": ["replay"], "faults": ["not reproduced", said]}
     command, before = cell.command(rng), entries(cell)
     change = int(np.exp(rng.uniform(0, np.log(MOST_CHANGES)))) if rng.random() < 0.6 else 0
     after = float(rng.uniform(0.0, LATEST_S * (2 if command[0] == "watch" else 1)))
