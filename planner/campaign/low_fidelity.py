@@ -6,7 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.campaign.learned import SUSPECT, Learned, lacking, likeliest
-from planner.campaign.missing_physics import SWINGS, with_springs, with_swinging_mass
+from planner.campaign.missing_physics import (
+    SWINGS,
+    with_loss_factors,
+    with_springs,
+    with_swinging_mass,
+)
 from planner.dynamics.simulation import Simulation
 from planner.dynamics.vibration import SimulatedModes
 from planner.frf import synthesis
@@ -148,7 +153,7 @@ class LowFidelity:
             return ""
         swinging = learned.structure.swinging
         if learned.fits:
-            more = lacking(learned.found) if learned.structure.added else ""
+            more = lacking(learned.found, learned.poses) if learned.structure.added else ""
             return " ".join(filter(None, (swinging, more)))
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
@@ -190,11 +195,11 @@ def learn(
         return before
     lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
     structure = ExtendedModel(nominal, before.priors)
-    stated = lesson.glanced(structure)
+    stated = with_loss_factors(lesson.glanced(structure), lesson)
     learned = with_springs(stated, lesson)
     if stated.identified.misfit > HOPELESS and learned.identified.misfit > SWINGS:
         # Nothing explains the recordings: now it matters how nearly what is stated does.
-        stated = lesson.identified(structure)
+        stated = lesson.identified(stated.structure)
         learned = likeliest([stated, learned])
     learned = with_swinging_mass(stated, learned, lesson)
     left_out = None
@@ -222,7 +227,8 @@ class Lesson:
         return self._learned(structure, found)
 
     def _learned(self, structure: ExtendedModel, found: Identification) -> Learned:
-        return Learned(structure, found, EXACT_SUSPECT if self.tolerances is None else SUSPECT)
+        suspect = EXACT_SUSPECT if self.tolerances is None else SUSPECT
+        return Learned(structure, found, suspect, len(self.frfs))
 
     def glanced(self, structure: ExtendedModel) -> Learned:
         """As `identified`; not followed to the end where it is far from the recordings."""

@@ -1,8 +1,11 @@
 """A low fidelity that learns: identified from recordings, uncertain where it should be, doubted."""
 
+import re
+
 import numpy as np
 import pytest
 
+from planner.campaign.learned import lacking
 from planner.campaign.low_fidelity import OF_EXACT_HITS, LowFidelity, learn
 from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import estimate
@@ -132,6 +135,30 @@ def test_physics_that_no_joint_has_is_noticed_and_said(tmp_path):
     assert after.simulation is not None
     body = pseudo_inertia(after.simulation.elastic.inertia)
     assert np.all(np.linalg.eigvalsh(body[after.simulation.elastic.inertia[:, 0] > 0]) > 0)
+
+
+def test_damping_that_is_partly_a_loss_factor_is_no_lack_of_compliance(tmp_path):
+    """Nothing is wrong but how gears dissipate: no spring is made up for it."""
+    path, band = write_arm(tmp_path), (4.0, 90.0)
+    stated = path.read_text()
+    damped = re.sub(r"damping = ([\d.e+]+)", lambda m: f"damping = {4 * float(m[1])}", stated)
+    path.write_text(damped)
+    truth = load_truth(path, Deviation(8, 0.15, 0.15, 0.03, 0.003, mixed=1.0))
+    hammer = Hammer(peak_n=250.0, duration_s=0.005, sampling_rate_hz=512.0, record_s=2.0)
+    q, rng = poses(3), np.random.default_rng(3)
+    frfs = [estimate(hits_at(truth, one, hammer, rng), band) for one in q]
+    after = learn(LowFidelity(COUNT, Simulation(Robot.load(path)), Tolerances()), frfs, q, band)
+    assert after.remark == ""
+    assert after.taught
+    assert after.learned is not None
+    assert after.learned.structure.added == 0
+
+
+def test_of_one_pose_no_place_is_told_as_found():
+    springs = ("l2 about y 2.6e+06 ± 3e+05 N·m/rad", "base about x 1e+07 ± 3e+06 N·m/rad")
+    assert "anchor bolts" in lacking(springs)
+    assert "anchor bolts" not in lacking(springs, 1)
+    assert "one pose cannot tell" in lacking(springs, 1)
 
 
 def test_a_mass_that_swings_on_a_link_is_found_and_named(tmp_path):

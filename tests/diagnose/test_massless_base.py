@@ -47,7 +47,7 @@ def test_the_little_mass_changes_no_frf(simulation):
     assert light.mass < 1e-3
     twice = msgspec.structs.replace(with_foot.robot.config, payload=(light, light))
     heavier = Simulation(replace(with_foot.robot, config=twice))
-    assert np.abs(heavier.accelerance(Q, LINES) / h - 1).max() < 1e-4
+    assert np.abs(heavier.accelerance(Q, LINES) - h).max() < 1e-4 * np.abs(h).max()
 
 
 def test_a_base_that_has_a_mass_is_given_none(tmp_path):
