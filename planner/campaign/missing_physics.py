@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.campaign.learned import Learned, likeliest
+from planner.diagnosis.thresholds import LOSS_FACTOR_FACTOR
 from planner.errors import InputError
 from planner.identification.extended_structure import ExtendedModel, added_softer, extended
 from planner.identification.result import Identification
-
-# e^sd of a loss factor around a share of the stated damper mid-band: as in a diagnosis.
-LOSS_FACTOR_FACTOR = 3.0
 
 if TYPE_CHECKING:
     from planner.campaign.low_fidelity import Lesson
@@ -75,6 +73,7 @@ def with_loss_factors(stated: Learned, lesson: "Lesson") -> Learned:
     """With a loss factor beside each damper, where dampers alone do not explain the recordings.
 
     How gears and bearings dissipate no data sheet says; springs that were added would imitate it.
+    Only where nothing else is missing: from loss factors that imitate something no fit comes back.
     Not where hits count as exact, as campaigns that began so took them.
     """
     dampers = sum(e.kind == "damping" for e in stated.identified.estimates)
@@ -86,7 +85,7 @@ def with_loss_factors(stated: Learned, lesson: "Lesson") -> Learned:
     simulation = partly_structural(structure.simulation)
     priors = replace(structure.priors, loss_factor_factor=LOSS_FACTOR_FACTOR)
     lossy = lesson.glanced(replace(structure, simulation=simulation, priors=priors))
-    return likeliest([stated, lossy])
+    return likeliest([stated, lossy]) if lossy.fits else stated
 
 
 def with_swinging_mass(stated: Learned, learned: Learned, lesson: "Lesson") -> Learned:
