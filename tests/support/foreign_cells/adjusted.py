@@ -13,7 +13,7 @@ from tests.support.foreign_cells.spatial import cross_matrix
 from tests.support.foreign_cells.system import System, Tie
 from tests.support.foreign_cells.tree import Body
 
-GEAR_SD, SLIGHT_SD, OTHER_SD, DAMPING_SD, LOSS_SD = 0.25, 0.7, 1.0, 0.5, 0.02
+GEAR_SD, OTHER_SD, DAMPING_SD, LOSS_SD = 0.25, 1.0, 0.5, 0.02
 MASS_SD, CENTRE_SD, SECOND_SD = 0.06, 0.03, 0.08
 
 
@@ -36,7 +36,11 @@ class Adjusted:
         elastic = np.exp(self.sd * self.moves[0]) * (spring(s) - spring.damping * s)
         viscous = spring.damping + spring.loss * spring.stiffness / (2 * np.pi * 15)
         loss = Spring(spring.stiffness, 0, LOSS_SD)(s) - spring.stiffness
-        return [self.sd * elastic, DAMPING_SD * np.exp(DAMPING_SD * self.moves[1]) * viscous * s, loss]
+        return [
+            self.sd * elastic,
+            DAMPING_SD * np.exp(DAMPING_SD * self.moves[1]) * viscous * s,
+            loss,
+        ]
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Dynamic stiffness at `s`."""
@@ -46,16 +50,29 @@ class Adjusted:
 
 
 def _sd(tie: Tie) -> float:
-    """Prior sd of a stiffness's logarithm."""
-    where = tie.name.split(":")
-    if where[-1] == "gear":
-        return GEAR_SD
-    return SLIGHT_SD if where[0].startswith(("joint", "link")) else OTHER_SD
+    """Prior sd of a stiffness's logarithm: of a stated spring, or of another effect's."""
+    return GEAR_SD if tie.name.startswith("joint") else OTHER_SD
 
 
-def movable(tie: Tie) -> bool:
-    """Springs and dampers can be moved; controllers and fluid stay."""
-    return tie.mutual and isinstance(tie.law, Spring)
+def movable(tie: Tie, robot: Robot) -> bool:
+    """Stated springs can be moved, and those of other effects; what is slightly soft stays."""
+    if not tie.mutual or not isinstance(tie.law, Spring):
+        return False
+    where, what = tie.name.split(":") if ":" in tie.name else (tie.name, "")
+    listed = [f"joint_{j + 1}" for j in robot.cross or {}]
+    return what == "gear" or where in listed or not where.startswith(("joint", "link"))
+
+
+def gear_moves(system: System, other: System, robot: Robot) -> np.ndarray:
+    """Moves at which the gears of `system` are as stiff at rest as those of `other`."""
+    moves, at = np.zeros(count(system, robot)), 0
+    stiffness = {tie.name: tie.law.stiffness for tie in other.ties}
+    for tie in system.ties:
+        if movable(tie, robot):
+            ratio = stiffness.get(tie.name, tie.law.stiffness) / tie.law.stiffness
+            moves[at] = np.log(ratio) / _sd(tie)
+            at += 3
+    return moves
 
 
 def _spatial(mass: float, first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -92,8 +109,10 @@ def adjusted(system: System, robot: Robot, moves: np.ndarray) -> System:
     """The system at `moves`: three for every movable tie, then those of inertia."""
     ties, at = [], 0
     for tie in system.ties:
-        if movable(tie):
-            tie = Tie(tie.name, tie.left, tie.right, Adjusted(tie.law, _sd(tie), moves[at : at + 3]))
+        if movable(tie, robot):
+            tie = Tie(
+                tie.name, tie.left, tie.right, Adjusted(tie.law, _sd(tie), moves[at : at + 3])
+            )
             at += 3
         ties.append(tie)
     # Left and right must stay one object: that marks a mutual tie.
@@ -106,7 +125,7 @@ def adjusted(system: System, robot: Robot, moves: np.ndarray) -> System:
 
 def count(system: System, robot: Robot) -> int:
     """How many moves there are."""
-    return 3 * sum(movable(t) for t in system.ties) + 10 * len(robot.links)
+    return 3 * sum(movable(t, robot) for t in system.ties) + 10 * len(robot.links)
 
 
 def columns(system: System, robot: Robot, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

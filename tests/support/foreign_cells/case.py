@@ -77,7 +77,9 @@ def make_case(seed: int, kind: str | None = None) -> Case:
     number = int(rng.integers(5, 11))
     stated_at = draw_poses(rng, robot, number + WANTED)
     sd = np.radians(rng.uniform(0.03, 0.1))
-    error = sd * (0.5 * rng.normal(size=len(robot.joints)) + rng.normal(size=(number, len(robot.joints))))
+    error = sd * (
+        0.5 * rng.normal(size=len(robot.joints)) + rng.normal(size=(number, len(robot.joints)))
+    )
     poses = np.radians(np.round(np.degrees(stated_at[:number]), 4)) + error
     for _ in range(60):
         effects = draw_effects(rng, kind, truth, poses)

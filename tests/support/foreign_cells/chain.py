@@ -57,7 +57,9 @@ def draw_chain(rng: np.random.Generator, motions: list[Motion], artefact: dict[s
     )  # fmt: skip
 
 
-def noise_of(rng: np.random.Generator, rms: float, corner: float, shape: tuple, clock: Clock) -> np.ndarray:
+def noise_of(
+    rng: np.random.Generator, rms: float, corner: float, shape: tuple, clock: Clock
+) -> np.ndarray:
     """White noise of `rms` with 1/f power below `corner` Hz."""
     white = np.fft.rfft(rms * rng.normal(size=shape), axis=-1)
     lines = np.fft.rfftfreq(shape[-1], 1 / clock.rate)

@@ -32,7 +32,9 @@ def kind_of(seed: int) -> str:
     return str(rng.permutation(deck)[place])
 
 
-def draw_effects(rng: np.random.Generator, kind: str, truth: Truth, poses: np.ndarray) -> list[Effect]:
+def draw_effects(
+    rng: np.random.Generator, kind: str, truth: Truth, poses: np.ndarray
+) -> list[Effect]:
     """What is concealed in a case of a kind; poses (n, joints) in rad."""
     if kind == "none":
         return []

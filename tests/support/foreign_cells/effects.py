@@ -98,7 +98,9 @@ def joint_stiffness(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
         gear = plan.gears[joint]
         plan.gears[joint] = gear.times(true / truth.gears[joint].stiffness)
 
-    return Effect("joint_stiffness", f"joint_{joint + 1}", {"stiffness": true, "times_stated": factor}, apply)
+    return Effect(
+        "joint_stiffness", f"joint_{joint + 1}", {"stiffness": true, "times_stated": factor}, apply
+    )
 
 
 def angle_dependent_stiffness(rng: np.random.Generator, truth: Truth, poses) -> Effect:
@@ -124,7 +126,14 @@ def angle_dependent_stiffness(rng: np.random.Generator, truth: Truth, poses) -> 
     def apply(plan: Blueprint, q: np.ndarray, _w: float) -> None:
         plan.gears[joint] = plan.gears[joint].times(max(0.15, 1 + share * shape(float(q[joint]))))
 
-    values = {"share": share, "law": law, "phase": phase, "periods": periods, "middle": middle, "arm": arm}
+    values = {
+        "share": share,
+        "law": law,
+        "phase": phase,
+        "periods": periods,
+        "middle": middle,
+        "arm": arm,
+    }
     return Effect("angle_dependent_stiffness", f"joint_{joint + 1}", values, apply)
 
 
@@ -172,7 +181,9 @@ def local_resonator(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
     total, items, told = sum(b.mass for b in robot.links), [], []
     for _ in range(1 + int(rng.random() < 0.25)):
         mass, ratio = log_uniform(rng, 0.003, 0.06) * total, rng.uniform(0.01, 0.12)
-        place = rng.uniform(0.2, 1) * link_way(robot, link) + rng.normal(size=3) * 0.05 * robot.reach
+        place = (
+            rng.uniform(0.2, 1) * link_way(robot, link) + rng.normal(size=3) * 0.05 * robot.reach
+        )
         middle = log_uniform(rng, 8, 75)
         hertz = [middle * f for f in (1.0, log_uniform(rng, 0.8, 4), log_uniform(rng, 1.5, 6))]
         rates = [2 * np.pi * f for f in hertz]

@@ -18,7 +18,14 @@ def _numbers(values) -> str:
 
 def _inertial(body: Body) -> str:
     tensor = inertia_of(body.second)
-    names = (("ixx", 0, 0), ("iyy", 1, 1), ("izz", 2, 2), ("ixy", 0, 1), ("ixz", 0, 2), ("iyz", 1, 2))
+    names = (
+        ("ixx", 0, 0),
+        ("iyy", 1, 1),
+        ("izz", 2, 2),
+        ("ixy", 0, 1),
+        ("ixz", 0, 2),
+        ("iyz", 1, 2),
+    )
     cells = " ".join(f'{n}="{tensor[i, j]:.12g}"' for n, i, j in names)
     return (
         f'<inertial><origin xyz="{_numbers(body.centre)}" rpy="0 0 0"/>'
@@ -86,7 +93,9 @@ def hit_file(hit: Hit) -> str:
     return f"data/P{hit.pose + 1:02d}_{'xyz'[hit.axis]}_L{hit.level}_{hit.repeat}.uff"
 
 
-def write_tables(folder: Path, robot: Robot, readback: np.ndarray, hits: list[Hit], wanted: np.ndarray) -> None:
+def write_tables(
+    folder: Path, robot: Robot, readback: np.ndarray, hits: list[Hit], wanted: np.ndarray
+) -> None:
     """recordings.csv and predict.csv; angles (rad) as read back."""
     rows = [_header(robot) + ",hit,repeat,file"]
     for hit in hits:

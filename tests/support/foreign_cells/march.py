@@ -38,7 +38,10 @@ def first_order(system: System, gear: str) -> FirstOrder:
     a = np.zeros((total, total))
     a[:size, size : 2 * size] = np.eye(size)
     inverse = np.linalg.inv(system.mass)
-    a[size : 2 * size, :size], a[size : 2 * size, size : 2 * size] = -inverse @ stiff, -inverse @ damp
+    a[size : 2 * size, :size], a[size : 2 * size, size : 2 * size] = (
+        -inverse @ stiff,
+        -inverse @ damp,
+    )
     at = 2 * size
     for tie in ladders:
         for rate in RATES:

@@ -77,7 +77,9 @@ def _real(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return np.concatenate([flat.real, flat.imag], axis=-1)
 
 
-def _normal(pose: Pose, robot: Robot, s: np.ndarray, moves: np.ndarray, error: float, share: float) -> tuple:
+def _normal(
+    pose: Pose, robot: Robot, s: np.ndarray, moves: np.ndarray, error: float, share: float
+) -> tuple:
     """Normal equations of a pose over the shared unknowns; its own are eliminated."""
     shared, frf = columns(adjusted(pose.system, robot, moves), robot, s)
     shared = np.concatenate([shared, _chain_columns(frf)])
@@ -96,7 +98,9 @@ def _normal(pose: Pose, robot: Robot, s: np.ndarray, moves: np.ndarray, error: f
     return d @ d.T - cross.T @ cross, d @ r - cross.T @ short, float(r @ r - short @ short)
 
 
-def _sum(poses: list[Pose], robot: Robot, s: np.ndarray, moves: np.ndarray, error: float, share: float) -> tuple:
+def _sum(
+    poses: list[Pose], robot: Robot, s: np.ndarray, moves: np.ndarray, error: float, share: float
+) -> tuple:
     """Over all poses, and chi-square at `moves` with the chain at its best."""
     parts = [_normal(pose, robot, s, moves, error, share) for pose in poses]
     square, vector, plain = (sum(p[i] for p in parts) for i in range(3))
@@ -105,22 +109,27 @@ def _sum(poses: list[Pose], robot: Robot, s: np.ndarray, moves: np.ndarray, erro
     return square, vector, plain - float(vector[size:] @ chain) + float(moves @ moves)
 
 
-def nats_of(poses: list[Pose], robot: Robot, s: np.ndarray, share: float = 1.0) -> float:
+def nats_of(
+    poses: list[Pose], robot: Robot, s: np.ndarray, share: float, starts: list[np.ndarray]
+) -> float:
     """Half of chi-square that no unknown takes away; `share` of all lines are given."""
-    moves = np.zeros(count(poses[0].system, robot))
+    return max(0.0, 0.5 * min(_fitted(poses, robot, s, share, moves) for moves in starts))
+
+
+def _fitted(poses, robot, s, share, moves) -> float:
+    """Chi-square after the stages from a start; those that start far away skip the first."""
     best = np.inf
-    for stage, error in enumerate(STAGES):
+    for error in STAGES[4:] if moves.any() else STAGES:
         square, vector, before = _sum(poses, robot, s, moves, error, share)
-        best = min(best, before) if error == MODEL_ERROR else best
-        last = stage == len(STAGES) - 1
-        step = _step(square, vector, moves)
-        if last:
-            break
-        size = 1.0
+        if error == MODEL_ERROR:
+            if before > 0.99 * best:
+                break
+            best = before
+        step, size = _step(square, vector, moves), 1.0
         while size > 0.1 and _sum(poses, robot, s, moves + size * step, error, share)[2] > before:
             size *= 0.4
         moves = moves + size * step if size > 0.1 else moves
-    return max(0.0, 0.5 * best)
+    return min(best, before)
 
 
 def _step(square: np.ndarray, vector: np.ndarray, moves: np.ndarray) -> np.ndarray:

@@ -103,7 +103,10 @@ def _dead_zone(x, width, round_off):
 
 def hanging_at(torque: float, stiffness: float, width: float) -> float:
     """The angle (rad) at which a gear with a gap of +-`width` bears `torque` (N m); bisection."""
-    low, high = -width - 2 * abs(torque) / stiffness - width, 2 * width + 2 * abs(torque) / stiffness
+    low, high = (
+        -width - 2 * abs(torque) / stiffness - width,
+        2 * width + 2 * abs(torque) / stiffness,
+    )
     for _ in range(80):
         middle = (low + high) / 2
         out, _ = _dead_zone(np.array(middle), width, 0.15 * width)

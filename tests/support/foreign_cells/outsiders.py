@@ -43,7 +43,9 @@ def servo_loop(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
     return _unknown("servo_loop", values, apply)
 
 
-def _point(tree: Tree, links: list[int], link: int, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _point(
+    tree: Tree, links: list[int], link: int, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """World place (m) and (3, n) jacobian of a point given in a link's frame."""
     world = tree.at(links[link], place)
     return world, tree.jacobian(links[link], world)[:3]
@@ -53,14 +55,18 @@ def fluid_damper(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
     """A tuned fluid damper between two links, two joints apart: inertance, damper and spring."""
     first = int(rng.integers(0, len(truth.gears) - 2))
     second, reach = first + 2, truth.robot.reach
-    places = [0.6 * link_way(truth.robot, i) + 0.08 * reach * rng.normal(size=3) for i in (first, second)]
+    places = [
+        0.6 * link_way(truth.robot, i) + 0.08 * reach * rng.normal(size=3) for i in (first, second)
+    ]
     stiffness = log_uniform(rng, 0.1, 6) * truth.gears[first + 1].stiffness / (0.3 * reach) ** 2
     omega = 2 * np.pi * log_uniform(rng, 8, 60)
     inertance = stiffness / omega**2
     law = FluidDamper(stiffness, 2 * rng.uniform(0.05, 0.5) * inertance * omega, inertance)
 
     def make(tree: Tree, links: list[int]) -> Tie:
-        (a, ja), (b, jb) = (_point(tree, links, i, p) for i, p in zip((first, second), places, strict=True))
+        (a, ja), (b, jb) = (
+            _point(tree, links, i, p) for i, p in zip((first, second), places, strict=True)
+        )
         row = (b - a) / np.linalg.norm(b - a) @ (jb - ja)
         return Tie("fluid", row, row, law)
 
@@ -95,7 +101,9 @@ def joint_coupling(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
     j = int(rng.integers(i + 1, min(i + 3, len(truth.gears))))
     rho = log_uniform(rng, 0.05, 0.6) * rng.choice([-1, 1])
     a, b = truth.gears[i], truth.gears[j]
-    law = Spring(float(rho * np.sqrt(a.stiffness * b.stiffness)), float(rho * np.sqrt(a.damping * b.damping)))
+    law = Spring(
+        float(rho * np.sqrt(a.stiffness * b.stiffness)), float(rho * np.sqrt(a.damping * b.damping))
+    )
 
     def apply(plan: Blueprint, _q: np.ndarray, _w: float) -> None:
         plan.ties.append(lambda tree, _l: Tie("coupling", _gear(tree, i), _gear(tree, j), law))

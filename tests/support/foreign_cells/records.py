@@ -102,7 +102,9 @@ def rumble(rng: np.random.Generator, system: System, clock: Clock, count: int) -
     shape = 1 / (1 + (lines[some] / 12) ** 2)
     spectrum = np.zeros((count, 3, len(lines)), complex)
     for i in range(count):
-        phases = (rng.normal(size=(some.sum(), 3)) + 1j * rng.normal(size=(some.sum(), 3))) * shape[:, None]
+        phases = (rng.normal(size=(some.sum(), 3)) + 1j * rng.normal(size=(some.sum(), 3))) * shape[
+            :, None
+        ]
         spectrum[i][:, some] = np.einsum("fij,fj->if", answer, phases)
     signal = np.fft.irfft(spectrum, window, axis=-1)[..., : clock.samples]
     return signal / np.sqrt(np.mean(signal**2))

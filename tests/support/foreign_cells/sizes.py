@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tests.support.foreign_cells.adjusted import gear_moves
 from tests.support.foreign_cells.case import Case, system_of
 from tests.support.foreign_cells.effects import Effect
 from tests.support.foreign_cells.nats import READBACK_SD, Observed, Pose, nats_of
@@ -40,10 +41,22 @@ def _sizes(case: Case, effect: Effect) -> tuple[float, float]:
         poses.append(Pose(before, _moved(case, rest, q, s, h), sets))
     length = case.clock.samples / case.clock.rate
     stride = max(1, round(float(np.diff(s.imag)[0]) / (2 * np.pi) * length))
-    return float(np.sqrt(changed / plain)), nats_of(poses, case.robot, s, 1 / stride)
+    starts = _starts(case, rest, poses)
+    return float(np.sqrt(changed / plain)), nats_of(poses, case.robot, s, 1 / stride, starts)
 
 
-def _moved(case: Case, rest: list[Effect], q: np.ndarray, s: np.ndarray, h: np.ndarray) -> np.ndarray:
+def _starts(case: Case, rest: list[Effect], poses: list[Pose]) -> list[np.ndarray]:
+    """The robot as it is without the effect, and with gears as stiff as with it on average."""
+    middle = case.warmth(len(case.hits) / 2)
+    with_it = [system_of(case.truth, case.effects, q, middle) for q in case.poses]
+    moves = [gear_moves(p.system, w, case.robot) for p, w in zip(poses, with_it, strict=True)]
+    mean = np.mean(moves, axis=0)
+    return [0 * mean, mean] if mean.any() else [mean]
+
+
+def _moved(
+    case: Case, rest: list[Effect], q: np.ndarray, s: np.ndarray, h: np.ndarray
+) -> np.ndarray:
     """Change of the FRFs by the readback's sd of each joint."""
     return np.array([
         system_of(case.truth, rest, q + READBACK_SD * unit).frf(s)[:, :3, :3] - h
@@ -70,7 +83,9 @@ def _observed(
             continue
         residual = _excess(case, some, s, sigma)
         residuals.append(residual)
-        sets.append(Observed(h + residual, _mean_variance(case, some, variance), _counts(case, some)))
+        sets.append(
+            Observed(h + residual, _mean_variance(case, some, variance), _counts(case, some))
+        )
     return sets, residuals[-1] - residuals[0] if len(residuals) == 2 else 0 * residuals[0]
 
 
@@ -95,7 +110,9 @@ def _excess(case: Case, some: list[int], s: np.ndarray, sigma: float) -> np.ndar
         force = _transform(case, case.motions[i].force, s, sigma)
         extra = _difference(case.motions[i], case.linear[i])
         hit = case.hits[i]
-        total[:, :, hit.axis] += hit.sign * (_transform(case, extra, s, sigma) / force).T / counts[hit.axis]
+        total[:, :, hit.axis] += (
+            hit.sign * (_transform(case, extra, s, sigma) / force).T / counts[hit.axis]
+        )
     return total
 
 

@@ -39,7 +39,9 @@ def _with_springs(rng: np.random.Generator, robot: Robot, with_cross: bool) -> R
     for inertia, (low, high) in zip(carried, LADDER_HZ, strict=False):
         omega = 2 * np.pi * rng.uniform(low, high)
         stiffness = inertia * omega**2
-        gears.append(Spring(float(stiffness), float(2 * rng.uniform(0.01, 0.03) * stiffness / omega)))
+        gears.append(
+            Spring(float(stiffness), float(2 * rng.uniform(0.01, 0.03) * stiffness / omega))
+        )
     cross = {}
     for j in (0, 1) if with_cross else ():
         springs = [gears[j].times(rng.uniform(2, 8)) for _ in range(2)]
@@ -51,7 +53,9 @@ def _with_springs(rng: np.random.Generator, robot: Robot, with_cross: bool) -> R
 def stated(robot: Robot) -> Blueprint:
     """What the files say, as an elastic robot."""
     cross = robot.cross or {}
-    return Blueprint(robot, list(robot.gears), [list(cross.get(j, ())) for j in range(len(robot.joints))])
+    return Blueprint(
+        robot, list(robot.gears), [list(cross.get(j, ())) for j in range(len(robot.joints))]
+    )
 
 
 def draw_poses(rng: np.random.Generator, robot: Robot, count: int) -> np.ndarray:
@@ -109,7 +113,9 @@ def draw_truth(rng: np.random.Generator, robot: Robot) -> Truth:
     for link in np.argsort(lengths)[-2:]:
         bends[int(link)] = Bend(1, tuple(_stiff(rng, gears[link], 200, 600) for _ in range(2)))
     inertia_sd = rng.uniform(0.03, 0.08)
-    links = tuple(_off_body(rng, b, inertia_sd, l) for b, l in zip(robot.links, lengths, strict=True))
+    links = tuple(
+        _off_body(rng, b, inertia_sd, l) for b, l in zip(robot.links, lengths, strict=True)
+    )
     ripple = np.column_stack([
         rng.uniform(0, 0.003, len(gears)), rng.integers(1, 8, len(gears)), rng.uniform(0, 6, len(gears))
     ])  # fmt: skip
