@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import pyuff
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 
@@ -213,10 +214,16 @@ def test_moves_of_springs_and_inertias_are_derivatives() -> None:
 def test_a_case_is_written_whole(tmp_path: Path) -> None:
     assert main([str(tmp_path), "--seed", "7", "--kind", "sensor_gain"]) == 0
     answer = json.loads((tmp_path / "answer.json").read_text(encoding="utf-8"))
-    assert answer["effects"][0]["effect"] == "sensor_gain" and not answer["outside_library"]
+    assert answer["effects"][0]["effect"] == "sensor_gain"
+    assert not answer["outside_library"]
     rows = (tmp_path / "recordings" / "recordings.csv").read_text(encoding="utf-8").splitlines()
     assert len(rows) == answer["hits"] + 1
-    assert len(list((tmp_path / "recordings" / "data").glob("*.uff"))) == answer["hits"]
+    paths = list((tmp_path / "recordings" / "data").glob("*.uff"))
+    assert len(paths) == answer["hits"]
+    sets = pyuff.UFF(str(paths[0])).read_sets()
+    assert [s["ordinate_spec_data_type"] for s in sets] == [13, 12, 12, 12]
+    assert [s["rsp_dir"] for s in sets[1:]] == [1, 2, 3]
+    assert np.max(sets[0]["data"]) > 20 * np.std(sets[0]["data"][:20])
 
 
 def test_a_seed_gives_the_same_case_again() -> None:

@@ -48,6 +48,7 @@ class Blueprint:
     hanging: list[Hanging] = field(default_factory=list)
     base: list[tuple[str, np.ndarray, Any]] = field(default_factory=list)
     masses: list[tuple[int, Body]] = field(default_factory=list)
+    lighter: dict[int, float] = field(default_factory=dict)  # factor of a link's mass
     spin: np.ndarray | None = None
     ties: list[Callable[[Tree, list[int]], Tie]] = field(default_factory=list)
 
@@ -101,6 +102,7 @@ class _Builder:
         """The link's body, in pieces where it bends; the last node and its place in the link."""
         plan, tree = self.plan, self.tree
         body, bend = plan.robot.links[link], plan.bends.get(link)
+        body = body.scaled(plan.lighter.get(link, 1.0))
         label = f"link_{link + 1}"
         if bend is None:
             tree.ride(node, body, label)

@@ -39,7 +39,7 @@ class Chain:
 
 
 def draw_chain(rng: np.random.Generator, motions: list[Motion], artefact: dict[str, Any]) -> Chain:
-    """Gains 1 to 2 %, cross-axis 1 to 3 %, mounting 1 deg, place 4 to 8 mm; noise after the hits."""
+    """Gains 1 to 2 %, cross-axis 1 to 3 %, mounting 1 deg, place 4 to 8 mm; noise by the hits."""
     gains = np.eye(3) + np.diag(rng.uniform(0.01, 0.02) * rng.normal(size=3))
     cross = rng.uniform(0.01, 0.03) * rng.normal(size=(3, 3)) * (1 - np.eye(3))
     mount = random_turn(rng, np.radians(1.0) * abs(rng.normal()) * 1.2)

@@ -1,4 +1,4 @@
-"""Which kind a seed gets: decks of 40 shuffled kinds, so that all come up; and drawing its effects."""
+"""Which kind a seed gets: decks of 40 shuffled kinds, so that all come up; and its effects."""
 
 from typing import Any
 

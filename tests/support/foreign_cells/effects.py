@@ -44,7 +44,7 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def base_compliance(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
-    """Floor or pedestal tilts about x and y, perhaps turns or bounces; own damper or loss factor."""
+    """Floor or pedestal tilts about x and y, perhaps turns or bounces; own damping."""
     top = max(truth.gears[0].stiffness, truth.gears[1].stiffness)
     size, ratio = log_uniform(rng, 1.2, 120), log_uniform(rng, 0.5, 2.0)
     hysteretic = bool(rng.integers(2))
@@ -163,13 +163,15 @@ def added_mass(rng: np.random.Generator, truth: Truth, _poses) -> Effect:
     body, total = robot.links[link], sum(b.mass for b in robot.links)
     if rng.random() < 0.25:
         share = log_uniform(rng, 0.08, 0.6)
-        extra = body.scaled(-share)
-    else:
-        mass = log_uniform(rng, 0.004, 0.15) * total
-        place = rng.uniform(0, 1) * link_way(robot, link) + rng.normal(size=3) * 0.05 * robot.reach
-        extra = Body(mass, place, np.eye(3) * mass * (0.02 * robot.reach) ** 2)
+        return Effect(
+            "added_mass", f"link_{link + 1}", {"mass": -share * body.mass, "share_of_link": -share},
+            lambda plan, _q, _w: plan.lighter.update({link: 1 - share}),
+        )  # fmt: skip
+    mass = log_uniform(rng, 0.004, 0.15) * total
+    place = rng.uniform(0, 1) * link_way(robot, link) + rng.normal(size=3) * 0.05 * robot.reach
+    extra = Body(mass, place, np.eye(3) * mass * (0.02 * robot.reach) ** 2)
     return Effect(
-        "added_mass", f"link_{link + 1}", {"mass": extra.mass, "centre": extra.centre.tolist()},
+        "added_mass", f"link_{link + 1}", {"mass": mass, "centre": place.tolist()},
         lambda plan, _q, _w: plan.masses.append((link, extra)),
     )  # fmt: skip
 

@@ -65,7 +65,8 @@ def write_toml(path: Path, robot: Robot, chances: dict[str, dict[str, float]]) -
     lines = [
         "# Simulated robot, drawn at random.", f'name = "{robot.name}"', 'urdf = "robot.urdf"',
         'tcp_frame = "tcp"', 'sensor_frame = "sensor"',
-        f"gravity = [0.0, 0.0, {robot.gravity[2]}]", f"band_hz = [{robot.band[0]}, {robot.band[1]}]",
+        f"gravity = [0.0, 0.0, {robot.gravity[2]}]",
+        f"band_hz = [{robot.band[0]}, {robot.band[1]}]",
     ]  # fmt: skip
     for j, joint in enumerate(robot.joints):
         springs = [(joint.axis, robot.gears[j]), *(robot.cross or {}).get(j, ())]
@@ -125,4 +126,4 @@ def write_hit(path: Path, hit: Hit, clock: Clock, force: np.ndarray, answer: np.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         path.unlink(missing_ok=True)
-        pyuff.UFF(str(path)).write_sets(sets, "overwrite")
+        pyuff.UFF(str(path)).write_sets(sets, "add")

@@ -12,7 +12,7 @@ from tests.support.foreign_cells.stating import Truth
 class Sizing:
     """Draws a law once the angle (rad) and rate (rad/s) of a hit of middle level are known.
 
-    `law(peak, rate, weights)` answers the law; weights: gravity's torque on the gear in every hit (N m).
+    `law(peak, rate, weights)` answers the law; weights: gravity's torque on it, hit by hit (N m).
     """
 
     def __init__(self, rng: np.random.Generator, kind: str, stiffness: float) -> None:

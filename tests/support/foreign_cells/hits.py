@@ -65,7 +65,7 @@ class Clock:
 def draw_clock(rng: np.random.Generator) -> Clock:
     """512 to 2048 Hz, records of 2 to 4 s."""
     rate = float(rng.choice([512, 640, 800, 1024, 1280, 1600, 2048]))
-    return Clock(rate, int(round(rate * float(rng.choice([2.0, 2.5, 3.2, 4.0])))))
+    return Clock(rate, round(rate * float(rng.choice([2.0, 2.5, 3.2, 4.0]))))
 
 
 def _heavy(rng: np.random.Generator, size: int = 3) -> np.ndarray:
@@ -97,7 +97,8 @@ def draw_hits(rng: np.random.Generator, poses: int, payload: float, rate: float)
                 peak = top * levels[level] * np.exp(0.12 * rng.normal())
                 hits.append(Hit(
                     pose, int(axis), int(signs[axis]), level + 1, number + 1,
-                    (aim[0] + angle * _heavy(rng)) * across, (aim[1] + place * _heavy(rng)) * across,
+                    (aim[0] + angle * _heavy(rng)) * across,
+                    (aim[1] + place * _heavy(rng)) * across,
                     float(peak), float(width * np.exp(0.08 * rng.normal()) * (peak / top) ** -0.08),
                     float(rng.uniform(0.9, 1.7)), float(rng.uniform(-0.25, 0.35)), len(hits),
                 ))  # fmt: skip

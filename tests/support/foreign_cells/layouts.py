@@ -174,7 +174,7 @@ def _joints(places, frames, axes, centre) -> tuple[Joint, ...]:
 
 
 def _link(rng, mass, start, end, frame) -> Body:
-    """A link's body between two world places, in its own frame: a rod with thickness, off-centre."""
+    """A link's body between two world places, in its frame: a rod with thickness, off-centre."""
     way = end - start
     length = max(float(np.linalg.norm(way)), 0.05)
     aside = rng.normal(size=3) * 0.06 * length

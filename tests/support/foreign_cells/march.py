@@ -26,7 +26,7 @@ class FirstOrder:
 
 
 def first_order(system: System, gear: str) -> FirstOrder:
-    """State form of a system all of whose ties are mutual springs; `gear`: the tie with the torque."""
+    """State form where all ties are mutual springs; `gear`: the tie with the torque."""
     size = len(system.mass)
     stiff, damp = system.gravity.copy(), system.spin.copy()
     ladders = [t for t in system.ties if t.law.loss]

@@ -1,8 +1,9 @@
 """How much the recordings tell of an effect: half the drop of chi-square by it.
 
-The FRFs with the effect are fitted by the robot without it, moved within what may err anyway: springs,
-dampers, loss factors, inertias (adjusted.py; Gauss-Newton steps), sensor's gains, cross-axis and
-place, force gain, over all poses; misses of hits and readback, pose by pose (linear columns).
+The FRFs with the effect are fitted by the robot without it, moved within what may err anyway:
+springs, dampers, loss factors, inertias (adjusted.py; Gauss-Newton steps), sensor's gains,
+cross-axis and place, force gain, over all poses; misses of hits and readback, pose by pose
+(linear columns).
 
     chi2 = |r - D x|2 + |x|2 in units of the FRFs' noise and 0.3 % of |H|, x in prior sds
 
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.support.foreign_cells.adjusted import adjusted, columns, count
+from tests.support.foreign_cells.adjusted import adjusted, columns
 from tests.support.foreign_cells.layouts import Robot
 from tests.support.foreign_cells.spatial import cross_matrix
 from tests.support.foreign_cells.system import System

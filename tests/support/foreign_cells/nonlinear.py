@@ -1,7 +1,7 @@
 """Nonlinear torques of a gear, in excess of its linear spring (N m); angles in rad, rates in rad/s.
 
-`torque(x, rate, before, memory)` answers (torque, by angle, by rate): `before` is the angle one step
-earlier, `memory` the torque then (for laws that remember).
+`torque(x, rate, before, memory)` answers (torque, by angle, by rate): `before` is the angle one
+step earlier, `memory` the torque then (for laws that remember).
 """
 
 from dataclasses import dataclass

@@ -147,4 +147,4 @@ def stable(systems: list) -> bool:
 OUTSIDERS = (
     gyroscopic_spindle, servo_loop, fluid_damper, cable_to_ground, joint_coupling, late_feedback,
 )  # fmt: skip
-__all__ = ["OUTSIDERS", "stable", "controller"]
+__all__ = ["OUTSIDERS", "controller", "stable"]

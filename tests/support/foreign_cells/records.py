@@ -4,8 +4,8 @@ A linear response over a record of T s is taken on the line s = sigma + i omega 
 
     a(t) = e^(sigma t) IFFT[ H(sigma + i omega) FFT[ f(t) e^(-sigma t) ] ],   2 T sigma = 9
 
-so what wraps around has fallen by e^-9 beside its own decay. The anti-alias filter (linear phase) acts
-on force and accelerations alike, so it may act on the force before the robot does.
+so what wraps around has fallen by e^-9 beside its own decay. The anti-alias filter (linear phase)
+acts on force and accelerations alike, so it may act on the force before the robot does.
 """
 
 from dataclasses import dataclass

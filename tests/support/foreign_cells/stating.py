@@ -23,7 +23,7 @@ def draw_robot(rng: np.random.Generator, kind: str) -> Robot:
             frequencies, _ = assemble(stated(robot), q)[0].modes()
             first.append(frequencies[0])
             count.append(np.sum(frequencies < robot.band[1]))
-        if 5 < np.min(first) and np.max(first) < 15 and 4 <= np.median(count) <= 6:
+        if np.min(first) > 5 and np.max(first) < 15 and 4 <= np.median(count) <= 6:
             return robot
     raise RuntimeError(f"no {kind} with modes where they are wanted")
 
@@ -114,10 +114,12 @@ def draw_truth(rng: np.random.Generator, robot: Robot) -> Truth:
         bends[int(link)] = Bend(1, tuple(_stiff(rng, gears[link], 200, 600) for _ in range(2)))
     inertia_sd = rng.uniform(0.03, 0.08)
     links = tuple(
-        _off_body(rng, b, inertia_sd, l) for b, l in zip(robot.links, lengths, strict=True)
+        _off_body(rng, body, inertia_sd, length)
+        for body, length in zip(robot.links, lengths, strict=True)
     )
     ripple = np.column_stack([
-        rng.uniform(0, 0.003, len(gears)), rng.integers(1, 8, len(gears)), rng.uniform(0, 6, len(gears))
+        rng.uniform(0, 0.003, len(gears)), rng.integers(1, 8, len(gears)),
+        rng.uniform(0, 6, len(gears)),
     ])  # fmt: skip
     return Truth(replace(robot, links=links), tuple(gears), tuple(bearings), bends, ripple)
 

@@ -2,8 +2,8 @@
 
     Z(s) = s2 M + s G + Kg + sum over ties of l d(s) r',   H(s) = s2 C Z(s)^-1 B
 
-B: wrench at the tcp in tcp axes (N, N m); C: acceleration and angular acceleration (m/s2, rad/s2) of
-the sensor frame in its own axes. So H is (6, 6) at every s.
+B: wrench at the tcp in tcp axes (N, N m); C: acceleration and angular acceleration (m/s2, rad/s2)
+of the sensor frame in its own axes. So H is (6, 6) at every s.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ class Tie:
 
 @dataclass(frozen=True)
 class System:
-    """See the module; `parts` maps a label to the (6, n) jacobian of a link's frame, in its axes."""
+    """See the module; `parts` maps a link to the (6, n) jacobian of its frame, in its axes."""
 
     mass: np.ndarray
     gravity: np.ndarray
