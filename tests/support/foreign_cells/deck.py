@@ -1,0 +1,51 @@
+"""Which kind a seed gets: decks of 40 shuffled kinds, so that all come up; and its effects."""
+
+from typing import Any
+
+import numpy as np
+
+from tests.support.foreign_cells import effects as physical
+from tests.support.foreign_cells.chain import ARTEFACTS
+from tests.support.foreign_cells.effects import Effect
+from tests.support.foreign_cells.gears import GEARS
+from tests.support.foreign_cells.outsiders import OUTSIDERS
+from tests.support.foreign_cells.stating import Truth
+
+LINEAR = (
+    physical.base_compliance, physical.transverse_compliance, physical.joint_stiffness,
+    physical.angle_dependent_stiffness, physical.link_flexibility, physical.added_mass,
+    physical.local_resonator,
+)  # fmt: skip
+SINGLE = {f.__name__: f for f in (*LINEAR, *GEARS, physical.drift, *ARTEFACTS)}
+OUTSIDE = {f.__name__: f for f in OUTSIDERS}
+KINDS = ("none", "pair", *SINGLE, *OUTSIDE)
+NULLS, PAIRS, DECK = 8, 6, 40
+
+
+def kind_of(seed: int) -> str:
+    """The kind that a seed draws: 20 % none, 15 % pairs, 15 % outsiders, half single effects."""
+    number, place = divmod(seed - 1, DECK)
+    rng = np.random.default_rng([number, 40, 5077])
+    singles = list(SINGLE)
+    more = rng.choice(singles, DECK - NULLS - PAIRS - len(OUTSIDE) - len(singles), replace=False)
+    deck = ["none"] * NULLS + ["pair"] * PAIRS + [*OUTSIDE, *singles, *more.tolist()]
+    return str(rng.permutation(deck)[place])
+
+
+def draw_effects(
+    rng: np.random.Generator, kind: str, truth: Truth, poses: np.ndarray
+) -> list[Effect]:
+    """What is concealed in a case of a kind; poses (n, joints) in rad."""
+    if kind == "none":
+        return []
+    if kind != "pair":
+        return [{**SINGLE, **OUTSIDE}[kind](rng, truth, poses)]
+    first, second = rng.choice(len(LINEAR), 2, replace=False)
+    makers: list[Any] = [LINEAR[first], LINEAR[second]]
+    if rng.random() < 0.3:
+        makers[1] = GEARS[rng.integers(len(GEARS))]
+    for _ in range(50):
+        drawn = [maker(rng, truth, poses) for maker in makers]
+        if len({e.at for e in drawn}) == 2 or drawn[1].law is None:
+            return drawn
+    return drawn
