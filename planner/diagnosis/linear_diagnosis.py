@@ -197,9 +197,8 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters_percent
     named = [_told_of(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
-    left = np.array([m.unexplained for m in weights.mismatch])
     evidence = np.array([w.log_evidence for w in weights.worth])
-    own = weights.probabilities[:-1], prior, weights.bent, left, evidence
+    own = weights.probabilities[:-1], prior, weights.bent, evidence
     shares = list(without_slight(fits, named, *own, matters / 100))
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):

@@ -14,9 +14,10 @@ BANDS = 12
 
 @dataclass(frozen=True, eq=False)
 class Where:
-    """Mean square residuals, 1 at the noise: by band (k,), pose (n,), response and hit (3, 3).
+    """Mean square residuals: by band (k,), pose (n,), response and hit (3, 3).
 
-    `edges_hz` (k + 1,) are the bands'.
+    1 is noise and what just does not matter ([diagnose] matters_percent) together; `edges_hz`
+    (k + 1,) are the bands'.
     """
 
     edges_hz: np.ndarray

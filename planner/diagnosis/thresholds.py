@@ -22,6 +22,9 @@ SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; c
 # that of the generated robots. Dampers scatter more, and a loss factor may take the place of one:
 # chosen. Inertias do as in any identification (CAD_INERTIAS).
 STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.0
+# By how much of its size a body's mass lies elsewhere than stated: half of what its moments, which
+# go with the square of a length, are off by (CAD_INERTIAS).
+MASS_ELSEWHERE = 0.04
 # Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as
 # gears and bearings are both and no data sheet says in which share.
 STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
@@ -63,8 +66,12 @@ LAW_FARTHEST = 6.0  # prior sds (of ln a: units) beyond which no law is looked f
 
 # How much data tell that no model quite explains -------------------------------------------------
 
+# What errs by some percent of a FRF, as [diagnose] matters_percent says, errs in every direction:
+# by so much besides of all FRFs of the pose at that frequency. Chosen.
+ERRORS_SPREAD = 0.3
+
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
-NOISE_OVERSTATED = 0.3  # misfit below which noise is not believed to be overstated; chosen
+NOISE_OVERSTATED = 1.0  # misfit below which noise is overstated, as it is on purpose
 # Sizes τ of the discrepancy that is inferred (`linear.discrepancy`): relative sd by which a spring
 # differs from pose to pose; of dampers DAMPERS times as much, as damping of joints scatters in the
 # literature. Where nothing unknown is there, sizes up to USUAL are alike, and beyond it a normal
@@ -78,10 +85,6 @@ CHAIN_VARIES = 0.3  # of the chain's tolerance, by which it may differ from pose
 # effects this share of what the fit without effects leaves. A larger misfit is penalised by a
 # normal law of ln(misfit) with sd ln LEFT_FACTOR. Chosen.
 LEFT_SHARE = 0.15
-# An effect that explains GOOD_PART of the squared misfit of the fit without effects is more than
-# what every robot has a little of: it is named even if it changes the FRFs by only CLEARLY_MATTERS
-# times what matters. Chosen.
-GOOD_PART, CLEARLY_MATTERS = 1 / 3, 0.2
 LEFT_FACTOR = 1.5
 # c·ω/k mid-band from which a spring that gives is no bearing, link or foot (welded frames: 0.01,
 # rubber feet: 0.3), where the FRFs tell ln k to within the second. Chosen.

@@ -1,4 +1,4 @@
-"""Pictures of a diagnosis: FRFs before and after, FRF maps, residuals beside the noise."""
+"""Pictures of a diagnosis: FRFs before and after, FRF maps, residuals beside what matters."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,8 @@ from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
 from planner.report.plot_text import plain_text
 
-LEAST, DARK, MOST_SHOWN = 0.1, 50.0, 1000.0  # residuals: of the scale; from which text is white
+UNIT = "mean square residual (1: just matters)"
+LEAST, DARK, MOST_SHOWN = 1e-3, 50.0, 1000.0  # residuals: of the scale; from which text is white
 MOST = 4  # poses whose FRFs are shown, those that differed most
 SIDES = (
     ("as given", "tab:blue", ":"),
@@ -92,13 +93,13 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
         (before, "refitted", "tab:orange"),
         (after, "explained", "tab:red"),
     ):
-        bands.semilogy(middle, np.maximum(place.by_band, 0.1), "o-", color=colour, label=label)
+        bands.semilogy(middle, np.maximum(place.by_band, LEAST), "o-", color=colour, label=label)
         number = np.arange(len(names))
-        poses.semilogy(number, np.maximum(place.by_pose, 0.1), "o-", color=colour, label=label)
+        poses.semilogy(number, np.maximum(place.by_pose, LEAST), "o-", color=colour, label=label)
     for panel, what in ((bands, "frequency (Hz)"), (poses, "pose")):
         panel.axhline(1.0, color="black", lw=0.8, ls=":")
         panel.set_xlabel(what)
-        panel.set_ylabel("mean square residual (1: noise)", fontsize=8)
+        panel.set_ylabel(UNIT, fontsize=8)
         panel.legend()
     poses.set_xticks(np.arange(len(names)), [plain_text(n) for n in names], rotation=60, fontsize=7)
     scale, image = LogNorm(LEAST, MOST_SHOWN), ScalarMappable()
@@ -112,6 +113,11 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
         panel.set_yticks(range(3), [f"response {a}" for a in AXES])
         panel.set_title(f"by direction, {label}", fontsize=9)
     # One scale for both, so that what an explanation takes away is seen.
-    figure.colorbar(image, ax=[left, right], label="mean square residual (1: noise)", shrink=0.9)
-    figure.suptitle(f"{mark}Residuals in units of the noise's variance", fontsize=10)
+    figure.colorbar(
+        image, ax=[left, right], label="mean square residual (1: just matters)", shrink=0.9
+    )
+    figure.suptitle(
+        f"{mark}Residuals, errors of hits and sensors taken out; 1: noise, and matters_percent of FRFs",
+        fontsize=10,
+    )
     return figure

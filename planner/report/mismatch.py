@@ -31,7 +31,7 @@ class MismatchPlaces:
 
 @dataclass(frozen=True)
 class TwoMisfits:
-    """χ² per value, 1 at the noise: of the refitted simulation, and with what explains it."""
+    """χ² per value, refitted and with what explains it; 1: noise, and what just does not matter."""
 
     refitted: float
     explained: float

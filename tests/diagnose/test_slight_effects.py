@@ -37,13 +37,13 @@ def at(tmp_path_factory) -> Callable[[str, str, Moved], Fit]:
     return made
 
 
-def given_on(whole: Fit, without: Fit, prior=(100.0, 1.0), left=(0.01, 0.01)) -> float:
-    """Share of the effect that ends up with the fit without it; what both leave is `left`."""
+def given_on(whole: Fit, without: Fit, prior=(100.0, 1.0)) -> float:
+    """Share of the effect that ends up with the fit without it."""
     fits = [without, whole]
     told = [f.effect.parts() for f in fits]
     bent = np.array([moved(f, without) for f in fits])
     shares, evidence = np.array([0.0, 1.0]), np.array([-50.0, 0.0])
-    return float(without_slight(fits, told, shares, prior, bent, np.array(left), evidence, 0.03)[0])
+    return float(without_slight(fits, told, shares, prior, bent, evidence, 0.03)[0])
 
 
 def moved(fit: Fit, plain: Fit) -> float:
@@ -93,8 +93,8 @@ def test_of_two_slight_effects_the_likelier_stays(at):
     fits = [none, first, second, both]
     told = [f.effect.parts() for f in fits]
     shares, prior = np.array([0.0, 0.0, 0.0, 1.0]), np.ones(4)
-    evidence, left = np.array([-5000.0, -2000.0, -50.0, 0.0]), np.full(4, 0.01)
-    out = without_slight(fits, told, shares, prior, np.zeros(4), left, evidence, 0.03)
+    evidence = np.array([-5000.0, -2000.0, -50.0, 0.0])
+    out = without_slight(fits, told, shares, prior, np.zeros(4), evidence, 0.03)
     # What both give on goes by way of the likelier, not to whichever changes a little less.
     assert out[1] == 0
     assert out[2] > 0

@@ -37,7 +37,9 @@ class Mismatch:
         unit = 1 / misfit.weight[used]
         recorded = float(np.sum(np.abs(misfit.measured.accelerance[used]) ** 2))
         parts = (np.abs(one[used] * unit) ** 2 for one in (whole, left))
-        sums = [*(float(np.sum(part)) for part in parts), float(np.sum(2 * unit**2))]
+        own = misfit.measured.noise_sd
+        noise = 2 * unit**2 if own is None else own[used] ** 2
+        sums = [*(float(np.sum(part)) for part in parts), float(np.sum(noise))]
         shares = (value / max(recorded, 1e-300) for value in sums)
         return cls(*shares, values=2 * int(np.count_nonzero(used)))
 

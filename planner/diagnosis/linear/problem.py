@@ -11,7 +11,9 @@ from planner.diagnosis.effects.structural_damping import partly_structural
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.thresholds import (
     DAMPING_FACTOR,
+    ERRORS_SPREAD,
     LOSS_FACTOR_FACTOR,
+    MASS_ELSEWHERE,
     STIFFNESS_FACTOR,
 )
 from planner.dynamics.gradient import Inertias
@@ -26,7 +28,7 @@ from planner.robot.elastic_model import Matrices
 
 PRIORS = replace(
     CAD_INERTIAS, stiffness_factor=STIFFNESS_FACTOR, damping_factor=DAMPING_FACTOR,
-    loss_factor_factor=LOSS_FACTOR_FACTOR,
+    loss_factor_factor=LOSS_FACTOR_FACTOR, elsewhere=MASS_ELSEWHERE,
 )  # fmt: skip
 
 
@@ -34,11 +36,13 @@ PRIORS = replace(
 class Grade:
     """How closely one looks: lines a pose, relative sd of all that no simulation follows.
 
-    As in `Misfit`: whether logarithms are compared, and whether inertias are free.
+    None: of what does not matter, robot.toml's. Every robot has bearings that give a little and
+    gears that ripple: weighed by the noise, inertias would be bent by any number of their sds to
+    follow them. As in `Misfit`: whether logarithms are compared, and whether inertias are free.
     """
 
     lines: int
-    model_error: float = 0.003
+    model_error: float | None = None
     logarithmic: bool = False
     inertial: bool = True
 
@@ -137,4 +141,7 @@ def _prepared(problem: Problem, effect: Effect) -> _Prepared:
 @lru_cache(maxsize=16)
 def _measured(problem: Problem, grade: Grade) -> Measured:
     lines = max(round(grade.lines * problem.blocks**SHARED_WORK), min(grade.lines, LEAST_LINES))
-    return stack(problem.frfs, problem.band_hz, lines, grade.model_error)
+    error, spread = grade.model_error, 0.0
+    if error is None:
+        error, spread = problem.simulation.robot.config.diagnose.matters, ERRORS_SPREAD
+    return stack(problem.frfs, problem.band_hz, lines, error, spread)

@@ -20,9 +20,7 @@ from planner.diagnosis.linear.mismatch import residuals
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.thresholds import (
-    CLEARLY_MATTERS,
     DISCREPANCY_USUAL,
-    GOOD_PART,
     LEFT_FACTOR,
     SOMETHING_UNKNOWN,
     SPRING_STRAYED,
@@ -38,29 +36,21 @@ def without_slight(
     shares: np.ndarray,
     prior: Sequence[float],
     bent: np.ndarray,
-    left: np.ndarray,
     evidence: np.ndarray,
     matters: float,
 ) -> np.ndarray:
     """Shares (k,) of fits to the same lines, moved to simpler fits where an effect is too small.
 
     The first fit is "none"; `told` are each fit's effects, `prior` (k,) their weights before any
-    data, `bent` (k,) how far each fit moved the stated values (see `Weights`), `left` (k,) the
-    relative misfit that it leaves (see `Mismatch`), `evidence` (k,) its log evidence. An effect is
-    too small if, with everything else refitted, it changes the FRFs by less than `matters` and what
-    every robot has, added in squares. The more surely that is so, the more of the fit's share moves
-    to the fit without the effect; of several that do as well, to the likeliest. An effect that
-    explains a good part of all that refitting leaves may be smaller. Where both fits have nearly
-    the same FRFs, the prior decides between them: the farther the simpler fit had to move the
-    stated values, the likelier is the effect.
+    data, `bent` (k,) how far each fit moved the stated values (see `Weights`), `evidence` (k,) its
+    log evidence. An effect is too small if, with everything else refitted, it changes the FRFs by
+    less than `matters` and what every robot has, added in squares. The more surely that is so, the
+    more of the fit's share moves to the fit without the effect; of several that do as well, to the
+    likeliest. Where both fits have nearly the same FRFs, the prior decides between them: the
+    farther the simpler fit had to move the stated values, the likelier is the effect.
     """
     pull = np.logaddexp(np.log1p(-SOMETHING_UNKNOWN), np.log(SOMETHING_UNKNOWN) + bent)
-    enough = matters * CLEARLY_MATTERS
     matters = float(np.hypot(matters, usual(fits[0])))
-
-    def taken(i: int, j: int) -> float:
-        return max(left[j] ** 2 - left[i] ** 2, 0.0) / max(left[0] ** 2, 1e-300)
-
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
     shares = np.array(shares, dtype=float)
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
@@ -70,9 +60,7 @@ def without_slight(
         if not fewer:
             continue
         given = [
-            _slight(
-                _size(fits[j], fits[i], _more(told[i], called[j])), matters, enough, taken(i, j)
-            )
+            (1 - _above(_size(fits[j], fits[i], _more(told[i], called[j])), matters))
             * expit(np.log(prior[j] / prior[i]) + pull[i] - pull[j])
             for j in fewer
         ]
@@ -105,15 +93,6 @@ def _size(without: Fit, whole: Fit, parts: Sequence[Effect]) -> float:
         far = far or abs(away) > SPRING_STRAYED * before.sd[stated]
         x[here] = before.mean[stated]
     return _apart(residuals(misfit, x)[1], whole) if far else change(without, whole)
-
-
-def _slight(size: float, matters: float, enough: float, taken: float) -> float:
-    """Probability that an effect does not matter that changes FRFs by a relative `size`.
-
-    It has `taken` so large a share of the squares of all that refitting leaves.
-    """
-    good = _above(taken, GOOD_PART) * _above(size, enough)
-    return (1 - _above(size, matters)) * (1 - good)
 
 
 def _above(size: float, limit: float) -> float:
