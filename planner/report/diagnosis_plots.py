@@ -116,8 +116,6 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
     figure.colorbar(
         image, ax=[left, right], label="mean square residual (1: just matters)", shrink=0.9
     )
-    figure.suptitle(
-        f"{mark}Residuals, errors of hits and sensors taken out; 1: noise, and matters_percent of FRFs",
-        fontsize=10,
-    )
+    what = "Residuals without the errors of hits and sensors; 1: noise and matters_percent of FRFs"
+    figure.suptitle(f"{mark}{what}", fontsize=10)
     return figure
