@@ -29,6 +29,7 @@ from planner.campaign.state import CampaignState, fold
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.store import Store
 from planner.errors import InputError, NoPoseLeftError, PlannerError
+from planner.words import counted
 
 CLOSE = 1e-6  # relative; another processor rounds differently, another program errs by more
 
@@ -142,7 +143,9 @@ def _check_import(
     accepted = [v.accepted for v in measured.verdicts[len(hits) - len(event.hits) :]]
     if accepted != [hit.accepted for hit in event.hits]:
         return "differs", f"{event.pose}: other hits are refused than before", measured
-    detail = f"{event.pose}: {sum(accepted)} hits, {len(modes)} modes"
+    detail = f"{event.pose}: {counted(sum(accepted), 'hit')}, {counted(len(modes), 'mode')}"
+    if event.unhit:
+        detail = f"{event.pose}: {counted(len(event.hits), 'hit')} refused"
     detail += ", held until confirmed" if event.question else ""
     check, detail = _compare(_numbers(event.modes), _numbers(modes), detail)
     return check, detail, measured

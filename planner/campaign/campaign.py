@@ -138,7 +138,7 @@ class Campaign(CampaignReads):
         if pose in self.state.held:
             return self.refuse_held(pose, reason or REFUSED)
         with self._acting():
-            measurement = self.state.measurements.get(pose)
+            measurement = self.state.hit_at(pose)
             if measurement is None or measurement.withdrawn:
                 raise InputError(f"Pose {pose} is not among the measured ones; see planner status.")
             self._append(Withdrawn(pose, reason))
@@ -218,10 +218,10 @@ class Campaign(CampaignReads):
         from planner.campaign.revisits import suspected
 
         before, state, pose = self.model, self.state, delivery.pose
-        known = state.measurements.get(pose)
+        known = state.hit_at(pose)
         kept = keep_files(self.directory, delivery, state, named)
         if not kept.fresh:
-            held = state.held.get(pose)
+            held, known = state.held.get(pose), state.measurements.get(pose)
             return ImportReport(
                 pose, (), (), kept.already, held or known, None, before, before, 0.0,
                 left_out=kept.left_out, question=held.question if held else None,
@@ -293,5 +293,5 @@ def _first_entry(directory: Path) -> bytes:
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
     units = cell.robot.joints.declared
-    event = Configured(as_logged(config), hashes, __version__, True, True, True, units)
+    event = Configured(as_logged(config), hashes, __version__, True, True, True, units, True)
     return encode_line("", Entry(1, now, event))[0]

@@ -65,7 +65,7 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
 
     Raises InputError where they are not known or contradict each other.
     """
-    known = state.measurements.get(delivery.pose) or state.held.get(delivery.pose)
+    known = state.hit_at(delivery.pose) or state.held.get(delivery.pose)
     if delivery.joints_deg is None:
         stated = known or state.proposals.get(delivery.pose)
         if stated is None:

@@ -76,7 +76,7 @@ def _new_poses(
 
 def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
     """Names of proposed poses: the one that a pose was proposed under before, else a new one."""
-    taken = {*state.measurements, *state.held}
+    taken = {*(m.pose for m in state.over), *state.held}
     known = {p.joints_deg: name for name, p in state.proposals.items() if name not in taken}
     new = counted(state.proposals_made + 1)
     return [known.get(joints_deg) or f"P{next(new):03d}" for joints_deg in angles]
@@ -85,8 +85,9 @@ def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
     cell = model.cell
     joints, x = cell.robot.joints, cell.candidates.features
-    taken = [m.joints_deg for m in state.measurements.values()]
-    at = joints.internal(taken[-1]) if taken else None
+    stood = [m.joints_deg for m in state.measurements.values()]
+    at = joints.internal(stood[-1]) if stood else None
+    taken = [m.joints_deg for m in state.over]
     taken += [m.joints_deg for m in state.held.values()]
     shares = None
     if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:

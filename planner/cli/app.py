@@ -111,8 +111,9 @@ def import_(
     from planner.report.imports import ImportedPoses
 
     with reporting("importing", quiet=as_json) as progress:
-        reports = Campaign(directory).import_paths(tuple(paths), pose, progress)
-    answer = ImportedPoses.of(reports)
+        campaign = Campaign(directory)
+        reports = campaign.import_paths(tuple(paths), pose, progress)
+    answer = ImportedPoses.of(reports, campaign.state.simulated)
     return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
 from planner.report.answer import Answer
+from planner.words import counted
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class WrittenReport(Answer):
     def text(self) -> str:
         """One sentence."""
         size = self.bytes / 1e6
-        return f"Report of {self.measurements} poses ({size:.1f} MB): {self.report}"
+        return f"Report of {counted(self.measurements, 'pose')} ({size:.1f} MB): {self.report}"
 
 
 def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> WrittenReport:

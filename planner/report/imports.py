@@ -13,6 +13,7 @@ from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
+from planner.words import counted
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
@@ -121,9 +122,11 @@ class PoseImport(Answer):
         )
 
     def parts(self) -> list[RenderableType]:
-        """Modes beside what was expected, remarks, and the change of the model."""
+        """Modes beside what was expected, remarks, and the change of the model, if there is any."""
+        if self.unhit:
+            return [Text(self._without_hits()), *remarks(self.remarks)]
         made = table(
-            f"Pose {self.pose}: {len(self.accepted)} hits accepted, "
+            f"Pose {self.pose}: {counted(len(self.accepted), 'hit')} accepted, "
             f"{len(self.refused)} refused, {len(self.already_imported)} known before",
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
         )
@@ -136,6 +139,19 @@ class PoseImport(Answer):
         return [made, *remarks(self.remarks), said, *asked]
 
 
+    @property
+    def unhit(self) -> bool:
+        """Whether nothing came of it: no hit was accepted, nor is one held."""
+        return not (self.accepted or self.modes or self.question)
+
+    def _without_hits(self) -> str:
+        known = f", {len(self.already_imported)} known before" if self.already_imported else ""
+        return (
+            f"Pose {self.pose}: no hit accepted, {len(self.refused)} refused{known}; nothing "
+            f"changed, and the pose is still to be measured."
+        )
+
+
 @dataclass(frozen=True)
 class ImportedPoses(Answer):
     """Answer of `import`, one entry a pose in recording order.
@@ -145,13 +161,17 @@ class ImportedPoses(Answer):
 
     poses: tuple[PoseImport, ...]
     habits: tuple[str, ...] = ()
+    simulated: bool = False  # whether the campaign has simulated recordings
 
     @classmethod
-    def of(cls, reports: "tuple[ImportReport, ...]") -> "ImportedPoses":
+    def of(
+        cls, reports: "tuple[ImportReport, ...]", simulated: bool = False
+    ) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
         every = [hit for pose in model.misses for hit in pose.hits]
-        return cls(tuple(PoseImport.of(report, model) for report in reports), habits(every))
+        poses = tuple(PoseImport.of(report, model) for report in reports)
+        return cls(poses, habits(every), simulated or any(pose.simulated for pose in poses))
 
     @property
     def hit_errors(self) -> tuple[HitMiss, ...]:
@@ -177,7 +197,7 @@ class ImportedPoses(Answer):
         """Pose by pose."""
         parts = [part for pose in self.poses for part in pose.parts()]
         parts += [Text(f"  {habit}") for habit in self.habits]
-        return Group(*parts, SIMULATED) if self.poses[-1].simulated else Group(*parts)
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
 def how_to_answer(directory: Path, pose: str, asked: str) -> str:
