@@ -1,7 +1,7 @@
 """The campaign: the only thing with state, and its state is a fold over its log."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,13 +94,18 @@ class Campaign(CampaignReads):
                 reports.append(self._import_pose(delivery, joints_deg, named))
             return tuple(reports)
 
-    def refuse(self, pose: str, paths: tuple[Path, ...]) -> None:
-        """Refuse files that wait at a pose: they are kept, and not imported unless named."""
+    def refuse(
+        self, pose: str, paths: tuple[Path, ...], reasons: Mapping[Path, str] | None = None
+    ) -> None:
+        """Refuse files that wait at a pose: they are kept, and not imported unless named.
+
+        `reasons` are what was found wrong with some of them.
+        """
         from planner.campaign.importing import refusals
 
         with self._acting():
             if paths:
-                self._append(Refused(pose, refusals(self.directory, paths)))
+                self._append(Refused(pose, refusals(self.directory, paths, reasons or {})))
 
     def confirm(self, pose: str) -> None:
         """The held hits of a pose are from there indeed: the model uses them."""
@@ -204,6 +209,7 @@ class Campaign(CampaignReads):
         self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
     ) -> "ImportReport":
         from planner.campaign.alerts import alerts
+        from planner.campaign.contradictions import contradiction
         from planner.campaign.importing import (
             ImportReport,
             displacement,
@@ -234,7 +240,8 @@ class Campaign(CampaignReads):
         if old:  # among earlier hits, wrong ones would not stand out
             alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
-        asked = question(before, state, pose, joints_deg, new_modes)
+        asked = contradiction(pose, measured, len(old))
+        asked = asked or question(before, state, pose, joints_deg, new_modes)
         drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
         event = Imported(
             pose=pose,

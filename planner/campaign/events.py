@@ -120,14 +120,16 @@ class Question(msgspec.Struct, frozen=True):
     """What the engineer is asked of hits that lie far from what the model is sure of.
 
     The `mode` that is furthest off is so by `off_sd` standard deviations; `fits` names the pose
-    whose modes these are instead, if there is one.
+    whose modes these are instead, if there is one. Where hits contradict each other instead,
+    `disagree` are their files, and no mode is named (0).
     """
 
     text: str
-    mode: int
-    off_sd: float
-    off_percent: float
+    mode: int = 0
+    off_sd: float = 0.0
+    off_percent: float = 0.0
     fits: str = ""
+    disagree: tuple[str, ...] = ()
 
 
 class Imported(Event, frozen=True, tag="imported"):

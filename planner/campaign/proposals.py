@@ -20,6 +20,7 @@ from planner.design.propose import propose as choose
 from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
+from planner.words import small
 
 # Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
 AVOIDED = 0.1
@@ -148,7 +149,7 @@ def _reason(model: Model, index: int, acquisition: str) -> str:
     p = model.expected(index)
     sd = 100 * p.frequency_sd_hz[0] / p.frequency_hz[0]
     k = int(np.argmax(sd))
-    text = f"mode {k + 1} is expected at {p.frequency_hz[0, k]:.2f} Hz ± {sd[k]:.1f} %"
+    text = f"mode {k + 1} is expected at {p.frequency_hz[0, k]:.2f} Hz ± {small(sd[k], '.1f')} %"
     if model.labelled:
         x = model.cell.features(np.array([pose.q for pose in model.labelled]))
         distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)

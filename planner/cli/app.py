@@ -164,8 +164,9 @@ def watch(
     from planner.report.imports import how_to_answer
     from planner.session.watch import watch as run
 
+    campaign = Campaign(directory)
     summary = run(
-        Campaign(directory),
+        campaign,
         folder,
         console=console(quiet=False, stderr=as_json),
         auto=auto,
@@ -174,7 +175,8 @@ def watch(
         viewer=viewer,
         explain=explain,
     )
-    asked = [how_to_answer(directory, pose, text) for pose, text in summary.questions.items()]
+    held = campaign.state.held.items()
+    asked = [how_to_answer(directory, pose, m.question) for pose, m in held if m.question]
     return respond(summary, as_json, refusals((), asked))
 
 

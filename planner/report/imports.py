@@ -138,7 +138,6 @@ class PoseImport(Answer):
         asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
         return [made, *remarks(self.remarks), said, *asked]
 
-
     @property
     def unhit(self) -> bool:
         """Whether nothing came of it: no hit was accepted, nor is one held."""
@@ -164,9 +163,7 @@ class ImportedPoses(Answer):
     simulated: bool = False  # whether the campaign has simulated recordings
 
     @classmethod
-    def of(
-        cls, reports: "tuple[ImportReport, ...]", simulated: bool = False
-    ) -> "ImportedPoses":
+    def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
         every = [hit for pose in model.misses for hit in pose.hits]
@@ -191,7 +188,7 @@ class ImportedPoses(Answer):
     def to_be_answered(self, directory: Path) -> list[str]:
         """What is asked of held hits, with the commands that answer it, a line each."""
         asked = [pose.question for pose in self.poses if pose.question is not None]
-        return [how_to_answer(directory, one.pose, one.text) for one in asked]
+        return [how_to_answer(directory, one.pose, one.question) for one in asked]
 
     def text(self) -> Group:
         """Pose by pose."""
@@ -200,11 +197,17 @@ class ImportedPoses(Answer):
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
-def how_to_answer(directory: Path, pose: str, asked: str) -> str:
+def how_to_answer(directory: Path, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
+    if asked.disagree:
+        return (
+            f"{asked.text} They are held, not used. To take the import back: planner undo "
+            f"{directory}; if each is right: planner confirm {directory} {pose}; to set all "
+            f"aside: planner withdraw {directory} {pose}."
+        )
     return (
-        f"{asked} They are held, not used. If it is: planner confirm {directory} {pose}; if it is "
-        f"at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
+        f"{asked.text} They are held, not used. If it is: planner confirm {directory} {pose}; "
+        f"if it is at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
         f"{directory} {pose}."
     )
 

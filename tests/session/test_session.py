@@ -82,7 +82,7 @@ def test_a_session_shows_imports_and_goes_on(cell):
     proposal = campaign.next()[0]
     analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
     script = Script(console, [
-        (wait("all hits are in"), "?"), (wait("set the waiting hits aside"), "s"),
+        (wait("all hits are in"), "?"), (wait("set all waiting hits aside"), "s"),
         (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("not be offered"), "u"),
         (wait("Took back"), "q"),
     ])  # fmt: skip
@@ -124,7 +124,8 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
     campaign, truth, tmp_path = cell
     deliver(truth, tmp_path, campaign.next()[0], 0)
     console = screen()
-    script = Script(console, [(wait("all hits are in"), "r"), (wait("set aside"), "a"),
+    script = Script(console, [(wait("all hits are in"), "r"), (wait("No hit is to be"), "r"),
+                              (wait("9 hits set aside (1, 2, 3"), "a"),
                               (wait("No whole new file"), "q")])  # fmt: skip
     watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
           quiet_s=0.05, limit_s=30)  # fmt: skip

@@ -184,14 +184,14 @@ def _urscript(
 FASTEST_UR_RAD_S = 3.14  # joint speed of which `speed_percent` is a share, as UR's manuals state it
 
 
-def _poses(
-    _: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Sequence[str]
-) -> str:
+def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Sequence[str]) -> str:
     """A table: axes as the controller counts them, in degrees, those that slide in mm.
 
     It has no room for sentences: each note begins with what is to be known first.
     """
-    first = "".join(f"{line.partition(':')[0]}; " for line in said if line in (SIMULATED, UNCHECKED))
+    first = "".join(
+        f"{line.partition(':')[0]}; " for line in said if line in (SIMULATED, UNCHECKED)
+    )
     axes: list[str] = []
     if poses:
         axes = [f"A{k}" for k in range(1, len(poses[0].arm) + 1)]

@@ -163,9 +163,7 @@ def decisions(facts: Facts) -> Markup:
     for entry in facts.campaign.entries:
         mark = " (taken back)" if entry.seq in undone else ""
         rows.append((str(entry.seq), local_time(entry.time), act(entry) + mark))
-    return section(
-        "Log of decisions", words_table(("entry", "time", "what"), rows), id_="log"
-    )
+    return section("Log of decisions", words_table(("entry", "time", "what"), rows), id_="log")
 
 
 def reproduce(facts: Facts) -> Markup:
