@@ -67,11 +67,12 @@ class Travel:
         return replace(self, q=self.q[which], shares=shares)
 
 
-def check_name(name: str) -> None:
-    """InputError if no acquisition has this name."""
+def check_name(name: str, where: str = "") -> None:
+    """InputError if no acquisition has this name, which stands `where` (file and entry)."""
     if name not in ACQUISITIONS and name not in DESIGNS:
         known = ", ".join([*ACQUISITIONS, *DESIGNS])
-        raise InputError(f'There is no acquisition "{name}"; choose one of {known}.')
+        said = f"{where}: there" if where else "There"
+        raise InputError(f'{said} is no acquisition "{name}"; choose one of {known}.')
 
 
 def workspace_outputs(
