@@ -41,7 +41,7 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     try:
         found = msgspec.toml.decode(text, type=kind)
     except msgspec.ValidationError as error:
-        raise InputError(wrong_entry(path, text, kind, str(error))) from error
+        raise InputError(wrong_entry(path, name, text, kind, str(error))) from error
     except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(f"{path} is not a valid {name} ({error}); correct it.") from None
     except ValueError:  # of more digits than Python turns into an integer
@@ -61,7 +61,7 @@ _WANTED = {
 }  # fmt: skip
 
 
-def wrong_entry(path: Path, text: str, kind: type, fault: str) -> str:
+def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str:
     """What msgspec found wrong in a TOML file, as a sentence that names the entry."""
     what, _, at = fault.partition(" - at `$")
     steps = [step for step in re.findall(r"\.\.\.|\w+", at) if step]
@@ -70,7 +70,7 @@ def wrong_entry(path: Path, text: str, kind: type, fault: str) -> str:
         table = _entry(steps, table=True)
         known = _fields(kind, steps)
         near = difflib.get_close_matches(unknown[1], known, 1)
-        meant = f"; entries of this {'table' if table else 'file'} are {', '.join(known)}."
+        meant = f"; entries of {'this table' if table else f'a {name}'} are {', '.join(known)}."
         meant = f'; did you mean "{near[0]}"?' if near else meant
         return f'{path}: {table + " has" if table else "there is"} no entry "{unknown[1]}"{meant}'
     missing = re.search(r"missing required field `([^`]+)`", what)
