@@ -56,7 +56,8 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
 
 # What msgspec expects, in words.
 _WANTED = {
-    "int": "a whole number", "float": "a number", "str": "a text in quotes", "bool": "true or false",
+    "int": "a whole number", "float": "a number", "str": "a text in quotes",
+    "bool": "true or false",
     "array": "a list in brackets", "object": "a table",
 }  # fmt: skip
 

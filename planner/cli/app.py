@@ -26,6 +26,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # in which brackets are no markup
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 

@@ -11,7 +11,7 @@ from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.report.pose_screen import PosePage
-from planner.report.text import with_sd
+from planner.report.text import SIMULATED, with_sd
 from planner.words import counted
 
 HELP = """\
@@ -23,7 +23,6 @@ s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
-SIMULATED = "SIMULATED RECORDINGS: nothing here was measured on a real robot"
 
 
 def _table(*columns: str) -> Table:
@@ -63,7 +62,7 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     parts += [Text(remark, style="yellow") for remark in report.remarks]
     parts.append(uncertainty_line(report.model))
     if simulated:
-        parts.append(Text(SIMULATED, style="bold magenta"))
+        parts.append(SIMULATED)
     title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
 

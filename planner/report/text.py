@@ -7,7 +7,9 @@ from rich.text import Text
 
 from planner.words import small
 
-SIMULATED = Text("SIMULATED RECORDINGS: no measured data in this campaign", style="bold magenta")
+SIMULATED = Text(
+    "SIMULATED RECORDINGS: nothing here was measured on a real robot", style="bold magenta"
+)
 SIMULATED_TITLE = "SIMULATED recordings · "  # before the title of a picture
 
 

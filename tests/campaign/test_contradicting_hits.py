@@ -60,6 +60,10 @@ def test_the_import_is_held_and_names_the_files(cell, made):
     told("confirm", cell, pose)
     assert told("status", cell)["used"] == 1
     assert told("replay", cell)["reproduced"]
+    page = Path(told("report", cell)["report"]).read_text()
+    assert "Joints as proposed: nothing was read back" in page  # files alone say no angles
+    code, _, err = call("report", cell, "--out", cell / "none" / "x.html")
+    assert (code, "make that folder" in err, (cell / "none").exists()) == (2, True, False)
 
 
 def test_a_third_hit_tells_which_was_right(cell, made):

@@ -48,7 +48,7 @@ def test_the_pose_stays_open_and_nothing_is_counted(refused, made):
     assert call("withdraw", cell, name)[0] == 2
     report = told("report", cell)
     assert report["measurements"] == 0
-    code, out, err = call("import", cell, made[2])
+    code, _, err = call("import", cell, made[2])
     assert code == 0, err
     (cell / "more.sh").write_text("no recording either")
     assert "SIMULATED" in call("import", cell, cell / "more.sh", "--pose", name)[1]
@@ -92,6 +92,6 @@ def test_a_log_written_before_goes_on_as_it_did(refused, made):
     found = told("replay", cell)
     assert found["reproduced"]
     assert found["steps"][-1]["check"] == "identical"
-    code, out, _ = call("replay", cell)
+    _, out, _ = call("replay", cell)
     assert "1 hit refused" in " ".join(re.sub(r"[│┃]", " ", out).split())
     assert json.loads(call("status", cell, "--json")[1])["measurements"] == []

@@ -157,7 +157,7 @@ def test_a_hit_along_another_axis_than_said_is_asked_about(cell, key, said, used
     campaign, truth, tmp_path = cell
     proposal = campaign.next()[0]
     q, rng = np.deg2rad(proposal.joints_deg), np.random.default_rng(3)
-    for number, (axis, stated) in enumerate([*zip(SIX, SIX, strict=True)][:5] + [("+y", "+z")]):
+    for number, (axis, stated) in enumerate(zip([*SIX[:5], "+y"], SIX, strict=True)):
         hit = simulate_hit(truth, q, axis, HAMMER, rng)
         hit = type(hit)(stated, hit.force_n, hit.acceleration_m_s2)
         write_uff(tmp_path / "inbox" / f"h{number}.uff", hit, HAMMER)
