@@ -53,8 +53,8 @@ def _usage(error: TyperException) -> int:
         return 2
     context = getattr(error, "ctx", None)
     # What is wrong below a command is explained by that command's own help.
-    below = context is not None and context.parent is not None
-    command = f"planner {context.info_name}" if below else "planner"
+    name = context.info_name if context is not None and context.parent is not None else ""
+    command = f"planner {name}".strip()
     return _say(f"{text.rstrip('.')}; see {command} --help.", 2)
 
 

@@ -46,6 +46,8 @@ def page_with_hits(
 def _judged(verdict: HitVerdict, before: str) -> JudgedHit:
     late = f"answers as {before} did: [b] it is from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
+    if verdict.kind == "unsure":
+        text = f"{text}, or [h]: it is right"
     return JudgedHit(verdict.number, verdict.axis, verdict.kind, text)
 
 

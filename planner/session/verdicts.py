@@ -153,7 +153,7 @@ class Verdicts:
             return ""
         return (
             f"the tool answers it against its direction, and {right[0].name} not: hit along "
-            f"{hit.axis[-1]} once more; [h] if it is right"
+            f"{hit.axis[-1]} once more"
         )
 
     def _hits_of(self, path: Path) -> list[tuple[Verdict, tuple[Hit, ...]]]:
@@ -185,5 +185,5 @@ def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> Hi
 def _asked(hit: Hit, doubt: Doubt, others: str) -> str:
     again = f"hit along {hit.axis[-1]} once more, that tells which is right"
     if doubt.along:
-        return f"answers as {others} along {doubt.along} did: {again}; [h] if it is right"
-    return f"disagrees with {others} (likeness {doubt.likeness:.2f}): {again}; [h] if it is right"
+        return f"answers as {others} along {doubt.along} did: {again}"
+    return f"disagrees with {others} (likeness {doubt.likeness:.2f}): {again}"
