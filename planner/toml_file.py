@@ -24,7 +24,7 @@ def read_toml_text(path: Path, name: str) -> str:
         raise InputError(f"{path} does not exist; name a {name}.") from None
     except IsADirectoryError:
         found = [p for p in (path / name, path / "robot" / name) if p.is_file()]
-        meant = f"did you mean {found[0]}?" if found else f"name a {name} in it."
+        meant = f"name {found[0]}." if found else f"name a {name} in it."
         raise InputError(f"{path} is a folder; {meant}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); name a file.") from None
@@ -72,7 +72,7 @@ def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str
         known = _fields(kind, steps)
         near = difflib.get_close_matches(unknown[1], known, 1)
         meant = f"; entries of {'this table' if table else f'a {name}'} are {', '.join(known)}."
-        meant = f'; did you mean "{near[0]}"?' if near else meant
+        meant = f'; "{near[0]}" may be meant.' if near else meant
         return f'{path}: {table + " has" if table else "there is"} no entry "{unknown[1]}"{meant}'
     missing = re.search(r"missing required field `([^`]+)`", what)
     if missing:
