@@ -13,6 +13,10 @@ class InputError(PlannerError):
     exit_code = 2
 
 
+class ForeignFileError(InputError):
+    """A file is no recording at all, not one that is damaged."""
+
+
 class RefusedError(PlannerError):
     """A recording was read but cannot be used as a measurement."""
 

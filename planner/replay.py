@@ -25,10 +25,11 @@ from planner.campaign.events import (
 from planner.campaign.log_conversion import from_modal
 from planner.campaign.model import Model
 from planner.campaign.proposals import propose
-from planner.campaign.state import CampaignState, fold
+from planner.campaign.state import CampaignState, Measurement, fold
 from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.store import Store
 from planner.errors import InputError, NoPoseLeftError, PlannerError
+from planner.words import counted
 
 CLOSE = 1e-6  # relative; another processor rounds differently, another program errs by more
 
@@ -87,16 +88,19 @@ def replay(
         raise InputError(f"The log has entries 1 to {len(entries)}; {until} is not among them.")
     with ExitStack() as stack:
         cells = _Cells(campaign, stack)
-        model, model_key, kept = None, None, campaign.recordings
+        # A model follows from configuration and measurements: skips and undone acts leave it alone.
+        models: dict[tuple[int, tuple[Measurement, ...]], Model] = {}
+        model, kept = None, campaign.recordings
         for entry in entries[:until]:
             before, after = fold(entries[: entry.seq - 1]), fold(entries[: entry.seq])
             check, detail, measured = _check(campaign, entry, before, model)
             instead = _instead(entry, before, model, acquisition)
             assert after.configured is not None
-            key = (after.model_version, id(cells.of(after.configured)))
-            if model is None or key != model_key:
-                of_hits = kept.frf, kept.hits
-                model, model_key = build(cells.of(after.configured), after, *of_hits), key
+            cell = cells.of(after.configured)
+            key = id(cell), after.used
+            if key not in models:
+                models[key] = build(cell, after, kept.frf, kept.hits)
+            model = models[key]
             yield Step(entry, check, detail, after, model, measured, instead)
 
 
@@ -142,7 +146,9 @@ def _check_import(
     accepted = [v.accepted for v in measured.verdicts[len(hits) - len(event.hits) :]]
     if accepted != [hit.accepted for hit in event.hits]:
         return "differs", f"{event.pose}: other hits are refused than before", measured
-    detail = f"{event.pose}: {sum(accepted)} hits, {len(modes)} modes"
+    detail = f"{event.pose}: {counted(sum(accepted), 'hit')}, {counted(len(modes), 'mode')}"
+    if event.unhit:
+        detail = f"{event.pose}: {counted(len(event.hits), 'hit')} refused"
     detail += ", held until confirmed" if event.question else ""
     check, detail = _compare(_numbers(event.modes), _numbers(modes), detail)
     return check, detail, measured

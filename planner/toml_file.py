@@ -1,6 +1,10 @@
 """TOML files as typed values, every fault in one sentence."""
 
+import difflib
 import math
+import re
+import typing
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,6 +13,7 @@ import msgspec
 from planner.errors import InputError
 
 T = TypeVar("T")
+LONGEST = 40  # of a wrong value that is repeated
 
 
 def read_toml_text(path: Path, name: str) -> str:
@@ -17,6 +22,10 @@ def read_toml_text(path: Path, name: str) -> str:
         return path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; name a {name}.") from None
+    except IsADirectoryError:
+        found = [p for p in (path / name, path / "robot" / name) if p.is_file()]
+        meant = f"name {found[0]}." if found else f"name a {name} in it."
+        raise InputError(f"{path} is a folder; {meant}") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); name a file.") from None
     except UnicodeDecodeError as error:
@@ -31,6 +40,8 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     text = read_toml_text(path, name)
     try:
         found = msgspec.toml.decode(text, type=kind)
+    except msgspec.ValidationError as error:
+        raise InputError(wrong_entry(path, name, text, kind, str(error))) from error
     except (msgspec.DecodeError, RecursionError) as error:
         raise InputError(f"{path} is not a valid {name} ({error}); correct it.") from None
     except ValueError:  # of more digits than Python turns into an integer
@@ -41,6 +52,83 @@ def load_toml(path: Path, kind: type[T], name: str) -> T:
     if entry:
         raise InputError(f"{path}: {entry} is {value}; it must be a finite number.")
     return found
+
+
+# What msgspec expects, in words.
+_WANTED = {
+    "int": "a whole number", "float": "a number", "str": "a text in quotes",
+    "bool": "true or false",
+    "array": "a list in brackets", "object": "a table",
+}  # fmt: skip
+
+
+def wrong_entry(path: Path, name: str, text: str, kind: type, fault: str) -> str:
+    """What msgspec found wrong in a TOML file, as a sentence that names the entry."""
+    what, _, at = fault.partition(" - at `$")
+    steps = [step for step in re.findall(r"\.\.\.|\w+", at) if step]
+    unknown = re.search(r"unknown field `([^`]+)`", what)
+    if unknown:
+        table = _entry(steps, table=True)
+        known = _fields(kind, steps)
+        near = difflib.get_close_matches(unknown[1], known, 1)
+        meant = f"; entries of {'this table' if table else f'a {name}'} are {', '.join(known)}."
+        meant = f'; "{near[0]}" may be meant.' if near else meant
+        return f'{path}: {table + " has" if table else "there is"} no entry "{unknown[1]}"{meant}'
+    missing = re.search(r"missing required field `([^`]+)`", what)
+    if missing:
+        return f"{path}: {_entry([*steps, missing[1]])} is missing; add it."
+    wanted = re.fullmatch(r"Expected `([^`]+)`, got `[^`]+`", what)
+    if not wanted or not steps:
+        where = f"{_entry(steps)}: " if steps else ""
+        return f"{path}: {where}{what[:1].lower()}{what[1:]}; correct it."
+    kinds = [_WANTED.get(k.strip(), k.strip()) for k in wanted[1].split("|") if k.strip() != "null"]
+    return f"{path}: {_entry(steps)} must be {' or '.join(kinds)}, not {_given(text, steps)}."
+
+
+def _entry(steps: Sequence[str], table: bool = False) -> str:
+    """Where an entry, or a `table`, stands, as one would look for it: "[modes] count"."""
+    names = [i for i, step in enumerate(steps) if not _is_place(step)]
+    said = []
+    for k, i in enumerate(names):
+        listed = i + 1 < len(steps) and _is_place(steps[i + 1])
+        if k + 1 < len(names) or table:
+            said.append(f"[[{steps[i]}]]" if listed else f"[{steps[i]}]")
+        else:
+            said.append(steps[i])
+    return " ".join(said)
+
+
+def _is_place(step: str) -> bool:
+    """Whether a step is a place in a list, which msgspec does not always tell."""
+    return step == "..." or step.isdecimal()
+
+
+def _fields(kind: Any, steps: Sequence[str]) -> list[str]:
+    """Names of the entries of a table, as far as they are known."""
+    for step in (step for step in steps if not _is_place(step)):
+        hints = typing.get_type_hints(kind) if msgspec.inspect.is_struct_type(kind) else {}
+        kind = next(
+            (part for part in _parts(hints.get(step)) if msgspec.inspect.is_struct_type(part)), None
+        )
+    return list(typing.get_type_hints(kind)) if msgspec.inspect.is_struct_type(kind) else []
+
+
+def _parts(hint: Any) -> list[Any]:
+    """A type and those that it is made of."""
+    return [hint, *(inner for part in typing.get_args(hint) for inner in _parts(part))]
+
+
+def _given(text: str, steps: Sequence[str]) -> str:
+    """The value at an entry as TOML writes it, short."""
+    value: Any = msgspec.toml.decode(text)
+    for step in steps:
+        try:
+            value = value[int(step)] if isinstance(value, list) else value[step]
+        except (LookupError, ValueError, TypeError):
+            break
+    said = {True: "true", False: "false"}.get(value) if isinstance(value, bool) else None
+    said = said or (f'"{value}"' if isinstance(value, str) else str(value))
+    return said if len(said) <= LONGEST else f"{said[:LONGEST]}…"
 
 
 def _not_finite(value: Any, name: str) -> tuple[str, float]:

@@ -34,7 +34,7 @@ def alerts(
         return told
     if measured.frf is not None:
         told += unreciprocal(measured.frf)
-    known = state.measurements.get(event.pose)
+    known = state.hit_at(event.pose)
     if known is not None:
         return told + hit_again(model, known, modes)
     return told if suspicion is None else (*told, suspicion.text)

@@ -1,7 +1,7 @@
 """The campaign: the only thing with state, and its state is a fold over its log."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,13 +94,18 @@ class Campaign(CampaignReads):
                 reports.append(self._import_pose(delivery, joints_deg, named))
             return tuple(reports)
 
-    def refuse(self, pose: str, paths: tuple[Path, ...]) -> None:
-        """Refuse files that wait at a pose: they are kept, and not imported unless named."""
+    def refuse(
+        self, pose: str, paths: tuple[Path, ...], reasons: Mapping[Path, str] | None = None
+    ) -> None:
+        """Refuse files that wait at a pose: they are kept, and not imported unless named.
+
+        `reasons` are what was found wrong with some of them.
+        """
         from planner.campaign.importing import refusals
 
         with self._acting():
             if paths:
-                self._append(Refused(pose, refusals(self.directory, paths)))
+                self._append(Refused(pose, refusals(self.directory, paths, reasons or {})))
 
     def confirm(self, pose: str) -> None:
         """The held hits of a pose are from there indeed: the model uses them."""
@@ -138,7 +143,7 @@ class Campaign(CampaignReads):
         if pose in self.state.held:
             return self.refuse_held(pose, reason or REFUSED)
         with self._acting():
-            measurement = self.state.measurements.get(pose)
+            measurement = self.state.hit_at(pose)
             if measurement is None or measurement.withdrawn:
                 raise InputError(f"Pose {pose} is not among the measured ones; see planner status.")
             self._append(Withdrawn(pose, reason))
@@ -204,6 +209,7 @@ class Campaign(CampaignReads):
         self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
     ) -> "ImportReport":
         from planner.campaign.alerts import alerts
+        from planner.campaign.contradictions import contradiction
         from planner.campaign.importing import (
             ImportReport,
             displacement,
@@ -218,10 +224,10 @@ class Campaign(CampaignReads):
         from planner.campaign.revisits import suspected
 
         before, state, pose = self.model, self.state, delivery.pose
-        known = state.measurements.get(pose)
+        known = state.hit_at(pose)
         kept = keep_files(self.directory, delivery, state, named)
         if not kept.fresh:
-            held = state.held.get(pose)
+            held, known = state.held.get(pose), state.measurements.get(pose)
             return ImportReport(
                 pose, (), (), kept.already, held or known, None, before, before, 0.0,
                 left_out=kept.left_out, question=held.question if held else None,
@@ -234,7 +240,8 @@ class Campaign(CampaignReads):
         if old:  # among earlier hits, wrong ones would not stand out
             alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
-        asked = question(before, state, pose, joints_deg, new_modes)
+        asked = contradiction(pose, measured, len(old))
+        asked = asked or question(before, state, pose, joints_deg, new_modes)
         drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
         event = Imported(
             pose=pose,
@@ -293,5 +300,5 @@ def _first_entry(directory: Path) -> bytes:
     store.keep_robot_files(directory, hashes)
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
     units = cell.robot.joints.declared
-    event = Configured(as_logged(config), hashes, __version__, True, True, True, units)
+    event = Configured(as_logged(config), hashes, __version__, True, True, True, units, True)
     return encode_line("", Entry(1, now, event))[0]

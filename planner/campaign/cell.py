@@ -1,6 +1,7 @@
 """What stays the same while a campaign is measured: robot, simulation, workspace, candidates."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -57,10 +58,11 @@ class Cell:
         where robot.toml does not say. `visit_scatter` and `hits_err` are off for campaigns that
         began without.
         """
-        check_name(config.acquisition.name)
+        check_name(config.acquisition.name, "campaign.toml, [acquisition] name")
         robot = _handled(robot or Robot.load(robot_toml, geometric_stiffness), config)
         simulation = Simulation(robot) if config.fidelity.simulation != "none" else None
-        workspace = Workspace.from_table(config.workspace, robot)
+        with _of_campaign_toml():
+            workspace = Workspace.from_table(config.workspace, robot)
         _check_angles(robot, config)
         cut = _cut_of(robot_toml, config)
         return cls(
@@ -155,6 +157,15 @@ class Cell:
     def check_pose(self, joints_deg: tuple[float, ...], where: str) -> np.ndarray:
         """The pose in rad (m); InputError if the robot cannot stand there."""
         return _checked_pose(self.robot, joints_deg, where)
+
+
+@contextmanager
+def _of_campaign_toml() -> Iterator[None]:
+    """Name the file in an InputError that names an entry of campaign.toml only."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"campaign.toml: {error}") from None
 
 
 def _checked_pose(robot: Robot, joints_deg: Sequence[float], where: str) -> np.ndarray:

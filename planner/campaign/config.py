@@ -157,7 +157,7 @@ def config_from_builtins(data: Any) -> CampaignConfig:
 
 def check_config(config: CampaignConfig, path: Path) -> None:
     """InputError where entries make no sense by themselves; `path` is named there."""
-    w, low_high = config.workspace, [config.modes.band_hz]
+    w = config.workspace
     if (w.joints_deg is None) == (w.position_m is None):
         raise InputError(
             f"{path}: [workspace] needs either joints_deg or position_m; give exactly one of them."
@@ -170,16 +170,13 @@ def check_config(config: CampaignConfig, path: Path) -> None:
         raise InputError(
             f"{path}: [workspace] position_m needs ranges of x, y, z and a tool_axis; add them."
         )
-    low_high += w.joints_deg or w.position_m or []
-    low_high += [w.rotation_deg] if w.rotation_deg else []
-    heights = config.acquisition.hammer_height_m
-    low_high += [heights] if heights else []
-    for zone in config.forbidden:
-        low_high += zone.position_m or zone.joints_deg or []
-    low_high += [config.goal.band_hz] if config.goal.band_hz else []
-    for low, high in low_high:
+    for name, number, (low, high) in _ranges(config):
         if not (abs(low) < 1e6 and abs(high) < 1e6 and low <= high):
-            raise InputError(f"{path}: range [{low}, {high}] must be finite, lower bound first.")
+            which = f", range {number}" if number else ""
+            raise InputError(
+                f"{path}: {name}{which} is [{low:g}, {high:g}]; give finite numbers, the lower "
+                f"one first."
+            )
     band = config.modes.band_hz
     if not 0 < band[0] < band[1]:
         raise InputError(f"{path}: [modes] band_hz {list(band)} must rise from above 0 Hz.")
@@ -204,6 +201,25 @@ def check_config(config: CampaignConfig, path: Path) -> None:
     for name, value, low, high in limits:
         if not low <= value <= high:
             raise InputError(f"{path}: {name} is {value}; it must lie between {low} and {high}.")
+
+
+def _ranges(config: CampaignConfig) -> list[tuple[str, int, tuple[float, float]]]:
+    """Every range: its entry, its number there (0: it is the only one), lower and upper bound."""
+    w, found = config.workspace, [("[modes] band_hz", 0, config.modes.band_hz)]
+    several = [
+        ("[workspace] joints_deg", w.joints_deg), ("[workspace] position_m", w.position_m),
+        *(("[[forbidden]] position_m", zone.position_m) for zone in config.forbidden),
+        *(("[[forbidden]] joints_deg", zone.joints_deg) for zone in config.forbidden),
+    ]  # fmt: skip
+    for name, ranges in several:
+        found += [(name, number, one) for number, one in enumerate(ranges or (), 1)]
+    for name, one in (
+        ("[workspace] rotation_deg", w.rotation_deg),
+        ("[acquisition] hammer_height_m", config.acquisition.hammer_height_m),
+        ("[goal] band_hz", config.goal.band_hz),
+    ):
+        found += [(name, 0, one)] if one else []
+    return found
 
 
 def _check_choices(config: CampaignConfig, path: Path) -> None:

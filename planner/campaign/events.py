@@ -19,7 +19,8 @@ class Configured(Event, frozen=True, tag="configured"):
     not say either began when gravity's own stiffness was left out, and go on like that. So it is
     with `visit_scatter`: whether the scatter of frequencies from visit to visit is learned; and
     with `hits_err`: whether the simulation is identified from hits at all points that err, as
-    hits and measuring chains do, or from the tool's sensor as if they did not.
+    hits and measuring chains do, or from the tool's sensor as if they did not; and with
+    `unhit_stay_open`: whether a pose of which every hit was refused is still to be measured.
     `joint_units` are those of all `joints_deg` that follow, "deg" or "mm" of each joint; unset
     where all are degrees.
     """
@@ -31,6 +32,7 @@ class Configured(Event, frozen=True, tag="configured"):
     visit_scatter: bool = False
     hits_err: bool = False
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    unhit_stay_open: bool = False
 
 
 class Proposal(msgspec.Struct, frozen=True):
@@ -118,14 +120,16 @@ class Question(msgspec.Struct, frozen=True):
     """What the engineer is asked of hits that lie far from what the model is sure of.
 
     The `mode` that is furthest off is so by `off_sd` standard deviations; `fits` names the pose
-    whose modes these are instead, if there is one.
+    whose modes these are instead, if there is one. Where hits contradict each other instead,
+    `disagree` are their files, and no mode is named (0).
     """
 
     text: str
-    mode: int
-    off_sd: float
-    off_percent: float
+    mode: int = 0
+    off_sd: float = 0.0
+    off_percent: float = 0.0
     fits: str = ""
+    disagree: tuple[str, ...] = ()
 
 
 class Imported(Event, frozen=True, tag="imported"):
@@ -143,6 +147,11 @@ class Imported(Event, frozen=True, tag="imported"):
     amplitude: Amplitude | None = None  # null: all hits of one strength
     question: Question | None = None
     again: str = ""
+
+    @property
+    def unhit(self) -> bool:
+        """Whether nothing came of it: every hit was refused."""
+        return not self.modes and not any(hit.accepted for hit in self.hits)
 
 
 class Confirmed(Event, frozen=True, tag="confirmed"):

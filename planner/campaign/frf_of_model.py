@@ -6,7 +6,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from planner.campaign.frf_model import FrfModel, frf_model
-from planner.campaign.frf_posterior import closely
+from planner.campaign.frf_posterior import MODEL_ERROR, closely
 from planner.campaign.frf_simulation import learned_simulation
 from planner.identification.extended_structure import ExtendedModel
 from planner.identification.measured_frfs import common_band, stack
@@ -38,7 +38,7 @@ def _frf_model(model: "Model") -> FrfModel:
     else:
         seen = common_band(model.frfs, band)
         grade = closely(len(q))
-        measured = stack(model.frfs, seen, grade.lines, grade.model_error)
+        measured = stack(model.frfs, seen, grade.lines, MODEL_ERROR)
 
     def modes() -> ModalPrediction:
         return left_out_modes(model.with_residues, model.seen_exactly)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -27,9 +28,10 @@ class HitMiss:
 
     @property
     def cells(self) -> tuple[str, str, str]:
-        """A row of a table: the hit, how it tilts, where it lands."""
+        """A row of a table: the hit and its file, how it tilts, where it lands."""
         tilt = _beside(self.tilt_deg, self.tilt_sd_deg, self.across, "°")
-        return self.hit, tilt, _beside(self.offset_mm, self.offset_sd_mm, self.across, " mm")
+        named = f"{self.hit} {Path(self.file).name}"
+        return named, tilt, _beside(self.offset_mm, self.offset_sd_mm, self.across, " mm")
 
     @property
     def across(self) -> tuple[str, str]:

@@ -1,6 +1,7 @@
 """Importing the hits of one pose: where they belong, which are new, what they give."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from dataclasses import replace as replaced
 from pathlib import Path
@@ -65,7 +66,7 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
 
     Raises InputError where they are not known or contradict each other.
     """
-    known = state.measurements.get(delivery.pose) or state.held.get(delivery.pose)
+    known = state.hit_at(delivery.pose) or state.held.get(delivery.pose)
     if delivery.joints_deg is None:
         stated = known or state.proposals.get(delivery.pose)
         if stated is None:
@@ -137,11 +138,14 @@ def _asked_of(held: Measurement) -> str:
     return held.question.text if held.question else ""
 
 
-def refusals(directory: Path, paths: tuple[Path, ...]) -> tuple[HitRecord, ...]:
+def refusals(
+    directory: Path, paths: tuple[Path, ...], reasons: Mapping[Path, str]
+) -> tuple[HitRecord, ...]:
     """The engineer's refusal of each of these files, which are kept like any other."""
+    said = {path: f"{text} ({REFUSED})" for path, text in reasons.items() if text}
     kept = [(path, *store.store_recording(directory, path)) for path in paths]
     return tuple(
-        HitRecord(str(path), digest, suffix, accepted=False, reason=REFUSED)
+        HitRecord(str(path), digest, suffix, accepted=False, reason=said.get(path, REFUSED))
         for path, digest, suffix in kept
     )
 

@@ -146,6 +146,14 @@ class LowFidelity:
         return np.sqrt((RIGHT**2 + square.sum(axis=0)) / np.maximum(known.sum(axis=0), 1))
 
     @property
+    def misses(self) -> float:
+        """By how many sds of their noise it misses the recordings; 0 where it explains them."""
+        learned = self.learned or self.suspect
+        if learned is None or learned.fits:
+            return 0.0
+        return float(np.sqrt(learned.identified.misfit))
+
+    @property
     def remark(self) -> str:
         """What the engineer should know of the simulation; empty where it follows as stated."""
         learned = self.learned or self.suspect
@@ -157,7 +165,7 @@ class LowFidelity:
             return " ".join(filter(None, (swinging, more)))
         text = (
             f"Fitted to the recordings, the simulation still differs from them by "
-            f"{np.sqrt(learned.identified.misfit):.2g} times their noise: it lacks physics"
+            f"{self.misses:.2g} times their noise: it lacks physics"
         )
         if self.learned is None:
             how = "the campaign goes on without it"

@@ -38,6 +38,8 @@ CONSIDERED = 500  # candidates, the first ones, when asking what one more measur
 ABOVE_SD = 0.05  # of what modes above those modelled add to an FRF, by a simulation that fits
 # Scatter from visit to visit is told from so many poses on, where it is larger than usual.
 SCATTER_POSES, TOLD_SCATTER_PERCENT = 5, 0.3
+# Left-out residuals of fewer poses do not tell how far a simulation is off that lacks physics.
+FEW_POSES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,7 +162,9 @@ class Model:
         outputs, _ = self.outlook
         best = self._informed_pose(int(np.argmax(self._gains)))
         stop = self.cell.config.stop
-        return forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
+        found = forecast(outputs, best, stop.frequency_sd_percent, stop.probability)
+        misses = self.low.misses
+        return found.doubted(misses) if misses and found.measurements < FEW_POSES else found
 
     def _informed_pose(self, index: int) -> Poses:
         """The candidate (n = 1) of that index, and what hits there tell of open parameters."""

@@ -20,6 +20,7 @@ from planner.design.propose import propose as choose
 from planner.design.sensor_places import BetterPlaces, better_places
 from planner.design.space_filling import DESIGNS
 from planner.errors import NoPoseLeftError
+from planner.words import small
 
 # Radius, in model coordinates over √d, around a pose whose neighbours are to be avoided too.
 AVOIDED = 0.1
@@ -76,7 +77,7 @@ def _new_poses(
 
 def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
     """Names of proposed poses: the one that a pose was proposed under before, else a new one."""
-    taken = {*state.measurements, *state.held}
+    taken = {*(m.pose for m in state.over), *state.held}
     known = {p.joints_deg: name for name, p in state.proposals.items() if name not in taken}
     new = counted(state.proposals_made + 1)
     return [known.get(joints_deg) or f"P{next(new):03d}" for joints_deg in angles]
@@ -85,8 +86,9 @@ def _names(state: CampaignState, angles: list[tuple[float, ...]]) -> list[str]:
 def _picks(model: Model, state: CampaignState, count: int, acquisition: str) -> tuple[Pick, ...]:
     cell = model.cell
     joints, x = cell.robot.joints, cell.candidates.features
-    taken = [m.joints_deg for m in state.measurements.values()]
-    at = joints.internal(taken[-1]) if taken else None
+    stood = [m.joints_deg for m in state.measurements.values()]
+    at = joints.internal(stood[-1]) if stood else None
+    taken = [m.joints_deg for m in state.over]
     taken += [m.joints_deg for m in state.held.values()]
     shares = None
     if cell.config.acquisition.hit_axes == "best" and acquisition not in DESIGNS:
@@ -147,7 +149,7 @@ def _reason(model: Model, index: int, acquisition: str) -> str:
     p = model.expected(index)
     sd = 100 * p.frequency_sd_hz[0] / p.frequency_hz[0]
     k = int(np.argmax(sd))
-    text = f"mode {k + 1} is expected at {p.frequency_hz[0, k]:.2f} Hz ± {sd[k]:.1f} %"
+    text = f"mode {k + 1} is expected at {p.frequency_hz[0, k]:.2f} Hz ± {small(sd[k], '.1f')} %"
     if model.labelled:
         x = model.cell.features(np.array([pose.q for pose in model.labelled]))
         distance = np.linalg.norm(x - model.cell.candidates.features[index], axis=1)

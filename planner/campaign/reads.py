@@ -199,6 +199,7 @@ class CampaignReads:
         hashes = store.robot_hashes(self.directory)
         begun = next(e.event for e in self.entries if isinstance(e.event, Configured))
         kept = begun.geometric_stiffness, begun.visit_scatter, begun.hits_err, begun.joint_units
+        kept += (begun.unhit_stay_open,)
         return Configured(as_logged(config), hashes, __version__, *kept)
 
     # -- what is expected ----------------------------------------------------------------------

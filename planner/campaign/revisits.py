@@ -50,7 +50,7 @@ def suspected(
 
     `model` and `state` are those before the import; it is a hint only where they expect enough.
     """
-    if len(model.labelled) < LEAST or pose in state.measurements:
+    if len(model.labelled) < LEAST or state.hit_at(pose) is not None:
         return None
     here = compared(model, joints_deg, tuple(modes))
     near = np.abs(here.off) < SAME_MODE

@@ -45,6 +45,11 @@ class Measurement:
         return tuple(hit for hit in self.hits if hit.accepted)
 
     @property
+    def unhit(self) -> bool:
+        """Whether every hit was refused, so that nothing is known of the pose."""
+        return not self.modes and not self.accepted
+
+    @property
     def simulated(self) -> bool:
         """Whether any hit is labelled as simulated."""
         return any(hit.simulated for hit in self.hits)
@@ -76,6 +81,36 @@ class CampaignState:
         return tuple(m for m in self.measurements.values() if m.modes and not m.withdrawn)
 
     @property
+    def measured(self) -> tuple[Measurement, ...]:
+        """Poses of which something was accepted, used or not."""
+        return tuple(m for m in self.measurements.values() if not m.unhit)
+
+    def hit_at(self, pose: str) -> Measurement | None:
+        """What was measured at a pose; None too where every hit there was refused."""
+        known = self.measurements.get(pose)
+        return None if known is None or known.unhit else known
+
+    @property
+    def over(self) -> tuple[Measurement, ...]:
+        """Poses that are not to be proposed again, for there were hits; see `unhit_stay_open`."""
+        return self.measured if self._unhit_stay_open else tuple(self.measurements.values())
+
+    @property
+    def _unhit_stay_open(self) -> bool:
+        return self.configured is not None and self.configured.unhit_stay_open
+
+    def unchanged_by(self, event: AnyEvent) -> bool:
+        """Whether an act changes neither the model nor what is proposed."""
+        if isinstance(event, Imported):
+            return event.question is not None or (event.unhit and self._unhit_stay_open)
+        return isinstance(event, Starred | Refused)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any recording is labelled as simulated."""
+        return any(m.simulated for m in self.recorded)
+
+    @property
     def recorded(self) -> tuple[Measurement, ...]:
         """All that was imported, used or not, and what is held."""
         return (*self.measurements.values(), *self.held.values())
@@ -90,7 +125,7 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
         if isinstance(entry.event, Proposed):
             state = replace(state, proposals_made=_made(state, entry.event))
         if isinstance(entry.event, Undone):
-            if _counts(entries[entry.event.act - 1].event):
+            if not state.unchanged_by(entries[entry.event.act - 1].event):
                 state = replace(state, stale=True, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
@@ -111,12 +146,6 @@ def last_act(entries: Iterable[Entry], decisions_only: bool = False) -> Entry | 
     kinds = tuple(kind for kind in ACTS if not (decisions_only and kind is Proposed))
     acts = [e for e in entries if isinstance(e.event, kinds) and e.seq not in undone]
     return acts[-1] if acts else None
-
-
-def _counts(event: AnyEvent) -> bool:
-    """Whether taking an act back changes the model or the proposals."""
-    held = isinstance(event, Imported) and event.question is not None
-    return not (held or isinstance(event, Starred | Refused))
 
 
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
@@ -179,6 +208,8 @@ def _imported(
         held = {**state.held, event.pose: measurement}
         return replace(state, open=left, refused=refused, held=held)
     measurements = {**state.measurements, event.pose: measurement}
+    if state.unchanged_by(event):
+        return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
     return replace(changed, open=left, refused=refused, measurements=measurements, doubt=doubt)
 

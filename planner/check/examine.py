@@ -63,7 +63,7 @@ def home_of(robot: Robot) -> np.ndarray:
 def examine(robot: Robot, plan: Plan | None = None) -> Examination:
     """Check a robot that was loaded, and what a campaign asks of it."""
     links, home = link_bodies(robot), home_of(robot)
-    found = check_links(robot, links) + check_joints(robot) + check_frames(robot)
+    found = check_links(robot, links) + check_joints(robot, plan is not None) + check_frames(robot)
     found += check_collision(robot, links, home)
     poses, q = (HOME,), home[None]
     if plan is None:

@@ -6,6 +6,7 @@ from planner.check.remark import CheckRemark
 from planner.robot.robot import Robot
 
 WIDEST_RAD = 20.0  # of a limit: three turns; 360 rad are 57
+NEVER_RAD = 20 * np.pi  # ten turns to a side
 FASTEST_RAD_S = 20.0  # of industrial arms' joints, small ones included
 LONGEST_M, FASTEST_M_S = 100.0, 10.0  # of a rail; in mm both are a thousand times as much
 PARALLEL_DEG = 1.0
@@ -13,8 +14,12 @@ APART_M = 0.6  # between where the hammer hits and where the sensor sits
 EARTH_M_S2 = 9.81
 
 
-def check_joints(robot: Robot) -> list[CheckRemark]:
-    """What looks wrong in limits (rad, m of those that slide) and speeds (rad/s, m/s)."""
+def check_joints(robot: Robot, planned: bool = False) -> list[CheckRemark]:
+    """What looks wrong in limits (rad, m of those that slide) and speeds (rad/s, m/s).
+
+    With a workspace `planned` it is an error where no such joint can be: the limits keep nobody
+    from driving there.
+    """
     found = []
     rows = zip(
         robot.joint_names, robot.lower_rad, robot.upper_rad, robot.velocity_rad_s, strict=True
@@ -22,7 +27,10 @@ def check_joints(robot: Robot) -> list[CheckRemark]:
     for name, low, high, speed in rows:
         where = f"{robot.urdf_path.name}, joint {name}"
         wrong = (_shifts if robot.slides(name) else _turns)(float(low), float(high), float(speed))
-        found += [CheckRemark("warning", text, where, remedy) for text, remedy in wrong]
+        away = max(abs(low), abs(high))
+        never = planned and not robot.slides(name) and NEVER_RAD < away < np.inf
+        severity = "error" if never else "warning"
+        found += [CheckRemark(severity, text, where, remedy) for text, remedy in wrong]
         if not 0 < speed < np.inf:
             text = "It has no speed limit: what it takes to get to a pose cannot be told."
             unit = "m/s" if robot.slides(name) else "rad/s"

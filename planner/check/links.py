@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.check.remark import CheckRemark
+from planner.check.remark import CheckRemark, Severity
 from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
 
@@ -11,7 +11,7 @@ HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.02
 GYRATION = 0.02, 1.2  # radius of gyration over the size of a link; a ball of that size has 0.18
 SMALLEST_SIZE_M = 0.02  # smaller links tell nothing
 OUTSIDE = 0.5  # of its size may a centre of mass lie outside the box around a link
-LONGEST_REACH_M, SHORTEST_REACH_M = 12.0, 0.1
+LONGEST_REACH_M, SHORTEST_REACH_M, NEVER_M = 12.0, 0.1, 100.0
 
 
 def check_links(robot: Robot, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
@@ -34,7 +34,7 @@ def _lengths(robot: Robot) -> list[CheckRemark]:
     unit = "millimetres" if reach > LONGEST_REACH_M else "another unit"
     return [
         CheckRemark(
-            "warning",
+            "error" if reach > NEVER_M else "warning",
             f"The tool reaches {reach:.4g} m from the first joint, as if lengths were in {unit}.",
             where,
             "A URDF's lengths are in m.",
@@ -48,18 +48,23 @@ def _stated(robot: Robot, link: LinkBody, links: tuple[LinkBody, ...]) -> list[C
     whole = any(other.mass > 0 for other in turned)
     if link.first and not whole:
         text = f"What {link.joint} turns has no mass: no <inertial>, here or on what is fixed to it"
+        if any(block.joint == link.joint for block in robot.config.compliance):
+            text = f"{text}, though [[compliance]] lets {link.joint} swing"
+            return [_weightless(robot, link, text, "error")]
     elif link.shapes or link.visuals:
         text = "It has shapes but no <inertial>, so that the simulation takes it for weightless"
     else:
         return []
-    return [
-        CheckRemark(
-            "warning",
-            f"{text}: simulated frequencies come out too high.",
-            _where(robot, link),
-            "Add its mass (kg), centre of mass (m) and moments of inertia (kg·m²).",
-        )
-    ]
+    return [_weightless(robot, link, text, "warning")]
+
+
+def _weightless(robot: Robot, link: LinkBody, text: str, severity: Severity) -> CheckRemark:
+    return CheckRemark(
+        severity,
+        f"{text}: simulated frequencies come out too high.",
+        _where(robot, link),
+        "Add its mass (kg), centre of mass (m) and moments of inertia (kg·m²).",
+    )
 
 
 def _body(robot: Robot, link: LinkBody) -> list[CheckRemark]:
@@ -67,7 +72,9 @@ def _body(robot: Robot, link: LinkBody) -> list[CheckRemark]:
     if link.mass == 0:
         return [CheckRemark("warning", "It has an <inertial> of mass 0.", where, "State its mass.")]
     if not LIGHTEST_KG <= link.mass <= HEAVIEST_KG:
-        text = f"It has a mass of {link.mass:.4g} kg."
+        text = f"It has a mass of {link.mass:,.4g} kg."
+        if link.mass > HEAVIEST_KG:
+            text = f"It has a mass of {link.mass:,.0f} kg, {link.mass / 1000:.3g} t."
         remedy = "Masses are in kg, neither in g nor in t."
         found.append(CheckRemark("warning", text, where, remedy))
     low, mid, high = link.moments

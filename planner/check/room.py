@@ -13,6 +13,7 @@ SPREAD = 8  # poses of the workspace that are looked at
 RADIANS = 6.3  # ranges of joints in degrees that stay below are most likely radians
 FIXED_BY_A_PLACE = 6  # coordinates of a place and a direction
 METRES = 20.0  # ranges of slides in mm that stay below are most likely metres
+NOTHING_DEG = 8.0  # by which all joints together move in a workspace that nobody means
 NARROW_DEG = 15.0  # unless other joints move by this much
 
 
@@ -98,7 +99,8 @@ def _units(robot: Robot, table: WorkspaceRanges, file: str) -> list[CheckRemark]
         if 0 < np.abs(box).max(initial=0.0) < RADIANS and wide < NARROW_DEG:
             text = f"No joint moves by more than {wide:.3g}°, as if the ranges were in radians."
             where = f"{file}, [workspace] joints_deg"
-            return [CheckRemark("warning", text, where, "Give degrees.")]
+            severity = "error" if np.ptp(box, axis=1).sum() < NOTHING_DEG else "warning"
+            return [CheckRemark(severity, text, where, "Give degrees.")]
     elif position_m is not None and np.abs(np.array(position_m, dtype=float)).max() > 50:
         text = "Positions of more than 50 m, as if they were in millimetres."
         where = f"{file}, [workspace] position_m"

@@ -26,6 +26,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # in which brackets are no markup
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
@@ -111,8 +112,9 @@ def import_(
     from planner.report.imports import ImportedPoses
 
     with reporting("importing", quiet=as_json) as progress:
-        reports = Campaign(directory).import_paths(tuple(paths), pose, progress)
-    answer = ImportedPoses.of(reports)
+        campaign = Campaign(directory)
+        reports = campaign.import_paths(tuple(paths), pose, progress)
+    answer = ImportedPoses.of(reports, campaign.state.simulated)
     return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 
 
@@ -163,8 +165,9 @@ def watch(
     from planner.report.imports import how_to_answer
     from planner.session.watch import watch as run
 
+    campaign = Campaign(directory)
     summary = run(
-        Campaign(directory),
+        campaign,
         folder,
         console=console(quiet=False, stderr=as_json),
         auto=auto,
@@ -173,7 +176,8 @@ def watch(
         viewer=viewer,
         explain=explain,
     )
-    asked = [how_to_answer(directory, pose, text) for pose, text in summary.questions.items()]
+    held = campaign.state.held.items()
+    asked = [how_to_answer(directory, pose, m.question) for pose, m in held if m.question]
     return respond(summary, as_json, refusals((), asked))
 
 

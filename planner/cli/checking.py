@@ -30,7 +30,8 @@ def check(
 
     pictures = Pictures(plot, format_)
     answer = RobotCheckReport.of(examine_robot(robot, campaign)).with_pictures(pictures)
-    for finding in answer.findings:
-        if finding.severity == "error":
-            warn(finding.sentence)
+    if as_json:  # the text says them itself
+        for finding in answer.findings:
+            if finding.severity == "error":
+                warn(finding.sentence)
     return respond(answer, as_json, 0 if answer.ok else 2)

@@ -51,7 +51,11 @@ def _usage(error: TyperException) -> int:
     text = error.format_message() if hasattr(error, "format_message") else str(error)
     if not text:  # no command was given: the help has been printed
         return 2
-    return _say(f"{text.rstrip('.')}; see planner --help.", 2)
+    context = getattr(error, "ctx", None)
+    # What is wrong below a command is explained by that command's own help.
+    name = context.info_name if context is not None and context.parent is not None else ""
+    command = f"planner {name}".strip()
+    return _say(f"{text.rstrip('.')}; see {command} --help.", 2)
 
 
 def _no_access(error: OSError) -> int:

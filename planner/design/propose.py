@@ -67,11 +67,28 @@ class Travel:
         return replace(self, q=self.q[which], shares=shares)
 
 
-def check_name(name: str) -> None:
-    """InputError if no acquisition has this name."""
+# In words, for who chooses one.
+TOLD = {
+    "variance": "the pose whose frequencies are least sure",
+    "integrated_variance": "the pose that makes all of the workspace surest",
+    "mutual_information": "the pose that tells most of all the others",
+    "parameter_information": "the pose that makes predictions surest by what parameters leave open",
+    "d_information": "the pose that tells most of the simulation's parameters themselves",
+    "mixed": "integrated_variance, by frequencies and the simulation's parameters together",
+    "goal": "the pose that makes those of [goal] surest",
+    "stability": "the pose that tells most of whether the cut of [cut] is stable",
+    "random": "poses at random, without looking at the model",
+    "sobol": "poses spread evenly by a Sobol sequence, without looking at the model",
+    "maximin_lhs": "poses spread by a maximin Latin hypercube, without looking at the model",
+}
+
+
+def check_name(name: str, where: str = "") -> None:
+    """InputError if no acquisition has this name, which stands `where` (file and entry)."""
     if name not in ACQUISITIONS and name not in DESIGNS:
         known = ", ".join([*ACQUISITIONS, *DESIGNS])
-        raise InputError(f'There is no acquisition "{name}"; choose one of {known}.')
+        said = f"{where}: there" if where else "There"
+        raise InputError(f'{said} is no acquisition "{name}"; choose one of {known}.')
 
 
 def workspace_outputs(

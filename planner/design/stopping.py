@@ -5,10 +5,12 @@ square. The model's sds are corrected: leave-one-out residuals, in units of the 
 posterior of a common factor on them (scaled inverse χ², Gelman et al. 2013, section 2.6).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from planner.words import counted
 
 if TYPE_CHECKING:  # a forecast that was kept is read without JAX
     from planner.design.frequency_posterior import FrequencyOutputs, Poses
@@ -35,17 +37,37 @@ class Forecast:
     calibration: float  # size of left-out residuals in sds, 1 where the model is right
     gain_percent: float  # of the RMSE, by one more measurement
     measurements: int
+    misses: float = 0.0  # of the simulation, in sds of the noise, where they make it no forecast
+
+    def doubted(self, misses: float) -> "Forecast":
+        """The same where a simulation misses what was measured by so many sds of its noise.
+
+        Left-out residuals of a few poses do not tell what that does elsewhere: it is as much wider.
+        """
+        rmse, bound = self.rmse_percent * misses, self.bound_percent * misses
+        return replace(self, rmse_percent=rmse, bound_percent=bound, reached=0.0, misses=misses)
 
     @property
     def text(self) -> str:
         """One or two sentences for the engineer."""
+        if self.misses:
+            return (
+                f"How far frequencies are off over the workspace is not known: the simulation "
+                f"misses the recordings by {self.misses:.2g} times their noise, and "
+                f"{counted(self.measurements, 'pose')} cannot tell what that does elsewhere. Look "
+                f"at the hits first (axis, sign, point), or measure on."
+            )
         known = f"The frequencies' RMSE over the workspace is about {percent(self.rmse_percent)}"
         share = f"{100 * self.probability:.0f} % probability"
         if self.bound_percent > MOST_PERCENT:
             known += f"; too little is known for a bound with {share}."
         else:
             known += f", below {percent(self.bound_percent)} with {share}."
-        return f"{known} One more measurement would gain about {percent(self.gain_percent, 1)}."
+        gain, left = self.gain_percent, percent(self.rmse_percent - self.gain_percent)
+        return (
+            f"{known} One more measurement would gain about {percent(gain, 1)}: the RMSE would be "
+            f"{left}."
+        )
 
 
 def percent(value: float, digits: int = 2) -> str:

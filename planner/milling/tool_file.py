@@ -108,7 +108,7 @@ def load_tool(path: Path) -> Tool:
     try:
         table = load_toml(path, ToolTable, "tool.toml")
     except InputError as error:
-        raise InputError(_with_unit(path, str(error))) from None
+        raise InputError(_with_unit(path, str(error), str(error.__cause__))) from None
     _check(path, table)
     materials = {
         name: ToolMaterial(m.youngs_modulus_pa, m.density_kg_m3, m.poisson_ratio, m.loss_factor)
@@ -166,9 +166,9 @@ UNITS = {
 }  # fmt: skip
 
 
-def _with_unit(path: Path, sentence: str) -> str:
-    """The fault in words where a key only lacks its unit, or has another one."""
-    found = re.search(r"unknown field `(\w+)`(?:.*at `([^`]+)`)?", sentence)
+def _with_unit(path: Path, sentence: str, fault: str) -> str:
+    """The `fault` in words where a key only lacks its unit, or has another one."""
+    found = re.search(r"unknown field `(\w+)`(?:.*at `([^`]+)`)?", fault)
     if found is None:
         return sentence
     key, place = found.group(1), (found.group(2) or "").removeprefix("$.")

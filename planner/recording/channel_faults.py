@@ -14,7 +14,7 @@ BY_CHANCE, NEAR, NARROW, COARSE = 5e-4, 0.1, 6, 2e-3
 
 def channel_faults(hit: Hit) -> tuple[Fault, ...]:
     """Faults of the force and of each acceleration by itself."""
-    force = _overload("force", hit.force_n, pulse=True)
+    force = _overload("force", "N", hit.force_n, pulse=True)
     answers = (_of_acceleration(hit, row) for row in range(len(hit.responses)))
     return tuple(fault for fault in (force, *answers) if fault is not None)
 
@@ -46,11 +46,13 @@ def by_good_sensors(hit: Hit) -> tuple[Hit, tuple[Fault, ...]]:
 def _of_acceleration(hit: Hit, row: int) -> Fault | None:
     samples, name = hit.acceleration_m_s2[row], hit.label(row)
     if not np.any(samples - samples[0]):
-        return Fault("dead", f"The acceleration along {name} is constant; check its cable.")
-    return _overload(f"acceleration {name}", samples, pulse=False)
+        return Fault(
+            "dead", f"The acceleration along {name} is constant; check the cable of {name}."
+        )
+    return _overload(f"acceleration {name}", "m/s²", samples, pulse=False)
 
 
-def _overload(name: str, samples: np.ndarray, pulse: bool) -> Fault | None:
+def _overload(name: str, unit: str, samples: np.ndarray, pulse: bool) -> Fault | None:
     """Overload leaves the top flat: several samples (n,) equal to the last digit."""
     size = samples - np.median(samples)
     for sense in (1.0, -1.0):
@@ -62,8 +64,8 @@ def _overload(name: str, samples: np.ndarray, pulse: bool) -> Fault | None:
             level = float(samples[int(np.argmax(sense * size))])
             return Fault(
                 "clipped",
-                f"The {name} is clipped at {level:.4g} ({flat} samples); raise the channel's "
-                f"range or hit more softly.",
+                f"The {name} is clipped at {level:.4g} {unit} ({flat} samples); raise the range "
+                f"of {name} or hit more softly.",
             )
     return None
 

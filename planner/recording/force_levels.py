@@ -1,16 +1,31 @@
 """How hard the hits were: peaks and force levels."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from planner.recording.records import Hit
 
 # Levels differ by this factor or more: nobody hits alike twice.
 SAME_LEVEL = 1.8
+FAR_BELOW = 0.1  # of the median of other hits; chosen, for no hand misses its force by so much
 
 
 def peak_n(hit: Hit) -> float:
     """Largest force of a hit over its offset, in N."""
     return hit.pulse.peak_n
+
+
+def far_below(hit: Hit, others: Sequence[Hit]) -> float | None:
+    """The median peak (N) of other hits along its axis, where a hit is far below it; else None.
+
+    A level that is there more than once is meant.
+    """
+    peak = peak_n(hit)
+    peaks = [peak_n(one) for one in others if one.axis_index == hit.axis_index]
+    meant = any(max(p, peak) < SAME_LEVEL * min(p, peak) for p in peaks)
+    usual = float(np.median(peaks)) if peaks else 0.0
+    return None if meant or peak >= FAR_BELOW * usual else usual
 
 
 def by_level(hits: tuple[Hit, ...]) -> tuple[tuple[Hit, ...], ...]:

@@ -1,6 +1,6 @@
 """Hits of a pose beside each other: whether repeats along an axis agree, as they should."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from planner.recording.screening import NOTHING
 # the last they are the same. Chosen.
 UNLIKE, FAR_BELOW, LIKE = 0.5, 0.3, 0.8
 MOST_TILT = 0.1  # rad: three times what a hand usually tilts by
+SAME = 0.95  # from which, in size too, two hits are of one axis: as like as hits of one pose are
 WHOLE = 0.5  # share of another axis' FRF that is no tilt: that axis was hit
 
 
@@ -69,6 +70,92 @@ def _screen_alike(
                     ),
                 )
     return tuple(faults)
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Why one of a few hits is wrong, and nothing tells which: a vote needs three along an axis.
+
+    `others` are the hits it contradicts, by their places among all; with `along` they are of
+    that other axis and answer as it does, which hits of two axes do not.
+    """
+
+    others: tuple[int, ...]
+    likeness: float
+    along: str = ""
+
+
+def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt | None, ...]:
+    """Per hit, whether it contradicts the only other one of its axis, or repeats another axis'.
+
+    Of two hits that disagree the one that answers as another axis does is doubted alone.
+    """
+    found: list[Doubt | None] = [None] * len(hits)
+    for place in {(hit.hit_point, hit.responses, hit.sampling_rate_hz) for hit in hits}:
+        own = [
+            i for i, hit in enumerate(hits)
+            if (hit.hit_point, hit.responses, hit.sampling_rate_hz) == place
+        ]  # fmt: skip
+        group = _Few.of(tuple(hits[i] for i in own), band_hz)
+        for i in range(len(own)):
+            doubt = group.doubt(i)
+            if doubt is not None:
+                others = tuple(own[j] for j in doubt.others)
+                found[own[i]] = replace(doubt, others=others)
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Few:
+    """FRFs (n, N) of hits at one place, with the axis and force level (n,) of each."""
+
+    frfs: np.ndarray
+    axes: np.ndarray
+    level: np.ndarray
+
+    @classmethod
+    def of(cls, hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> "_Few":
+        shortest = min(len(hit.force_n) for hit in hits)
+        frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
+        return cls(frfs, np.array([hit.axis_index for hit in hits]), _levels(hits))
+
+    def doubt(self, i: int) -> Doubt | None:
+        same = [int(j) for j in np.flatnonzero(self.axes == self.axes[i]) if j != i]
+        if not same:
+            return self._repeated(i)
+        return self._contradicted(i, same[0]) if len(same) == 1 else None
+
+    def _across(self, i: int) -> dict[int, np.ndarray]:
+        others = set(self.axes.tolist()) - {int(self.axes[i])}
+        return {axis: _centre(self.frfs[self.axes == axis]) for axis in others}
+
+    def _elsewhere(self, i: int) -> bool:
+        """Whether a hit answers as those along another axis do."""
+        return any(abs(_likeness(self.frfs[i], c)) > LIKE for c in self._across(i).values())
+
+    def _contradicted(self, i: int, j: int) -> Doubt | None:
+        across = self._across(i)
+        others = tuple(across.values())
+        a, b = self.frfs[i], self.frfs[j]
+        likeness = max(_Agreement(b, others).of(a), _Agreement(a, others).of(b))
+        struck = _struck(a, b, across), _struck(b, a, across)
+        if likeness > UNLIKE and not any(struck):
+            return None
+        odd = self._elsewhere(i), self._elsewhere(j)
+        # Levels of what is not linear may be unlike; they are not opposite, nor of another axis.
+        if self.level[i] != self.level[j] and likeness > -UNLIKE and not any(odd):
+            return None
+        return None if odd[1] and not odd[0] else Doubt((j,), likeness)
+
+    def _repeated(self, i: int) -> Doubt | None:
+        for axis, centre in self._across(i).items():
+            sizes = np.linalg.norm(self.frfs[i]), np.linalg.norm(centre)
+            ratio = float(min(sizes) / max(*sizes, NOTHING))
+            alike = _likeness(self.frfs[i], centre)
+            if abs(alike) * ratio >= SAME:
+                others = tuple(int(j) for j in np.flatnonzero(self.axes == axis))
+                return Doubt(others, alike, AXES[axis])
+        return None
 
 
 def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:

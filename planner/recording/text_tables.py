@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.errors import ForeignFileError, InputError
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import Record
 
@@ -106,7 +106,7 @@ def _block_start(path: Path, lines: list[str], delimiter: str) -> int:
             f"{path} is a list of {len(lines)} complex numbers without frequency lines or units; "
             f"export FRFs with their frequencies."
         )
-    raise InputError(
+    raise ForeignFileError(
         f"{path} holds no table of numbers (at least {LEAST_ROWS} rows); export time histories."
     )
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.errors import ForeignFileError, InputError
 from planner.recording.named_columns import sampling_rate
 from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
 from planner.recording.units import lookup
@@ -21,6 +21,7 @@ _SI = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2", "force":
 _FUNCTIONS = {0: "general data", 1: "time histories", 2: "auto-spectra", 3: "cross-spectra",
               4: "FRFs", 5: "transmissibilities", 6: "coherences", 9: "power spectral densities",
               12: "spectra"}  # fmt: skip
+HEAD = 1 << 16  # bytes in which a first dataset begins
 _RATIO = {"acceleration": "accelerance", "velocity": "mobility", "displacement": "receptance"}
 
 
@@ -50,6 +51,8 @@ def _sets(path: Path) -> list[dict[str, Any]]:
     import pyuff
 
     with open(path, "rb") as file:
+        if b"-1" not in file.read(HEAD).split():
+            raise ForeignFileError(f"{path} is no universal file (no dataset in it); export again.")
         file.seek(-min(path.stat().st_size, 256), 2)
         end = file.read().rstrip()
     if not end.endswith(b"-1"):  # the parser would leave out the dataset that is cut off
@@ -60,7 +63,9 @@ def _sets(path: Path) -> list[dict[str, Any]]:
             file = pyuff.UFF(str(path))
             count = len(file.get_set_types())
             if not count:
-                raise InputError(f"{path} is no universal file (no dataset in it); export again.")
+                raise ForeignFileError(
+                    f"{path} is no universal file (no dataset in it); export again."
+                )
             sets: list[Any] = [file.read_sets(i) for i in range(count)]
             return sets
     except InputError:

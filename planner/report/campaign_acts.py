@@ -44,7 +44,7 @@ class NewCampaign(Answer):
     def text(self) -> str:
         """What was started, and how it goes on."""
         warned = (f"Check: {finding.sentence}" for finding in self.findings)
-        remarks = "".join(f"{remark}\n" for remark in (*self.remarks, *warned))
+        remarks = "".join(f"{remark}\n" for remark in (*warned, *self.remarks))
         return (
             f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"

@@ -7,6 +7,7 @@ from pathlib import Path
 from planner.campaign.campaign import Campaign
 from planner.errors import InputError
 from planner.report.answer import Answer
+from planner.words import counted
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class WrittenReport(Answer):
     def text(self) -> str:
         """One sentence."""
         size = self.bytes / 1e6
-        return f"Report of {self.measurements} poses ({size:.1f} MB): {self.report}"
+        return f"Report of {counted(self.measurements, 'pose')} ({size:.1f} MB): {self.report}"
 
 
 def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -> WrittenReport:
@@ -40,9 +41,10 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
     file = (out or campaign.directory / "report.html").absolute()
     if file.is_dir():
         raise InputError(f"{file} is a folder; name a file for the report.")
+    if not file.parent.is_dir():
+        raise InputError(f"{file.parent} does not exist; make that folder, or name another.")
     data = page(campaign, kept).encode("utf-8", "replace")
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
         file.write_bytes(data)
     except OSError as error:
         raise InputError(f"{file} cannot be written ({error.strerror}); name another.") from None

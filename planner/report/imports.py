@@ -13,6 +13,7 @@ from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
+from planner.words import counted
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
@@ -121,9 +122,11 @@ class PoseImport(Answer):
         )
 
     def parts(self) -> list[RenderableType]:
-        """Modes beside what was expected, remarks, and the change of the model."""
+        """Modes beside what was expected, remarks, and the change of the model, if there is any."""
+        if self.unhit:
+            return [Text(self._without_hits()), *remarks(self.remarks)]
         made = table(
-            f"Pose {self.pose}: {len(self.accepted)} hits accepted, "
+            f"Pose {self.pose}: {counted(len(self.accepted), 'hit')} accepted, "
             f"{len(self.refused)} refused, {len(self.already_imported)} known before",
             *("mode", "frequency (Hz)", "expected (Hz)", "damping (%)"),
         )
@@ -135,6 +138,18 @@ class PoseImport(Answer):
         asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
         return [made, *remarks(self.remarks), said, *asked]
 
+    @property
+    def unhit(self) -> bool:
+        """Whether nothing came of it: no hit was accepted, nor is one held."""
+        return not (self.accepted or self.modes or self.question)
+
+    def _without_hits(self) -> str:
+        known = f", {len(self.already_imported)} known before" if self.already_imported else ""
+        return (
+            f"Pose {self.pose}: no hit accepted, {len(self.refused)} refused{known}; nothing "
+            f"changed, and the pose is still to be measured."
+        )
+
 
 @dataclass(frozen=True)
 class ImportedPoses(Answer):
@@ -145,13 +160,15 @@ class ImportedPoses(Answer):
 
     poses: tuple[PoseImport, ...]
     habits: tuple[str, ...] = ()
+    simulated: bool = False  # whether the campaign has simulated recordings
 
     @classmethod
-    def of(cls, reports: "tuple[ImportReport, ...]") -> "ImportedPoses":
+    def of(cls, reports: "tuple[ImportReport, ...]", simulated: bool = False) -> "ImportedPoses":
         """Of what `Campaign.import_paths` gave; hits are told by what all of them taught."""
         model = reports[-1].model
         every = [hit for pose in model.misses for hit in pose.hits]
-        return cls(tuple(PoseImport.of(report, model) for report in reports), habits(every))
+        poses = tuple(PoseImport.of(report, model) for report in reports)
+        return cls(poses, habits(every), simulated or any(pose.simulated for pose in poses))
 
     @property
     def hit_errors(self) -> tuple[HitMiss, ...]:
@@ -171,20 +188,26 @@ class ImportedPoses(Answer):
     def to_be_answered(self, directory: Path) -> list[str]:
         """What is asked of held hits, with the commands that answer it, a line each."""
         asked = [pose.question for pose in self.poses if pose.question is not None]
-        return [how_to_answer(directory, one.pose, one.text) for one in asked]
+        return [how_to_answer(directory, one.pose, one.question) for one in asked]
 
     def text(self) -> Group:
         """Pose by pose."""
         parts = [part for pose in self.poses for part in pose.parts()]
         parts += [Text(f"  {habit}") for habit in self.habits]
-        return Group(*parts, SIMULATED) if self.poses[-1].simulated else Group(*parts)
+        return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
-def how_to_answer(directory: Path, pose: str, asked: str) -> str:
+def how_to_answer(directory: Path, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
+    if asked.disagree:
+        return (
+            f"{asked.text} They are held, not used. To take the import back: planner undo "
+            f"{directory}; if each is right: planner confirm {directory} {pose}; to set all "
+            f"aside: planner withdraw {directory} {pose}."
+        )
     return (
-        f"{asked} They are held, not used. If it is: planner confirm {directory} {pose}; if it is "
-        f"at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
+        f"{asked.text} They are held, not used. If it is: planner confirm {directory} {pose}; "
+        f"if it is at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
         f"{directory} {pose}."
     )
 

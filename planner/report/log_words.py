@@ -2,7 +2,8 @@
 
 import msgspec
 
-from planner.campaign.events import Configured, Entry, Imported, Proposed, Undone
+from planner.campaign.events import Configured, Entry, Imported, Proposed, Refused, Undone
+from planner.words import counted
 
 
 def act(entry: Entry) -> str:
@@ -16,7 +17,11 @@ def act(entry: Entry) -> str:
     if isinstance(event, Imported):
         used = sum(hit.accepted for hit in event.hits)
         held = "; held: a question was asked" if event.question else ""
-        return f"imported {used} of {len(event.hits)} hits at {event.pose}{held}"
+        if event.unhit:
+            return f"refused all of {counted(len(event.hits), 'hit')} at {event.pose}"
+        return f"imported {used} of {counted(len(event.hits), 'hit')} at {event.pose}{held}"
+    if isinstance(event, Refused):
+        return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
     if isinstance(event, Undone):
         return f"took back entry {event.act}"
     told = msgspec.to_builtins(event)

@@ -13,15 +13,17 @@ from rich.text import Text
 from planner.campaign.events import Proposal
 from planner.recording.joints import JointUnits
 from planner.report.fitted_lines import Said, fitted
+from planner.report.text import with_sd
 
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
 LAST = 4  # verdicts that are shown
-COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow"}
+COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
+           "unsure": "bold yellow"}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class JudgedHit:
-    """A hit that waits: its number at this pose, axis, kind ("good", "repeat", "late"), why."""
+    """A hit that waits: its number at this pose, axis, kind as of its verdict, why."""
 
     number: int
     axis: str
@@ -45,9 +47,12 @@ class JudgedHit:
             but = f"hit {self.number} ({axis}): good, but: {text}"
             plain = Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
             return Text(but, style=COLOURS["late"]) if text else plain
-        said = f"hit {self.number} ({axis}), late?"
-        said = f"REPEAT HIT {self.number} ({axis}):" if self.kind == "repeat" else said
-        return Text(f"{said} {text}", style=COLOURS[self.kind])
+        named = f"{self.number} ({axis})"
+        said = {
+            "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
+            "unsure": f"hit {named}, right?",
+        }  # fmt: skip
+        return Text(f"{said[self.kind]} {text}", style=COLOURS[self.kind])
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +106,7 @@ class PosePage:
         x, y, z = self.proposal.position_m
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m"
         each = zip(self.expected_hz, self.expected_sd_hz, strict=True)
-        expected = ", ".join(f"{hz:.2f} ± {sd:.2f}" for hz, sd in each)
+        expected = ", ".join(with_sd(hz, sd) for hz, sd in each)
         short = ", ".join(f"{hz:.2f}" for hz in self.expected_hz)
         return [
             Said([None, _said(place), _said(f"{place}; {self.proposal.reason}")], 7),
@@ -140,6 +145,9 @@ class PosePage:
         if again:
             axes = ", ".join(dict.fromkeys(hit.axis or "?" for hit in again))
             made.add_row(Text(f"{len(again)} to be repeated ({axes})", style=COLOURS["repeat"]))
+        unsure = sum(hit.kind == "unsure" for hit in self.hits)
+        if unsure:
+            made.add_row(Text(f"{unsure} held: right?", style=COLOURS["unsure"]))
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made
@@ -177,7 +185,7 @@ def _unfinished(name: str, said: str) -> Said:
     do, why = remedy_first(said)
     if not why:
         return Said([None, _said(f"not whole yet: {said}", "dim")], 5)
-    short = f"not whole yet: {name}: {do}"
+    short = f"cannot be read: {name}: {do}"
     return Said([None, _said(short, "dim"), _said(f"{short} {why}", "dim")], 5)
 
 

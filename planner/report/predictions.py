@@ -15,6 +15,7 @@ from planner.errors import InputError
 from planner.recording.joints import JointUnits
 from planner.report.answer import Answer
 from planner.report.text import table, with_sd
+from planner.words import counted
 
 if TYPE_CHECKING:
     from planner.surrogate.frf_bands import ModalPrediction
@@ -69,7 +70,7 @@ class PredictionReport(Answer):
     def text(self) -> Group:
         """A table of modes, and which poses lie where nobody asked the model to be good."""
         made = table(
-            f"After {self.measurements} measured poses",
+            f"After {counted(self.measurements, 'measured pose')}",
             *("pose", "mode", "frequency (Hz)", "damping (%)"),
         )
         for pose in self.poses:
@@ -96,7 +97,7 @@ def predictions(
         PosePrediction(name, ExpectedMode.all_of(prediction, i), bool(outside[i]))
         for i, name in enumerate(names)
     )
-    return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.model.labelled))
+    return PredictionReport(tuple(poses), str(npz.resolve()), len(campaign.state.used))
 
 
 def save_frfs(

@@ -36,7 +36,7 @@ class ProposedPose(Answer):
         proposal = self.proposal
         angles = table(f"Pose {proposal.pose}", *joints.headings)
         angles.add_row(*(f"{value:.3f}" for value in proposal.joints_deg))
-        expected = table("expected there", "mode", "frequency (Hz)", "damping (%)")
+        expected = table("expected there", "mode", "frequency (Hz, ± 1 sd)", "damping (%)")
         for k, mode in enumerate(self.expected):
             expected.add_row(str(k + 1), *mode.cells)
         x, y, z = proposal.position_m

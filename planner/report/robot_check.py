@@ -14,7 +14,6 @@ from planner.report.plot_files import Pictures
 from planner.report.text import drawn, number, table
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
-SHOWN_MODES = 6  # in the text; JSON has all
 
 
 @dataclass(frozen=True)
@@ -123,8 +122,11 @@ class RobotCheckReport(Answer):
                 cells = link.joint or "–", mass, place, str(link.collision_shapes)
                 masses.add_row(Text(link.link), *cells)
         modes = table("simulated modes", "pose", "frequency in Hz (damping in %), from the lowest")
+        units = ["" if joint.unit is msgspec.UNSET else " mm" for joint in self.joints]
         for pose in self.poses:
-            modes.add_row(pose.pose, _cell(pose))
+            stands = zip(pose.joints_deg, units, strict=True)
+            at = ", ".join(f"{round(v)}{unit or '°'}" for v, unit in stands)
+            modes.add_row(f"{pose.pose}: {at}", _cell(pose))
         low, high = self.band_hz
         said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_line, self.findings)]
         parts = [masses, *([modes] if self.poses else []), *said, _summary(self.findings)]
@@ -151,9 +153,9 @@ def _poses(found: Examination) -> tuple[CheckedPose, ...]:
 
 
 def _cell(pose: CheckedPose) -> str:
-    pairs = list(zip(pose.frequency_hz, pose.damping_ratio, strict=True))[:SHOWN_MODES]
-    more = " …" if len(pose.frequency_hz) > SHOWN_MODES else ""
-    return "   ".join(f"{number(f, '.1f')} ({number(100 * d, '.1f')})" for f, d in pairs) + more
+    pairs = zip(pose.frequency_hz, pose.damping_ratio, strict=True)
+    # Frequency and damping of a mode stay on one line.
+    return "   ".join(f"{number(f, '.1f')}\u00a0({number(100 * d, '.1f')})" for f, d in pairs)
 
 
 def _line(remark: CheckRemark) -> Text:

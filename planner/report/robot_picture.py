@@ -14,6 +14,7 @@ LINK, SHAPE, OBSTACLE, MASS = "0.25", "tab:blue", "tab:brown", "tab:orange"
 AXIS_COLOURS = "tab:red", "tab:green", "tab:blue"  # x, y, z, as CAD programs have them
 VIEWS = (("seen from the side", (0, 2)), ("seen from above", (0, 1)))
 FRAME = 0.14  # length of a drawn frame, in units of the arm's length
+NEAR = 0.07  # in the same units: joints so close to each other share a label
 AREA_PER_SHARE = 1200.0  # of a mass's dot in points², times its share of the whole
 
 
@@ -43,17 +44,12 @@ def _flat(panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float) 
             panel.plot(*np.vstack([hull, hull[:1]]).T, color=colour, lw=0.6, alpha=0.6)
     for start, end in lines.links:
         panel.plot([start[a], end[a]], [start[b], end[b]], color=LINK, lw=3, solid_capstyle="round")
-    for k, (name, place, axis) in enumerate(lines.joints):
+    for _, place, axis in lines.joints:
         tip = place + 0.6 * length * axis
         arrow = {"arrowstyle": "->", "color": "black", "lw": 1.4}
         panel.annotate("", (tip[a], tip[b]), (place[a], place[b]), arrowprops=arrow)
         panel.plot(place[a], place[b], "o", color="white", mec="black", ms=6)
-        side = 1 if k % 2 else -1
-        panel.annotate(
-            plain_text(name), (place[a], place[b]), xytext=(side * 26, -10 * side),
-            textcoords="offset points", fontsize=8, ha="left" if side > 0 else "right",
-            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": "0.5"},
-        )  # fmt: skip
+    _names(panel, lines, pair, NEAR * length / FRAME)
     whole = sum(mass for mass, _ in lines.masses) or 1.0
     for k, (mass, place) in enumerate(lines.masses):
         label = "centre of mass, area ~ mass" if k == 0 else None
@@ -63,10 +59,30 @@ def _flat(panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float) 
         _frame(panel, pair, place, rotation, 0.7 * length)
         panel.annotate(plain_text(name), (place[a], place[b]), xytext=(8, 22 if k else -26),
                        textcoords="offset points", fontsize=9, weight="bold")  # fmt: skip
+    panel.margins(x=0.25)  # for the names on the left
     panel.set_aspect("equal", adjustable="datalim")
     panel.grid(True, alpha=0.25)
     if lines.masses:
         panel.legend(fontsize=8, loc="lower right")
+
+
+def _names(panel: Axes, lines: RobotLines, pair: tuple[int, int], near: float) -> None:
+    """Names of the joints, one label for those that this view shows `near` each other."""
+    groups: list[tuple[np.ndarray, list[str]]] = []
+    for name, place, _ in lines.joints:
+        at = place[list(pair)]
+        same = next((names for other, names in groups if np.hypot(*(at - other)) < near), None)
+        if same is None:
+            groups.append((at, [plain_text(name)]))
+        else:
+            same.append(plain_text(name))
+    # Frames are named on the right; on the left labels in turn sit above and below.
+    for k, (at, names) in enumerate(groups):
+        panel.annotate(
+            "\n".join(names), tuple(at), xytext=(-26, 12 if k % 2 else -12), va="center",
+            textcoords="offset points", fontsize=8, ha="right",
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": "0.5"},
+        )  # fmt: skip
 
 
 def _frame(panel: Axes, pair: tuple[int, int], place: np.ndarray, rotation: np.ndarray, length):
@@ -88,10 +104,11 @@ def _space(panel, lines: RobotLines, length: float) -> None:
                 panel.plot(*corners[[i, j]].T, color=colour, lw=0.5, alpha=0.6)
     for _, place, axis in lines.joints:
         panel.plot(*np.array([place, place + 0.6 * length * axis]).T, color="black", lw=1.2)
-    for name, place, rotation in lines.frames:
+    for number, (name, place, rotation) in enumerate(lines.frames):
         for k, colour in enumerate(AXIS_COLOURS):
             panel.plot(*np.array([place, place + length * rotation[:, k]]).T, color=colour, lw=1.8)
-        panel.text(*place, f"  {plain_text(name)}", fontsize=8)
+        beside = "bottom" if number else "top"  # tool and sensor are near each other
+        panel.text(*place, f"  {plain_text(name)}", fontsize=8, va=beside)
     panel.set_aspect("equal")
     panel.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
     panel.tick_params(labelsize=7)

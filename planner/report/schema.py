@@ -10,7 +10,7 @@ from msgspec import inspect as types
 from rich.console import Group
 from rich.text import Text
 
-from planner.campaign.config import CampaignConfig
+from planner.campaign.config import AcquisitionTable, CampaignConfig
 from planner.errors import InputError
 from planner.report.answer import Answer
 from planner.report.text import table
@@ -30,12 +30,24 @@ class SchemaEntry:
 
 
 @dataclass(frozen=True)
+class SchemaChoice:
+    """A name that an entry takes, and what it stands for."""
+
+    name: str
+    about: str
+
+
+@dataclass(frozen=True)
 class SchemaTable:
-    """A table of a file; "" for what stands at its top. `about` may have several sentences."""
+    """A table of a file; "" for what stands at its top. `about` may have several sentences.
+
+    `choices` are what its `name` may be, where that is one of several.
+    """
 
     name: str
     about: str
     entries: tuple[SchemaEntry, ...]
+    choices: tuple[SchemaChoice, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,7 +68,9 @@ class SchemaReport(Answer):
                 column.justify = "left"
             for entry in one.entries:
                 made.add_row(*(Text(v) for v in (entry.name, entry.takes, entry.default)))
-            parts += [made, Text(one.about + "\n")]
+            parts += [made, Text(one.about)]
+            parts += [Text(f"  {choice.name}: {choice.about}") for choice in one.choices]
+            parts.append(Text(""))
         return Group(*parts)
 
 
@@ -80,9 +94,18 @@ def _tables(kind: type[msgspec.Struct], name: str) -> Iterator[SchemaTable]:
         else:
             path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
             inner.append((struct, f"[[{path}]]" if many else f"[{path}]"))
-    yield SchemaTable(name, _about(kind), tuple(entries))
+    yield SchemaTable(name, _about(kind), tuple(entries), _choices(kind))
     for struct, path in inner:
         yield from _tables(struct, path)
+
+
+def _choices(kind: type[msgspec.Struct]) -> tuple[SchemaChoice, ...]:
+    """Acquisitions, where the table names one."""
+    if kind is not AcquisitionTable:
+        return ()
+    from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
+
+    return tuple(SchemaChoice(name, TOLD[name]) for name in (*ACQUISITIONS, *DESIGNS))
 
 
 def _about(kind: type) -> str:

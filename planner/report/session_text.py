@@ -11,16 +11,18 @@ from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.report.pose_screen import PosePage
-from planner.report.text import with_sd
+from planner.report.text import SIMULATED, with_sd
+from planner.words import counted
 
 HELP = """\
-a, Enter  import the hits that wait          r  set the waiting hits aside, do not import them
+a, Enter  import the hits that wait          r  set bad hits aside, do not import them
+R         set all waiting hits aside
 k         skip this pose, do not offer it    n  propose anew
-b, h      late hits: of the pose before, or of this one
+b, h      late hits: of the pose before, or of this one; h: unsure hits are right too
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
+NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
-SIMULATED = "SIMULATED RECORDINGS: nothing here was measured on a real robot"
 
 
 def _table(*columns: str) -> Table:
@@ -43,13 +45,13 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
             certain = labelled.probability[k]
             sure = Text(f"{100 * certain:.0f}", style="bold yellow" if certain < 0.9 else "")
             if mode is None:
-                table.add_row(str(k + 1), "not found", f"{expected:.2f} ± {sd:.2f}", "–", "–", sure)
+                table.add_row(str(k + 1), "not found", with_sd(expected, sd), "–", "–", sure)
                 continue
             off = (mode.frequency_hz - expected) / np.hypot(sd, mode.frequency_sd_hz)
             table.add_row(
                 str(k + 1),
                 with_sd(mode.frequency_hz, mode.frequency_sd_hz, ".3f"),
-                f"{expected:.2f} ± {sd:.2f}",
+                with_sd(expected, sd),
                 Text(f"{off:+.1f}", style="bold yellow" if abs(off) > 3 else ""),
                 with_sd(100 * mode.damping_ratio, 100 * mode.damping_sd),
                 sure,
@@ -60,8 +62,8 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     parts += [Text(remark, style="yellow") for remark in report.remarks]
     parts.append(uncertainty_line(report.model))
     if simulated:
-        parts.append(Text(SIMULATED, style="bold magenta"))
-    title = f"Pose {report.pose}: {len(report.accepted)} hits in, {len(report.refused)} refused"
+        parts.append(SIMULATED)
+    title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
 
 
@@ -87,6 +89,10 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
     return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
 
 
+def _in(report: ImportReport) -> str:
+    return f"{counted(len(report.accepted), 'hit')} in, {len(report.refused)} refused"
+
+
 def uncertainty_line(model: Model) -> Text:
     """What the model does not know yet."""
     sd = model.frequency_sd_percent
@@ -103,7 +109,7 @@ def incomplete(page: PosePage) -> str:
 
 def result_line(report: ImportReport) -> str:
     """What came out against what was expected, in one sentence."""
-    said = f"{report.pose}: {len(report.accepted)} hits in, {len(report.refused)} refused"
+    said = f"{report.pose}: {_in(report)}"
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
     if labelled is None:
         return f"{said}; no modes"

@@ -19,6 +19,7 @@ from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
+from planner.words import counted, local_time
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -54,7 +55,7 @@ class MeasuredPoseStatus:
         """A row of the table."""
         mark = (" ★" if self.starred else "") + (" withdrawn" if self.withdrawn else "")
         found = "  ".join(f"{f:.2f}" for f in self.frequency_hz) or "none"
-        return self.pose + mark, str(self.hits), str(self.refused), found, self.time[:19]
+        return self.pose + mark, str(self.hits), str(self.refused), found, local_time(self.time)
 
 
 @dataclass(frozen=True)
@@ -212,6 +213,7 @@ class StatusReport(Answer):
     held: tuple["HeldPose", ...] = ()
     decision: Any = msgspec.UNSET
     joint_units: Any = msgspec.UNSET
+    used: int = 0  # of the measured poses, those that the model rests on
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -232,13 +234,21 @@ class StatusReport(Answer):
     def text(self) -> Group:
         """Measured poses as a table, then all else line by line."""
         measured = table(
-            f"{self.campaign}: {len(self.measurements)} poses measured",
-            *("pose", "hits", "refused", "frequencies (Hz)", "time (UTC)"),
+            f"{self.campaign}: {self._counts()}",
+            *("pose", "hits", "refused", "frequencies (Hz)", "time"),
         )
         for pose in self.measurements:
             measured.add_row(*pose.cells)
         parts = [measured, Text("\n".join(self._lines())), *drawn(self.plots)]
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
+
+    def _counts(self) -> str:
+        """How many poses the model uses, as report and predict count them, and others."""
+        away = sum(pose.withdrawn for pose in self.measurements)
+        without = len(self.measurements) - self.used - away
+        more = f", {away} withdrawn" if away else ""
+        more += f", {without} without modes" if without else ""
+        return f"{counted(self.used, 'pose')} measured{more}"
 
     def _lines(self) -> list[str]:
         each = enumerate(self.frequency_sd_percent, 1)
@@ -249,14 +259,14 @@ class StatusReport(Answer):
             + ", ".join(f"mode {k} {v:.2f} %" for k, v in each)
             + f" (target {self.target_frequency_sd_percent:g} %)",
             self.forecast.text + (" The target is reached." if self.done else ""),
-            f"log: {self.log.entries} entries",
+            f"log: {counted(self.log.entries, 'entry', 'entries')}",
         ]
         if self.log.torn_bytes:
             lines.append("The log's last line was torn by a crash; the next act sets it aside.")
         if self.stored_but_not_imported:
             lines.append(
-                f"{len(self.stored_but_not_imported)} recordings were stored, but the program "
-                f"stopped before they were imported: import them again."
+                f"{counted(len(self.stored_but_not_imported), 'recording')} stored, but the "
+                f"program stopped before the import: import again."
             )
         lines += [
             f"Held, not used: {h.question.text} Answer with planner confirm, or withdraw."
@@ -272,7 +282,7 @@ def status(campaign: Campaign) -> StatusReport:
     """Of a campaign as it is now."""
     state = campaign.state
     believed = campaign.of_model("status", ModelStatus, ModelStatus.of)
-    measured = tuple(state.measurements.values())
+    measured = state.measured
     refused = [RefusedHit(m.pose, h.file, h.reason) for m in state.recorded for h in m.hits
                if not h.accepted]  # fmt: skip
     refused += [RefusedHit(pose, h.file, h.reason) for pose, h in state.refused.values()]
@@ -296,5 +306,6 @@ def status(campaign: Campaign) -> StatusReport:
         held=tuple(HeldPose.of(m, m.pose in state.starred) for m in state.held.values()),
         decision=msgspec.UNSET if believed.decision is None else believed.decision,
         joint_units=believed.joint_units,
+        used=len(state.used),
         model=lambda: campaign.model,
     )

@@ -5,7 +5,11 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-SIMULATED = Text("SIMULATED RECORDINGS: no measured data in this campaign", style="bold magenta")
+from planner.words import small
+
+SIMULATED = Text(
+    "SIMULATED RECORDINGS: nothing here was measured on a real robot", style="bold magenta"
+)
 SIMULATED_TITLE = "SIMULATED recordings · "  # before the title of a picture
 
 
@@ -23,14 +27,13 @@ def number(value: float | None, form: str = ".2f") -> str:
 
 
 def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
-    """A number and its standard deviation; one that rounds to 0 is said to be below the last digit.
+    """A number and its standard deviation, or a dash; an sd that rounds to 0 is below that digit.
 
     `form` has fixed decimals (".2f").
     """
-    said = number(sd, form)
-    if sd and said.strip("0.") == "":
-        said = f"<{10.0 ** -int(form[1:-1]):{form}}"
-    return f"{number(value, form)} ± {said}"
+    if number(value, form) == "–":
+        return "–"
+    return f"{number(value, form)} ± {number(sd, form) if not sd or sd != sd else small(sd, form)}"
 
 
 def remarks(lines: Sequence[str]) -> list[Text]:

@@ -1,7 +1,7 @@
 """What the engineer's keys do. Each act changes the campaign and gives the session's next value."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,11 @@ from planner.errors import NoPoseLeftError, PlannerError
 from planner.recording.folder import TABLE
 from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
-from planner.session.course import Course, PoseInProgress
+from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.page import page_with_hits, page_without_hits
 from planner.session.station import Station
 from planner.session.verdicts import PoseBefore
+from planner.words import counted
 
 ENTER = ("a", "\n", "\r")
 IMPORTING = "importing and refitting"
@@ -71,16 +72,20 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             if visit.good and not visit.page.complete and not visit.pressed:
                 station.say(session_text.incomplete(visit.page), "yellow")
                 return replace(course, visit=replace(visit, pressed=True))
-            files = [path for path in visit.whole if path not in visit.late]
+            files = [path for path in visit.whole if path not in visit.late | visit.unsure]
             return import_waiting(station, course, visit, files)
         case "b" if visit.late:
             return _to_before(station, course, sorted(visit.late))
-        case "h" if visit.late:
-            return replace(course, here=course.here | visit.late)
+        case "h" if visit.late | visit.unsure:
+            return replace(course, here=course.here | visit.late | visit.unsure)
         case "r" if visit.whole:
-            campaign.refuse(pose, visit.whole)
-            station.teller.note()
-            station.say(f"{len(visit.whole)} hits set aside; hit again.")
+            bad = visit.paths("repeat") or visit.paths(*BAD)
+            if not bad and not visit.refusing:
+                station.say(session_text.NONE_BAD, "yellow")
+                return replace(course, visit=replace(visit, refusing=True))
+            _refuse(station, visit, bad or visit.whole)
+        case "R" if visit.whole:
+            _refuse(station, visit, visit.whole)
         case "s":
             campaign.star(pose)
             station.say(f"★ {pose}")
@@ -102,13 +107,28 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
     return course
 
 
+def _refuse(station: Station, visit: PoseInProgress, files: Collection[Path]) -> None:
+    """Set files aside with what is wrong with them, and say which hits they are."""
+    chosen = tuple(path for path in visit.whole if path in files)
+    if not chosen:
+        return
+    station.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen))
+    station.teller.note()
+    numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
+    said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
+    station.say(f"{said}; hit again.")
+
+
 def import_waiting(
     station: Station, course: Course, visit: PoseInProgress, files: Sequence[Path]
 ) -> Course:
     """Import the waiting hits; the pose is over when it gave modes."""
+    files = [path for path in files if path not in visit.weak]
     if not files:
         station.say("No whole new file waits yet.", "yellow")
         return course
+    # What the import would take as good, or ask for at every pose from here on.
+    _refuse(station, visit, visit.weak | (frozenset() if station.auto else visit.unsure))
     folder = station.inbox.folder
     table = (folder / TABLE).is_file()
     try:
@@ -122,6 +142,8 @@ def import_waiting(
         return replace(course, aside=course.aside | bad)
     station.teller.note(reports)
     for report in reports:
+        if report.question is not None and report.question.disagree and course.here:
+            return _right(station, course, report)
         course = replace(course, aside=course.aside | {hit.sha256 for hit in report.left_out})
         course = _imported(station, course, report)
     if not any(report.measurement and report.measurement.modes for report in reports):
@@ -130,6 +152,15 @@ def import_waiting(
     hits = tuple(hit for verdict in visit.verdicts for hit in verdict.hits)
     before = PoseBefore(visit.proposal.pose, hits)
     return replace(course, visit=None, before=before, here=frozenset())
+
+
+def _right(station: Station, course: Course, report: ImportReport) -> Course:
+    """The engineer said before that hits which contradict others are right."""
+    with station.screen.working("refitting"):
+        station.campaign.confirm(report.pose)
+    station.teller.note()
+    station.say(f"The hits of {report.pose} are used, as you said.")
+    return replace(measured(station, course, report.pose), visit=None, here=frozenset())
 
 
 def undo(station: Station, course: Course) -> Course:
@@ -190,6 +221,8 @@ def _to_before(station: Station, course: Course, late: Sequence[Path]) -> Course
     with station.screen.working(IMPORTING):
         reports = station.campaign.import_paths(tuple(late), course.before.pose)
     station.teller.note(reports)
+    names = ", ".join(path.name for path in late)
+    station.say(f"{counted(len(late), 'file')} moved to {course.before.pose}: {names}.")
     for report in reports:
         station.say(session_text.result_line(report), "bold")
     return course

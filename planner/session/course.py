@@ -1,5 +1,6 @@
 """What a session knows beside the campaign, as values: each act gives the next one."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -10,7 +11,9 @@ from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.report import session_text
 from planner.report.pose_screen import PosePage
-from planner.session.verdicts import HitVerdict, PoseBefore
+from planner.session.verdicts import HitVerdict, Part, PoseBefore
+
+BAD = ("repeat", "unsure")
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +21,8 @@ class PoseInProgress:
     """A pose while the robot stands there: what is on the page, and which files wait.
 
     `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
-    pressed though hits are missing.
+    pressed though hits are missing; `refusing`: refuse was, though no hit is bad. `numbers` are
+    those of its hits, as they came.
     """
 
     proposal: Proposal
@@ -28,6 +32,30 @@ class PoseInProgress:
     verdicts: tuple[HitVerdict, ...] = ()
     shown: tuple | None = None
     pressed: bool = False
+    refusing: bool = False
+    numbers: dict[Part, int] = field(default_factory=dict)
+
+    def paths(self, *kinds: str) -> frozenset[Path]:
+        """Files of which every hit is of one of these kinds."""
+        others = {verdict.path for verdict in self.verdicts if verdict.kind not in kinds}
+        return frozenset(verdict.path for verdict in self.verdicts) - others
+
+    @property
+    def weak(self) -> frozenset[Path]:
+        """Files with hits so weak that they are not to be imported."""
+        return frozenset(verdict.path for verdict in self.verdicts if verdict.weak)
+
+    @property
+    def unsure(self) -> frozenset[Path]:
+        """Files with hits that contradict others."""
+        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "unsure")
+
+    def reasons(self, files: Collection[Path]) -> dict[Path, str]:
+        """What is wrong with the hits in these files, where something is."""
+        return {
+            path: " ".join(v.text for v in self.verdicts if v.path == path and v.kind in BAD)
+            for path in files
+        }
 
     @property
     def late(self) -> frozenset[Path]:
@@ -44,8 +72,8 @@ class PoseInProgress:
 class Course:
     """How far a session is. All else is the campaign's, so that it may end anywhere.
 
-    `asking` is the pose whose question is on the page; `here` are files that looked late and are
-    of the open pose; `aside`, by content, what could not be imported without the engineer;
+    `asking` is the pose whose question is on the page; `here` are files that looked late or
+    unsure and are right; `aside`, by content, what could not be imported without the engineer;
     `history` the overall sd (%) after each measurement; `announced`: the target was.
     """
 

@@ -1,15 +1,31 @@
 """The folder into which the analyser exports: which files are there, whole, and new."""
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from planner.campaign.store import read_bytes, sha256
-from planner.errors import PlannerError
+from planner.errors import ForeignFileError, PlannerError
 from planner.recording.folder import TABLE
 from planner.recording.read import READERS, read
 
 TEXT, TEXT_LONGER = (".csv", ".tsv", ".txt"), 3.0
+SETTLED = 8.0  # times `quiet_s`: what does not read until then is not being written any more
+WRITING = "is still being written"
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a file holds: its hash, why it does not read to its end, and whether it is foreign.
+
+    `unfit` is why no hit can be made of what reads.
+    """
+
+    digest: str = ""
+    fault: str = ""
+    foreign: bool = False
+    unfit: str = ""
 
 
 @dataclass
@@ -17,13 +33,16 @@ class Inbox:
     """Watches a folder. A file is whole when its size has stood still and it reads to its end.
 
     Files are known by content: what was imported or set aside is never offered again, whatever
-    it is called and however often the session is started.
+    it is called and however often the session is started. What does not read is being written
+    until it has stood still for longer; `unfit` says why no hit can be made of a file that reads.
     """
 
     folder: Path
     quiet_s: float = 0.6
+    unfit: Callable[[Path], str] = lambda path: ""
     _seen: dict[Path, tuple[int, float, float]] = field(default_factory=dict)
-    _digests: dict[Path, tuple[tuple[int, float], str, str]] = field(default_factory=dict)
+    _contents: dict[Path, tuple[tuple[int, float], Content]] = field(default_factory=dict)
+    _ignored: set[Path] = field(default_factory=set)
 
     def scan(self, done: set[str]) -> tuple[list[Path], list[tuple[Path, str]]]:
         """Whole new files, oldest first, and those not whole yet, with what is the matter."""
@@ -34,16 +53,29 @@ class Inbox:
             except OSError:
                 continue
             if not self._still(path, stat.st_size, stat.st_mtime):
-                waiting.append((path, "is being written"))
+                waiting.append((path, WRITING))
                 continue
-            digest, fault = self._content(path, stat.st_size, stat.st_mtime)
-            if digest in done:
+            found = self._content(path, stat.st_size, stat.st_mtime)
+            settled = self._quiet(path) >= SETTLED * self.quiet_s
+            if found.digest in done:
                 continue
-            if fault:
-                waiting.append((path, fault))
-            else:
+            if not settled and (found.fault or found.unfit):
+                waiting.append((path, WRITING))
+            elif found.fault and not found.foreign:
+                waiting.append((path, found.fault))
+            elif not found.fault:
                 whole.append(path)
         return whole, waiting
+
+    def ignored(self) -> list[Path]:
+        """Files that are no recordings, each once."""
+        found = [
+            path for path, (_, content) in self._contents.items()
+            if content.foreign and path not in self._ignored
+            and self._quiet(path) >= SETTLED * self.quiet_s
+        ]  # fmt: skip
+        self._ignored.update(found)
+        return found
 
     def _candidates(self) -> list[Path]:
         found = [
@@ -53,6 +85,10 @@ class Inbox:
         ]  # fmt: skip
         return sorted(found, key=lambda p: (p.stat().st_mtime, p.name))
 
+    def _quiet(self, path: Path) -> float:
+        """For how long (s) a file has stood still."""
+        return time.monotonic() - self._seen[path][2]
+
     def _still(self, path: Path, size: int, modified: float) -> bool:
         known = self._seen.get(path)
         if known is None or known[:2] != (size, modified):
@@ -60,21 +96,21 @@ class Inbox:
             return self.quiet_s <= 0
         # A text table that is cut off between two rows reads to its end: it gets more time.
         longer = TEXT_LONGER if path.suffix.lower() in TEXT else 1.0
-        return time.monotonic() - known[2] >= longer * self.quiet_s
+        return self._quiet(path) >= longer * self.quiet_s
 
-    def _content(self, path: Path, size: int, modified: float) -> tuple[str, str]:
-        """Content hash and, if the file does not read to its end, why."""
-        known = self._digests.get(path)
+    def _content(self, path: Path, size: int, modified: float) -> Content:
+        """What a file holds, read anew where it changed."""
+        known = self._contents.get(path)
         if known is not None and known[0] == (size, modified):
-            return known[1], known[2]
-        fault = ""
+            return known[1]
         try:
             digest = sha256(read_bytes(path))
             read(path)
+            found = Content(digest, unfit=self.unfit(path))
         except PlannerError as error:
-            digest, fault = "", str(error)
-        self._digests[path] = ((size, modified), digest, fault)
-        return digest, fault
+            found = Content(fault=str(error), foreign=isinstance(error, ForeignFileError))
+        self._contents[path] = ((size, modified), found)
+        return found
 
     def digest(self, path: Path) -> str:
         """Content hash of a whole file."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
-from planner.session.course import Course
+from planner.session.course import BAD, Course
 from planner.session.verdicts import HitVerdict
 
 
@@ -35,7 +35,7 @@ def page_with_hits(
 ) -> PosePage:
     """The page with the hits that wait, the files that are not whole yet, and keys that do."""
     before = course.before.pose
-    hits = tuple(_judged(number, one, before) for number, one in enumerate(verdicts, 1))
+    hits = tuple(_judged(one, before) for one in verdicts)
     page = replace(
         page, hits=hits, unfinished=tuple((one[0].name, _named(*one)) for one in waiting),
         progress=course.progress,
@@ -43,22 +43,31 @@ def page_with_hits(
     return replace(page, keys="" if auto else _keys(page, before, undoable))
 
 
-def _judged(number: int, verdict: HitVerdict, before: str) -> JudgedHit:
+def _judged(verdict: HitVerdict, before: str) -> JudgedHit:
     late = f"answers as {before} did: [b] it is from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
-    return JudgedHit(number, verdict.axis, verdict.kind, text)
+    if verdict.kind == "unsure":
+        text = f"{text}, or [h]: it is right"
+    return JudgedHit(verdict.number, verdict.axis, verdict.kind, text)
 
 
 def _keys(page: PosePage, before: str, undoable: bool) -> str:
     kinds = {hit.kind for hit in page.hits}
     return keys_that_do([
         ("a", "accept" if page.complete else "accept as it is", "good" in kinds),
-        ("r", "refuse all", bool(page.hits)),
+        ("r", "refuse bad hits", bool(kinds & {*BAD})),
+        ("R", "refuse all", bool(page.hits)),
         ("b", f"late ones to {before}", "late" in kinds),
-        ("h", "late ones are from here", "late" in kinds),
+        ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
         ("s", "star", True), ("k", "skip", True), ("n", "other pose", True),
         ("u", "undo", undoable), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
+
+
+def _right_here(kinds: set[str]) -> str:
+    if "late" not in kinds:
+        return "unsure ones are right"
+    return "late and unsure ones are right" if "unsure" in kinds else "late ones are from here"
 
 
 def _named(path: Path, why: str) -> str:

@@ -1,26 +1,31 @@
 """A verdict on each hit as soon as its file is whole, before anything is imported."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.dataset.screened_files import Source, Verdict, read_one
+from planner.recording.driving_point import driving_point
+from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import hit_count
 from planner.recording.records import Hit
-from planner.recording.repeats import likeness_to, screen_repeats
+from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
-SAME_POSE = 0.95
+SAME_POSE = SAME
+Part = tuple[Path, int]  # which of a file's hits, from 1
 
 
 @dataclass(frozen=True, eq=False)
 class HitVerdict:
-    """One hit that waits: `kind` is "good", "repeat" (why is in `text`) or "late".
+    """One hit that waits: `kind` is "good", "repeat" (why is in `text`), "late" or "unsure".
 
     The `text` of a good one says what is to be known of it, if anything is. A late one answers as
-    the pose before did. `axis` is "" where the file does not say it; `hits` is what of it can be
-    used.
+    the pose before did; an unsure one contradicts others, and nothing tells which is right. `axis`
+    is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
+    they came to the pose. An import would take it where it is `weak` only.
     """
 
     path: Path
@@ -28,6 +33,13 @@ class HitVerdict:
     kind: str
     text: str = ""
     hits: tuple[Hit, ...] = ()
+    number: int = 0
+    weak: bool = False
+
+    @property
+    def name(self) -> str:
+        """As other verdicts speak of it."""
+        return f"hit {self.number} ({self.path.name})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,30 +58,103 @@ class Verdicts:
         self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
         self._read: dict[tuple, list[tuple[Verdict, tuple[Hit, ...]]]] = {}
 
+    def unfit(self, path: Path) -> str:
+        """Why no hit can be made of a file that reads; empty: it can."""
+        return " ".join(v.reason for v, _ in self._hits_of(path) if not (v.accepted or v.axis))
+
+    def numbered(
+        self, files: Sequence[Path], numbers: Mapping[Part, int] | None = None
+    ) -> dict[Part, int]:
+        """Numbers of the hits in files: those they have, and further ones as they came."""
+        known = dict(numbers or {})
+        for path in files:
+            for part in range(1, len(self._hits_of(path)) + 1):
+                known.setdefault((path, part), len(known) + 1)
+        return known
+
     def of(
         self,
-        files: list[Path],
+        files: Sequence[Path],
         before: tuple[Hit, ...] = (),
         here: frozenset[Path] = frozenset(),
+        numbers: Mapping[Part, int] | None = None,
     ) -> tuple[HitVerdict, ...]:
-        """Each hit by itself and beside the others that wait, in the order of the files.
+        """Each hit by itself and beside the others that wait, by number.
 
-        Hits like those of the pose `before` are late, unless their files are said to be of `here`.
+        Hits like those of the pose `before` are late, and hits that contradict others unsure,
+        unless their files are said to be right and of `here`.
         """
-        found = [(path, *one) for path in files for one in self._hits_of(path)]
-        hits = [hit for *_, own in found for hit in own]
+        numbers = self.numbered(files, numbers)
+        found = [
+            (self._alone(path, *one, numbers[path, part]), len(parts))
+            for path in files for parts in (self._hits_of(path),)
+            for part, one in enumerate(parts, 1)
+        ]  # fmt: skip
+        found.sort(key=lambda one: one[0].number)
+        judged = self._beside_repeats([verdict for verdict, _ in found])
+        usable = [hit for verdict in judged if verdict.kind == "good" for hit in verdict.hits]
+        judged = [
+            _weak(verdict, usable, before) if count == 1 else verdict
+            for verdict, (_, count) in zip(judged, found, strict=True)
+        ]
+        asked = self._unsure(judged, here)
+        late = (
+            replace(verdict, kind="late", text="")
+            if verdict.kind == "good" and self._late(verdict, before, here) else verdict
+            for verdict in judged
+        )  # fmt: skip
+        return tuple(asked.get(verdict.number, verdict) for verdict in late)
+
+    def _alone(self, path: Path, verdict: Verdict, own: tuple[Hit, ...], number: int) -> HitVerdict:
+        kind = "repeat" if verdict.reason else "good"
+        text = verdict.reason or " ".join(verdict.remarks)
+        return HitVerdict(path, verdict.axis or "", kind, text, own, number)
+
+    def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
+        """With what a vote among three and more hits of an axis says."""
+        hits = [hit for verdict in judged for hit in verdict.hits]
         repeats = dict(zip(map(id, hits), screen_repeats(tuple(hits), self._band), strict=True))
         out = []
-        for path, verdict, own in found:
-            told = [f.text for hit in own for f in repeats[id(hit)] if f.refuse]
-            fault = verdict.reason or " ".join(told)
-            late = path not in here and any(
-                likeness_to(hit, before, self._band) >= SAME_POSE for hit in own
-            )
-            kind = "repeat" if fault else "late" if late else "good"
-            text = fault or " ".join(verdict.remarks)
-            out.append(HitVerdict(path, verdict.axis or "", kind, text, own))
-        return tuple(out)
+        for verdict in judged:
+            told = [f.text for hit in verdict.hits for f in repeats[id(hit)] if f.refuse]
+            told = told if verdict.kind == "good" else []
+            out.append(replace(verdict, kind="repeat", text=" ".join(told)) if told else verdict)
+        return out
+
+    def _late(self, verdict: HitVerdict, before: tuple[Hit, ...], here: frozenset[Path]) -> bool:
+        return verdict.path not in here and any(
+            likeness_to(hit, before, self._band) >= SAME_POSE for hit in verdict.hits
+        )
+
+    def _unsure(self, judged: Sequence[HitVerdict], here: frozenset[Path]) -> dict[int, HitVerdict]:
+        """By number, good hits that contradict others or are answered against their direction."""
+        good = [(v, hit) for v in judged if v.kind == "good" for hit in v.hits]
+        found = doubts(tuple(hit for _, hit in good), self._band) if len(good) > 1 else ()
+        asked = {}
+        for (verdict, hit), doubt in zip(good, found, strict=False):
+            if verdict.path in here:
+                continue
+            if doubt is not None:
+                others = " and ".join(good[j][0].name for j in doubt.others)
+                asked[verdict.number] = replace(
+                    verdict, kind="unsure", text=_asked(hit, doubt, others)
+                )
+            elif text := self._turned(verdict, hit, good):
+                asked[verdict.number] = replace(verdict, kind="unsure", text=text)
+        return asked
+
+    def _turned(self, verdict: HitVerdict, hit: Hit, good: Sequence[tuple[HitVerdict, Hit]]) -> str:
+        """What is said of the one hit along an axis that is answered against its direction."""
+        if not driving_point(hit, self._band):
+            return ""
+        same = [one for one, own in good if own.axis_index == hit.axis_index]
+        right = [one for one, own in good if not driving_point(own, self._band)]
+        if len(same) > 1 or not right:
+            return ""
+        return (
+            f"the tool answers it against its direction, and {right[0].name} not: hit along "
+            f"{hit.axis[-1]} once more"
+        )
 
     def _hits_of(self, path: Path) -> list[tuple[Verdict, tuple[Hit, ...]]]:
         """The verdict on each hit in a file by itself, and what of it is usable."""
@@ -80,3 +165,25 @@ class Verdicts:
             judged = [read_one(source, self._band) for source in every]
             self._read[key] = [(verdict, hits) for verdict, hits, _ in judged]
         return self._read[key]
+
+
+def _weak(verdict: HitVerdict, usable: list[Hit], before: tuple[Hit, ...]) -> HitVerdict:
+    """The verdict on a good hit, where it is far weaker than the others of its axis."""
+    if verdict.kind != "good" or not verdict.hits:
+        return verdict
+    own = verdict.hits[0]
+    usual = far_below(own, [hit for hit in (*usable, *before) if hit is not own])
+    if usual is None:
+        return verdict
+    text = (
+        f"{peak_n(own):.3g} N, others {usual:.3g} N (median) along {own.axis[-1]}; hit harder, or "
+        f"as softly once more if a level of its own is meant."
+    )
+    return replace(verdict, kind="repeat", text=text, weak=True)
+
+
+def _asked(hit: Hit, doubt: Doubt, others: str) -> str:
+    again = f"hit along {hit.axis[-1]} once more, that tells which is right"
+    if doubt.along:
+        return f"answers as {others} along {doubt.along} did: {again}"
+    return f"disagrees with {others} (likeness {doubt.likeness:.2f}): {again}"

@@ -72,9 +72,10 @@ def watch(
         if explaining is not None:
             stack.callback(explaining.close)
         cell, started = campaign.cell, time.monotonic()
+        verdicts = Verdicts(cell.config.modes.band_hz, cell.robot.points)
+        inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
-            campaign, Inbox(folder, quiet_s), Screen(console), source, Teller(campaign, story),
-            Verdicts(cell.config.modes.band_hz, cell.robot.points),
+            campaign, inbox, Screen(console), source, Teller(campaign, story), verdicts,
             auto or isinstance(source, NoKeys), hits_per_pose, explaining, LEAST, started,
             None if limit_s is None else started + limit_s,
         ))  # fmt: skip
@@ -152,16 +153,20 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
 def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
     whole, waiting = station.inbox.scan(course.known(station.campaign.state))
-    verdicts = station.verdicts.of(whole, course.before.hits, course.here)
+    for path in station.inbox.ignored():
+        station.say(f"{path.name} is no recording; ignored.", "dim")
+    numbers = station.verdicts.numbered(whole, visit.numbers)
+    verdicts = station.verdicts.of(whole, course.before.hits, course.here, numbers)
     now = (tuple(whole), tuple(waiting), tuple(verdict.kind for verdict in verdicts))
     if now == visit.shown:
         return visit
     page = page_with_hits(visit.page, verdicts, waiting, undoable(station), station.auto, course)
-    station.screen.ring({(str(v.path), n): v.kind for n, v in enumerate(verdicts, 1)})
+    station.screen.ring({(str(v.path), v.number): v.kind for v in verdicts})
     station.screen.show(page.page)
     return replace(
-        visit, page=page, whole=tuple(whole), verdicts=verdicts, shown=now, since=time.monotonic()
-    )
+        visit, page=page, whole=tuple(whole), verdicts=verdicts, shown=now, since=time.monotonic(),
+        numbers=numbers, refusing=False,
+    )  # fmt: skip
 
 
 def _unless_late(station: Station, course: Course) -> Course:

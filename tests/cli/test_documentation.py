@@ -1,5 +1,6 @@
 """Help, schema and manual: complete, and no example in them is wrong."""
 
+import html
 import json
 import re
 import shlex
@@ -14,6 +15,7 @@ from planner.campaign.config import CampaignConfig
 from planner.campaign.example import EXAMPLE
 from planner.cli.app import app
 from planner.cli.run import run
+from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
 from planner.report.manual.words import TUTORIAL
 from planner.robot.config import RobotConfig
 
@@ -88,6 +90,22 @@ def test_the_manual_quotes_files_that_are_right(tmp_path, capsys):
     links = re.findall(r'href="#(\w+)"', html)
     assert links
     assert all(f'id="{link}"' in html for link in links)
+
+
+def test_every_acquisition_is_told_in_schema_and_manual(tmp_path, capsys):
+    assert set(TOLD) == {*ACQUISITIONS, *DESIGNS}
+    assert run(["schema", "campaign"]) == 0
+    schema = capsys.readouterr().out
+    assert run(["manual", "--out", str(tmp_path / "manual.html")]) == 0
+    manual = (tmp_path / "manual.html").read_text()
+    for name, about in TOLD.items():
+        assert f"{name}: {about.split()[0]}" in schema
+        assert about in html.unescape(manual)
+
+
+def test_help_swallows_no_brackets(capsys):
+    assert run(["export", "--help"]) == 0
+    assert "[controller]" in capsys.readouterr().out
 
 
 def test_the_shell_completes(monkeypatch, capsys):

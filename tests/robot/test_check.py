@@ -16,7 +16,7 @@ INERTIAL = r"<inertial>.*?</inertial>"
 
 # Where, what is replaced (a regular expression), by what, and what the check says of it.
 WRONG = {
-    "no inertia": (URDF, INERTIAL, "", "warning", "no mass"),
+    "no inertia": (URDF, INERTIAL, "", "error", "no mass"),
     "no inertia on the spindle": (
         URDF, r'(<link name="spindle">\s*)' + INERTIAL, r"\1", "warning", "weightless",
     ),
@@ -28,7 +28,7 @@ WRONG = {
                            'ixx="0.1" iyy="1" izz="5"', "warning", "No body has"),
     "mass in g": (URDF, r'<mass value="24"/>', '<mass value="24000"/>', "warning", "24000|2.4e"),
     "com far outside": (URDF, r'xyz="0 0.02 0.36"', 'xyz="0 0.02 3.6"', "warning", "outside"),
-    "lengths in mm": (URDF, r'0.75"/>\s*<axis', '750"/> <axis', "warning", "millimetres"),
+    "lengths in mm": (URDF, r'0.75"/>\s*<axis', '750"/> <axis', "error", "millimetres"),
     "limits in degrees": (URDF, r'lower="-3.1416" upper="3.1416"', 'lower="-360" upper="360"',
                           "warning", "rad"),
     "speeds in degrees": (URDF, r'velocity="1.920"', 'velocity="110"', "warning", "turns a second"),
@@ -52,7 +52,7 @@ WRONG = {
     "band cuts mode 1": (ROBOT, r"band_hz = .*", "band_hz = [11, 80]", "warning", "Mode 1"),
     "workspace in rad": (PLAN, r"joints_deg = .*",
                          "joints_deg = [[-0.7, 0.7], [-0.3, 0.7], [-1, 0.2], [0, 0], [0.3, 1], "
-                         "[0, 0]]", "warning", "radians"),
+                         "[0, 0]]", "error", "radians"),
     "workspace in mm": (PLAN, r"joints_deg = .*", "position_m = [[800, 1400], [0, 0], [600, 900]]"
                         "\ntool_axis = [0, 0, -1]", "error", "reach"),
     "too many modes": (PLAN, r"count = 4", "count = 6", "warning", "6 modes"),
@@ -130,9 +130,33 @@ def test_what_is_wrong_is_found(name, tmp_path, capsys):
     found = [f for f in answer["findings"] if f["severity"] == severity]
     assert any(re.search(words, f["what"]) for f in found), answer["findings"]
     assert all(f["where"] and f["what"].endswith((".", ":")) for f in found)
-    refused = severity == "error" or name == "lengths in mm"  # where it falls over too
+    refused = severity == "error"
     assert (code, answer["ok"]) == ((2, False) if refused else (0, True))
     assert bool(err) == refused
+
+
+def test_the_cause_is_told_first_and_each_error_once(tmp_path, capsys):
+    """Lengths in mm let springs look soft too; limits in degrees are none with a workspace."""
+    file, pattern, text, *_ = WRONG["lengths in mm"]
+    robot = changed(tmp_path / "long", file, pattern, text)
+    assert run(["check", str(robot)]) == 2
+    said = capsys.readouterr()
+    both = " ".join((said.out + said.err).split())
+    assert both.count("as if lengths were in millimetres") == 1
+    assert both.index("error:") < both.index("warning:")
+    file, pattern, text, *_ = WRONG["limits in degrees"]
+    robot = changed(tmp_path / "wide", file, pattern, text)
+    assert run(["check", str(robot)]) == 0
+    capsys.readouterr()
+    assert run(["check", str(robot), "--campaign", str(tmp_path / "wide" / PLAN)]) == 2
+    assert "error: robot.urdf, joint" in capsys.readouterr().out
+
+
+def test_modes_are_told_with_where_the_robot_stands(capsys):
+    assert run(["check", str(EXAMPLE / ROBOT)]) == 0
+    said = " ".join(re.sub("[│┃]", " ", capsys.readouterr().out).split())
+    assert "home: 0°, 0°" in said
+    assert "…" not in said
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -24,8 +24,9 @@ AGAINST = JudgedHit(
 )  # fmt: skip
 CLIPPED = JudgedHit(
     3, "", "repeat",
-    "The force is clipped at 312.5 (3 samples); raise the channel's range or hit more softly. The "
-    "acceleration x is clipped at 5.1 (4 samples); raise the channel's range or hit more softly.",
+    "The force is clipped at 312.5 N (3 samples); raise the range of force or hit more softly. The "
+    "acceleration x is clipped at 5.1 m/s² (4 samples); raise the range of acceleration x or hit "
+    "more softly.",
 )  # fmt: skip
 LATE = JudgedHit(4, "+z", "late", "answers as P001 did: [b] it is from there, [h] from here")
 OTHER = JudgedHit(
@@ -50,7 +51,7 @@ def page():
         JointUnits(names, (True, *[False] * 6)), "tool0_hammer_tip", 4, (),
         (8.12, 12.5, 17.8, 22.3, 28.9, 33.1), (0.12, 0.2, 0.3, 0.4, 0.5, 0.6),
         Path("/home/someone/projects/2026/cell7/measurements/exports/analyser-3"),
-        unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is being written")),
+        unfinished=(("foreign.uff", FOREIGN), ("half.uff", "half.uff is still being written")),
         progress="sd of all 1.23 %; 2.3 min per pose; 3 to 5 more poses, 7 to 12 min to go",
         keys=KEYS,
     )  # fmt: skip
@@ -86,16 +87,15 @@ def test_what_to_do_comes_first(page):
         "Hit once and let it bounce off.", "A second pulse of 120 N follows the first of 300 N."
     )  # fmt: skip
     do, why = remedy_first(CLIPPED.text)
-    assert do == "Raise the channel's range or hit more softly."  # once
-    assert why == "The force is clipped at 312.5 (3 samples). The acceleration x is clipped at " \
-        "5.1 (4 samples)."  # fmt: skip
+    force = "Raise the range of force or hit more softly."
+    assert do == f"{force} Raise the range of acceleration x or hit more softly."
+    assert why == "The force is clipped at 312.5 N (3 samples). The acceleration x is clipped at " \
+        "5.1 m/s² (4 samples)."  # fmt: skip
     assert remedy_first(LATE.text) == (LATE.text, "")
     said = whole(lines(replace(page, hits=(CLIPPED,))))
-    assert (
-        "REPEAT HIT 3 (axis not stated): Raise the channel's range or hit more softly. The" in said
-    )
-    assert "foreign.uff: Export it again." in said
-    assert "half.uff is being written" in said
+    assert f"REPEAT HIT 3 (axis not stated): {force} Raise the range of acceleration x" in said
+    assert "cannot be read: foreign.uff: Export it again." in said
+    assert "not whole yet: half.uff is still being written" in said
 
 
 def test_with_room_all_is_said(page):

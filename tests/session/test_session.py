@@ -17,8 +17,10 @@ from planner.campaign.campaign import Campaign
 from planner.report.rerun_story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.watch import watch
-from tests.support.outside import make_cell, record
+from planner.truth.hits import simulate_hit, write_uff
+from tests.support.outside import HAMMER, make_cell, record
 
+SIX = ("+x", "+x", "+y", "+y", "+z", "+z")
 WANTED = (
     "joint_a1",
     "angle (°)",
@@ -82,7 +84,7 @@ def test_a_session_shows_imports_and_goes_on(cell):
     proposal = campaign.next()[0]
     analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
     script = Script(console, [
-        (wait("all hits are in"), "?"), (wait("set the waiting hits aside"), "s"),
+        (wait("all hits are in"), "?"), (wait("set all waiting hits aside"), "s"),
         (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("not be offered"), "u"),
         (wait("Took back"), "q"),
     ])  # fmt: skip
@@ -124,7 +126,8 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
     campaign, truth, tmp_path = cell
     deliver(truth, tmp_path, campaign.next()[0], 0)
     console = screen()
-    script = Script(console, [(wait("all hits are in"), "r"), (wait("set aside"), "a"),
+    script = Script(console, [(wait("all hits are in"), "r"), (wait("No hit is to be"), "r"),
+                              (wait("9 hits set aside (1, 2, 3"), "a"),
                               (wait("No whole new file"), "q")])  # fmt: skip
     watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=9,
           quiet_s=0.05, limit_s=30)  # fmt: skip
@@ -143,6 +146,34 @@ def test_refused_hits_are_not_offered_again_even_by_the_next_session(cell):
           quiet_s=0.05, limit_s=30)  # fmt: skip
     assert list(again.state.measurements) == ["P001"]
     assert again.state.refused == {}
+
+
+@pytest.mark.parametrize(
+    ("key", "said", "used", "refused"),
+    [("a", "1 hit set aside (", 5, 1), ("h", "are used, as you said", 6, 0),
+     ("r", "1 hit set aside (", 5, 1)],
+)  # fmt: skip
+def test_a_hit_along_another_axis_than_said_is_asked_about(cell, key, said, used, refused):
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    q, rng = np.deg2rad(proposal.joints_deg), np.random.default_rng(3)
+    for number, (axis, stated) in enumerate(zip([*SIX[:5], "+y"], SIX, strict=True)):
+        hit = simulate_hit(truth, q, axis, HAMMER, rng)
+        hit = type(hit)(stated, hit.force_n, hit.acceleration_m_s2)
+        write_uff(tmp_path / "inbox" / f"h{number}.uff", hit, HAMMER)
+    console = screen()
+    keys = [(wait("right?"), key), (wait("aside (" if key == "r" else "z  "), "a")]
+    keys += [] if key == "h" else [(wait("Hits are missing"), "a")]
+    script = Script(console, [*keys, (wait(said), "q")])
+    watch(campaign, tmp_path / "inbox", console=console, keys=script, hits_per_pose=6,
+          quiet_s=0.05, limit_s=60)  # fmt: skip
+    text = " ".join(console.export_text(clear=False).split())
+    assert said in text
+    (measured,) = campaign.state.used
+    assert len(measured.accepted) == used
+    reasons = [hit.reason for _, hit in campaign.state.refused.values()]
+    assert len(reasons) == refused
+    assert all("disagrees with hit" in r and "refused by the engineer" in r for r in reasons)
 
 
 @pytest.fixture

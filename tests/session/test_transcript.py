@@ -155,7 +155,7 @@ def test_a_session_in_which_all_goes_wrong(cell):
         # Hits that came late answer as the pose before did; they are asked about, and moved.
         analyser.write("late", analyser.good("+x"))
         terminal.until("late?", f"[b] late ones to {first.pose}")
-        terminal.press("b", f"{first.pose}: 1 hits in")
+        terminal.press("b", f"{first.pose}: 1 hit in")
         # The robot stands elsewhere than said: asked, and not used.
         now = Campaign(campaign.directory).state.open[0]
         elsewhere = Analyser(truth, inbox, second.joints_deg)

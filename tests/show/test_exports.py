@@ -133,6 +133,37 @@ def test_names_are_no_commands(kind, turned):
     assert len(set(names)) == len(names)
 
 
+@pytest.mark.parametrize("kind", ["krl", "rapid", "urscript", "poses"])
+def test_programs_say_what_nobody_checked_and_what_is_simulated(kind, tmp_path):
+    toml = make_arm(tmp_path / "robot")
+    pose = [PoseToDrive("P1", (0.0,) * 6)]
+    checked = program(kind, Robot.load(toml), "cell", pose)
+    urdf = toml.parent / "arm.urdf"
+    urdf.write_text(re.sub(r"<collision>.*?</collision>", "", urdf.read_text()))
+    bare = program(kind, Robot.load(toml), "cell", pose, simulated=True)
+    assert "Nothing was checked for collision" in bare
+    assert "SIMULATED RECORDINGS" in bare
+    assert "Only the poses" not in bare
+    assert "Nothing was checked" not in checked
+    assert "SIMULATED" not in checked
+    assert ("Only the poses" in checked) == (kind != "poses")
+
+
+def test_a_pose_named_by_hand_that_touches_something_is_not_driven_to(named, tmp_path, capsys):
+    here = named.state.used[0].joints_deg
+    floor = (-5.0, -20.0, 137.0, -100.0, 18.0, -125.0)
+    rows = [",".join(["pose", *named.cell.robot.joints.columns])]
+    file = tmp_path / "poses.csv"
+    for name, angles, code in (("free", here, 0), ("low", floor, 2)):
+        rows.append(",".join([name, *map(str, angles)]))
+        file.write_text("\n".join(rows) + "\n")
+        command = ["export", str(named.directory), "krl", "--poses", str(file)]
+        assert run([*command, "--out", str(tmp_path)]) == code
+    said = capsys.readouterr().err
+    assert "poses.csv, row 3: at low" in said
+    assert " touches " in said
+
+
 @pytest.mark.parametrize(
     ("table", "words"),
     [('joints = ["joint_a1"]', "each of"), ("signs = [1]", "one a joint"),

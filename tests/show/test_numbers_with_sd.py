@@ -15,7 +15,7 @@ from planner.report.text import with_sd
         (15.985, 0.0006, ".3f", "15.985 ± 0.001"),
         (1.5, 0.0, ".2f", "1.50 ± 0.00"),  # stated to be exact
         (1.5, None, ".2f", "1.50 ± –"),
-        (None, None, ".2f", "– ± –"),
+        (None, None, ".2f", "–"),
         (1.5, float("nan"), ".2f", "1.50 ± –"),
     ],
 )

@@ -43,6 +43,7 @@ class Reader(HTMLParser):
 def report(named, tmp_path_factory):
     """The campaign, its report's answer, and the file as it was read."""
     folder, campaign = tmp_path_factory.mktemp("report"), named
+    (folder / "out").mkdir()
     answer = write_report(campaign, folder / "out" / "report.html", None)
     html = (folder / "out" / "report.html").read_text()
     reader = Reader()

@@ -213,6 +213,7 @@ def interrupt(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
 def others(cell: Cell) -> list[Command]:
     """Commands that write elsewhere than into the log."""
     there, out = str(cell.campaign), cell.root / "out"
+    out.mkdir(exist_ok=True)
     robot, plan = cell.root / "robot" / "robot.toml", cell.root / "plan" / "campaign.toml"
     compare = ["compare", str(cell.root / "pool"), "--robot", str(robot), "--campaign", str(plan),
                "--strategies", "sobol", "--repeats", "2", "--initial", "2", "--budget", "3",

@@ -13,14 +13,11 @@ from scipy.stats import norm
 
 from planner.diagnosis.effects.combined import Both
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import multiples
-from planner.diagnosis.linear.evidence import stated_springs
 from planner.diagnosis.linear.fit import LAST_STEPS, Fit, carried_on
 from planner.diagnosis.linear.mismatch import residuals
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.thresholds import (
-    DISCREPANCY_USUAL,
     LEFT_FACTOR,
     SOMETHING_UNKNOWN,
     SPRING_STRAYED,
@@ -50,7 +47,6 @@ def without_slight(
     farther the simpler fit had to move the stated values, the likelier is the effect.
     """
     pull = np.logaddexp(np.log1p(-SOMETHING_UNKNOWN), np.log(SOMETHING_UNKNOWN) + bent)
-    matters = float(np.hypot(matters, usual(fits[0])))
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
     shares = np.array(shares, dtype=float)
     for i in sorted(range(len(fits)), key=lambda i: -len(called[i])):
@@ -98,20 +94,6 @@ def _size(without: Fit, whole: Fit, parts: Sequence[Effect]) -> float:
 def _above(size: float, limit: float) -> float:
     """Probability that a size counts as above a limit: neither is known better than by a factor."""
     return float(norm.cdf(np.log(max(size, 1e-12) / limit) / np.log(LEFT_FACTOR)))
-
-
-def usual(fit: Fit) -> float:
-    """As `change`, by springs and dampers that differ from pose to pose as those of any robot."""
-    misfit = fit.misfit
-    size = DISCREPANCY_USUAL * multiples(misfit, stated_springs(fit))
-    by_size = size[:, None, None, None]
-    if misfit.tolerances is None:
-        moved = misfit.response(fit.x)[1][:, : len(size)] * by_size
-    else:
-        around = misfit.around_misses(fit.x)
-        assert around.slope is not None
-        moved = around.net(around.slope[:, : len(size)] * by_size) * _noise(misfit)[:, None]
-    return _relative(np.sum(np.abs(moved) ** 2, axis=1), misfit)
 
 
 def thinned(problem: Problem, whole: Fit, fits: Sequence[Fit]) -> list[Fit]:

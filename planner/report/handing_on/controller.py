@@ -5,15 +5,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from planner.errors import InputError
+from planner.robot.collision import Collisions
 from planner.robot.config import ControllerTable
 from planner.robot.robot import Robot
 
 ARM_AXES, EXTERNAL_AXES = 6, 6  # that KRL and RAPID have words for
 UNUSED = "9E9"  # an external axis that is not there, in RAPID
-WARNING = (
-    "Only the poses themselves were checked for collision, not the ways between them.",
-    "Run it slowly first, with a hand at the stop.",
-)
+CHECKED = "Only the poses themselves were checked for collision, not the ways between them."
+UNCHECKED = "Nothing was checked for collision, neither the poses nor the ways between them:"
+SLOWLY = "Run it slowly first, with a hand at the stop."
+SIMULATED = "SIMULATED RECORDINGS: what chose these poses was not measured on a real robot."
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,14 @@ class DrivenPose:
     units: tuple[str, ...]
 
 
+def heading(robot: Robot, simulated: bool) -> tuple[str, ...]:
+    """What is to be known before the program is run, in lines of plain ASCII."""
+    found = (CHECKED,)
+    if Collisions(robot).unchecked is not None:
+        found = (UNCHECKED, f"{plain(robot.urdf_path.name)} has no collision geometry.")
+    return (*((SIMULATED,) if simulated else ()), *found, SLOWLY)
+
+
 def plain(text: str) -> str:
     """Text that no controller takes for more than a comment."""
     return re.sub(r"[^A-Za-z0-9 _.,+-]", "_", text)
@@ -55,9 +64,12 @@ def identifier(text: str, start: str = "P_") -> str:
     return name if re.match(r"[A-Za-z]", name) else f"{start}{name}"[:24]
 
 
-def program(kind: str, robot: Robot, name: str, poses: Sequence[PoseToDrive]) -> str:
+def program(
+    kind: str, robot: Robot, name: str, poses: Sequence[PoseToDrive], simulated: bool = False
+) -> str:
     """The program that drives to the poses one after the other and waits at each.
 
+    `simulated`: the campaign that chose them rests on simulated recordings, which is said.
     Raises InputError where the robot's axes do not suit the controller.
     """
     table, axes = robot.config.controller, axes_of(robot)
@@ -85,7 +97,8 @@ def program(kind: str, robot: Robot, name: str, poses: Sequence[PoseToDrive]) ->
         one = unique(identifier(pose.pose), used)
         turned = [tuple(s * values[n] + o for n, s, o in group) for group in (arm, external)]
         driven.append(DrivenPose(one, pose.note, turned[0], turned[1], units))
-    return PROGRAMS[kind](identifier(name, "C_"), driven, table)
+    said = heading(robot, simulated)
+    return PROGRAMS[kind](identifier(name, "C_"), driven, table, said)
 
 
 def unique(name: str, used: set[str]) -> str:
@@ -123,10 +136,12 @@ def axes_of(robot: Robot) -> list[tuple[str, float, float]]:
     return list(zip(order, signs, offsets, strict=True))
 
 
-def _krl(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+def _krl(
+    name: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Sequence[str]
+) -> str:
     """KUKA Robot Language: point-to-point to each pose, halt there."""
     speed = f"{table.speed_percent:g}"
-    lines = [f"DEF {name}( )", *(f"; {line}" for line in WARNING), "BAS(#INITMOV, 0)",
+    lines = [f"DEF {name}( )", *(f"; {line}" for line in said), "BAS(#INITMOV, 0)",
              f"BAS(#VEL_PTP, {speed})", f"BAS(#ACC_PTP, {speed})"]  # fmt: skip
     for pose in poses:
         values = [f"A{k} {v:.4f}" for k, v in enumerate(pose.arm, 1)]
@@ -135,9 +150,11 @@ def _krl(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
     return "\r\n".join([*lines, "END", ""])
 
 
-def _rapid(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+def _rapid(
+    name: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Sequence[str]
+) -> str:
     """ABB RAPID: absolute joint moves, stop at each."""
-    lines = [f"MODULE {name}", *(f"  ! {line}" for line in WARNING)]
+    lines = [f"MODULE {name}", *(f"  ! {line}" for line in said)]
     for pose in poses:
         arm = [f"{v:.4f}" for v in pose.arm] + ["0"] * (ARM_AXES - len(pose.arm))
         outer = [f"{v:.4f}" for v in pose.external]
@@ -151,9 +168,11 @@ def _rapid(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> st
     return "\n".join([*lines, "  ENDPROC", "ENDMODULE", ""])
 
 
-def _urscript(name: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
+def _urscript(
+    name: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Sequence[str]
+) -> str:
     """URScript: joint moves, a dialogue at each."""
-    lines = [f"def {name}():", *(f"  # {line}" for line in WARNING)]
+    lines = [f"def {name}():", *(f"  # {line}" for line in said)]
     speed = f"{table.speed_percent / 100 * FASTEST_UR_RAD_S:.3f}"
     for pose in poses:
         values = ", ".join(f"d2r({v:.4f})" for v in pose.arm)
@@ -165,8 +184,14 @@ def _urscript(name: str, poses: Sequence[DrivenPose], table: ControllerTable) ->
 FASTEST_UR_RAD_S = 3.14  # joint speed of which `speed_percent` is a share, as UR's manuals state it
 
 
-def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
-    """A table: axes as the controller counts them, in degrees, those that slide in mm."""
+def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable, said: Sequence[str]) -> str:
+    """A table: axes as the controller counts them, in degrees, those that slide in mm.
+
+    It has no room for sentences: each note begins with what is to be known first.
+    """
+    first = "".join(
+        f"{line.partition(':')[0]}; " for line in said if line in (SIMULATED, UNCHECKED)
+    )
     axes: list[str] = []
     if poses:
         axes = [f"A{k}" for k in range(1, len(poses[0].arm) + 1)]
@@ -175,11 +200,12 @@ def _poses(_: str, poses: Sequence[DrivenPose], table: ControllerTable) -> str:
     rows = [",".join(["pose", *axes, "note"])]
     for pose in poses:
         numbers = [f"{v:.4f}" for v in (*pose.arm, *pose.external)]
-        rows.append(",".join([pose.name, *numbers, f'"{pose.note}"']))
+        rows.append(",".join([pose.name, *numbers, f'"{first}{pose.note}"']))
     return "\n".join([*rows, ""])
 
 
-PROGRAMS: dict[str, Callable[[str, Sequence[DrivenPose], ControllerTable], str]] = {
+Writer = Callable[[str, Sequence[DrivenPose], ControllerTable, Sequence[str]], str]
+PROGRAMS: dict[str, Writer] = {
     "krl": _krl, "rapid": _rapid, "urscript": _urscript, "poses": _poses,
 }  # fmt: skip
 SUFFIXES = {"krl": ".src", "rapid": ".mod", "urscript": ".script", "poses": ".csv"}

@@ -26,6 +26,8 @@ from planner.report.handing_on.controller import (
 )
 from planner.report.handing_on.model_file import LOADER, model_arrays
 from planner.report.handing_on.tables import frfs_csv, mat_arrays, modes_csv
+from planner.robot.collision import Collisions
+from planner.robot.robot import Robot
 
 DATA = ("uff", "mat", "csv", "model")
 KINDS = (*PROGRAMS, *DATA)
@@ -72,6 +74,7 @@ def export(
         campaign.cell.check_pose(row.joints_deg, f"{poses_csv}, row {row.row}")
     folder = (out or campaign.directory / "export").absolute()
     if kind in PROGRAMS:
+        _refuse_contacts(campaign.cell.robot, poses_csv, rows)
         return _program(campaign, kind, folder, rows)
     found = collect(campaign, [r.pose for r in rows], [r.joints_deg for r in rows])
     if not found.measured and not found.predicted.poses and kind != "model":
@@ -92,6 +95,18 @@ def export(
     return ExportedFiles(kind, written, tuple(poses), found.simulated, loader, errors)
 
 
+def _refuse_contacts(robot: Robot, file: Path | None, rows: Sequence[PoseRow]) -> None:
+    """Proposals touch nothing; InputError where a pose that was named by hand does."""
+    collisions = Collisions(robot) if rows else None
+    for row in rows:
+        touching = collisions.contacts(robot.joints.internal(row.joints_deg)) if collisions else ()
+        if touching:
+            raise InputError(
+                f"{file}, row {row.row}: at {row.pose} {'; '.join(touching)}; name another pose, "
+                f"or list the pair in robot.toml, [collision] ignore."
+            )
+
+
 def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow]) -> ExportedFiles:
     state, name = campaign.state, campaign.directory.name
     drive = [PoseToDrive(r.pose, tuple(r.joints_deg)) for r in rows]
@@ -102,9 +117,9 @@ def _program(campaign: Campaign, kind: str, folder: Path, rows: Sequence[PoseRow
         raise InputError(
             f"{campaign.directory} has no open proposal; ask planner next first, or name --poses."
         )
-    text = program(kind, campaign.cell.robot, f"planner_{name}", drive)
-    files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
     simulated = any(m.simulated for m in state.recorded)
+    text = program(kind, campaign.cell.robot, f"planner_{name}", drive, simulated)
+    files = {f"{identifier(f'planner_{name}', 'C_')}{SUFFIXES[kind]}": text}
     return ExportedFiles(kind, _write(folder, files), tuple(d.pose for d in drive), simulated)
 
 

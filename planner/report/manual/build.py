@@ -47,6 +47,9 @@ def _file(name: str) -> Markup:
         parts.append(tag("h3", one.name or f"{name}.toml, at its top"))
         parts.append(tag("p", one.about.replace("`", "")))
         parts += [words_table(("entry", "takes", "if left out"), rows)] if rows else []
+        if one.choices:
+            named = [(choice.name, choice.about) for choice in one.choices]
+            parts.append(words_table(("name", "chooses"), named))
     return section(f"{name}.toml", joined(parts), id_=name)
 
 

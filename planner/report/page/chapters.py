@@ -25,6 +25,7 @@ from planner.report.page.html import (
 from planner.report.text import number
 from planner.report.text import with_sd as pm
 from planner.version import __version__
+from planner.words import local_time
 
 
 def asked(facts: Facts) -> Markup:
@@ -103,15 +104,13 @@ def findings(remarks: Iterable[CheckRemark]) -> Markup:
 
 def measured(facts: Facts) -> Markup:
     """What was measured and refused, and why."""
-    state, joints = facts.state, facts.campaign.cell.robot.joints
+    state = facts.state
     header = ("pose", "hits used", "refused", "natural frequencies (Hz)", "damping ratios (%)",
-              "time (UTC)")  # fmt: skip
-    rows = [_pose(m, m.pose in state.starred) for m in state.measurements.values()]
-    angles = [(m.pose, *(f"{v:.2f}" for v in m.joints_deg)) for m in state.measurements.values()]
+              "time")  # fmt: skip
+    rows = [_pose(m, m.pose in state.starred) for m in state.measured]
     parts: list[object] = [tag("p", "Nothing has been measured yet.")]
     if rows:
-        readback = table(("pose", *joints.headings), angles, "Joints as read back")
-        parts = [table(header, rows), readback]
+        parts = [table(header, rows), _stood(facts)]
     refused = [(r.pose, r.file, r.reason) for r in facts.status.refused]
     if refused:
         parts += [tag("h3", f"Refused, kept and not used: {len(refused)}"),
@@ -131,6 +130,21 @@ def measured(facts: Facts) -> Markup:
     return section("What was measured, and what was refused", *parts, id_="measured")
 
 
+def _stood(facts: Facts) -> Markup:
+    """Where the robot stood: as read back, or as proposed where nobody read it back."""
+    joints, proposed = facts.campaign.cell.robot.joints, facts.state.proposals
+    rows, setpoints = [], 0
+    for m in facts.state.measured:
+        setpoint = m.pose in proposed and proposed[m.pose].joints_deg == m.joints_deg
+        setpoints += setpoint
+        source = "setpoint" if setpoint else "readback"
+        rows.append((m.pose, *(f"{v:.2f}" for v in m.joints_deg), source))
+    said = "Joints as read back; where nothing was read back, the setpoint of the proposal"
+    if setpoints == len(rows):
+        said = "Joints as proposed: nothing was read back"
+    return table(("pose", *joints.headings, "from"), rows, said)
+
+
 def _pose(m: Measurement, starred: bool) -> list[object]:
     modes = [mode for mode in m.modes if mode.likely]
     mark = (" ★" if starred else "") + (" (withdrawn)" if m.withdrawn else "")
@@ -138,7 +152,7 @@ def _pose(m: Measurement, starred: bool) -> list[object]:
         m.pose + mark, str(len(m.accepted)), str(len(m.hits) - len(m.accepted)),
         [pm(x.frequency_hz, x.frequency_sd_hz, ".3f") for x in modes],
         [number(100 * x.damping_ratio) for x in modes],
-        m.time[:16].replace("T", " "),
+        local_time(m.time),
     ]  # fmt: skip
 
 
@@ -148,10 +162,8 @@ def decisions(facts: Facts) -> Markup:
     rows = []
     for entry in facts.campaign.entries:
         mark = " (taken back)" if entry.seq in undone else ""
-        rows.append((str(entry.seq), entry.time[:19].replace("T", " "), act(entry) + mark))
-    return section(
-        "Log of decisions", words_table(("entry", "time (UTC)", "what"), rows), id_="log"
-    )
+        rows.append((str(entry.seq), local_time(entry.time), act(entry) + mark))
+    return section("Log of decisions", words_table(("entry", "time", "what"), rows), id_="log")
 
 
 def reproduce(facts: Facts) -> Markup:

@@ -1,0 +1,21 @@
+"""Small words that every sentence needs: counts, standard deviations, times."""
+
+from datetime import datetime
+
+
+def counted(count: int, one: str, more: str = "") -> str:
+    """A number with its noun: "1 pose", "2 poses"; `more` is an unusual plural."""
+    return f"{count} {one if count == 1 else more or f'{one}s'}"
+
+
+def small(value: float, form: str = ".2f") -> str:
+    """A number of fixed decimals (".2f"); one above 0 that rounds to 0 is below the last digit."""
+    said = format(value, form)
+    if value > 0 and said.strip("0.") == "":
+        return f"<{10.0 ** -int(form[1:-1]):{form}}"
+    return said
+
+
+def local_time(utc: str) -> str:
+    """A time of the log (UTC, ISO 8601) as clocks here show it, with its zone."""
+    return f"{datetime.fromisoformat(utc).astimezone():%Y-%m-%d %H:%M:%S %Z}" if utc else ""
