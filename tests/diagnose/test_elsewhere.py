@@ -35,7 +35,8 @@ def test_it_is_found_from_the_next_link(recorded, neighbour):
     ends = [settle(problem, f, steps=30) for f in found]
     best = min(ends, key=lambda f: f.per_value)
     assert best.effect.at == "link_3"
-    assert best.per_value < 1.1 < 2.0 < wrong.per_value
+    assert best.per_value < 1.0
+    assert wrong.per_value > 1.3 * best.per_value
 
 
 def test_joints_are_not_moved(recorded):
@@ -53,7 +54,7 @@ def test_further_recordings_are_told_by_the_same_candidates(recorded):
     before = diagnose(frfs[:3], q[:3], simulation, effects=some)
     after = again(before, frfs, q)
     assert after.candidates[0].places == (("local_resonator", "link_3"),)
-    assert after.candidates[0].probability > 0.9
+    assert after.candidates[0].probability > 0.8  # it changes hardly more than what matters
     assert sum(c.probability for c in after.candidates) == pytest.approx(1.0)
     assert len(after.problem.frfs) == len(frfs)
     tied = {c.places for c in before.undecided} | {(("none", None),), (("unknown", None),)}

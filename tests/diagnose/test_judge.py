@@ -20,11 +20,11 @@ LINES = np.linspace(6.0, 60.0, 96)
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    """Twelve kilograms on link 5 in simulated recordings of four poses, and their diagnosis."""
+    """Sixty kilograms on link 5 in simulated recordings of four poses, and their diagnosis."""
     folder = tmp_path_factory.mktemp("robot")
     toml = KR210.write(folder)
     simulation = Simulation(Robot.load(toml))
-    heavy = '\n[[payload]]\nlink = "link_5"\nmass = 12.0\ncom_m = [0.1, 0.05, 0.1]\n'
+    heavy = '\n[[payload]]\nlink = "link_5"\nmass = 60.0\ncom_m = [0.1, 0.05, 0.1]\n'
     toml.write_text(toml.read_text() + heavy)
     q, rng = KR210.poses(4, 5), np.random.default_rng(0)
     frfs = []

@@ -17,7 +17,7 @@ from planner.identification.missed_ports import actual_ports
 from planner.robot.robot import Robot
 from tests.support.known_robots import kr210_folder
 
-LINES = Grade(24)
+LINES = Grade(24, 0.003)
 BAND = 5.0, 55.0
 SIZE, AWAY = 3e-3, 0.25  # of the discrepancy; prior sds, beyond which other minima lie
 
@@ -41,7 +41,7 @@ def best(tmp_path_factory) -> Fit:
         return Problem(tuple(frfs), q, simulation, BAND)
 
     plain = problem_of(simulation.accelerance(q, frequency))
-    misfit = plain.misfit(Effect(""), Grade(48))
+    misfit = plain.misfit(Effect(""), Grade(48, 0.003))
     x = misfit.mean + misfit.sd * np.clip(rng.standard_normal(len(misfit.mean)), -1, 1)
     s, t = misfit.setting.s, misfit.tolerances
     assert t is not None

@@ -148,9 +148,12 @@ def _left(fit: Fit) -> np.ndarray:
 
 
 def _apart(left: np.ndarray, whole: Fit) -> float:
-    misfit = whole.misfit
-    difference = _left(whole) - left
-    return _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
+    """The larger of two sizes: of all FRFs together, where peaks count, and of each by itself."""
+    misfit, difference = whole.misfit, _left(whole) - left
+    matters = misfit.setting.simulation.robot.config.diagnose.matters
+    each = float(np.mean(np.abs(difference[misfit.weight > 0]) ** 2)) / 2
+    together = _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
+    return max(together, matters * float(np.sqrt(each)))
 
 
 def _noise(misfit: Misfit) -> np.ndarray:
