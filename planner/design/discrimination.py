@@ -19,7 +19,7 @@ from planner.design.frequency_posterior import AXES
 from planner.design.parameter_sensitivity import FrfNoise
 from planner.diagnosis.linear.fit import Fit, carried_on
 from planner.diagnosis.linear.predict import misfit_at
-from planner.diagnosis.linear.problem import Problem, tolerances_of
+from planner.diagnosis.linear.problem import FINE, Problem, tolerances_of
 from planner.frf.frf import Frf
 from planner.identification.measurement_model import OpenNumbers, basis
 from planner.inference.block_diagonal import block_diagonal
@@ -145,15 +145,18 @@ def separation(
     share = np.array(probability) / np.sum(probability)
     noise = FrfNoise.of(problem.frfs, problem.band_hz, temper)
     lines = np.linspace(*problem.band_hz, FRF_LINES)
-    # Lines closer than those of a record are not measured apart; farther ones stand for several.
-    each = max((lines[1] - lines[0]) / noise.step_hz, 1.0)
+    # As many count as fits look at: what does not matter errs at each of them.
+    each = min((lines[-1] - lines[0]) / noise.step_hz, FINE.lines) / FRF_LINES
     numbers = OpenNumbers.of(np.empty((*layout.shape, 0)))
     open_ = 0 if problem.exact else numbers.known + problem.q.shape[1]
     known = [block_diagonal(fit.precision(temper), np.eye(open_)) for fit in fits]
     rate = problem.frfs[0].exponential_rate_1_s
     for place, row in enumerate(q):
         predicted = [_predicted(problem, f, row, lines, rate, layout) for f in fits]
-        scales = [np.sqrt(2 * each / noise.misfit) / _sd(noise, h) for h, _ in predicted]
+        scales = [
+            np.sqrt(2 * each / noise.misfit) / np.hypot(_sd(noise, h), _unmodelled(problem, h))
+            for h, _ in predicted
+        ]
         gain[place] = expected_log_odds(predicted, scales, known, share)
     return gain
 
@@ -210,6 +213,12 @@ def _sd(noise: FrfNoise, h: np.ndarray) -> np.ndarray:
     if floor is None:
         floor = noise.relative * np.sqrt(np.mean(np.abs(h) ** 2))
     return np.hypot(noise.relative * np.abs(h), floor)
+
+
+def _unmodelled(problem: Problem, h: np.ndarray) -> np.ndarray:
+    """Sd of what a fit to an FRF h (r, 3, F) need not follow, as in `stack`."""
+    error, spread = problem.error
+    return error * np.hypot(np.abs(h), spread * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 1))))
 
 
 def _left(missed: np.ndarray, slope: np.ndarray, precision: np.ndarray) -> float:

@@ -53,7 +53,7 @@ def test_simply_supported_rod_has_timoshenkos_frequencies(thick):
     e, g = m.youngs_modulus, s.shear_coefficient * m.youngs_modulus / 2.6
     a, b, c = m.density * r2 / g, -(1 + r2 * k**2 * (1 + e / g)), e * r2 * k**4 / m.density
     expected = np.sqrt((-b - np.sqrt(b * b - 4 * a * c)) / (2 * a))
-    omega = expected * np.linspace(0.995, 1.005, 41)
+    omega = expected * np.linspace(0.9951, 1.005, 41)  # no line on the root itself
     t = transfer([rod(length, thick * length)], omega)
     supported = t[:, [0, 10]][:, :, [4, 6]]  # no motion, no moment at both ends
     assert roots(np.linalg.det(supported).real, omega) == pytest.approx([expected], rel=1e-6)

@@ -88,6 +88,11 @@ class Problem:
         rows, columns = self.layout.shape
         return rows * columns // 9
 
+    @property
+    def error(self) -> tuple[float, float]:
+        """Relative sd of what does not matter, and the share of it in every direction."""
+        return self.simulation.robot.config.diagnose.matters, ERRORS_SPREAD
+
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
         body, measured = _prepared(self, effect), _measured(self, grade)
@@ -141,7 +146,5 @@ def _prepared(problem: Problem, effect: Effect) -> _Prepared:
 @lru_cache(maxsize=16)
 def _measured(problem: Problem, grade: Grade) -> Measured:
     lines = max(round(grade.lines * problem.blocks**SHARED_WORK), min(grade.lines, LEAST_LINES))
-    error, spread = grade.model_error, 0.0
-    if error is None:
-        error, spread = problem.simulation.robot.config.diagnose.matters, ERRORS_SPREAD
+    error, spread = problem.error if grade.model_error is None else (grade.model_error, 0.0)
     return stack(problem.frfs, problem.band_hz, lines, error, spread)
