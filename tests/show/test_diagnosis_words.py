@@ -11,6 +11,7 @@ from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
 from planner.report.diagnosis_plots import _residuals
+from planner.report.mismatch import MismatchShares
 from planner.report.place_names import place_names, with_names
 from planner.robot.robot import Robot
 from tests.support.plain_arm import make_plain_arm
@@ -91,3 +92,8 @@ def test_residuals_by_direction_share_a_scale_that_is_shown():
     assert images[0].norm is images[1].norm
     assert isinstance(images[0].norm, LogNorm)
     assert any("mean square residual" in axes.get_ylabel() for axes in figure.axes[4:])
+
+
+def test_a_refit_that_is_farther_off_is_explained():
+    assert "peaks are farther off" in MismatchShares(-6.3, 2.1, -34.4, -46.6).sentence
+    assert "peaks" not in MismatchShares(-6.3, -9.0, -34.4, -46.6).sentence
