@@ -194,12 +194,12 @@ def _told_of(found: Fit, temper: float) -> tuple[Effect, ...]:
 
 def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
-    matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters_percent
+    matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters
     named = [_told_of(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
     evidence = np.array([w.log_evidence for w in weights.worth])
     own = weights.probabilities[:-1], prior, weights.bent, evidence
-    shares = list(without_slight(fits, named, *own, matters / 100))
+    shares = list(without_slight(fits, named, *own, matters))
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):
         if shares[i] > TIED / len(fits) and sluggish(one, weights.temper):

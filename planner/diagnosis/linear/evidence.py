@@ -39,11 +39,16 @@ LOG_KNOWN = float(np.log(1 / SOMETHING_UNKNOWN - 1))  # odds, before any data, o
 
 def temper_of(fits: Sequence[Fit]) -> float:
     """T for fits on the same lines, from the best of them."""
-    measured = fits[0].misfit.measured
-    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
-    shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
+    shared = _shared(fits[0])
     misfit = min(f.per_value for f in fits)
     return temper(misfit, ALIKE, shared=shared, least=NOISE_OVERSTATED)
+
+
+def _shared(fit: Fit) -> float:
+    """How many neighbouring lines share their noise, see `shared_noise`."""
+    measured = fit.misfit.measured
+    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
+    return shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +79,7 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     """
     springs = stated_springs(fits[0])
     products = [InnerProducts.of(f, springs) for f in fits]
-    measured = fits[0].misfit.measured
-    spacing = float(np.median(np.diff(measured.frequency_hz, axis=1)))
-    shared = shared_noise(spacing, float(np.median(measured.s.real[:, 0])))
+    shared = _shared(fits[0])
     first = np.array([p.at(DISCREPANCY_USUAL, 1.0).evidence for p in products])
     rough = first.copy()
     for i in np.flatnonzero(first > first.max() - HARDLY):
@@ -94,7 +97,7 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
     left = np.array([m.unexplained for m in mismatch])
     seen = np.array([m.resolution for m in mismatch])
-    matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters_percent / 100
+    matters = fits[0].misfit.setting.simulation.robot.config.diagnose.matters
     bent = np.array([_bent(f, w, fits[0]) for f, w in zip(fits, worth, strict=True)])
     least = float(seen.min())
     shares = shares_of(worth, left, prior, matters, least, seed, bent)
