@@ -217,7 +217,7 @@ def _sd(noise: FrfNoise, h: np.ndarray) -> np.ndarray:
 
 def _unmodelled(problem: Problem, h: np.ndarray) -> np.ndarray:
     """Sd of what a fit to an FRF h (r, 3, F) need not follow, as in `stack`."""
-    error, spread = problem.error
+    error, spread = problem.error(FINE)
     return error * np.hypot(np.abs(h), spread * np.sqrt(np.mean(np.abs(h) ** 2, axis=(0, 1))))
 
 

@@ -86,7 +86,7 @@ def diagnose(
     """
     started = time.perf_counter()
     band = common_band(frfs, simulation.robot.config.band_hz)
-    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band, lossy=True)
+    problem = Problem(tuple(frfs), np.atleast_2d(q), simulation, band, as_built=True)
     if not stands(simulation.elastic.matrices(problem.q), simulation.elasticity.stiffness):
         raise InputError(TOO_SOFT)
     tell("refitting the simulation", 0.0)

@@ -24,7 +24,7 @@ SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; c
 STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.0
 # By how much of its size a body's mass lies elsewhere than stated: half of what its moments, which
 # go with the square of a length, are off by (CAD_INERTIAS).
-MASS_ELSEWHERE = 0.04
+MASS_ELSEWHERE = 0.08
 # Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as
 # gears and bearings are both and no data sheet says in which share.
 STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
@@ -33,6 +33,8 @@ STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
 FAR_SPRING_FACTOR = 8.0  # either way, of a joint's stiffness that is far off
 BASE_STIFFNESS = 0.3, 30.0  # of the base, times the largest stiffness of the robot's joints
 ACROSS_STIFFNESS = 0.2, 20.0  # of a joint across its axis, times that about its own
+# What every robot's bearings give across, from where that is an effect on; chosen, two decades.
+SLIGHTLY_ACROSS = 20.0, 2000.0
 LINK_STIFFNESS = 0.1, 10.0  # of a link, times that of the joint that moves it about its own axis
 FURTHER_DAMPING_FACTOR = 8.0  # either way, of the damping of springs that are not stated
 # Prior sd of where a bending link's halves have their centres, of their distance: where a link's
@@ -66,9 +68,11 @@ LAW_FARTHEST = 6.0  # prior sds (of ln a: units) beyond which no law is looked f
 
 # How much data tell that no model quite explains -------------------------------------------------
 
-# What errs by some percent of a FRF, as [diagnose] matters_percent says, errs in every direction:
-# by so much besides of all FRFs of the pose at that frequency. Chosen.
-ERRORS_SPREAD = 0.3
+# Relative sd of FRFs while one looks closely, and where nothing stands for what every robot has and
+# none states; at the end it is [diagnose] matters_percent. It errs in every direction: by that
+# share of it besides, of all FRFs of the pose at that frequency. Chosen.
+CLOSELY, ERRORS_SPREAD = 0.03, 0.3
+NAMED_FROM = 0.5  # of matters_percent, by which an effect changes the FRFs; chosen
 
 ALIKE = 40.0  # neighbouring values that share what is not noise: a half-power band, nine FRFs
 NOISE_OVERSTATED = 1.0  # misfit below which noise is overstated, as it is on purpose

@@ -9,6 +9,7 @@ import numpy as np
 import tomlkit
 
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.slight_bearings import is_slight
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.dynamics.simulation import Simulation
@@ -81,6 +82,7 @@ def _changes(diagnosis: Diagnosis, accepted: Candidate) -> _Changes:
     )
     there = accepted.effects if accepted.effects[0].at else ()
     effects = tuple(_entry(diagnosis, accepted, found, effect) for effect in there)
+    effects += _bearings(diagnosis, found)
     change = found.misfit.parametrisation.inertia_change(found.x[a:b])
     bodies = found.misfit.setting.simulation.elastic.bodies
     if BASE in bodies and foot(diagnosis.problem.simulation.robot):
@@ -103,6 +105,23 @@ def _entry(diagnosis: Diagnosis, accepted: Candidate, found: Fit, effect: Effect
     probability = _round(accepted.probability)
     whole = {"effect": effect.name, "at": effect.at, "probability": probability}
     return {**whole, "parameters": told, **lists}
+
+
+def _bearings(diagnosis: Diagnosis, found: Fit) -> tuple[dict[str, Any], ...]:
+    """An [[effects]] block of what bearings give, which is no finding, where the fit has them."""
+    stated = len(diagnosis.problem.simulation.robot.config.compliance)
+    elasticity = found.misfit.parametrisation.elasticity(found.x[: found.misfit.split[0]])
+    blocks = [
+        {
+            "joint": block.joint,
+            "axis": [_round(a) for a in block.axis],
+            "tie": block.tie,
+            **{kind: _round(float(getattr(elasticity, kind)[i])) for kind in KINDS[:2]},
+        }
+        for i, block in enumerate(found.misfit.setting.simulation.robot.config.compliance)
+        if i >= stated and is_slight(block)
+    ]
+    return ({"effect": "slight_bearings", "at": "joints", "compliance": blocks},) if blocks else ()
 
 
 def _toml(robot: Robot, changes: _Changes, urdf: str) -> str:

@@ -26,11 +26,12 @@ class Priors:
 
     `stiffness_factor` and so on are e^sd of the logarithm. `bounds` maps the name of a parameter
     to its least and largest plausible value; the log-normal then has mean and sd of a log-uniform
-    one. `bias_factor` is e^sd of what all stiffnesses have in common, those with bounds excepted.
-    What robot.toml says of its stiffnesses goes before both factors. `mass`, `inertia` (relative)
-    and `com_m` are sds of the inertias of robot and URDF; where all are 0, inertias are taken for
-    exact. `elsewhere` is by how much of its radius of gyration a body's centre is off besides, and
-    by how many rad its principal axes are: 1 cm is much of a wrist, and little of an arm.
+    one; those named by `firm` are never below theirs. `bias_factor` is e^sd of what all stiffnesses
+    have in common, those with bounds excepted. What robot.toml says of its stiffnesses goes before
+    both factors. `mass`, `inertia` (relative) and `com_m` are sds of the inertias of robot and
+    URDF; where all are 0, inertias are taken for exact. `elsewhere` is by how much of its radius of
+    gyration a body's centre is off besides, and by how many rad its principal axes are: 1 cm is
+    much of a wrist, and little of an arm.
     """
 
     stiffness_factor: float = 3.0
@@ -38,6 +39,7 @@ class Priors:
     loss_factor_factor: float = 3.0
     bias_factor: float = 1.0
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    firm: frozenset[str] = frozenset()
     mass: float = 0.0
     inertia: float = 0.0
     com_m: float = 0.0
@@ -59,7 +61,8 @@ class Parameter:
 
     Its logarithm has a normal prior with mean ln `median` and standard deviation `log_sd`, of which
     `shared` is that of a deviation common to all stiffnesses; starts lie between `lower` and
-    `upper`.
+    `upper`. Where it is not `stated`, it is known to lie within bounds; where it is `firm`, never
+    below `lower`.
     """
 
     name: str
@@ -71,6 +74,8 @@ class Parameter:
     upper: float
     shared: float = 0.0
     slide: bool = False
+    stated: bool = True
+    firm: bool = False
 
     @property
     def unit(self) -> str:
@@ -109,6 +114,11 @@ class Parametrisation:
         """Largest θ (P,) that robot.toml takes: what is fitted can be written and read again."""
         below = np.log(0.999 * LOSS_FACTOR_BELOW)
         return np.array([below if p.kind == "loss_factor" else np.inf for p in self.parameters])
+
+    @cached_property
+    def least(self) -> np.ndarray:
+        """Smallest θ (P,) that may be."""
+        return np.array([np.log(p.lower) if p.firm else -np.inf for p in self.parameters])
 
     @cached_property
     def covariance(self) -> np.ndarray:
@@ -165,7 +175,8 @@ def parametrise(simulation: Simulation, priors: Priors) -> Parametrisation:
                     factors = _factors(config, kind, blocks[0], priors)
                     parameters.append(_stated(name, kind, tuple(blocks), value, *factors))
                 slide = config.compliance[blocks[0]].slide
-                parameters[-1] = replace(parameters[-1], slide=slide)
+                firm = name in priors.firm
+                parameters[-1] = replace(parameters[-1], slide=slide, firm=firm)
                 columns.append(np.isin(np.arange(len(values)), k * e + np.array(blocks)))
     unknown = set(priors.bounds) - {p.name for p in parameters}
     if unknown:
@@ -211,7 +222,8 @@ def _bounded(name: str, kind: str, blocks: tuple[int, ...], low: float, high: fl
     if not 0 < low < high < float("inf"):
         raise InputError(f"Bounds {low}, {high} of {name} must rise from above 0; correct them.")
     log_sd = float(np.log(high / low) / np.sqrt(12))
-    return Parameter(name, kind, blocks, float(np.sqrt(low * high)), log_sd, low, high)
+    median = float(np.sqrt(low * high))
+    return Parameter(name, kind, blocks, median, log_sd, low, high, stated=False)
 
 
 def _stated(

@@ -56,7 +56,7 @@ class MismatchShares:
         from planner.diagnosis.linear.mismatch import Mismatch
         from planner.diagnosis.linear.problem import FINE
 
-        given = replace(found.problem, lossy=False).misfit(found.refitted.effect, FINE)
+        given = replace(found.problem, as_built=False).misfit(found.refitted.effect, FINE)
         plain = found.problem.misfit(found.refitted.effect, FINE)
         best = found.problem.misfit(found.best.effect, FINE)
         last = Mismatch.of(best, found.best.x)

@@ -193,7 +193,7 @@ class ReadbackTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class DiagnoseTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What a diagnosis need not explain: a mismatch of so many percent of |H| does not matter."""
 
-    matters_percent: float = 3.0
+    matters_percent: float = 1.0
 
     @property
     def matters(self) -> float:

@@ -1,12 +1,16 @@
 """The explained simulation in memory is the one that is read from the files written of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import Both
+from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.linear.problem import COARSE, Problem
+from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear.problem import COARSE, FINE, Problem
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.diagnosis.write_explained import explained_simulation, write_explained
 from planner.dynamics.simulation import Simulation
@@ -43,9 +47,9 @@ def first_of(problem, name, at=None):
     return next(e for e in effects if e.name == name and at in (None, e.at))
 
 
-def explained(problem, effect):
+def explained(problem, effect, grade=COARSE):
     """A diagnosis that says so, its springs, inertias and the effect's own numbers off a little."""
-    misfit = problem.misfit(effect, COARSE)
+    misfit = problem.misfit(effect, grade)
     away = np.random.default_rng(0).normal(size=len(misfit.mean))
     x = misfit.mean + 0.2 * misfit.sd * away
     fit = Fit(effect, misfit, x, misfit.by_pose(x))
@@ -64,6 +68,18 @@ def test_in_memory_as_written_and_read(problem, tmp_path, kind):
     nominal = problem.simulation.accelerance(problem.q, LINES)
     assert np.linalg.norm(h - nominal) > 1e-2 * np.linalg.norm(nominal)
     assert ours.robot.config.effects == read.robot.config.effects
+
+
+def test_what_bearings_give_is_written(problem, tmp_path):
+    found, accepted = explained(replace(problem, as_built=True), Effect(""), FINE)
+    path = write_explained(tmp_path / "out", problem.simulation.robot, found, accepted)
+    misfit = accepted.fit.misfit
+    h = Simulation(Robot.load(path)).accelerance(problem.q, LINES)
+    nothing = misfit_at(found.problem, Effect(""), problem.q, LINES)
+    np.testing.assert_allclose(h, nothing.values(accepted.fit.x)[0], rtol=2e-3)
+    stiff = explained_simulation(*explained(problem, Effect(""))).accelerance(problem.q, LINES)
+    assert np.linalg.norm(h - stiff) > 1e-2 * np.linalg.norm(stiff)
+    assert misfit.split[0] > 2 * problem.simulation.elastic.size
 
 
 def test_effects_are_added_to_those_that_the_robot_has(problem, tmp_path):

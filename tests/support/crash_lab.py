@@ -235,6 +235,7 @@ def starve(cell: Cell, rng: np.random.Generator, log: Path) -> dict:
     disk, filler = cell.root, cell.root / "filler"
     if cell.log.exists() and len(cell.state().used) >= ENOUGH:
         shutil.rmtree(cell.campaign)
+        shutil.rmtree(cell.root / "exports")  # which would fill the disk in the end
     shutil.rmtree(cell.root / "out", ignore_errors=True)
     (cell.root / "out").mkdir()
     command = cell.command(rng)

@@ -90,7 +90,7 @@ def diagnosed(folder: Path, seed: int) -> Scored:
         asked = command("diagnose", str(case / "recordings"), "--robot", robot, "--json")
         run = subprocess.run(asked, capture_output=True, text=True, timeout=LIMIT_S, check=False)
         failed = json.dumps({"failed": run.stderr})
-        told.write_text(run.stdout if run.returncode == 0 else failed, encoding="utf-8")
+        told.write_text(run.stdout if run.returncode in (0, 3) else failed, encoding="utf-8")
     return scored(case, json.loads(told.read_text(encoding="utf-8")))
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.places import joint_of, joints
+from planner.diagnosis.effects.slight_bearings import is_slight
 from planner.diagnosis.thresholds import FAR_SPRING_FACTOR
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors, place_name
@@ -34,7 +35,7 @@ class JointStiffness(Effect):
 
     def _blocks(self, simulation: Simulation) -> list[Compliance]:
         robot, joint = simulation.robot, joint_of(simulation, self.at)
-        there = [b for b in robot.config.compliance if b.joint == joint]
+        there = [b for b in robot.config.compliance if b.joint == joint and not is_slight(b)]
         return [b for b in there if not self.only_own or robot.is_own(b)]
 
     def springs(self, simulation: Simulation) -> tuple[str, ...]:

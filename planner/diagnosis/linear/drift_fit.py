@@ -70,11 +70,12 @@ class DriftProblem(Problem):
         return DriftMisfit(**fields, order=self.order)
 
 
-def problem_of(recorded: Dataset, nominal: Simulation) -> DriftProblem:
+def problem_of(recorded: Dataset, nominal: Simulation, *, as_built: bool = False) -> DriftProblem:
     """Visits (n), each for itself, as data of `fit`: FRFs in m/s²/N, poses in rad.
 
     Raises InputError where nothing of them lies in robot.toml's band.
     """
     band = common_band(recorded.visit_frfs, recorded.band_hz)
     order = np.array([visit.order for visit in recorded.visits])
-    return DriftProblem(recorded.visit_frfs, recorded.visit_q, nominal, band, order=order)
+    visits = recorded.visit_frfs, recorded.visit_q
+    return DriftProblem(*visits, nominal, band, as_built=as_built, order=order)

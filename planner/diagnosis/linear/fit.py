@@ -1,6 +1,6 @@
 """Fit of one candidate: all springs, inertial nuisances and its own parameters together."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -90,7 +90,8 @@ class Fit:
 def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
     """From the prior's median by way of logarithms, and from each warm one; on the finest lines."""
     coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
-    ends = [_best(coarse, [_approach(problem, effect)]).x]
+    afar = _at(coarse, _best(coarse, [_approach(problem, effect)]))
+    ends = [_best(close, points(close, afar)).x]
     for earlier in warm:
         ends.append(_best(close, points(close, earlier)).x)
     fine = problem.misfit(effect, FINE)
@@ -107,13 +108,13 @@ def staged(problem: Problem, effect: Effect) -> Fit:
 
 
 def _identified(problem: Problem, effect: Effect, effort: Effort) -> Fit:
-    simulation = problem.parametrised(effect)[0]
-    priors = effect.priors(simulation, problem.priors)
+    simulation, priors = problem.built(effect, rough=True)
     found = identify(
         problem.frfs, problem.q, simulation, priors,
         band_hz=problem.band_hz, starts=1, effort=effort,
     )  # fmt: skip
-    return _settled(problem.misfit(effect, FINE), found.mean)
+    near = approached(problem.misfit(effect, COARSE), [found.mean], PROMISE_STEPS)
+    return settle(problem, near)
 
 
 def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
@@ -144,11 +145,12 @@ def afresh(problem: Problem, near: Fit, steps: int = AFRESH_STEPS) -> Fit:
     """
     if len(near.effect.parts()) > 1 or near.effect.artefact:
         return near
-    rough = _approach(problem, near.effect)
+    rough, coarse = _approach(problem, near.effect), problem.misfit(near.effect, COARSE)
     starts = [rough]
     if steps > ROUGH_STEPS:
-        starts.append(_best(problem.misfit(near.effect, COARSE), starts).x)
-    far = approached(near.misfit, starts, steps)
+        starts.append(_best(coarse, starts).x)
+    named = (dict(zip(coarse.names, x, strict=True)) for x in starts)
+    far = approached(near.misfit, [_placed(near.misfit, known) for known in named], steps)
     return min((near, far), key=lambda f: f.misfit(f.x).value)
 
 
@@ -193,7 +195,13 @@ def carried_on(problem: Problem, fit: Fit, effect: Effect, steps: int = SETTLED[
 
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
-    return _settled(problem.misfit(found.effect, grade), found.x, steps)
+    misfit = problem.misfit(found.effect, grade)
+    return _settled(misfit, _placed(misfit, found.named()), steps)
+
+
+def _placed(misfit: Misfit, known: Mapping[str, float]) -> np.ndarray:
+    """x of what is known by name; all else, as bearings after a rough look, as it may be."""
+    return np.array([known.get(n, m) for n, m in zip(misfit.names, misfit.mean, strict=True)])
 
 
 def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:

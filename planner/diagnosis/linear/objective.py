@@ -102,9 +102,10 @@ class Misfit:
     def sides(self) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest x (D,) that is looked at."""
         reach, springs = FARTHEST * self.sd, self.split[0]
-        upper = self.mean + reach
+        lower, upper = self.mean - reach, self.mean + reach
+        lower[:springs] = np.maximum(lower[:springs], self.parametrisation.least)
         upper[:springs] = np.minimum(upper[:springs], self.parametrisation.most)
-        return self.mean - reach, upper
+        return lower, upper
 
     @cached_property
     def weight(self) -> np.ndarray:

@@ -75,7 +75,7 @@ def misfit_at(
 def similarity(problem: Problem, found: Fit | None) -> Similarity:
     """Of a fit (None: the simulation as it stands) to the FRFs of a problem, artefacts included."""
     if found is None:
-        problem = replace(problem, lossy=False)
+        problem = replace(problem, as_built=False)
     misfit = problem.misfit(Effect("") if found is None else found.effect, ALL)
     h = misfit.response(misfit.mean if found is None else found.x)[0]
     return similarity_of(misfit.measured, h)

@@ -7,9 +7,11 @@ from functools import lru_cache
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting
+from planner.diagnosis.effects.slight_bearings import with_bearings
 from planner.diagnosis.effects.structural_damping import partly_structural
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.thresholds import (
+    CLOSELY,
     DAMPING_FACTOR,
     ERRORS_SPREAD,
     LOSS_FACTOR_FACTOR,
@@ -36,19 +38,25 @@ PRIORS = replace(
 class Grade:
     """How closely one looks: lines a pose, relative sd of all that no simulation follows.
 
-    None: of what does not matter, robot.toml's. Every robot has bearings that give a little and
-    gears that ripple: weighed by the noise, inertias would be bent by any number of their sds to
-    follow them. As in `Misfit`: whether logarithms are compared, and whether inertias are free.
+    None: CLOSELY, and `finely` what does not matter, robot.toml's. Looked at finely from afar,
+    inertias are bent to follow what only a spring would lead to. As in `Misfit`: whether logarithms
+    are compared, and whether inertias are free.
     """
 
     lines: int
     model_error: float | None = None
     logarithmic: bool = False
     inertial: bool = True
+    finely: bool = False
+
+    @property
+    def rough(self) -> bool:
+        """Whether one looks from afar."""
+        return self.model_error is not None
 
 
 GLANCE, COARSE = Grade(32, 0.05, True, False), Grade(32, 0.05, False, False)
-CLOSE, FINE = Grade(40), Grade(72)
+CLOSE, FINE = Grade(40), Grade(72, finely=True)
 # More sensors tell more at fewer lines: of these, a power of the number of 3 × 3 FRFs is looked at.
 # Chosen so that four sensors take about twice the time of one; resonances need the least number.
 SHARED_WORK, LEAST_LINES = -0.35, 28
@@ -65,8 +73,9 @@ class Problem:
     """What all candidates share: FRFs of n poses at q (n, dof) in rad, and the simulation.
 
     Where it is `exact`, hits are taken to be on their axes and the measuring chain to be perfect.
-    With `lossy` a part of each damper may be a loss factor: every candidate has it, so that none is
-    told by how damping goes with frequency.
+    `as_built` every candidate has what each robot has and no robot.toml states: of each damper a
+    part may be a loss factor, so that none is told by how damping goes with frequency, and bearings
+    give a little across their axes.
     """
 
     frfs: tuple[Frf, ...]
@@ -75,7 +84,7 @@ class Problem:
     band_hz: tuple[float, float]
     priors: Priors = PRIORS
     exact: bool = False
-    lossy: bool = False
+    as_built: bool = False
 
     @property
     def layout(self) -> Layout:
@@ -88,14 +97,16 @@ class Problem:
         rows, columns = self.layout.shape
         return rows * columns // 9
 
-    @property
-    def error(self) -> tuple[float, float]:
-        """Relative sd of what does not matter, and the share of it in every direction."""
-        return self.simulation.robot.config.diagnose.matters, ERRORS_SPREAD
+    def error(self, grade: Grade) -> tuple[float, float]:
+        """Relative sd of what is not followed, and the share of it in every direction."""
+        if grade.model_error is not None:
+            return grade.model_error, 0.0
+        matters = self.simulation.robot.config.diagnose.matters
+        return matters if grade.finely and self.as_built else CLOSELY, ERRORS_SPREAD
 
     def misfit(self, effect: Effect, grade: Grade) -> Misfit:
         """Misfit with an effect."""
-        body, measured = _prepared(self, effect), _measured(self, grade)
+        body, measured = _prepared(self, effect, grade.rough), _measured(self, grade)
         setting = Setting(body.simulation, self.q, measured.s, body.jacobians, self.layout)
         inertias, p = body.inertias, body.parametrisation
         tolerances = None if self.exact else tolerances_of(self.simulation)
@@ -104,13 +115,25 @@ class Problem:
 
     def parametrised(self, effect: Effect) -> tuple[Simulation, Parametrisation]:
         """The simulation with an effect's structure, and its parameters."""
-        body = _prepared(self, effect)
+        body = _prepared(self, effect, rough=False)
         return body.simulation, body.parametrisation
+
+    def built(self, effect: Effect, rough: bool = False) -> tuple[Simulation, Priors]:
+        """The simulation with an effect's structure, and priors of all its parameters.
+
+        Where one looks `rough`ly, bearings do not give: they would be taken for what is not there.
+        """
+        simulation = effect.structure(self.simulation)
+        if not self.as_built:
+            return simulation, effect.priors(simulation, self.priors)
+        simulation = partly_structural(simulation)
+        priors = effect.priors(simulation, self.priors)
+        return (simulation, priors) if rough else with_bearings(simulation, priors)
 
     def able(self, effect: Effect) -> bool:
         """Whether a robot can have it: each spring moves an inertia of its own, beside others."""
         try:
-            _prepared(self, effect)
+            _prepared(self, effect, rough=True)
         except InputError:
             return False
         return True
@@ -133,11 +156,9 @@ class _Prepared:
 
 
 @lru_cache(maxsize=512)
-def _prepared(problem: Problem, effect: Effect) -> _Prepared:
-    simulation = effect.structure(problem.simulation)
-    if problem.lossy:
-        simulation = partly_structural(simulation)
-    p = parametrise(simulation, effect.priors(simulation, problem.priors))
+def _prepared(problem: Problem, effect: Effect, rough: bool) -> _Prepared:
+    simulation, priors = problem.built(effect, rough)
+    p = parametrise(simulation, priors)
     jacobians = simulation.elastic.body_jacobians(problem.q)
     matrices = matrices_at(simulation.elastic, problem.q, problem.frfs, sloped=True)
     return _Prepared(simulation, p, matrices, jacobians, p.inertias(jacobians))
@@ -146,5 +167,4 @@ def _prepared(problem: Problem, effect: Effect) -> _Prepared:
 @lru_cache(maxsize=16)
 def _measured(problem: Problem, grade: Grade) -> Measured:
     lines = max(round(grade.lines * problem.blocks**SHARED_WORK), min(grade.lines, LEAST_LINES))
-    error, spread = problem.error if grade.model_error is None else (grade.model_error, 0.0)
-    return stack(problem.frfs, problem.band_hz, lines, error, spread)
+    return stack(problem.frfs, problem.band_hz, lines, *problem.error(grade))

@@ -183,6 +183,8 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
     best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
     if not best.effect.at or len(best.effect.parts()) > 1 or best.per_value > AT_NOISE:
         return found
+    if lag([found.finalists[0], best])[0] < HOPELESS:  # nothing at all does nearly as well
+        return found
     tell("looking for a small second effect", 0.98)
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
     if not pairs:

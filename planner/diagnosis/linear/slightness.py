@@ -18,7 +18,9 @@ from planner.diagnosis.linear.mismatch import residuals
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Problem
 from planner.diagnosis.thresholds import (
+    ERRORS_SPREAD,
     LEFT_FACTOR,
+    NAMED_FROM,
     SOMETHING_UNKNOWN,
     SPRING_STRAYED,
 )
@@ -41,10 +43,10 @@ def without_slight(
     The first fit is "none"; `told` are each fit's effects, `prior` (k,) their weights before any
     data, `bent` (k,) how far each fit moved the stated values (see `Weights`), `evidence` (k,) its
     log evidence. An effect is too small if, with everything else refitted, it changes the FRFs by
-    less than `matters` and what every robot has, added in squares. The more surely that is so, the
-    more of the fit's share moves to the fit without the effect; of several that do as well, to the
-    likeliest. Where both fits have nearly the same FRFs, the prior decides between them: the
-    farther the simpler fit had to move the stated values, the likelier is the effect.
+    less than NAMED_FROM of what `matters`. The more surely that is so, the more of the fit's share
+    moves to the fit without the effect; of several that do as well, to the likeliest. Where both
+    fits have nearly the same FRFs, the prior decides between them: the farther the simpler fit had
+    to move the stated values, the likelier is the effect.
     """
     pull = np.logaddexp(np.log1p(-SOMETHING_UNKNOWN), np.log(SOMETHING_UNKNOWN) + bent)
     called = [frozenset((e.name, e.at) for e in effects if e.at) for effects in told]
@@ -56,7 +58,7 @@ def without_slight(
         if not fewer:
             continue
         given = [
-            (1 - _above(_size(fits[j], fits[i], _more(told[i], called[j])), matters))
+            (1 - _above(_size(fits[j], fits[i], _more(told[i], called[j])), NAMED_FROM * matters))
             * expit(np.log(prior[j] / prior[i]) + pull[i] - pull[j])
             for j in fewer
         ]
@@ -149,11 +151,25 @@ def _left(fit: Fit) -> np.ndarray:
 
 def _apart(left: np.ndarray, whole: Fit) -> float:
     """The larger of two sizes: of all FRFs together, where peaks count, and of each by itself."""
-    misfit, difference = whole.misfit, _left(whole) - left
+    misfit, difference = whole.misfit, (_left(whole) - left) * _noise(whole.misfit)
+    each = np.abs(difference[misfit.weight > 0]) ** 2 / _squares(misfit)
+    together = _relative(np.abs(difference) ** 2, misfit)
+    return max(together, float(np.sqrt(np.mean(each))))
+
+
+def _squares(misfit: Misfit) -> np.ndarray:
+    """Squares of the FRFs that were measured, those in every direction (ERRORS_SPREAD) added.
+
+    What is lost in noise does not count: a difference as large as that matters as little.
+    """
+    measured, used = misfit.measured, misfit.weight > 0
+    size = np.abs(measured.accelerance) ** 2 * used
     matters = misfit.setting.simulation.robot.config.diagnose.matters
-    each = float(np.mean(np.abs(difference[misfit.weight > 0]) ** 2)) / 2
-    together = _relative(np.abs(difference * _noise(misfit)) ** 2, misfit)
-    return max(together, matters * float(np.sqrt(each)))
+    count = np.maximum(used.sum(axis=(1, 2), keepdims=True), 1)
+    spread = size.sum(axis=(1, 2), keepdims=True) / count
+    own = 0.0 if measured.noise_sd is None else measured.noise_sd
+    noise = np.where(used, own, 0.0) / matters
+    return (size + ERRORS_SPREAD**2 * spread + noise**2)[used]
 
 
 def _noise(misfit: Misfit) -> np.ndarray:

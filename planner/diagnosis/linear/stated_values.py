@@ -21,6 +21,7 @@ def away(fit: Fit, x: np.ndarray, plain: Fit) -> dict[str, float]:
     own = {name for part in fit.effect.parts() for name in part.springs(misfit.setting.simulation)}
     whole = {b for b, values in _bodies(fit).items() if np.array_equal(values, bodies.get(b, ()))}
     springs, inertias = misfit.split
+    own |= {p.name for p in plain.misfit.parametrisation.parameters if not p.stated}
     far = (x - misfit.mean) / misfit.sd
     return {
         name: float(far[i])

@@ -33,7 +33,7 @@ from planner.inference.evidence import temper
 
 def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
     """The refitted simulation without drift, and with it: gradual, and at once."""
-    problem = problem_of(recorded, nominal)
+    problem = problem_of(recorded, nominal, as_built=True)
     plain = fit(problem, Effect(""))
     end = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
     gradual = Drift("campaign", (end, Quantity("bend", "1", 0.0, DRIFT_BEND_SD)), "gradual")
@@ -60,7 +60,7 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     if len(recorded.visits) < 4 or _unchanged(recorded, nominal):
         return ()
     plain, *found = fits(recorded, nominal)
-    problem = problem_of(recorded, nominal)
+    problem = problem_of(recorded, nominal, as_built=True)
     best = settle(problem, min(found, key=lambda f: f.per_value))
     # A fit that drift led out of a wrong minimum gains by that alone: it does without drift too.
     back = carried_on(problem, best, Effect(""))
