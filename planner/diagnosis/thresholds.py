@@ -22,8 +22,8 @@ SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; c
 # that of the generated robots. Dampers scatter more, and a loss factor may take the place of one:
 # chosen. Inertias do as in any identification (CAD_INERTIAS).
 STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.0
-# By how much of its size a body's mass lies elsewhere than stated: half of what its moments, which
-# go with the square of a length, are off by (CAD_INERTIAS).
+# By how much of its radius of gyration a body's mass lies elsewhere than stated: cables, oil and
+# covers, 8 % of it (CAD_INERTIAS), lie about as far from its centre.
 MASS_ELSEWHERE = 0.08
 # Of a stated damper mid-band, what a loss factor beside it takes: median and e^sd; chosen wide, as
 # gears and bearings are both and no data sheet says in which share.
@@ -33,8 +33,9 @@ STRUCTURAL_SHARE, LOSS_FACTOR_FACTOR = 0.2, 3.0
 FAR_SPRING_FACTOR = 8.0  # either way, of a joint's stiffness that is far off
 BASE_STIFFNESS = 0.3, 30.0  # of the base, times the largest stiffness of the robot's joints
 ACROSS_STIFFNESS = 0.2, 20.0  # of a joint across its axis, times that about its own
-# What every robot's bearings give across, from where that is an effect on; chosen, two decades.
-SLIGHTLY_ACROSS = 20.0, 2000.0
+# What every robot's bearings give across; what gives more is an effect. Chosen, looking at cases in
+# which bearings of robots with nothing wrong have 100 to 400 times their joint's own stiffness.
+SLIGHTLY_ACROSS = 50.0, 2000.0
 LINK_STIFFNESS = 0.1, 10.0  # of a link, times that of the joint that moves it about its own axis
 FURTHER_DAMPING_FACTOR = 8.0  # either way, of the damping of springs that are not stated
 # Prior sd of where a bending link's halves have their centres, of their distance: where a link's

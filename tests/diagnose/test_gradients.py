@@ -7,6 +7,7 @@ import pytest
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.hanging_resonator import HangingResonator
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
@@ -18,7 +19,8 @@ from tests.support.known_robots import kr210_folder
 EFFECTS = (
     "joint_stiffness joint_2", "transverse_compliance joint_3", "base_compliance base",
     "link_flexibility link_2",
-    "added_mass link_3", "local_resonator link_4", "angle_dependent_stiffness joint_2",
+    "added_mass link_3", "local_resonator link_4", "local_resonator hanging",
+    "angle_dependent_stiffness joint_2",
     "structural_damping joints", "sensor_rotation sensor", "sensor_gain sensor_y",
     "polarity sensor_x", "channel_delay sensor", "exponential_window sensor",
 )  # fmt: skip
@@ -39,6 +41,7 @@ def problem(tmp_path_factory):
 @pytest.mark.parametrize("wanted", EFFECTS)
 def test_gradient_is_that_of_finite_differences(problem, wanted):
     effects = {f"{e.name} {e.at}": e for e in library(problem.simulation)}
+    effects["local_resonator hanging"] = HangingResonator.of(effects["local_resonator link_4"])
     misfit = problem.misfit(effects[wanted], Grade(12))
     start = misfit.effect.starts()[0]
     x = misfit.mean

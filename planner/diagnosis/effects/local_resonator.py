@@ -84,10 +84,10 @@ class LocalResonator(Effect):
         turn = (np.eye(3) - np.outer(d, d)) / length  # ∂d/∂v
         along = np.outer(d, d)
         # Ports: the place's motion and the link's turn, which moves what lies at e by turn × e.
-        shapes = [_moving(np.eye(3)), _moving(along)]
-        shapes += [_moving(np.outer(turn[v], d) + np.outer(d, turn[v])) for v in range(3)]
-        shapes += [_turning(one) for one in ACROSS]
-        shapes += [_turning(along @ one) for one in ACROSS]
+        shapes = [moving(np.eye(3)), moving(along)]
+        shapes += [moving(np.outer(turn[v], d) + np.outer(d, turn[v])) for v in range(3)]
+        shapes += [turning(one) for one in ACROSS]
+        shapes += [turning(along @ one) for one in ACROSS]
         m = mass * s**2
         u = m * (t - 1)
         values = (0, m), (1, u)
@@ -123,14 +123,14 @@ class LocalResonator(Effect):
         )
 
 
-def _moving(shape: np.ndarray) -> np.ndarray:
+def moving(shape: np.ndarray) -> np.ndarray:
     """(6, 6): a shape (3, 3) of velocities alone."""
     out = np.zeros((6, 6))
     out[:3, :3] = shape
     return out
 
 
-def _turning(shape: np.ndarray) -> np.ndarray:
+def turning(shape: np.ndarray) -> np.ndarray:
     """(6, 6): a shape (3, 3) between velocities and rates of turn, and its transpose."""
     out = np.zeros((6, 6))
     out[:3, 3:], out[3:, :3] = shape, shape.T

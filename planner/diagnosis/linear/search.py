@@ -9,6 +9,7 @@ import numpy as np
 from planner.diagnosis.effects.combined import Both, Family, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.linear.all_ways import all_ways
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
     Fit,
@@ -84,6 +85,9 @@ def search(
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
     found = _moved(problem, found, effects)
+    if min(f.per_value for f in found.finalists) > AT_NOISE:
+        near = _settled(problem, all_ways(problem, found.finalists))
+        found = Found((*found.finalists, *near), found.left)
     if not bent:
         found = _composed(problem, found, effects, tell)
     found = _lessened(problem, _rigid(problem, found, effects))

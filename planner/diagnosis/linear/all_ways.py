@@ -1,0 +1,58 @@
+"""What a fit says of something that swings along one direction, asked of all three."""
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from planner.diagnosis.effects.combined import Both, together
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.hanging_resonator import HangingResonator
+from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.linear.evidence import best_of
+from planner.diagnosis.linear.fit import Fit, approached, points
+from planner.diagnosis.linear.problem import CLOSE, Problem
+from planner.inference.parallel import side_by_side
+
+STEPS = 24
+RATIOS = (1.0, 1.0), (1.0, 3.0), (3.0, 1.0), (3.0, 3.0), (0.4, 1.0), (1.0, 0.4)  # to the frequency
+
+
+def all_ways(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
+    """Rough fits with a resonator on three springs: of the best that has one, and has it alone."""
+    swing = [f for f in finalists if any(isinstance(p, LocalResonator) for p in f.effect.parts())]
+    alone = [f for f in swing if len(f.effect.parts()) == 1]
+    best = {id(f): f for f in (*best_of(swing, 1), *best_of(alone, 1))}
+    way = [one for found in best.values() for one in _ways(found)]
+    return tuple(side_by_side(partial(_loosened, problem), way))
+
+
+def _ways(found: Fit) -> list[tuple[Fit, LocalResonator, Effect]]:
+    """Each of its resonators, and the effects with it on three springs."""
+    made = []
+    for part in found.effect.parts():
+        if isinstance(part, LocalResonator) and not isinstance(part, HangingResonator):
+            rest = [p for p in found.effect.parts() if p is not part]
+            free = HangingResonator.of(part)
+            effect = together(Both.of(*rest), free) if rest else free
+            if effect is not None:
+                made.append((found, part, effect))
+    return made
+
+
+def _loosened(problem: Problem, one: tuple[Fit, LocalResonator, Effect]) -> Fit:
+    found, part, effect = one
+    misfit, known = problem.misfit(effect, CLOSE), found.named()
+    of = f"of {part.name} at {part.at}"
+    way = np.array([known[f"direction_{a} {of}"] for a in "xyz"])
+    turn = Rotation.align_vectors(way[None], [[1.0, 0.0, 0.0]])[0].as_rotvec()
+    starts = []
+    for ratios in RATIOS:
+        x = points(misfit, found)[0]
+        for a, value in zip("xyz", turn, strict=True):
+            x[misfit.names.index(f"turn_{a} {of}")] = value
+        for name, ratio in zip(("frequency_2", "frequency_3"), ratios, strict=True):
+            x[misfit.names.index(f"{name} {of}")] = known[f"frequency {of}"] + np.log(ratio)
+        starts.append(x)
+    return approached(misfit, [x for x in starts if misfit.possible(x)] or starts[:1], STEPS)
