@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import partial
+from itertools import product
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,8 +16,8 @@ from planner.diagnosis.linear.fit import Fit, approached, points
 from planner.diagnosis.linear.problem import CLOSE, Problem
 from planner.inference.parallel import side_by_side
 
-STEPS = 24
-RATIOS = (1.0, 1.0), (1.0, 3.0), (3.0, 1.0), (3.0, 3.0), (0.4, 1.0), (1.0, 0.4)  # to the frequency
+FIRST, STEPS = 10, 24  # of all starts, and of the best
+RATIOS = tuple(product((0.5, 1.1, 2.2), repeat=2))  # of the other frequencies to the known one
 
 
 def all_ways(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
@@ -55,4 +56,6 @@ def _loosened(problem: Problem, one: tuple[Fit, LocalResonator, Effect]) -> Fit:
         for name, ratio in zip(("frequency_2", "frequency_3"), ratios, strict=True):
             x[misfit.names.index(f"{name} {of}")] = known[f"frequency {of}"] + np.log(ratio)
         starts.append(x)
-    return approached(misfit, [x for x in starts if misfit.possible(x)] or starts[:1], STEPS)
+    rough = [approached(misfit, [x], FIRST) for x in starts if misfit.possible(x)]
+    best = min(rough, key=lambda f: f.per_value, default=None)
+    return approached(misfit, starts[:1] if best is None else [best.x], STEPS)
