@@ -4,13 +4,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planner.dataset.screened_files import Source, Verdict, read_one
+from planner.dataset.screened_files import Source, Verdict, not_averaged, read_one
 from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import hit_count
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
+from planner.recording.sampling_rates import sampled_otherwise
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
@@ -111,12 +112,15 @@ class Verdicts:
         return HitVerdict(path, verdict.axis or "", kind, text, own, number)
 
     def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
-        """With what a vote among three and more hits of an axis says."""
+        """With which do not go with the others, and what a vote among three and more says."""
         hits = [hit for verdict in judged for hit in verdict.hits]
+        rates = dict(zip(map(id, hits), sampled_otherwise(hits), strict=True))
         repeats = dict(zip(map(id, hits), screen_repeats(tuple(hits), self._band), strict=True))
         out = []
         for verdict in judged:
-            told = [f.text for hit in verdict.hits for f in repeats[id(hit)] if f.refuse]
+            otherwise = dict.fromkeys(text for hit in verdict.hits if (text := rates[id(hit)]))
+            told = [not_averaged(verdict.path.name, text) for text in otherwise]
+            told += [f.text for hit in verdict.hits for f in repeats[id(hit)] if f.refuse]
             told = told if verdict.kind == "good" else []
             out.append(replace(verdict, kind="repeat", text=" ".join(told)) if told else verdict)
         return out
