@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from planner.errors import PlannerError
+from planner.errors import AxisNotStatedError, PlannerError
 from planner.recording.points import StatedPoints
 from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 
@@ -64,6 +64,7 @@ class Verdict:
     axis: str | None = None
     simulated: bool = False
     remarks: tuple[str, ...] = ()
+    axis_missing: bool = False  # good but for that nothing says along which axis it was made
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,9 @@ def read_one(
             simulated = any(record.simulated for record in frfs)
             return Verdict(source, True, "", source.hit, simulated), (), list(frfs)
     except PlannerError as error:
-        return Verdict(source, False, renamed(str(error), (source,))), (), []
+        missing = isinstance(error, AxisNotStatedError)
+        text = renamed(str(error), (source,))
+        return Verdict(source, False, text, axis_missing=missing), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)
     heard = [by_good_sensors(hit) for hit in found]
     judged = [

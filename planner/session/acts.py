@@ -9,7 +9,6 @@ from typing import Any
 from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
 from planner.campaign.importing import ImportReport
 from planner.errors import NoPoseLeftError, PlannerError
-from planner.recording.folder import TABLE
 from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
 from planner.session.course import BAD, Course, PoseInProgress
@@ -72,7 +71,8 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             if visit.good and not visit.page.complete and not visit.pressed:
                 station.say(session_text.incomplete(visit.page), "yellow")
                 return replace(course, visit=replace(visit, pressed=True))
-            files = [path for path in visit.whole if path not in visit.late | visit.unsure]
+            out = visit.late | visit.unsure | visit.unstated
+            files = [path for path in visit.whole if path not in out]
             return import_waiting(station, course, visit, files)
         case "b" if visit.late:
             return _to_before(station, course, sorted(visit.late))
@@ -129,13 +129,9 @@ def import_waiting(
         return course
     # What the import would take as good, or ask for at every pose from here on.
     _refuse(station, visit, visit.weak | (frozenset() if station.auto else visit.unsure))
-    folder = station.inbox.folder
-    table = (folder / TABLE).is_file()
     try:
         with station.screen.working(IMPORTING):
-            reports = station.campaign.import_paths(
-                (folder,) if table else tuple(files), None if table else visit.proposal.pose
-            )
+            reports = _imported_files(station, files, visit.proposal.pose)
     except PlannerError as error:
         station.say(str(error), "red")
         bad = {station.inbox.digest(path) for path in files} if station.auto else set()
@@ -152,6 +148,14 @@ def import_waiting(
     hits = tuple(hit for verdict in visit.verdicts for hit in verdict.hits)
     before = PoseBefore(visit.proposal.pose, hits)
     return replace(course, visit=None, before=before, here=frozenset())
+
+
+def _imported_files(station: Station, files: Sequence[Path], pose: str) -> tuple[ImportReport, ...]:
+    """Import files at the poses that recordings.csv states; those it does not list at `pose`."""
+    bare = tuple(path for path in files if station.verdicts.table.row(path) is None)
+    listed = (station.inbox.folder,) if len(bare) < len(files) else ()
+    reports = station.campaign.import_paths(listed) if listed else ()
+    return (*reports, *(station.campaign.import_paths(bare, pose) if bare else ()))
 
 
 def _right(station: Station, course: Course, report: ImportReport) -> Course:

@@ -13,7 +13,7 @@ from planner.report import session_text
 from planner.report.pose_screen import PosePage
 from planner.session.verdicts import HitVerdict, Part, PoseBefore
 
-BAD = ("repeat", "unsure")
+BAD = ("repeat", "unsure", "unstated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +56,11 @@ class PoseInProgress:
             path: " ".join(v.text for v in self.verdicts if v.path == path and v.kind in BAD)
             for path in files
         }
+
+    @property
+    def unstated(self) -> frozenset[Path]:
+        """Files that do not say along which axis they were hit: they wait until something does."""
+        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "unstated")
 
     @property
     def late(self) -> frozenset[Path]:

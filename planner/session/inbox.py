@@ -17,15 +17,11 @@ WRITING = "is still being written"
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds: its hash, why it does not read to its end, and whether it is foreign.
-
-    `unfit` is why no hit can be made of what reads.
-    """
+    """What a file holds: its hash, why it does not read to its end, and whether it is foreign."""
 
     digest: str = ""
     fault: str = ""
     foreign: bool = False
-    unfit: str = ""
 
 
 @dataclass
@@ -59,7 +55,7 @@ class Inbox:
             settled = self._quiet(path) >= SETTLED * self.quiet_s
             if found.digest in done:
                 continue
-            if not settled and (found.fault or found.unfit):
+            if not settled and (found.fault or self.unfit(path)):
                 waiting.append((path, WRITING))
             elif found.fault and not found.foreign:
                 waiting.append((path, found.fault))
@@ -106,7 +102,7 @@ class Inbox:
         try:
             digest = sha256(read_bytes(path))
             read(path)
-            found = Content(digest, unfit=self.unfit(path))
+            found = Content(digest)
         except PlannerError as error:
             found = Content(fault=str(error), foreign=isinstance(error, ForeignFileError))
         self._contents[path] = ((size, modified), found)

@@ -12,6 +12,7 @@ from planner.recording.read import hit_count
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling_rates import sampled_otherwise
+from planner.session.table import Table
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
@@ -21,9 +22,10 @@ Part = tuple[Path, int]  # which of a file's hits, from 1
 
 @dataclass(frozen=True, eq=False)
 class HitVerdict:
-    """One hit that waits: `kind` is "good", "repeat" (why is in `text`), "late" or "unsure".
+    """One hit that waits: `kind` is "good", "repeat", "unstated", "late" or "unsure".
 
-    The `text` of a good one says what is to be known of it, if anything is. A late one answers as
+    Of one to be repeated `text` says why; nothing says along which axis an unstated one is. The
+    `text` of a good one says what is to be known of it, if anything is. A late one answers as
     the pose before did; an unsure one contradicts others, and nothing tells which is right. `axis`
     is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
     they came to the pose. An import would take it where it is `weak` only.
@@ -54,9 +56,12 @@ class PoseBefore:
 class Verdicts:
     """Judges files that wait at a pose; it keeps what it read, and nothing else."""
 
-    def __init__(self, band_hz: tuple[float, float], points: PointNames):
+    def __init__(
+        self, band_hz: tuple[float, float], points: PointNames, table: Table | None = None
+    ):
         self._band = band_hz
         self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
+        self.table = table or Table()
         self._read: dict[tuple, list[tuple[Verdict, tuple[Hit, ...]]]] = {}
 
     def unfit(self, path: Path) -> str:
@@ -108,6 +113,7 @@ class Verdicts:
 
     def _alone(self, path: Path, verdict: Verdict, own: tuple[Hit, ...], number: int) -> HitVerdict:
         kind = "repeat" if verdict.reason else "good"
+        kind = "unstated" if verdict.axis_missing else kind
         text = verdict.reason or " ".join(verdict.remarks)
         return HitVerdict(path, verdict.axis or "", kind, text, own, number)
 
@@ -162,11 +168,13 @@ class Verdicts:
 
     def _hits_of(self, path: Path) -> list[tuple[Verdict, tuple[Hit, ...]]]:
         """The verdict on each hit in a file by itself, and what of it is usable."""
-        stat = path.stat()
-        key = path, stat.st_size, stat.st_mtime_ns
+        stat, row = path.stat(), self.table.row(path)
+        key = path, stat.st_size, stat.st_mtime_ns, str(row)
         if key not in self._read:
-            every = Source(path, path.name, stated=self._stated).parts(hit_count(path))
-            judged = [read_one(source, self._band) for source in every]
+            source = Source(path, path.name, stated=self._stated)
+            if row is not None:
+                source = replace(Source.of(row), path=path, name=path.name)
+            judged = [read_one(one, self._band) for one in source.parts(hit_count(path))]
             self._read[key] = [(verdict, hits) for verdict, hits, _ in judged]
         return self._read[key]
 

@@ -22,6 +22,7 @@ from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.session.page import page_with_hits
 from planner.session.screen import Screen
 from planner.session.station import Station
+from planner.session.table import Table
 from planner.session.teller import Teller
 from planner.session.verdicts import Verdicts
 
@@ -72,7 +73,10 @@ def watch(
         if explaining is not None:
             stack.callback(explaining.close)
         cell, started = campaign.cell, time.monotonic()
-        verdicts = Verdicts(cell.config.modes.band_hz, cell.robot.points)
+        verdicts = Verdicts(
+            cell.config.modes.band_hz, cell.robot.points,
+            Table(folder, cell.robot.joints, cell.robot.points),
+        )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
             campaign, inbox, Screen(console), source, Teller(campaign, story), verdicts,
@@ -144,8 +148,9 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     visit = _looked(station, course, visit)
     course = replace(course, visit=visit)
     waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
-    if station.auto and visit.whole and (len(visit.whole) >= station.hits_per_pose or waited):
-        return import_waiting(station, course, visit, visit.whole)
+    ready = [path for path in visit.whole if path not in visit.unstated]
+    if station.auto and ready and (len(ready) >= station.hits_per_pose or waited):
+        return import_waiting(station, course, visit, ready)
     course = on_key(station, course, visit, station.key())
     return _unless_late(station, course) if course.visit is not None else course
 
@@ -153,11 +158,12 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
 def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
     whole, waiting = station.inbox.scan(course.known(station.campaign.state))
+    waiting += station.verdicts.table.waiting
     for path in station.inbox.ignored():
         station.say(f"{path.name} is no recording; ignored.", "dim")
     numbers = station.verdicts.numbered(whole, visit.numbers)
     verdicts = station.verdicts.of(whole, course.before.hits, course.here, numbers)
-    now = (tuple(whole), tuple(waiting), tuple(verdict.kind for verdict in verdicts))
+    now = (tuple(whole), tuple(waiting), tuple((v.kind, v.text) for v in verdicts))
     if now == visit.shown:
         return visit
     page = page_with_hits(visit.page, verdicts, waiting, undoable(station), station.auto, course)

@@ -14,10 +14,13 @@ from rerun.chunk import RrdReader
 from rich.console import Console
 
 from planner.campaign.campaign import Campaign
+from planner.dataset.screened_files import Source
+from planner.recording.folder import TABLE
 from planner.report.rerun_story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
 from planner.session.watch import watch
 from planner.truth.hits import simulate_hit, write_uff
+from tests.support.hit_csv import write_csv
 from tests.support.outside import HAMMER, make_cell, record
 
 SIX = ("+x", "+x", "+y", "+y", "+z", "+z")
@@ -246,6 +249,34 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
     measured = campaign.state.measurements[proposal.pose].joints_deg
     off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
     assert 0 < off <= 0.011
+
+
+def test_files_that_do_not_say_their_axis_wait_for_the_table(cell):
+    """The table is written while the session runs; nothing is called a bad hit."""
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    made = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
+    inbox, table = tmp_path / "inbox", (made / TABLE).read_text()
+    for path in sorted((made / "data").iterdir()):
+        (hit,), _ = Source(path, path.name).read()
+        write_csv(inbox / f"{path.stem}.csv", hit, stated=False)
+    console = screen()
+
+    def ask(text):
+        if "9 of no stated axis" not in text:
+            return False
+        (inbox / TABLE).write_text(table.replace("data/", "").replace(".uff", ".csv"))
+        return True
+
+    script = Script(console, [(ask, "s"), (wait("all hits are in"), "a"),
+                              (wait("P001: 9 hits in"), "q")])  # fmt: skip
+    watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
+          limit_s=30)  # fmt: skip
+    text = console.export_text()
+    assert "along which axis? " in text
+    assert '"# hit: +x"' in text
+    assert "REPEAT HIT" not in text
+    assert len(campaign.state.used[0].accepted) == 9
 
 
 def test_the_next_pose_is_on_the_screen_before_pictures_are_made(cell, monkeypatch):

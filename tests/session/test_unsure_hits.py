@@ -13,6 +13,7 @@ from planner.recording.points import PointNames
 from planner.session.inbox import Inbox
 from planner.session.verdicts import PoseBefore, Verdicts
 from planner.truth.hits import simulate_hit, write_uff
+from tests.support.hit_csv import write_csv
 from tests.support.outside import HAMMER, make_cell
 from tests.support.robots import BAND_HZ
 
@@ -176,13 +177,6 @@ def test_a_hit_sampled_at_another_rate_alone_is_not_taken(bench):
 
 
 def at_rate(path: Path, name: str, rate_hz: float) -> Path:
-    """The same hit as a file of another sampling rate, a sample left out in between or not."""
+    """The same hit as a file of another sampling rate."""
     (hit,), _ = Source(path, path.name).read()
-    step = round(hit.sampling_rate_hz / rate_hz)
-    time_s = np.arange(len(hit.force_n))[::step] / step / rate_hz
-    columns = np.column_stack([time_s, hit.force_n[::step], hit.acceleration_m_s2[:, ::step].T])
-    header = "time_s,force_n," + ",".join(f"acceleration_{axis}_m_s2" for axis in "xyz")
-    text = f"# hit: {hit.axis}\n{header}"
-    target = path.with_name(f"{name}.csv")
-    np.savetxt(target, columns, delimiter=",", header=text, comments="", fmt="%.9g")
-    return target
+    return write_csv(path.with_name(f"{name}.csv"), hit, rate_hz)
