@@ -40,7 +40,7 @@ def arrive(station: Station, course: Course) -> Course:
         return replace(course, stop="no pose left")
     station.teller.note()
     page = page_without_hits(
-        campaign, proposal, station.hits_per_pose, station.inbox.folder, course
+        campaign, proposal, station.hits_at(proposal), station.inbox.folder, course
     )
     page = page_with_hits(page, (), (), undoable(station), station.auto, course)
     station.screen.show(page.page)

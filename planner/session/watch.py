@@ -46,7 +46,7 @@ def watch(
     *,
     console: Console,
     auto: bool = False,
-    hits_per_pose: int = 12,
+    hits_per_pose: int | None = None,
     rrd: Path | None = None,
     viewer: bool = False,
     explain: bool = False,
@@ -56,9 +56,10 @@ def watch(
 ) -> SessionSummary:
     """Run a session until quit, target, no pose left, or `limit_s`.
 
-    `auto` imports without asking, as does a session without a keyboard. `explain` diagnoses after
-    each import, beside the session, and says what the simulation lacks. Nobody else can act in the
-    campaign meanwhile: InputError names who does.
+    As many hits as campaign.toml's [cost] hits_per_axis make a pose, unless `hits_per_pose` says
+    otherwise. `auto` imports without asking, as does a session without a keyboard. `explain`
+    diagnoses after each import, beside the session, and says what the simulation lacks. Nobody else
+    can act in the campaign meanwhile: InputError names who does.
     """
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the one the analyser exports into.")
@@ -149,7 +150,7 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     course = replace(course, visit=visit)
     waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
     ready = [path for path in visit.whole if path not in visit.unstated]
-    if station.auto and ready and (len(ready) >= station.hits_per_pose or waited):
+    if station.auto and ready and (len(ready) >= station.hits_at(visit.proposal) or waited):
         return import_waiting(station, course, visit, ready)
     course = on_key(station, course, visit, station.key())
     return _unless_late(station, course) if course.visit is not None else course

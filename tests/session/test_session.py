@@ -279,6 +279,18 @@ def test_files_that_do_not_say_their_axis_wait_for_the_table(cell):
     assert len(campaign.state.used[0].accepted) == 9
 
 
+def test_as_many_hits_make_a_pose_as_the_campaign_file_says(cell):
+    campaign, truth, tmp_path = cell
+    decided = campaign.directory / "campaign.toml"
+    decided.write_text(decided.read_text() + "\n[cost]\nhits_per_axis = 3\n")
+    campaign = Campaign(campaign.directory)
+    deliver(truth, tmp_path, campaign.next()[0], 0)
+    console = screen()
+    script = Script(console, [(wait("all hits are in"), "q")])
+    watch(campaign, tmp_path / "inbox", console=console, keys=script, quiet_s=0.05, limit_s=20)
+    assert "x  3/3" in console.export_text()
+
+
 def test_the_next_pose_is_on_the_screen_before_pictures_are_made(cell, monkeypatch):
     campaign, truth, tmp_path = cell
     deliver(truth, tmp_path, campaign.next()[0], 0)
