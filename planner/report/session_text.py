@@ -10,6 +10,7 @@ from planner.campaign.events import Question
 from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
+from planner.modal.modes import Mode
 from planner.report.pose_screen import PosePage
 from planner.report.text import SIMULATED, with_sd
 from planner.words import counted
@@ -110,19 +111,29 @@ def incomplete(page: PosePage) -> str:
 def result_line(report: ImportReport) -> str:
     """What came out against what was expected, in one sentence."""
     said = f"{report.pose}: {_in(report)}"
-    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    return f"{said}; {against_expected(report.pose, report.model, report.model_before)}"
+
+
+def against_expected(pose: str, model: Model, before: Model | None) -> str:
+    """The modes of a pose, and what a model expected `before` it was hit, where that is known."""
+    labelled = next((p for p in model.labelled if p.pose == pose), None)
     if labelled is None:
-        return f"{said}; no modes"
-    before = report.model_before.predict(labelled.q[None])
+        return "no modes"
+    expected = None if before is None else before.predict(labelled.q[None])
     each = []
     for k, mode in enumerate(labelled.modes):
-        if mode is None:
-            each.append(f"mode {k + 1} not found")
-            continue
-        sd = np.hypot(before.frequency_sd_hz[0, k], mode.frequency_sd_hz)
-        off = (mode.frequency_hz - before.frequency_hz[0, k]) / sd
-        each.append(f"{mode.frequency_hz:.2f} Hz ({off:+.1f} sd)")
-    return f"{said}; {', '.join(each)}"
+        said = f"mode {k + 1} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
+        if expected is not None:
+            there, sd = expected.frequency_hz[0, k], expected.frequency_sd_hz[0, k]
+            off = "" if mode is None else _off_by(mode, there, sd)
+            said = f"{said} (expected {there:.2f}{off})"
+        each.append(said)
+    return ", ".join(each)
+
+
+def _off_by(mode: Mode, expected_hz: float, sd_hz: float) -> str:
+    off = (mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz)
+    return f", {off:+.1f} sd"
 
 
 def progress_line(

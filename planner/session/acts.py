@@ -8,6 +8,7 @@ from typing import Any
 
 from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
 from planner.campaign.importing import ImportReport
+from planner.campaign.state import fold, last_acts
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
@@ -46,6 +47,17 @@ def arrive(station: Station, course: Course) -> Course:
     station.screen.show(page.page)
     station.teller.tell()
     return replace(course, visit=PoseInProgress(proposal, page, time.monotonic()))
+
+
+def say_last_import(station: Station) -> None:
+    """What the last act gave, if it was an import: an interruption may have hidden it."""
+    campaign = station.campaign
+    acts = last_acts(campaign.entries, decisions_only=True)
+    event = acts[0].event if acts else None
+    if isinstance(event, Imported) and event.pose in campaign.state.measurements:
+        before = campaign.kept_model(fold(campaign.entries[: acts[0].seq - 1]))
+        told = session_text.against_expected(event.pose, campaign.model, before)
+        station.say(f"The last import, {event.pose}: {told}", "bold")
 
 
 def undoable(station: Station) -> bool:
@@ -169,10 +181,10 @@ def _right(station: Station, course: Course, report: ImportReport) -> Course:
 
 def undo(station: Station, course: Course) -> Course:
     """Take back the last act of the engineer."""
-    entry = station.campaign.undo(decisions_only=True)
+    taken = station.campaign.undo(decisions_only=True)
     station.teller.note()
     station.screen.forget()
-    station.say(UndoneAct.of(entry).text())
+    station.say(UndoneAct.of(taken).text())
     return course.undone(station.campaign.state)
 
 

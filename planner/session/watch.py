@@ -14,7 +14,15 @@ from planner.replay import replay
 from planner.report import session_text
 from planner.report.answer import Answer
 from planner.report.rerun_story import Story
-from planner.session.acts import answer, arrive, import_waiting, interrupted, on_key, undoable
+from planner.session.acts import (
+    answer,
+    arrive,
+    import_waiting,
+    interrupted,
+    on_key,
+    say_last_import,
+    undoable,
+)
 from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.inbox import Inbox
@@ -92,6 +100,7 @@ def _run(station: Station) -> SessionSummary:
     try:
         for remark in campaign.cell.remarks:
             station.say(remark, "yellow")
+        say_last_import(station)
         while not course.stop:
             course = _step(station, course)
         station.teller.tell()

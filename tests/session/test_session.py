@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import shutil
 import threading
 import time
@@ -16,12 +17,14 @@ from rich.console import Console
 from planner.campaign.campaign import Campaign
 from planner.dataset.screened_files import Source
 from planner.recording.folder import TABLE
+from planner.replay import replay
 from planner.report.rerun_story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
+from planner.session.teller import Teller
 from planner.session.watch import watch
 from planner.truth.hits import simulate_hit, write_uff
 from tests.support.hit_csv import write_csv
-from tests.support.outside import HAMMER, make_cell, record
+from tests.support.outside import HAMMER, make_cell, record, told
 
 SIX = ("+x", "+x", "+y", "+y", "+z", "+z")
 WANTED = (
@@ -277,6 +280,39 @@ def test_files_that_do_not_say_their_axis_wait_for_the_table(cell):
     assert '"# hit: +x"' in text
     assert "REPEAT HIT" not in text
     assert len(campaign.state.used[0].accepted) == 9
+
+
+def test_undo_after_an_interrupted_import_takes_it_back_with_its_proposal(cell, monkeypatch):
+    """What the import gave was never on the screen: the next session begins with it."""
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    deliver(truth, tmp_path, proposal, 0)
+    inbox, console = tmp_path / "inbox", screen()
+    script = Script(console, [(wait("all hits are in"), "a")])
+    with monkeypatch.context() as patched:
+        patched.setattr(Teller, "note", interrupt)  # right after the import
+        watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
+              limit_s=30)  # fmt: skip
+    assert "the hits of P001: that is in the log; planner undo" in flat(console)
+    console = screen()
+    script = Script(console, [(wait("go to pose P002"), "q")])
+    watch(Campaign(campaign.directory), inbox, console=console, keys=script, quiet_s=0.05)
+    assert re.search(r"The last import, P001: [\d.]+ Hz \(expected [\d.]+, .* sd\)", flat(console))
+    undone = told("undo", campaign.directory)
+    assert (undone["event"], len(undone["with_it"])) == ("imported", 1)
+    again = Campaign(campaign.directory)
+    assert again.state.measurements == {}
+    assert again.next()[0] == proposal
+    assert all(step.check in ("identical", "kept") for step in replay(again))
+
+
+def interrupt(teller, reports=()):
+    if reports:
+        raise KeyboardInterrupt
+
+
+def flat(console) -> str:
+    return " ".join(console.export_text(clear=False).split())
 
 
 def test_as_many_hits_make_a_pose_as_the_campaign_file_says(cell):
