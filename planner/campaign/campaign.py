@@ -178,7 +178,7 @@ class Campaign(CampaignReads):
 
     def holding(self):
         """A context in which nobody else can act in this campaign; InputError names who does."""
-        return self._journal.holding(wait_s=1.0)
+        return self._journal.holding(wait_s=1.0, session=True)
 
     # -- inside --------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ Stamp = tuple[int, int] | None  # size and time of the table; None: there is non
 
 
 @dataclass
-class Table:
+class FolderTable:
     """The table of a folder, if it has one. Without `joints` nothing is looked up."""
 
     folder: Path | None = None

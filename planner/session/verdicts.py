@@ -12,7 +12,7 @@ from planner.recording.read import hit_count
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling_rates import sampled_otherwise
-from planner.session.table import Table
+from planner.session.table import FolderTable
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
@@ -57,11 +57,11 @@ class Verdicts:
     """Judges files that wait at a pose; it keeps what it read, and nothing else."""
 
     def __init__(
-        self, band_hz: tuple[float, float], points: PointNames, table: Table | None = None
+        self, band_hz: tuple[float, float], points: PointNames, table: FolderTable | None = None
     ):
         self._band = band_hz
         self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
-        self.table = table or Table()
+        self.table = table or FolderTable()
         self._read: dict[tuple, list[tuple[Verdict, tuple[Hit, ...]]]] = {}
 
     def unfit(self, path: Path) -> str:

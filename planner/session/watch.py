@@ -30,7 +30,7 @@ from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.session.page import page_with_hits
 from planner.session.screen import Screen
 from planner.session.station import Station
-from planner.session.table import Table
+from planner.session.table import FolderTable
 from planner.session.teller import Teller
 from planner.session.verdicts import Verdicts
 
@@ -84,7 +84,7 @@ def watch(
         cell, started = campaign.cell, time.monotonic()
         verdicts = Verdicts(
             cell.config.modes.band_hz, cell.robot.points,
-            Table(folder, cell.robot.joints, cell.robot.points),
+            FolderTable(folder, cell.robot.joints, cell.robot.points),
         )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
