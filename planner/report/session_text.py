@@ -18,7 +18,7 @@ from planner.words import counted
 HELP = """\
 a, Enter  import the hits that wait          r  set bad hits aside, do not import them
 R         set all waiting hits aside
-k         skip this pose, do not offer it    n  propose anew
+k         skip this pose; asks why           n  another pose, never this one
 b, h      late hits: of the pose before, or of this one; h: unsure hits are right too
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""

@@ -14,6 +14,7 @@ from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
 from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.page import page_with_hits, page_without_hits
+from planner.session.skipping import ask_why, on_reason_key
 from planner.session.station import Station
 from planner.session.verdicts import PoseBefore
 from planner.words import counted
@@ -68,8 +69,9 @@ def undoable(station: Station) -> bool:
 
 def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     """Act on a key at a pose; without a visit the pose is over."""
+    act = _act if visit.typed is None else on_reason_key
     try:
-        return _act(station, course, visit, key)
+        return act(station, course, visit, key)
     except PlannerError as error:
         station.say(str(error), "red")
         return course
@@ -102,13 +104,12 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             campaign.star(pose)
             station.say(f"★ {pose}")
         case "k":
-            campaign.skip(pose, "skipped in the session")
-            station.say(f"{pose} will not be offered again.")
-            return over
+            return replace(course, visit=ask_why(station, visit))
         case "u":
             return undo(station, over)
         case "n":
             campaign.skip(pose, "another was asked for")
+            station.say(f"{pose} will not be offered again.")
             return over
         case "q":
             return replace(course, stop="quit")

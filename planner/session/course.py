@@ -22,7 +22,8 @@ class PoseInProgress:
 
     `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
     pressed though hits are missing; `refusing`: refuse was, though no hit is bad. `numbers` are
-    those of its hits, as they came.
+    those of its hits, as they came; `typed` is the reason for a skip as far as it is typed, None
+    where none is asked for.
     """
 
     proposal: Proposal
@@ -34,6 +35,7 @@ class PoseInProgress:
     pressed: bool = False
     refusing: bool = False
     numbers: dict[Part, int] = field(default_factory=dict)
+    typed: str | None = None
 
     def paths(self, *kinds: str) -> frozenset[Path]:
         """Files of which every hit is of one of these kinds."""

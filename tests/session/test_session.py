@@ -91,7 +91,8 @@ def test_a_session_shows_imports_and_goes_on(cell):
     analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
     script = Script(console, [
         (wait("all hits are in"), "?"), (wait("set all waiting hits aside"), "s"),
-        (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("not be offered"), "u"),
+        (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("stands in the way?"), "\n"),
+        (wait("not be offered"), "u"),
         (wait("Took back"), "q"),
     ])  # fmt: skip
     analyser.start()
@@ -313,6 +314,22 @@ def interrupt(teller, reports=()):
 
 def flat(console) -> str:
     return " ".join(console.export_text(clear=False).split())
+
+
+def test_a_skip_asks_for_its_reason_and_typing_runs_no_command(cell):
+    campaign, _, tmp_path = cell
+    console = screen()
+    keys = [
+        (wait("go to pose P001"), "k"),
+        (wait("stands in the way?"), "q"),
+        (wait(" q_"), "\x7f"),
+    ]
+    keys += [(lambda text: True, letter) for letter in "husk"] + [(wait(" husk_"), "\n")]
+    script = Script(console, [*keys, (wait("P001 and poses around it will not"), "q")])
+    summary = watch(campaign, tmp_path / "inbox", console=console, keys=script, limit_s=30)
+    assert summary.stopped == "quit"
+    assert campaign.state.skipped == {"P001": "husk"}
+    assert campaign.state.avoided == {"P001"}
 
 
 def test_as_many_hits_make_a_pose_as_the_campaign_file_says(cell):
