@@ -135,7 +135,9 @@ class Campaign(CampaignReads):
             # In this order: stopped in between, the hits are asked for again.
             self._append(Undone(entry.seq))
             refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
-            hits = (msgspec.structs.replace(h, reason=h.reason or reason) for h in refused)
+            asked = event.question
+            why = f"{reason}; held before: {asked.text}" if asked else reason
+            hits = (msgspec.structs.replace(h, reason=h.reason or why) for h in refused)
             self._append(Refused(pose, tuple(hits)))
 
     def withdraw(self, pose: str, reason: str = "") -> None:
