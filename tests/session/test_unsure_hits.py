@@ -180,3 +180,14 @@ def at_rate(path: Path, name: str, rate_hz: float) -> Path:
     """The same hit as a file of another sampling rate."""
     (hit,), _ = Source(path, path.name).read()
     return write_csv(path.with_name(f"{name}.csv"), hit, rate_hz)
+
+
+def test_a_foreign_file_of_long_ago_is_not_said_to_be_written(tmp_path):
+    old = tmp_path / "temperature.csv"
+    old.write_text("time,°C\n" + "12:00,21\n" * 20)
+    os.utime(old, (time.time() - 600,) * 2)
+    box = Inbox(tmp_path, 0.02)
+    assert box.scan(set()) == ([], [])
+    time.sleep(0.1)  # the size stood still, though not for as long as a new file has to
+    assert box.scan(set()) == ([], [])
+    assert box.ignored() == [old]
