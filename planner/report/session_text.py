@@ -74,6 +74,8 @@ def _missed(report: ImportReport) -> list[RenderableType]:
     if not hits:
         return []
     rows = _table("hit", "tilt of its direction", "beside the point")
+    for column in rows.columns[1:]:  # a number and its sd stay on one line, names may break
+        column.no_wrap = True
     for hit in hits:
         rows.add_row(*hit.cells)
     every = [hit for pose in report.model.misses for hit in pose.hits]
