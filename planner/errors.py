@@ -17,6 +17,10 @@ class ForeignFileError(InputError):
     """A file is no recording at all, not one that is damaged."""
 
 
+class AxisNotStatedError(InputError):
+    """A hit is whole, and nothing says along which axis it was made."""
+
+
 class RefusedError(PlannerError):
     """A recording was read but cannot be used as a measurement."""
 

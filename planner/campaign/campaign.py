@@ -26,7 +26,7 @@ from planner.campaign.events import (
     Withdrawn,
 )
 from planner.campaign.reads import CampaignReads, as_logged
-from planner.campaign.state import last_act
+from planner.campaign.state import last_acts
 from planner.errors import InputError
 from planner.version import __version__
 
@@ -135,7 +135,9 @@ class Campaign(CampaignReads):
             # In this order: stopped in between, the hits are asked for again.
             self._append(Undone(entry.seq))
             refused = (msgspec.structs.replace(h, accepted=False) for h in event.hits)
-            hits = (msgspec.structs.replace(h, reason=h.reason or reason) for h in refused)
+            asked = event.question
+            why = f"{reason}; held before: {asked.text}" if asked else reason
+            hits = (msgspec.structs.replace(h, reason=h.reason or why) for h in refused)
             self._append(Refused(pose, tuple(hits)))
 
     def withdraw(self, pose: str, reason: str = "") -> None:
@@ -162,18 +164,23 @@ class Campaign(CampaignReads):
                 raise InputError(f"Pose {pose} is not known; see planner status.")
             self._append(Starred(pose))
 
-    def undo(self, decisions_only: bool = False) -> Entry:
-        """Take back the last act (proposal, import, answer, refusal, withdrawal, skip, star)."""
+    def undo(self, decisions_only: bool = False) -> tuple[Entry, ...]:
+        """Take back the last act (import, answer, refusal, withdrawal, skip, star).
+
+        Proposals that followed it go with it and are given after it; where there is no other act
+        the last proposal is taken back, unless `decisions_only`.
+        """
         with self._acting():
-            entry = last_act(self.entries, decisions_only)
-            if entry is None:
+            acts = last_acts(self.entries, decisions_only)
+            if not acts:
                 raise InputError(f"{self.directory} holds no act that could be taken back.")
-            self._append(Undone(entry.seq))
-            return entry
+            for entry in acts:
+                self._append(Undone(entry.seq))
+            return acts
 
     def holding(self):
         """A context in which nobody else can act in this campaign; InputError names who does."""
-        return self._journal.holding(wait_s=1.0)
+        return self._journal.holding(wait_s=1.0, session=True)
 
     # -- inside --------------------------------------------------------------------------------
 

@@ -56,6 +56,8 @@ def encode_line(previous_check: str, entry: Entry) -> tuple[bytes, str]:
     return b'{"check":"%s","entry":%s}\n' % (check.encode(), body), check
 
 
+BRIEFLY_S = 0.5  # in which most acts are over
+SESSION = ", a session"  # ends what is said of who holds a campaign for long
 PART = ".part"  # ends the name of a file in the making
 START = b'{"check":"'  # of a line; within one, quotes are escaped
 
@@ -147,28 +149,35 @@ class Journal:
             yield self
 
     @contextmanager
-    def holding(self, wait_s: float = 10.0):
+    def holding(self, wait_s: float = 10.0, session: bool = False):
         """Hold the campaign's lock: nobody else writes meanwhile. Acts within need not wait.
 
-        Raises InputError that names who holds it.
+        An act of another is waited for, a `session` is not: it may last for hours. Raises
+        InputError that names who holds the lock.
         """
         holder = self.path.with_suffix(".holder")
-        try:
-            self._lock.acquire(timeout=wait_s)
-        except Timeout:
-            raise InputError(
-                f"{self.path.parent} is in use by {_text_of(holder)}; close that one first."
-            ) from None
+        self._acquire(holder, wait_s)
         try:
             if self._lock.lock_counter == 1:
                 with suppress(OSError):  # only for the eyes of others
-                    holder.write_text(_who(), encoding="utf-8")
+                    holder.write_text(_who() + SESSION * session, encoding="utf-8")
             yield self
         finally:
             if self._lock.lock_counter == 1:
                 with suppress(OSError):
                     holder.unlink(missing_ok=True)
             self._lock.release()
+
+    def _acquire(self, holder: Path, wait_s: float) -> None:
+        for seconds in (min(BRIEFLY_S, wait_s), max(0.0, wait_s - BRIEFLY_S)):
+            try:
+                self._lock.acquire(timeout=seconds)
+                return
+            except Timeout:
+                who = _text_of(holder)
+                if who.endswith(SESSION):
+                    break
+        raise InputError(f"{self.path.parent} is in use by {who}; close that one first.")
 
     def _repair_tail(self) -> None:
         content = self._content

@@ -114,6 +114,11 @@ class CampaignReads:
             self._models = {key: found}
         return self._models[key]
 
+    def kept_model(self, state: CampaignState) -> "Model | None":
+        """The model of an earlier state of this configuration, where it is kept on disk."""
+        configured = self._configured()
+        return model_cache.kept_model(self._kept, self._model_name(configured, state))
+
     def _model_name(self, configured: Configured, state: CampaignState) -> str:
         return model_cache.key("model", self.directory, configured, state.used)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 
 from planner.campaign.events import (
     Amplitude,
@@ -139,13 +140,21 @@ def _made(state: CampaignState, event: Proposed) -> int:
     return max([state.proposals_made, *map(int, numbers)])
 
 
-def last_act(entries: Iterable[Entry], decisions_only: bool = False) -> Entry | None:
-    """The act that `undo` would take back; proposals are acts, but nobody's decisions."""
+def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
+    """What `undo` would take back: the last decision, and the proposals that followed it.
+
+    Proposals follow of themselves, also after an act that was interrupted; where nothing was
+    decided the last of them is taken back alone, unless `decisions_only`.
+    """
     entries = tuple(entries)
     undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
-    kinds = tuple(kind for kind in ACTS if not (decisions_only and kind is Proposed))
-    acts = [e for e in entries if isinstance(e.event, kinds) and e.seq not in undone]
-    return acts[-1] if acts else None
+    acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
+    proposals = list(takewhile(lambda e: isinstance(e.event, Proposed), reversed(acts)))
+    if len(proposals) == len(acts):
+        return () if decisions_only else tuple(proposals[:1])
+    decision = acts[-1 - len(proposals)]
+    before = fold(entries[: decision.seq - 1])
+    return (decision, *(() if before.unchanged_by(decision.event) else proposals))
 
 
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:

@@ -148,7 +148,10 @@ def watch(
     directory: Directory,
     folder: Annotated[Path, typer.Argument(help="Folder into which the analyser exports.")],
     auto: Annotated[bool, typer.Option("--auto", help="Import without asking.")] = False,
-    hits_per_pose: Annotated[int, typer.Option(min=1, help="Hits that make a pose.")] = 12,
+    hits_per_pose: Annotated[
+        int | None,
+        typer.Option(min=1, help="Hits that make a pose; else [cost] hits_per_axis along each."),
+    ] = None,
     explain: Annotated[
         bool, typer.Option("--diagnose", help="Diagnose beside the session, after each import.")
     ] = False,

@@ -1,10 +1,9 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
-from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from planner.errors import PlannerError
+from planner.errors import AxisNotStatedError, PlannerError
 from planner.recording.points import StatedPoints
 from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 
@@ -65,6 +64,7 @@ class Verdict:
     axis: str | None = None
     simulated: bool = False
     remarks: tuple[str, ...] = ()
+    axis_missing: bool = False  # good but for that nothing says along which axis it was made
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,20 +101,25 @@ def _refuse_others(
     verdicts: list[Verdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
 ) -> None:
     """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
-    rates = Counter(round(hit.sampling_rate_hz, 6) for found in hits for hit in found)
-    usual = rates.most_common(1)[0][0]
+    from planner.recording.sampling_rates import sampled_otherwise
+
+    own = [number for number, found in enumerate(hits) for _ in found]
+    said = sampled_otherwise([hit for found in hits for hit in found])
+    other = {number: text for number, text in zip(own, said, strict=True) if text}
     for number, (verdict, found) in enumerate(zip(verdicts, hits, strict=True)):
-        other = next((h for h in found if round(h.sampling_rate_hz, 6) != usual), None)
-        text = ""
-        if other is not None:
-            text = f"sampled at {other.sampling_rate_hz:g} Hz, the others at {usual:g} Hz"
-        elif verdict.accepted and not found:
+        text = other.get(number, "")
+        if verdict.accepted and not found:
             text = "it holds FRFs, the pose's other files time histories"
         if text:
-            reason = f"{verdict.source.name} cannot be averaged: {text}; export all alike."
+            reason = not_averaged(verdict.source.name, text)
             verdicts[number] = replace(verdict, accepted=False, reason=reason)
             hits[number] = ()
     records.clear()
+
+
+def not_averaged(name: str, why: str) -> str:
+    """What is said of a file that does not go with the others of its pose."""
+    return f"{name} cannot be averaged: {why}; export all alike."
 
 
 def read_one(
@@ -131,7 +136,9 @@ def read_one(
             simulated = any(record.simulated for record in frfs)
             return Verdict(source, True, "", source.hit, simulated), (), list(frfs)
     except PlannerError as error:
-        return Verdict(source, False, renamed(str(error), (source,))), (), []
+        missing = isinstance(error, AxisNotStatedError)
+        text = renamed(str(error), (source,))
+        return Verdict(source, False, text, axis_missing=missing), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)
     heard = [by_good_sensors(hit) for hit in found]
     judged = [

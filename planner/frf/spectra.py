@@ -13,6 +13,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.recording.points import TOOL, Layout
 from planner.recording.records import Hit
+from planner.recording.sampling_rates import same_rate
 
 MARGIN = 1.3  # lines beyond the band, so that modes at its edge are met from both sides
 NYQUIST_SHARE = 0.45  # beyond it anti-alias filters act
@@ -84,7 +85,7 @@ def transform(
     if not hits:
         raise RefusedError("No usable hit is left at this pose; hit again.")
     rate = hits[0].sampling_rate_hz
-    if any(abs(hit.sampling_rate_hz / rate - 1) > 1e-6 for hit in hits):
+    if not all(same_rate(hit, hits[0]) for hit in hits):
         raise RefusedError("The hits of this pose have different sampling rates; use one.")
     before, after, remarks = _alignment(hits)
     length = max(before + after, samples or 0)

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
-from planner.errors import InputError
+from planner.errors import AxisNotStatedError, InputError
 from planner.recording.dof import Dof
 from planner.recording.named_columns import hit_direction
 from planner.recording.points import SENSOR, StatedPoints
@@ -112,14 +113,14 @@ def _rank(dof: Dof, responses: dict[Dof, Channel]) -> tuple[int, int]:
 
 
 def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[str]) -> str:
-    stated = hit_direction(axis) if axis else 0
+    source, stated = record.source, hit_direction(axis) if axis else 0
     if axis and not stated:
-        raise InputError(f'{record.source}: hit "{axis}" is no signed axis such as +x; correct it.')
+        raise InputError(f'{source}: hit "{axis}" is no signed axis such as +x; correct it.')
     own = force.direction if 1 <= abs(force.direction) <= 3 else 0
     if not own and not stated:
-        raise InputError(
-            f"{record.source} does not say along which axis it was hit; state it in the file "
-            f"(ref_dir) or in recordings.csv (hit)."
+        raise AxisNotStatedError(
+            f"{source} does not say along which axis it was hit; {_in_the_file(source)}, or list "
+            f"the file in recordings.csv with its pose, joint angles and hit."
         )
     if own and stated and own != stated:
         if abs(own) != abs(stated) or own < 0:
@@ -129,6 +130,16 @@ def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[st
             )
         remarks.append(f"The file names the axis without its sign; {_name(stated)} is used.")
     return _name(stated or own)
+
+
+def _in_the_file(source: Path) -> str:
+    """How a file of its kind states the hit's axis."""
+    kind = source.name.lower().removesuffix(".gz").rpartition(".")[2]
+    if kind in ("csv", "tsv", "txt"):
+        return 'write it as its first line, such as "# hit: +x"'
+    if kind in ("uff", "unv", "uf58"):
+        return "state it in the file (ref_dir)"
+    return 'state it in the file (attribute hit, such as "+x")'
 
 
 def _name(direction: int) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from planner.recording.band_spectra import band_spectra
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
+from planner.recording.sampling_rates import same_rate
 from planner.recording.screening import NOTHING
 
 # Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
@@ -22,14 +23,13 @@ def screen_repeats(
 ) -> tuple[tuple[Fault, ...], ...]:
     """Per hit, whether its FRF disagrees with the others of its axis (wrong axis, incoherent).
 
-    Only hits at one point that the same sensors heard are compared, and where three or more were
-    made along an axis; a robust vote needs a majority. What a careful hand misses by is no
-    disagreement, and what only sets one force level apart from another may be the structure: that
-    is for the diagnosis to say.
+    Only hits at one point that the same sensors heard, sampled alike, are compared, and where three
+    or more were made along an axis; a robust vote needs a majority. What a careful hand misses by
+    is no disagreement, and what only sets one force level apart from another may be the structure:
+    that is for the diagnosis to say.
     """
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    for place in {(hit.hit_point, hit.responses) for hit in hits}:
-        own = [i for i, hit in enumerate(hits) if (hit.hit_point, hit.responses) == place]
+    for own in _groups(hits):
         found = _screen_alike(tuple(hits[i] for i in own), band_hz)
         for i, one in zip(own, found, strict=True):
             faults[i] = one
@@ -41,8 +41,7 @@ def _screen_alike(
 ) -> tuple[tuple[Fault, ...], ...]:
     """The same of hits at one point that the same sensors heard."""
     faults: list[tuple[Fault, ...]] = [() for _ in hits]
-    shortest = min(len(hit.force_n) for hit in hits)
-    frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
+    frfs = _frfs(hits, band_hz)
     axes = np.array([hit.axis_index for hit in hits])
     level = _levels(hits)
     centres = {axis: _centre(frfs[axes == axis]) for axis in set(axes.tolist())}
@@ -91,11 +90,7 @@ def doubts(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> tuple[Doubt |
     Of two hits that disagree the one that answers as another axis does is doubted alone.
     """
     found: list[Doubt | None] = [None] * len(hits)
-    for place in {(hit.hit_point, hit.responses, hit.sampling_rate_hz) for hit in hits}:
-        own = [
-            i for i, hit in enumerate(hits)
-            if (hit.hit_point, hit.responses, hit.sampling_rate_hz) == place
-        ]  # fmt: skip
+    for own in _groups(hits):
         group = _Few.of(tuple(hits[i] for i in own), band_hz)
         for i in range(len(own)):
             doubt = group.doubt(i)
@@ -115,9 +110,7 @@ class _Few:
 
     @classmethod
     def of(cls, hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> "_Few":
-        shortest = min(len(hit.force_n) for hit in hits)
-        frfs = np.array([_frf(hit, shortest, band_hz) for hit in hits])
-        return cls(frfs, np.array([hit.axis_index for hit in hits]), _levels(hits))
+        return cls(_frfs(hits, band_hz), np.array([hit.axis_index for hit in hits]), _levels(hits))
 
     def doubt(self, i: int) -> Doubt | None:
         same = [int(j) for j in np.flatnonzero(self.axes == self.axes[i]) if j != i]
@@ -160,16 +153,11 @@ class _Few:
 
 def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float]) -> float:
     """How alike a hit's FRF and those of `others` along its axis are, in size too; 0: none such."""
-    same = [
-        other for other in others
-        if other.axis_index == hit.axis_index and other.sampling_rate_hz == hit.sampling_rate_hz
-        and (other.hit_point, other.responses) == (hit.hit_point, hit.responses)
-    ]  # fmt: skip
+    same = [o for o in others if o.axis_index == hit.axis_index and _comparable(o, hit)]
     if not same:
         return 0.0
-    shortest = min(len(one.force_n) for one in (hit, *same))
-    frf = _frf(hit, shortest, band_hz)
-    centre = _centre(np.array([_frf(other, shortest, band_hz) for other in same]))
+    frf, *theirs = _frfs((hit, *same), band_hz)
+    centre = _centre(np.array(theirs))
     sizes = np.linalg.norm(frf), np.linalg.norm(centre)
     return _likeness(frf, centre) * float(min(sizes) / max(*sizes, NOTHING))
 
@@ -240,10 +228,34 @@ def _centre(frfs: np.ndarray) -> np.ndarray:
     return np.median(frfs.real, axis=0) + 1j * np.median(frfs.imag, axis=0)
 
 
-def _frf(hit: Hit, samples: int, band_hz: tuple[float, float]) -> np.ndarray:
+def _comparable(one: Hit, other: Hit) -> bool:
+    """Whether two hits are at one point, heard by the same sensors and sampled alike."""
+    places = [(hit.hit_point, hit.responses) for hit in (one, other)]
+    return places[0] == places[1] and same_rate(one, other)
+
+
+def _groups(hits: tuple[Hit, ...]) -> list[list[int]]:
+    """Which hits, by their places among all, can be compared with each other."""
+    groups: list[list[int]] = []
+    for i, hit in enumerate(hits):
+        own = next((group for group in groups if _comparable(hits[group[0]], hit)), None)
+        if own is None:
+            groups.append([i])
+        else:
+            own.append(i)
+    return groups
+
+
+def _frfs(hits: tuple[Hit, ...], band_hz: tuple[float, float]) -> np.ndarray:
+    """FRFs (n, 3·F) of hits that can be compared, of as many samples, over the same lines."""
+    shortest = min(len(hit.force_n) for hit in hits)
+    return np.array([_frf(hit, shortest, band_hz, hits[0].sampling_rate_hz) for hit in hits])
+
+
+def _frf(hit: Hit, samples: int, band_hz: tuple[float, float], rate_hz: float) -> np.ndarray:
     """FRF (3·F,) of a hit's first samples over the band's lines."""
     rest_n = float(np.median(hit.force_n))
-    force, response = band_spectra(hit, band_hz, rest_n, samples)
+    force, response = band_spectra(hit, band_hz, rest_n, samples, rate_hz)
     floor = 1e-3 * np.max(np.abs(force))
     return (response * force.conj() / np.maximum(np.abs(force) ** 2, floor**2)).ravel()
 

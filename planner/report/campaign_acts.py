@@ -1,5 +1,6 @@
 """Answers of the acts on a campaign: `new`, `undo`, `withdraw`, `skip`, `confirm`."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,20 +76,27 @@ class ExampleFolder(Answer):
 
 @dataclass(frozen=True)
 class UndoneAct(Answer):
-    """Answer of `undo`: number and kind of the log's entry that was taken back, and its words."""
+    """Answer of `undo`: number and kind of the log's entry that was taken back, and its words.
+
+    `with_it` are the words of the proposals that followed it.
+    """
 
     undone: int
     event: str
     what: str
+    with_it: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, entry: Entry) -> "UndoneAct":
-        """Of the entry that was taken back."""
-        return cls(entry.seq, msgspec.to_builtins(entry.event)["kind"], act(entry))
+    def of(cls, entries: Sequence[Entry]) -> "UndoneAct":
+        """Of the entry that was taken back and those that went with it."""
+        entry, *others = entries
+        kind = msgspec.to_builtins(entry.event)["kind"]
+        return cls(entry.seq, kind, act(entry), tuple(act(other) for other in others))
 
     def text(self) -> str:
         """One sentence."""
-        return f"Took back entry {self.undone}: {self.what}."
+        follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
+        return f"Took back entry {self.undone}: {self.what}{follow}."
 
 
 @dataclass(frozen=True)

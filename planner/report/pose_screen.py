@@ -18,7 +18,7 @@ from planner.report.text import with_sd
 WIDTH, HEIGHT = 80, 22  # of the smallest terminal, less a line for work and the cursor's
 LAST = 4  # verdicts that are shown
 COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
-           "unsure": "bold yellow"}  # fmt: skip
+           "unsure": "bold yellow", "unstated": "bold yellow"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class JudgedHit:
         named = f"{self.number} ({axis})"
         said = {
             "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
-            "unsure": f"hit {named}, right?",
+            "unsure": f"hit {named}, right?", "unstated": f"hit {self.number}, along which axis?",
         }  # fmt: skip
         return Text(f"{said[self.kind]} {text}", style=COLOURS[self.kind])
 
@@ -148,6 +148,9 @@ class PosePage:
         unsure = sum(hit.kind == "unsure" for hit in self.hits)
         if unsure:
             made.add_row(Text(f"{unsure} held: right?", style=COLOURS["unsure"]))
+        unstated = sum(hit.kind == "unstated" for hit in self.hits)
+        if unstated:
+            made.add_row(Text(f"{unstated} of no stated axis", style=COLOURS["unstated"]))
         if self.complete:
             made.add_row(Text("all hits are in", style="bold green"))
         return made

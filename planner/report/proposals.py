@@ -40,7 +40,7 @@ class ProposedPose(Answer):
         for k, mode in enumerate(self.expected):
             expected.add_row(str(k + 1), *mode.cells)
         x, y, z = proposal.position_m
-        hits = f"hit along {', '.join(proposal.hits)}"
+        hits = f"hit along {', '.join(proposal.hits)} of the tcp frame"
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal.reason}"
         return [angles, Text(place), expected]
 

@@ -12,6 +12,7 @@ from planner.check.remark import SEVERITIES, CheckRemark
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.plot_files import Pictures
 from planner.report.text import drawn, number, table
+from planner.words import counted
 
 COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
@@ -164,8 +165,10 @@ def _line(remark: CheckRemark) -> Text:
 
 def _summary(findings: tuple[CheckRemark, ...]) -> Text:
     counts = [sum(f.severity == name for f in findings) for name in SEVERITIES]
-    if not any(counts[:2]):
+    if not any(counts):
         return Text("Nothing looks wrong.", style="green")
+    if not any(counts[:2]):
+        return Text(f"Nothing looks wrong; {counted(counts[2], 'note')} above.", style="green")
     said = ", ".join(
         f"{n} {name}{'s' if n != 1 else ''}" for n, name in zip(counts, SEVERITIES, strict=True)
     )

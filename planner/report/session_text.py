@@ -10,6 +10,7 @@ from planner.campaign.events import Question
 from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
+from planner.modal.modes import Mode
 from planner.report.pose_screen import PosePage
 from planner.report.text import SIMULATED, with_sd
 from planner.words import counted
@@ -17,7 +18,7 @@ from planner.words import counted
 HELP = """\
 a, Enter  import the hits that wait          r  set bad hits aside, do not import them
 R         set all waiting hits aside
-k         skip this pose, do not offer it    n  propose anew
+k         skip this pose; asks why           n  another pose, never this one
 b, h      late hits: of the pose before, or of this one; h: unsure hits are right too
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
@@ -73,6 +74,8 @@ def _missed(report: ImportReport) -> list[RenderableType]:
     if not hits:
         return []
     rows = _table("hit", "tilt of its direction", "beside the point")
+    for column in rows.columns[1:]:  # a number and its sd stay on one line, names may break
+        column.no_wrap = True
     for hit in hits:
         rows.add_row(*hit.cells)
     every = [hit for pose in report.model.misses for hit in pose.hits]
@@ -110,19 +113,29 @@ def incomplete(page: PosePage) -> str:
 def result_line(report: ImportReport) -> str:
     """What came out against what was expected, in one sentence."""
     said = f"{report.pose}: {_in(report)}"
-    labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
+    return f"{said}; {against_expected(report.pose, report.model, report.model_before)}"
+
+
+def against_expected(pose: str, model: Model, before: Model | None) -> str:
+    """The modes of a pose, and what a model expected `before` it was hit, where that is known."""
+    labelled = next((p for p in model.labelled if p.pose == pose), None)
     if labelled is None:
-        return f"{said}; no modes"
-    before = report.model_before.predict(labelled.q[None])
+        return "no modes"
+    expected = None if before is None else before.predict(labelled.q[None])
     each = []
     for k, mode in enumerate(labelled.modes):
-        if mode is None:
-            each.append(f"mode {k + 1} not found")
-            continue
-        sd = np.hypot(before.frequency_sd_hz[0, k], mode.frequency_sd_hz)
-        off = (mode.frequency_hz - before.frequency_hz[0, k]) / sd
-        each.append(f"{mode.frequency_hz:.2f} Hz ({off:+.1f} sd)")
-    return f"{said}; {', '.join(each)}"
+        said = f"mode {k + 1} not found" if mode is None else f"{mode.frequency_hz:.2f} Hz"
+        if expected is not None:
+            there, sd = expected.frequency_hz[0, k], expected.frequency_sd_hz[0, k]
+            off = "" if mode is None else _off_by(mode, there, sd)
+            said = f"{said} (expected {there:.2f}{off})"
+        each.append(said)
+    return ", ".join(each)
+
+
+def _off_by(mode: Mode, expected_hz: float, sd_hz: float) -> str:
+    off = (mode.frequency_hz - expected_hz) / np.hypot(sd_hz, mode.frequency_sd_hz)
+    return f", {off:+.1f} sd"
 
 
 def progress_line(

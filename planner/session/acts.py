@@ -8,12 +8,13 @@ from typing import Any
 
 from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
 from planner.campaign.importing import ImportReport
+from planner.campaign.state import fold, last_acts
 from planner.errors import NoPoseLeftError, PlannerError
-from planner.recording.folder import TABLE
 from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
 from planner.session.course import BAD, Course, PoseInProgress
 from planner.session.page import page_with_hits, page_without_hits
+from planner.session.skipping import ask_why, on_reason_key
 from planner.session.station import Station
 from planner.session.verdicts import PoseBefore
 from planner.words import counted
@@ -41,12 +42,23 @@ def arrive(station: Station, course: Course) -> Course:
         return replace(course, stop="no pose left")
     station.teller.note()
     page = page_without_hits(
-        campaign, proposal, station.hits_per_pose, station.inbox.folder, course
+        campaign, proposal, station.hits_at(proposal), station.inbox.folder, course
     )
     page = page_with_hits(page, (), (), undoable(station), station.auto, course)
     station.screen.show(page.page)
     station.teller.tell()
     return replace(course, visit=PoseInProgress(proposal, page, time.monotonic()))
+
+
+def say_last_import(station: Station) -> None:
+    """What the last act gave, if it was an import: an interruption may have hidden it."""
+    campaign = station.campaign
+    acts = last_acts(campaign.entries, decisions_only=True)
+    event = acts[0].event if acts else None
+    if isinstance(event, Imported) and event.pose in campaign.state.measurements:
+        before = campaign.kept_model(fold(campaign.entries[: acts[0].seq - 1]))
+        told = session_text.against_expected(event.pose, campaign.model, before)
+        station.say(f"The last import, {event.pose}: {told}", "bold")
 
 
 def undoable(station: Station) -> bool:
@@ -57,8 +69,9 @@ def undoable(station: Station) -> bool:
 
 def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
     """Act on a key at a pose; without a visit the pose is over."""
+    act = _act if visit.typed is None else on_reason_key
     try:
-        return _act(station, course, visit, key)
+        return act(station, course, visit, key)
     except PlannerError as error:
         station.say(str(error), "red")
         return course
@@ -72,7 +85,8 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             if visit.good and not visit.page.complete and not visit.pressed:
                 station.say(session_text.incomplete(visit.page), "yellow")
                 return replace(course, visit=replace(visit, pressed=True))
-            files = [path for path in visit.whole if path not in visit.late | visit.unsure]
+            out = visit.late | visit.unsure | visit.unstated
+            files = [path for path in visit.whole if path not in out]
             return import_waiting(station, course, visit, files)
         case "b" if visit.late:
             return _to_before(station, course, sorted(visit.late))
@@ -90,13 +104,12 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             campaign.star(pose)
             station.say(f"★ {pose}")
         case "k":
-            campaign.skip(pose, "skipped in the session")
-            station.say(f"{pose} will not be offered again.")
-            return over
+            return replace(course, visit=ask_why(station, visit))
         case "u":
             return undo(station, over)
         case "n":
             campaign.skip(pose, "another was asked for")
+            station.say(f"{pose} will not be offered again.")
             return over
         case "q":
             return replace(course, stop="quit")
@@ -129,13 +142,9 @@ def import_waiting(
         return course
     # What the import would take as good, or ask for at every pose from here on.
     _refuse(station, visit, visit.weak | (frozenset() if station.auto else visit.unsure))
-    folder = station.inbox.folder
-    table = (folder / TABLE).is_file()
     try:
         with station.screen.working(IMPORTING):
-            reports = station.campaign.import_paths(
-                (folder,) if table else tuple(files), None if table else visit.proposal.pose
-            )
+            reports = _imported_files(station, files, visit.proposal.pose)
     except PlannerError as error:
         station.say(str(error), "red")
         bad = {station.inbox.digest(path) for path in files} if station.auto else set()
@@ -154,6 +163,14 @@ def import_waiting(
     return replace(course, visit=None, before=before, here=frozenset())
 
 
+def _imported_files(station: Station, files: Sequence[Path], pose: str) -> tuple[ImportReport, ...]:
+    """Import files at the poses that recordings.csv states; those it does not list at `pose`."""
+    bare = tuple(path for path in files if station.verdicts.table.row(path) is None)
+    listed = (station.inbox.folder,) if len(bare) < len(files) else ()
+    reports = station.campaign.import_paths(listed) if listed else ()
+    return (*reports, *(station.campaign.import_paths(bare, pose) if bare else ()))
+
+
 def _right(station: Station, course: Course, report: ImportReport) -> Course:
     """The engineer said before that hits which contradict others are right."""
     with station.screen.working("refitting"):
@@ -165,10 +182,10 @@ def _right(station: Station, course: Course, report: ImportReport) -> Course:
 
 def undo(station: Station, course: Course) -> Course:
     """Take back the last act of the engineer."""
-    entry = station.campaign.undo(decisions_only=True)
+    taken = station.campaign.undo(decisions_only=True)
     station.teller.note()
     station.screen.forget()
-    station.say(UndoneAct.of(entry).text())
+    station.say(UndoneAct.of(taken).text())
     return course.undone(station.campaign.state)
 
 

@@ -13,7 +13,7 @@ from planner.report import session_text
 from planner.report.pose_screen import PosePage
 from planner.session.verdicts import HitVerdict, Part, PoseBefore
 
-BAD = ("repeat", "unsure")
+BAD = ("repeat", "unsure", "unstated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,8 @@ class PoseInProgress:
 
     `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
     pressed though hits are missing; `refusing`: refuse was, though no hit is bad. `numbers` are
-    those of its hits, as they came.
+    those of its hits, as they came; `typed` is the reason for a skip as far as it is typed, None
+    where none is asked for.
     """
 
     proposal: Proposal
@@ -34,6 +35,7 @@ class PoseInProgress:
     pressed: bool = False
     refusing: bool = False
     numbers: dict[Part, int] = field(default_factory=dict)
+    typed: str | None = None
 
     def paths(self, *kinds: str) -> frozenset[Path]:
         """Files of which every hit is of one of these kinds."""
@@ -56,6 +58,11 @@ class PoseInProgress:
             path: " ".join(v.text for v in self.verdicts if v.path == path and v.kind in BAD)
             for path in files
         }
+
+    @property
+    def unstated(self) -> frozenset[Path]:
+        """Files that do not say along which axis they were hit: they wait until something does."""
+        return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "unstated")
 
     @property
     def late(self) -> frozenset[Path]:

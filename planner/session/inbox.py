@@ -12,20 +12,17 @@ from planner.recording.read import READERS, read
 
 TEXT, TEXT_LONGER = (".csv", ".tsv", ".txt"), 3.0
 SETTLED = 8.0  # times `quiet_s`: what does not read until then is not being written any more
+OLD_S = 60.0  # what was changed last so long ago is not being written either; chosen
 WRITING = "is still being written"
 
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds: its hash, why it does not read to its end, and whether it is foreign.
-
-    `unfit` is why no hit can be made of what reads.
-    """
+    """What a file holds: its hash, why it does not read to its end, and whether it is foreign."""
 
     digest: str = ""
     fault: str = ""
     foreign: bool = False
-    unfit: str = ""
 
 
 @dataclass
@@ -53,13 +50,13 @@ class Inbox:
             except OSError:
                 continue
             if not self._still(path, stat.st_size, stat.st_mtime):
-                waiting.append((path, WRITING))
+                waiting += [] if _old(stat.st_mtime) else [(path, WRITING)]
                 continue
             found = self._content(path, stat.st_size, stat.st_mtime)
-            settled = self._quiet(path) >= SETTLED * self.quiet_s
+            settled = self._settled(path)
             if found.digest in done:
                 continue
-            if not settled and (found.fault or found.unfit):
+            if not settled and (found.fault or self.unfit(path)):
                 waiting.append((path, WRITING))
             elif found.fault and not found.foreign:
                 waiting.append((path, found.fault))
@@ -72,7 +69,7 @@ class Inbox:
         found = [
             path for path, (_, content) in self._contents.items()
             if content.foreign and path not in self._ignored
-            and self._quiet(path) >= SETTLED * self.quiet_s
+            and self._settled(path)
         ]  # fmt: skip
         self._ignored.update(found)
         return found
@@ -88,6 +85,10 @@ class Inbox:
     def _quiet(self, path: Path) -> float:
         """For how long (s) a file has stood still."""
         return time.monotonic() - self._seen[path][2]
+
+    def _settled(self, path: Path) -> bool:
+        """Whether a file is surely not being written any more."""
+        return self._quiet(path) >= SETTLED * self.quiet_s or _old(self._seen[path][1])
 
     def _still(self, path: Path, size: int, modified: float) -> bool:
         known = self._seen.get(path)
@@ -106,7 +107,7 @@ class Inbox:
         try:
             digest = sha256(read_bytes(path))
             read(path)
-            found = Content(digest, unfit=self.unfit(path))
+            found = Content(digest)
         except PlannerError as error:
             found = Content(fault=str(error), foreign=isinstance(error, ForeignFileError))
         self._contents[path] = ((size, modified), found)
@@ -115,3 +116,7 @@ class Inbox:
     def digest(self, path: Path) -> str:
         """Content hash of a whole file."""
         return sha256(read_bytes(path))
+
+
+def _old(modified: float) -> bool:
+    return time.time() - modified > OLD_S

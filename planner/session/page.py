@@ -59,7 +59,7 @@ def _keys(page: PosePage, before: str, undoable: bool) -> str:
         ("R", "refuse all", bool(page.hits)),
         ("b", f"late ones to {before}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
-        ("s", "star", True), ("k", "skip", True), ("n", "other pose", True),
+        ("s", "star", True), ("k", "skip, say why", True), ("n", "never this pose", True),
         ("u", "undo", undoable), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.events import Proposal
 from planner.session.diagnosis_process import DiagnosisProcess
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys
@@ -31,11 +32,16 @@ class Station:
     teller: Teller
     verdicts: Verdicts
     auto: bool
-    hits_per_pose: int
+    hits_per_pose: int | None
     explaining: DiagnosisProcess | None
     explain_from: int
     started: float
     deadline: float | None
+
+    def hits_at(self, proposal: Proposal) -> int:
+        """How many hits make this pose."""
+        each = self.campaign.cell.config.cost.hits_per_axis
+        return self.hits_per_pose or each * len(proposal.hits)
 
     def key(self) -> str | None:
         """The next key, or None after POLL_S."""

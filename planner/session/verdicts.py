@@ -4,13 +4,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planner.dataset.screened_files import Source, Verdict, read_one
+from planner.dataset.screened_files import Source, Verdict, not_averaged, read_one
 from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import hit_count
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
+from planner.recording.sampling_rates import sampled_otherwise
+from planner.session.table import FolderTable
 
 # As like as hits of one pose are (0.98 and more on the true robots of the tests); at poses that a
 # campaign proposes one after the other it is below 0.9. Chosen between.
@@ -20,9 +22,10 @@ Part = tuple[Path, int]  # which of a file's hits, from 1
 
 @dataclass(frozen=True, eq=False)
 class HitVerdict:
-    """One hit that waits: `kind` is "good", "repeat" (why is in `text`), "late" or "unsure".
+    """One hit that waits: `kind` is "good", "repeat", "unstated", "late" or "unsure".
 
-    The `text` of a good one says what is to be known of it, if anything is. A late one answers as
+    Of one to be repeated `text` says why; nothing says along which axis an unstated one is. The
+    `text` of a good one says what is to be known of it, if anything is. A late one answers as
     the pose before did; an unsure one contradicts others, and nothing tells which is right. `axis`
     is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
     they came to the pose. An import would take it where it is `weak` only.
@@ -53,9 +56,12 @@ class PoseBefore:
 class Verdicts:
     """Judges files that wait at a pose; it keeps what it read, and nothing else."""
 
-    def __init__(self, band_hz: tuple[float, float], points: PointNames):
+    def __init__(
+        self, band_hz: tuple[float, float], points: PointNames, table: FolderTable | None = None
+    ):
         self._band = band_hz
         self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
+        self.table = table or FolderTable()
         self._read: dict[tuple, list[tuple[Verdict, tuple[Hit, ...]]]] = {}
 
     def unfit(self, path: Path) -> str:
@@ -107,16 +113,20 @@ class Verdicts:
 
     def _alone(self, path: Path, verdict: Verdict, own: tuple[Hit, ...], number: int) -> HitVerdict:
         kind = "repeat" if verdict.reason else "good"
+        kind = "unstated" if verdict.axis_missing else kind
         text = verdict.reason or " ".join(verdict.remarks)
         return HitVerdict(path, verdict.axis or "", kind, text, own, number)
 
     def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
-        """With what a vote among three and more hits of an axis says."""
+        """With which do not go with the others, and what a vote among three and more says."""
         hits = [hit for verdict in judged for hit in verdict.hits]
+        rates = dict(zip(map(id, hits), sampled_otherwise(hits), strict=True))
         repeats = dict(zip(map(id, hits), screen_repeats(tuple(hits), self._band), strict=True))
         out = []
         for verdict in judged:
-            told = [f.text for hit in verdict.hits for f in repeats[id(hit)] if f.refuse]
+            otherwise = dict.fromkeys(text for hit in verdict.hits if (text := rates[id(hit)]))
+            told = [not_averaged(verdict.path.name, text) for text in otherwise]
+            told += [f.text for hit in verdict.hits for f in repeats[id(hit)] if f.refuse]
             told = told if verdict.kind == "good" else []
             out.append(replace(verdict, kind="repeat", text=" ".join(told)) if told else verdict)
         return out
@@ -158,11 +168,13 @@ class Verdicts:
 
     def _hits_of(self, path: Path) -> list[tuple[Verdict, tuple[Hit, ...]]]:
         """The verdict on each hit in a file by itself, and what of it is usable."""
-        stat = path.stat()
-        key = path, stat.st_size, stat.st_mtime_ns
+        stat, row = path.stat(), self.table.row(path)
+        key = path, stat.st_size, stat.st_mtime_ns, str(row)
         if key not in self._read:
-            every = Source(path, path.name, stated=self._stated).parts(hit_count(path))
-            judged = [read_one(source, self._band) for source in every]
+            source = Source(path, path.name, stated=self._stated)
+            if row is not None:
+                source = replace(Source.of(row), path=path, name=path.name)
+            judged = [read_one(one, self._band) for one in source.parts(hit_count(path))]
             self._read[key] = [(verdict, hits) for verdict, hits, _ in judged]
         return self._read[key]
 

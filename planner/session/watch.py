@@ -14,7 +14,15 @@ from planner.replay import replay
 from planner.report import session_text
 from planner.report.answer import Answer
 from planner.report.rerun_story import Story
-from planner.session.acts import answer, arrive, import_waiting, interrupted, on_key, undoable
+from planner.session.acts import (
+    answer,
+    arrive,
+    import_waiting,
+    interrupted,
+    on_key,
+    say_last_import,
+    undoable,
+)
 from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
 from planner.session.inbox import Inbox
@@ -22,6 +30,7 @@ from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.session.page import page_with_hits
 from planner.session.screen import Screen
 from planner.session.station import Station
+from planner.session.table import FolderTable
 from planner.session.teller import Teller
 from planner.session.verdicts import Verdicts
 
@@ -45,7 +54,7 @@ def watch(
     *,
     console: Console,
     auto: bool = False,
-    hits_per_pose: int = 12,
+    hits_per_pose: int | None = None,
     rrd: Path | None = None,
     viewer: bool = False,
     explain: bool = False,
@@ -55,9 +64,10 @@ def watch(
 ) -> SessionSummary:
     """Run a session until quit, target, no pose left, or `limit_s`.
 
-    `auto` imports without asking, as does a session without a keyboard. `explain` diagnoses after
-    each import, beside the session, and says what the simulation lacks. Nobody else can act in the
-    campaign meanwhile: InputError names who does.
+    As many hits as campaign.toml's [cost] hits_per_axis make a pose, unless `hits_per_pose` says
+    otherwise. `auto` imports without asking, as does a session without a keyboard. `explain`
+    diagnoses after each import, beside the session, and says what the simulation lacks. Nobody else
+    can act in the campaign meanwhile: InputError names who does.
     """
     if not folder.is_dir():
         raise InputError(f"{folder} is no folder; name the one the analyser exports into.")
@@ -72,7 +82,10 @@ def watch(
         if explaining is not None:
             stack.callback(explaining.close)
         cell, started = campaign.cell, time.monotonic()
-        verdicts = Verdicts(cell.config.modes.band_hz, cell.robot.points)
+        verdicts = Verdicts(
+            cell.config.modes.band_hz, cell.robot.points,
+            FolderTable(folder, cell.robot.joints, cell.robot.points),
+        )  # fmt: skip
         inbox = Inbox(folder, quiet_s, verdicts.unfit)
         return _run(Station(
             campaign, inbox, Screen(console), source, Teller(campaign, story), verdicts,
@@ -87,6 +100,7 @@ def _run(station: Station) -> SessionSummary:
     try:
         for remark in campaign.cell.remarks:
             station.say(remark, "yellow")
+        say_last_import(station)
         while not course.stop:
             course = _step(station, course)
         station.teller.tell()
@@ -144,8 +158,9 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     visit = _looked(station, course, visit)
     course = replace(course, visit=visit)
     waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
-    if station.auto and visit.whole and (len(visit.whole) >= station.hits_per_pose or waited):
-        return import_waiting(station, course, visit, visit.whole)
+    ready = [path for path in visit.whole if path not in visit.unstated]
+    if station.auto and ready and (len(ready) >= station.hits_at(visit.proposal) or waited):
+        return import_waiting(station, course, visit, ready)
     course = on_key(station, course, visit, station.key())
     return _unless_late(station, course) if course.visit is not None else course
 
@@ -153,11 +168,12 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
 def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
     whole, waiting = station.inbox.scan(course.known(station.campaign.state))
+    waiting += station.verdicts.table.waiting
     for path in station.inbox.ignored():
         station.say(f"{path.name} is no recording; ignored.", "dim")
     numbers = station.verdicts.numbered(whole, visit.numbers)
     verdicts = station.verdicts.of(whole, course.before.hits, course.here, numbers)
-    now = (tuple(whole), tuple(waiting), tuple(verdict.kind for verdict in verdicts))
+    now = (tuple(whole), tuple(waiting), tuple((v.kind, v.text) for v in verdicts))
     if now == visit.shown:
         return visit
     page = page_with_hits(visit.page, verdicts, waiting, undoable(station), station.auto, course)

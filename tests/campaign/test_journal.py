@@ -5,6 +5,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 from hypothesis import given, settings
@@ -134,3 +135,13 @@ def test_one_writer_at_a_time_and_no_stale_lock(tmp_path):
     with Journal(path).writing(wait_s=5.0) as journal:  # the lock died with its holder
         journal.append(Starred("P003"))
     assert len(Journal(path).entries) == 5
+
+
+def test_a_session_is_not_waited_for(tmp_path):
+    path = tmp_path / "log.jsonl"
+    path.write_bytes(log_of(EVENTS))
+    with Journal(path).holding(session=True):
+        started = time.monotonic()
+        with pytest.raises(InputError, match="a session; close"), Journal(path).writing():
+            pass
+        assert time.monotonic() - started < 2.0

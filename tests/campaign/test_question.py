@@ -154,7 +154,9 @@ def test_held_hits_set_aside_are_refused_ones_and_further_ones_wait(campaign, po
     again = Campaign(campaign.directory)
     assert not again.state.held
     assert len(again.state.refused) == 12
-    assert all(hit.reason == "refused by the engineer" for _, hit in again.state.refused.values())
+    reasons = {hit.reason for _, hit in again.state.refused.values()}
+    assert all(reason.startswith("refused by the engineer; held before: ") for reason in reasons)
+    assert all("sd (" in reason for reason in reasons)
     (report,) = again.import_paths((folder,))
     assert report.accepted == ()
     assert len(report.left_out) == 12

@@ -118,6 +118,5 @@ def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
         (said,) = (text for text in again["remarks"] if "P001 was hit again" in text)
         assert word in said
         assert told("next", cell)["proposals"][0]["pose"] != "P001"
-        told("undo", cell)
-        told("undo", cell)
+        told("undo", cell)  # the import, and the proposal that followed
         assert told("next", cell)["proposals"][0]["pose"] == "P001"

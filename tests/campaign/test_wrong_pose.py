@@ -1,4 +1,4 @@
-"""Hits of another pose of the workspace, under a pose's name, after three measurements."""
+"""Hits of another pose of the workspace, under a pose's name, after one to three measurements."""
 
 import csv
 
@@ -17,9 +17,9 @@ ARMS = ((911, 4, 2), (912, 4, 3), (913, 5, 3), (914, 4, 2), (915, 5, 3))  # seed
 POSES, PAIRS = 24, 40
 
 
-def three_measured(arm: Arm, folder) -> Campaign:
+def measured(arm: Arm, folder, poses: int = 3) -> Campaign:
     campaign = Campaign.new(folder / "campaign", arm.robot_toml, arm.campaign_toml)
-    for number in range(3):
+    for number in range(poses):
         (pose,) = campaign.next()
         named = [(pose.pose, np.deg2rad(pose.joints_deg))]
         (report,) = campaign.import_paths((arm.record(folder / pose.pose, named, number),))
@@ -43,7 +43,7 @@ def modes_at(arm: Arm, folder, q: np.ndarray) -> list:
 def judged(folder, seed: int, joints: int, modes: int) -> tuple[bool, int, int]:
     """Whether the simulation fits, and how often was asked of wrong poses and of right ones."""
     arm = make_generated_arm(folder, seed, joints, modes)
-    campaign = three_measured(arm, folder)
+    campaign = measured(arm, folder)
     rng = np.random.default_rng(seed + 2)
     q = rng.uniform(*arm.box_rad.T, (POSES, joints))
     found = modes_at(arm, folder, q)
@@ -55,6 +55,26 @@ def judged(folder, seed: int, joints: int, modes: int) -> tuple[bool, int, int]:
     pairs = [rng.choice(POSES, 2, replace=False).tolist() for _ in range(PAIRS)]
     wrong = sum(asked(stated, true) for stated, true in pairs)
     return campaign.model.low.taught, wrong, sum(asked(i, i) for i in range(POSES))
+
+
+@pytest.mark.parametrize("poses", [1, 2])
+def test_another_pose_is_asked_about_before_three_are_measured(tmp_path, poses):
+    arm = make_generated_arm(tmp_path, 922, 4, 3)
+    campaign = measured(arm, tmp_path, poses)
+    q = np.random.default_rng(924).uniform(*arm.box_rad.T, (6, 4))
+    first = np.deg2rad(campaign.state.used[0].joints_deg)
+    *found, again = modes_at(arm, tmp_path, np.vstack([q, first]))
+
+    def asked(at: int, modes):
+        angles = tuple(np.rad2deg(q[at]).tolist())
+        return question(campaign.model, campaign.state, "X", angles, modes)
+
+    assert not any(asked(i, found[i]) for i in range(6))
+    repeated = [asked(i, again) for i in range(6)]
+    assert [one and one.fits for one in repeated] == ["P001"] * 6
+    assert all("repeat the modes measured at P001" in one.text for one in repeated if one)
+    wrong = [asked(i, found[j]) is not None for i in range(6) for j in range(6) if i != j]
+    assert np.mean(wrong) >= (0.7 if poses == 1 else 0.9)
 
 
 @pytest.mark.slow

@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 from planner.campaign.example import EXAMPLE
+from planner.check.remark import CheckRemark
 from planner.cli.run import run
+from planner.report.robot_check import _summary
 from tests.support.plain_arm import make_plain_arm, plain_campaign
 
 ROBOT, URDF, PLAN = "robot/robot.toml", "robot/robot.urdf", "campaign.toml"
@@ -202,3 +204,9 @@ def test_the_robot_is_drawn(tmp_path, capsys):
     (picture,) = answer["plots"]
     assert code == 0
     assert Path(picture).stat().st_size > 20_000
+
+
+def test_notes_are_counted_where_nothing_looks_wrong():
+    note = CheckRemark("note", "robot", "The rail has no limits", "state them")
+    assert _summary((note,)).plain == "Nothing looks wrong; 1 note above."
+    assert _summary(()).plain == "Nothing looks wrong."

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import shutil
 import threading
 import time
@@ -14,11 +15,16 @@ from rerun.chunk import RrdReader
 from rich.console import Console
 
 from planner.campaign.campaign import Campaign
+from planner.dataset.screened_files import Source
+from planner.recording.folder import TABLE
+from planner.replay import replay
 from planner.report.rerun_story import Story
 from planner.session.diagnosis_process import DiagnosisProcess, diagnose_measured
+from planner.session.teller import Teller
 from planner.session.watch import watch
 from planner.truth.hits import simulate_hit, write_uff
-from tests.support.outside import HAMMER, make_cell, record
+from tests.support.hit_csv import write_csv
+from tests.support.outside import HAMMER, make_cell, record, told
 
 SIX = ("+x", "+x", "+y", "+y", "+z", "+z")
 WANTED = (
@@ -85,7 +91,8 @@ def test_a_session_shows_imports_and_goes_on(cell):
     analyser = threading.Thread(target=deliver, args=(truth, tmp_path, proposal, 0))
     script = Script(console, [
         (wait("all hits are in"), "?"), (wait("set all waiting hits aside"), "s"),
-        (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("not be offered"), "u"),
+        (wait("★"), "a"), (wait("Pose P001: 9 hits in"), "k"), (wait("stands in the way?"), "\n"),
+        (wait("not be offered"), "u"),
         (wait("Took back"), "q"),
     ])  # fmt: skip
     analyser.start()
@@ -246,6 +253,95 @@ def test_a_table_of_recordings_in_the_folder_gives_the_readback(cell):
     measured = campaign.state.measurements[proposal.pose].joints_deg
     off = np.max(np.abs(np.subtract(measured, proposal.joints_deg)))
     assert 0 < off <= 0.011
+
+
+def test_files_that_do_not_say_their_axis_wait_for_the_table(cell):
+    """The table is written while the session runs; nothing is called a bad hit."""
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    made = record(truth, tmp_path / "made", proposal.pose, proposal.joints_deg)
+    inbox, table = tmp_path / "inbox", (made / TABLE).read_text()
+    for path in sorted((made / "data").iterdir()):
+        (hit,), _ = Source(path, path.name).read()
+        write_csv(inbox / f"{path.stem}.csv", hit, stated=False)
+    console = screen()
+
+    def ask(text):
+        if "9 of no stated axis" not in text:
+            return False
+        (inbox / TABLE).write_text(table.replace("data/", "").replace(".uff", ".csv"))
+        return True
+
+    script = Script(console, [(ask, "s"), (wait("all hits are in"), "a"),
+                              (wait("P001: 9 hits in"), "q")])  # fmt: skip
+    watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
+          limit_s=30)  # fmt: skip
+    text = console.export_text()
+    assert "along which axis? " in text
+    assert '"# hit: +x"' in text
+    assert "REPEAT HIT" not in text
+    assert len(campaign.state.used[0].accepted) == 9
+
+
+def test_undo_after_an_interrupted_import_takes_it_back_with_its_proposal(cell, monkeypatch):
+    """What the import gave was never on the screen: the next session begins with it."""
+    campaign, truth, tmp_path = cell
+    proposal = campaign.next()[0]
+    deliver(truth, tmp_path, proposal, 0)
+    inbox, console = tmp_path / "inbox", screen()
+    script = Script(console, [(wait("all hits are in"), "a")])
+    with monkeypatch.context() as patched:
+        patched.setattr(Teller, "note", interrupt)  # right after the import
+        watch(campaign, inbox, console=console, keys=script, hits_per_pose=9, quiet_s=0.05,
+              limit_s=30)  # fmt: skip
+    assert "the hits of P001: that is in the log; planner undo" in flat(console)
+    console = screen()
+    script = Script(console, [(wait("go to pose P002"), "q")])
+    watch(Campaign(campaign.directory), inbox, console=console, keys=script, quiet_s=0.05)
+    assert re.search(r"The last import, P001: [\d.]+ Hz \(expected [\d.]+, .* sd\)", flat(console))
+    undone = told("undo", campaign.directory)
+    assert (undone["event"], len(undone["with_it"])) == ("imported", 1)
+    again = Campaign(campaign.directory)
+    assert again.state.measurements == {}
+    assert again.next()[0] == proposal
+    assert all(step.check in ("identical", "kept") for step in replay(again))
+
+
+def interrupt(teller, reports=()):
+    if reports:
+        raise KeyboardInterrupt
+
+
+def flat(console) -> str:
+    return " ".join(console.export_text(clear=False).split())
+
+
+def test_a_skip_asks_for_its_reason_and_typing_runs_no_command(cell):
+    campaign, _, tmp_path = cell
+    console = screen()
+    keys = [
+        (wait("go to pose P001"), "k"),
+        (wait("stands in the way?"), "q"),
+        (wait(" q_"), "\x7f"),
+    ]
+    keys += [(lambda text: True, letter) for letter in "husk"] + [(wait(" husk_"), "\n")]
+    script = Script(console, [*keys, (wait("P001 and poses around it will not"), "q")])
+    summary = watch(campaign, tmp_path / "inbox", console=console, keys=script, limit_s=30)
+    assert summary.stopped == "quit"
+    assert campaign.state.skipped == {"P001": "husk"}
+    assert campaign.state.avoided == {"P001"}
+
+
+def test_as_many_hits_make_a_pose_as_the_campaign_file_says(cell):
+    campaign, truth, tmp_path = cell
+    decided = campaign.directory / "campaign.toml"
+    decided.write_text(decided.read_text() + "\n[cost]\nhits_per_axis = 3\n")
+    campaign = Campaign(campaign.directory)
+    deliver(truth, tmp_path, campaign.next()[0], 0)
+    console = screen()
+    script = Script(console, [(wait("all hits are in"), "q")])
+    watch(campaign, tmp_path / "inbox", console=console, keys=script, quiet_s=0.05, limit_s=20)
+    assert "x  3/3" in console.export_text()
 
 
 def test_the_next_pose_is_on_the_screen_before_pictures_are_made(cell, monkeypatch):

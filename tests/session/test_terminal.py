@@ -38,6 +38,8 @@ def test_keys_and_screen_of_a_terminal(tmp_path):
         os.write(ours, b"a")
         read_until(ours, "No whole new file waits yet.")
         os.write(ours, b"k")
+        read_until(ours, "stands in the way?")
+        os.write(ours, b"\n")
         second = read_until(ours, "go to pose P002")
         assert "P001 will not be offered again." in second
         os.write(ours, b"q")

@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planner.dataset.screened_files import Source, read_files
+from planner.frf.estimator import estimate
 from planner.recording.points import PointNames
 from planner.session.inbox import Inbox
 from planner.session.verdicts import PoseBefore, Verdicts
 from planner.truth.hits import simulate_hit, write_uff
+from tests.support.hit_csv import write_csv
 from tests.support.outside import HAMMER, make_cell
 from tests.support.robots import BAND_HZ
 
@@ -156,3 +159,35 @@ def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(benc
     box.scan(set())
     time.sleep(0.05)
     assert "half.uff" in [path.name for path in box.scan(set())[0]]
+
+
+def test_a_hit_sampled_at_another_rate_alone_is_not_taken(bench):
+    for name, axis in (("x1", "+x"), ("x2", "+x"), ("y1", "+y")):
+        bench.hit(name, axis)
+    bench.files.append(at_rate(bench.files[1], "slow", HAMMER.sampling_rate_hz / 2))
+    found = bench.of()
+    assert kinds(found) == {"x1": "good", "x2": "good", "y1": "good", "slow": "repeat"}
+    assert "sampled at 320 Hz, the others at 640 Hz; export all alike" in found["slow"].text
+    # What a rounded time column cannot tell apart is one rate, though lines of the band shift.
+    bench.files[-1] = at_rate(bench.files[1], "rounded", HAMMER.sampling_rate_hz * (1 - 5e-6))
+    assert set(kinds(bench.of()).values()) == {"good"}
+    told = read_files(tuple(Source(path, path.name) for path in bench.files), BAND_HZ)
+    assert all(verdict.accepted for verdict in told.verdicts)
+    assert estimate(told.agreeing, BAND_HZ).hits == (3, 1, 0)
+
+
+def at_rate(path: Path, name: str, rate_hz: float) -> Path:
+    """The same hit as a file of another sampling rate."""
+    (hit,), _ = Source(path, path.name).read()
+    return write_csv(path.with_name(f"{name}.csv"), hit, rate_hz)
+
+
+def test_a_foreign_file_of_long_ago_is_not_said_to_be_written(tmp_path):
+    old = tmp_path / "temperature.csv"
+    old.write_text("time,°C\n" + "12:00,21\n" * 20)
+    os.utime(old, (time.time() - 600,) * 2)
+    box = Inbox(tmp_path, 0.02)
+    assert box.scan(set()) == ([], [])
+    time.sleep(0.1)  # the size stood still, though not for as long as a new file has to
+    assert box.scan(set()) == ([], [])
+    assert box.ignored() == [old]

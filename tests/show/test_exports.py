@@ -76,7 +76,7 @@ def test_tables_and_mat_hold_the_same_numbers(named, tmp_path):
     assert mat["measured"][1]["pose"] == used[1].pose
     with (tmp_path / "frfs.csv").open() as file:
         lines = [r for r in csv.DictReader(file) if r["source"] == "predicted"]
-    first = complex(float(lines[0]["real"]), float(lines[0]["imag"]))
+    first = complex(*(float(lines[0][f"{part}_m_s2_per_n"]) for part in ("real", "imag")))
     assert first == pytest.approx(mat["frf_mean"][0, 0, 0, 0], rel=1e-8)
 
 

@@ -36,8 +36,8 @@ def _mode_rows(found: Collected) -> Iterator[list[object]]:
 
 def frfs_csv(found: Collected) -> str:
     """Measured and predicted accelerances in m/s²/N, one line of one FRF a row."""
-    header = ["source", "pose", "response", "hit", "frequency_hz", "real", "imag", "sd",
-              "coherence"]  # fmt: skip
+    numbers = [f"{part}_m_s2_per_n" for part in ("real", "imag", "sd")]
+    header = ["source", "pose", "response", "hit", "frequency_hz", *numbers, "coherence"]
     return _text(found, header, _frf_rows(found))
 
 
@@ -84,6 +84,7 @@ def mat_arrays(found: Collected) -> dict[str, Any]:
         "frequency_hz": p.frequency_hz,
         "frf_mean": p.frf_mean,
         "frf_sd": p.frf_sd,
+        "frf_unit": "m/s^2/N",
         "mode_frequency_hz": modes.frequency_hz,
         "mode_frequency_sd_hz": modes.frequency_sd_hz,
         "mode_damping_ratio": modes.damping_ratio,

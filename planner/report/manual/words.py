@@ -75,7 +75,8 @@ FORMATS = (
      "(type 12, m/s²) with rsp_dir 1, 2, 3 for x, y, z of the sensor and ref_dir for the hit; or "
      "FRFs (function type 4), with or without coherence (type 6)"),
     ("CSV, MAT, HDF5, TDMS", "columns or arrays named time_s, force_n, acceleration_x_m_s2, …; for "
-     "FRFs frequency_hz, accelerance_xx, …; the hit as attribute, or in recordings.csv"),
+     "FRFs frequency_hz, accelerance_xx, …; the hit as attribute hit = +x, in a CSV as its first "
+     "line: # hit: +x; or else in recordings.csv"),
 )  # fmt: skip
 
 NUMBERS = (
