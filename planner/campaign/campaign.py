@@ -165,10 +165,10 @@ class Campaign(CampaignReads):
             self._append(Starred(pose))
 
     def undo(self, decisions_only: bool = False) -> tuple[Entry, ...]:
-        """Take back the last act (import, answer, refusal, withdrawal, skip, star).
+        """Take back the last act (proposal, import, answer, refusal, withdrawal, skip, star).
 
-        Proposals that followed it go with it and are given after it; where there is no other act
-        the last proposal is taken back, unless `decisions_only`.
+        With `decisions_only` the last that is no proposal; those that followed it go with it and
+        are given after it.
         """
         with self._acting():
             acts = last_acts(self.entries, decisions_only)

@@ -22,6 +22,7 @@ from planner.identification.hit_misses import (
     tell_misses,
 )
 from planner.identification.measurement_model import ACROSS, Tolerances
+from planner.identification.objective import stands
 from planner.identification.parameters import parametrise
 from planner.identification.simulated_visit import SolvedPoses
 from planner.identification.visit_equations import AIMED, OWN
@@ -134,6 +135,10 @@ def tell(
         return CampaignMisses((), None, t, band_hz)
     simulation = learned.structure.simulation
     known = Known(simulation, parametrise(simulation, learned.priors), learned.identified.mean)
+    matrices = simulation.elastic.matrices(np.array([one.q for one in those]))
+    springs = known.parametrisation.elasticity(known.x[: len(known.parametrisation.parameters)])
+    if not stands(matrices, springs.stiffness):  # at a pose that it was not identified from
+        return CampaignMisses((), None, t, band_hz)
     told = tell_misses([VisitHits(one.q, one.columns) for one in those], known, t, TELL_BY)
     return CampaignMisses(those, told, t, band_hz)
 

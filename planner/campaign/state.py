@@ -141,17 +141,19 @@ def _made(state: CampaignState, event: Proposed) -> int:
 
 
 def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
-    """What `undo` would take back: the last decision, and the proposals that followed it.
+    """What `undo` would take back: the last act; a proposal is one, too.
 
-    Proposals follow of themselves, also after an act that was interrupted; where nothing was
-    decided the last of them is taken back alone, unless `decisions_only`.
+    With `decisions_only` the last decision, and the proposals that followed it: in a session they
+    follow of themselves, also after an act that was interrupted.
     """
     entries = tuple(entries)
     undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
     acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
+    if not decisions_only:
+        return tuple(acts[-1:])
     proposals = list(takewhile(lambda e: isinstance(e.event, Proposed), reversed(acts)))
     if len(proposals) == len(acts):
-        return () if decisions_only else tuple(proposals[:1])
+        return ()
     decision = acts[-1 - len(proposals)]
     before = fold(entries[: decision.seq - 1])
     return (decision, *(() if before.unchanged_by(decision.event) else proposals))

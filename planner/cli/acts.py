@@ -36,7 +36,7 @@ def confirm(
 
 
 def undo(directory: Directory, as_json: AsJson = False) -> int:
-    """Take back the last act, and the proposal that followed it.
+    """Take back the last act.
 
     Example: planner undo cell7
     """

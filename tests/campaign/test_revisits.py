@@ -118,5 +118,6 @@ def test_a_robot_that_softened_is_told_by_the_command(tmp_path):
         (said,) = (text for text in again["remarks"] if "P001 was hit again" in text)
         assert word in said
         assert told("next", cell)["proposals"][0]["pose"] != "P001"
-        told("undo", cell)  # the import, and the proposal that followed
+        told("undo", cell)
+        told("undo", cell)
         assert told("next", cell)["proposals"][0]["pose"] == "P001"

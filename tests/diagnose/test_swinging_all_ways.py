@@ -1,0 +1,51 @@
+"""What hangs on three unlike springs, as it is written for the simulation."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from planner.diagnosis.effects.hanging_resonator import HangingResonator
+from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.linear.predict import misfit_at
+from planner.diagnosis.linear.problem import Problem
+from planner.dynamics.simulation import Simulation
+from planner.robot.config import EffectTable
+from planner.robot.robot import Robot
+from tests.support.known_robots import KR210
+
+LINES = np.linspace(6.0, 60.0, 109)
+HUNG_HZ = 14.0, 24.0, 40.0
+
+
+@pytest.fixture(scope="module")
+def stated(tmp_path_factory) -> Simulation:
+    return Simulation(Robot.load(KR210.write(tmp_path_factory.mktemp("robot"))))
+
+
+def hanging(stated: Simulation) -> tuple[HangingResonator, np.ndarray]:
+    """What hangs on link 3, and its ψ."""
+    slides = next(e for e in LocalResonator.everywhere(stated) if e.at == "link_3")
+    hangs = HangingResonator.of(slides)
+    turn, place = [0.3, -0.4, 0.2], [q.mean + 0.05 for q in hangs.quantities[-3:]]
+    return hangs, np.array([np.log(12.0), *np.log(HUNG_HZ), np.log(0.05), *turn, *place])
+
+
+def test_as_elements_it_answers_alike(stated):
+    """Three that slide, and twice the mass taken away, move the robot as the one that hangs."""
+    hangs, psi = hanging(stated)
+    q = KR210.poses(2, 3)
+    misfit = misfit_at(Problem((), q, stated, (6.0, 60.0)), hangs, q, LINES)
+    x = misfit.mean.copy()
+    x[misfit.split[1] :] = psi
+    values = {
+        part.name: (part.value(p), 0.0, part.unit)
+        for part, p in zip(hangs.quantities, psi, strict=True)
+    }
+
+    block = {"effect": hangs.name, "at": hangs.at, **hangs.elements(stated, values)}
+    springs = [{} for _ in stated.robot.config.compliance]
+    bodies = stated.elastic.bodies
+    nothing = np.zeros((len(bodies), 10))
+    with_it = stated.with_effects(springs, [msgspec.convert(block, EffectTable)], bodies, nothing)
+    h, wanted = with_it.accelerance(q, LINES), misfit.values(x)[0]
+    assert np.linalg.norm(h - wanted) < 1e-3 * np.linalg.norm(wanted)  # but for its weight
