@@ -17,6 +17,7 @@ from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.measurement_model import Tolerances
+from planner.identification.objective import TOO_SOFT
 from planner.identification.parameters import Parametrisation
 from planner.identification.simulated_visit import SimulatedPoses
 from planner.identification.visit_equations import (
@@ -28,6 +29,7 @@ from planner.identification.visit_equations import (
 )
 from planner.modal.residues import laplace
 
+UNSTABLE = 1e-6  # of a pole, that its real part is above 0: rounding is less
 SIZES = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 0.3)  # of the discrepancy, relative to modal shapes
 FEWEST_LINES, LINES = 16, 192  # a pose, and of all poses that tell the common numbers together
 STEPS = 4  # linearisations
@@ -174,6 +176,8 @@ class _Common:
             return ()
         q = np.array([visit.q for visit in visits])
         poses = SimulatedPoses.of(simulation, self.known.parametrisation, q)
+        if np.any(poses.solved.poles.real > UNSTABLE * np.abs(poses.solved.poles)):
+            raise InputError(TOO_SOFT)
         found = []
         for i, visit in enumerate(visits):
             columns = visit.columns
