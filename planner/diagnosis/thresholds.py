@@ -18,10 +18,11 @@ UNKNOWN = "unknown"
 NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong; chosen
 SECOND_EFFECT = 0.2  # how much less likely one more effect is than one; chosen on generated cases
 SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; chosen
-# Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong:
-# that of the generated robots. Dampers scatter more, and a loss factor may take the place of one:
-# chosen. Inertias do as in any identification (CAD_INERTIAS).
-STIFFNESS_FACTOR, DAMPING_FACTOR = 1.17, 2.0
+# Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong, as
+# data sheets of gears do, that state them to a fifth or a third. Dampers scatter more, and a loss
+# factor may take the place of one. Chosen, looking at two robots with nothing wrong. Inertias do as
+# in any identification (CAD_INERTIAS).
+STIFFNESS_FACTOR, DAMPING_FACTOR = 1.25, 2.0
 # By how much of its radius of gyration a body's mass lies elsewhere than stated: cables, oil and
 # covers, 8 % of it (CAD_INERTIAS), lie about as far from its centre.
 MASS_ELSEWHERE = 0.08
@@ -131,6 +132,7 @@ RESIDUAL_SHARE = 0.25  # of the largest, that makes a band, pose or direction on
 PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same
 LAW_EXPLAINS = 0.6  # of the levels' excess of χ², that a law at one joint has to take away
 LAW_HOPEFUL = 0.3  # of the same, from which on a law is followed to its end
+LAW_SURELY = 0.9  # of the same, from which a law is not looked for from another linear fit; chosen
 # Of the same, by an equivalent stiffness for each hit: below, no single joint is it, and below the
 # other several may be.
 LINEARISED, ONE_JOINT = 0.4, 0.8
@@ -145,8 +147,9 @@ SEVERAL_RIVAL = 4.0  # times what the best law leaves: beyond, another is not fo
 SEVERAL_EVIDENCE = 50.0  # nats: what is explained at other poses, by so many numbers, is no chance
 
 # Levels against repeats: the chance that hits of one level, shared out among levels at random,
-# differ as much as levels do; and how often they are shared out
-BY_CHANCE, SHARED_OUT = 1e-3, 4000
+# differ as much as levels do, for these to be told, and for a law to be looked for, which has to
+# explain them then; and how often they are shared out. Chosen.
+BY_CHANCE, LAW_BY_CHANCE, SHARED_OUT = 1e-3, 0.1, 4000
 
 # A tone that sounds without any hit: chosen on generated cases
 TONE_WIDTH_HZ = 1.0  # half of what a tone takes up under the window

@@ -17,7 +17,14 @@ from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.misses_again import abstained
 from planner.diagnosis.screens import drift, force_levels, repeats
 from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.thresholds import BY_CHANCE, DRIFT_STILL, LAWS_OF_JOINTS, UNKNOWN
+from planner.diagnosis.thresholds import (
+    BY_CHANCE,
+    DRIFT_STILL,
+    LAW_BY_CHANCE,
+    LAWS_OF_JOINTS,
+    UNKNOWN,
+)
+from planner.recording.records import Hit
 from tests.support.level_cases import LevelCase, Protocol, made
 
 HARDENING = 0.3  # k₃θ² over k at the largest angle of the strongest hits
@@ -75,7 +82,9 @@ def test_a_joint_that_hardens_is_found_beside_misses(hardening):
 def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     """Levels that differ, by no law: misses do as much as a structure that is not linear."""
     once = linear.recorded.corrected(
-        replace(v, hits=tuple(h for i, h in enumerate(v.hits) if i // 3 % 2 == 0))
+        replace(
+            v, hits=tuple(h for i, h in enumerate(v.hits) if h.axis_index == 0 and i // 3 % 2 == 0)
+        )
         for v in linear.recorded.visits
     )
     assert repeats.chance(once, misses_of(replace(linear, recorded=once))) is None
@@ -86,7 +95,19 @@ def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     told, (remark,) = abstained((found,))
     assert told == ()
     assert "only repeats show which" in remark
-    assert "Hit twice at each level at pose P1 along xyz" in remark
+    assert "Hit twice at each level at pose P1 along x" in remark
+
+
+def test_without_repeats_the_order_of_levels_tells(linear):
+    def first(hits: tuple[Hit, ...]) -> tuple[Hit, ...]:
+        kept = {(h.axis_index, linear.recorded.level(h)): h for h in reversed(hits)}
+        return tuple(h for h in hits if any(h is one for one in kept.values()))
+
+    visits = (replace(v, hits=first(v.hits)) for v in linear.recorded.visits)
+    once = replace(linear, recorded=linear.recorded.corrected(visits))
+    by_chance = repeats.chance(once.recorded, misses_of(once))
+    assert by_chance is not None
+    assert by_chance > LAW_BY_CHANCE
 
 
 def test_misses_are_left_open_as_the_dense_gaussian_says():

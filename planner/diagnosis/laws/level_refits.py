@@ -4,7 +4,7 @@ Of joints that are not linear, springs that follow the force level: what each do
 grows tells, joint by joint, about where a law's numbers lie.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +16,8 @@ from planner.diagnosis.laws.equivalent_stiffness import receptances, swing, syst
 from planner.diagnosis.laws.starting_values import faded
 from planner.diagnosis.laws.torque_laws import LEAST_SHARE, Law
 from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.linear.problem import FINE, GLANCE
+from planner.diagnosis.linear.fit import Fit, fit
+from planner.diagnosis.linear.problem import FINE, GLANCE, Problem
 from planner.diagnosis.thresholds import LAW_ANGLE_LOG_SD, LAW_LOG_SHARE, LAW_LOG_SHARE_SD
 from planner.dynamics.simulation import Simulation
 from planner.inference.least_squares import minimise
@@ -48,6 +48,18 @@ def base(recorded: Dataset, nominal: Simulation) -> Fit:
     found = minimise(rough, rough.mean, 1e-4, LOG_STEPS)
     misfit = problem.misfit(Effect(""), FINE)
     return Fit(Effect(""), misfit, found.x, misfit.by_pose(found.x))
+
+
+def bases(recorded: Dataset, nominal: Simulation) -> Iterator[tuple[Problem, Fit]]:
+    """Linear fits to the averages that laws may begin from, the most complete first.
+
+    With all that is free where one looks closely; without what every robot's bearings give; and
+    `base`. Which of them leads to the law that is there depends on how strong that is.
+    """
+    for as_built in (True, False):
+        problem = problem_of(recorded, nominal, as_built=as_built)
+        yield problem, fit(problem, Effect(""))
+    yield problem_of(recorded, nominal), base(recorded, nominal)
 
 
 def refits(recorded: Dataset, nominal: Simulation) -> tuple[Refit, ...]:

@@ -29,6 +29,7 @@ RELATIVE = 0.01  # of B: what no simulation is right to, however well it fits
 # Of what a tilt does, as hits along the other axes tell it that miss by themselves.
 TILTED = 0.03
 RAISED = 6  # times at most that B is taken to be less certain, until repeats agree
+MOST_UNCERTAIN = 1.0  # share of B: a joint that is not linear answers no two hits alike
 LINES = 128  # most lines a column
 
 
@@ -92,7 +93,8 @@ class OpenMisses:
     def told(cls, plain: Fit, recorded: Dataset, tolerances: Tolerances) -> "OpenMisses":
         """By how well the simulation fits, and by the repeats at one level, if there are any.
 
-        B is so uncertain at each visit that its repeats differ no more than is left open.
+        B is so uncertain at each visit that its repeats differ no more than is left open, unless
+        that were more than all of it.
         """
         off = np.hypot(RELATIVE, relative_misfit(plain))
         for number, hits in enumerate(hit_columns(recorded)):
@@ -101,7 +103,7 @@ class OpenMisses:
                 left = _left(cls(plain, tolerances, off).of_hits(number, hits), pairs)
                 if left <= 1:
                     break
-                off[number] *= np.sqrt(left)
+                off[number] = min(off[number] * np.sqrt(left), MOST_UNCERTAIN)
         return cls(plain, tolerances, off)
 
     def of_hits(

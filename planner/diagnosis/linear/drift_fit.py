@@ -32,10 +32,11 @@ class DriftMisfit(Misfit):
         p, (a, b) = self.parametrisation, self.split
         elasticity = p.elasticity(x[:a])
         psi, slope = self.effect.log_factor(self.order, x[b:])
+        members = self.effect.members(self.setting.simulation)
         mass = self.matrices.mass + self.inertias.mass_change(x[a:b])
         values, slopes, turns = [], [], []
         for i in range(len(self.order)):
-            now = replace(elasticity, stiffness=elasticity.stiffness * np.exp(psi[i]))
+            now = replace(elasticity, stiffness=elasticity.stiffness * np.exp(members @ psi[i]))
             one = slice(i, i + 1)
             m = self.matrices
             matrices = m.at(one)
@@ -47,8 +48,8 @@ class DriftMisfit(Misfit):
             full = motion_slopes(motion, now, inertias)
             e, springs = p.size, len(p.held)
             theta = np.einsum("np...,pq->nq...", full[:, :springs], p.spread, optimize=True)
-            along = full[:, :e].sum(axis=1)
-            own = slope[i][None, :, None, None, None] * along[:, None]
+            along = np.einsum("ne...,eg->ng...", full[:, :e], members)
+            own = np.einsum("pg,ng...->np...", slope[i], along)
             values.append(motion.accelerance)
             turns.append(motion)
             slopes.append(np.concatenate([theta, full[:, springs:], own], axis=1))

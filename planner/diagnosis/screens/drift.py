@@ -4,12 +4,12 @@ A pose that was visited twice tells by itself; otherwise the simulation, refitte
 course, takes what belongs to the pose.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from planner.dataset.dataset import Dataset
-from planner.diagnosis.effects.drift import Drift
+from planner.diagnosis.effects.drift import BEND, Drift, change_of
 from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
@@ -19,9 +19,10 @@ from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
     ALIKE,
+    AT_NOISE,
     CLEAR,
-    DRIFT_BEND_SD,
     DRIFT_COURSE,
+    DRIFT_CRUDE,
     DRIFT_GAINS,
     DRIFT_LOG_SD,
     DRIFT_MOVED,
@@ -32,17 +33,34 @@ from planner.inference.evidence import temper
 
 
 def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
-    """The refitted simulation without drift, and with it: gradual, and at once."""
+    """The refitted simulation without drift, and with it: gradual, at once, of single joints."""
     problem = problem_of(recorded, nominal, as_built=True)
     plain = fit(problem, Effect(""))
     end = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
-    gradual = Drift("campaign", (end, Quantity("bend", "1", 0.0, DRIFT_BEND_SD)), "gradual")
-    found = [fit(problem, gradual, [plain])]
+    gradual = fit(problem, Drift("campaign", (end, BEND), "gradual"), [plain])
     count = len(problem.order) - 1
     each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, DRIFT_LOG_SD) for i in range(count))
     free = fit(problem, Drift("campaign", each, "free"), [plain])
-    found.append(fit(problem, Drift("campaign", (end,), "step", _since(free, problem)), [free]))
-    return plain, *found
+    step = fit(problem, Drift("campaign", (end,), "step", _since(free, problem)), [free])
+    if min(gradual.per_value, step.per_value) < AT_NOISE:
+        return plain, gradual, step
+    return plain, gradual, step, *_of_joints(problem, plain)
+
+
+def _of_joints(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
+    """With drift of those joints that move surely; none where even so little is followed."""
+    every = fit(problem, Drift.of_each(problem.simulation), [plain])
+    assert isinstance(every.effect, Drift)
+    if every.per_value > DRIFT_CRUDE:
+        return ()
+    values = every.parameters(temper(every.per_value, ALIKE))
+    moved = [j for j in every.effect.joints if _sure(values[change_of(j)])]
+    return (fit(problem, Drift.of_joints(moved), [every]),) if moved else ()
+
+
+def _sure(change: tuple[float, float, str]) -> bool:
+    value, sd, _ = change
+    return abs(value) > DRIFT_MOVED * sd
 
 
 def _since(free: Fit, problem: DriftProblem) -> float:
@@ -61,27 +79,42 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
         return ()
     plain, *found = fits(recorded, nominal)
     problem = problem_of(recorded, nominal, as_built=True)
-    best = settle(problem, min(found, key=lambda f: f.per_value))
+    best = settle(problem, _likeliest(found))
     # A fit that drift led out of a wrong minimum gains by that alone: it does without drift too.
     back = carried_on(problem, best, Effect(""))
     plain = min((plain, back), key=lambda f: f.per_value)
     finding = evaluate(plain, best)
     explained = plain.per_value > DRIFT_GAINS * best.per_value
-    change, sd, _ = finding.parameters["change"]
-    there = explained and abs(change) > DRIFT_MOVED * sd
+    there = explained and _sure(finding.parameters["change"])
     return (finding,) if there and finding.log_evidence > CLEAR else ()
+
+
+def _likeliest(found: Sequence[Fit]) -> Fit:
+    """Of all joints together unless single ones, which are more numbers, tell clearly more."""
+    together = min(found[:2], key=lambda f: f.per_value)
+    for single in found[2:]:
+        t = temper(single.per_value, ALIKE)
+        if single.log_evidence(t) > together.log_evidence(t) + CLEAR:
+            return single
+    return together
 
 
 def evaluate(plain: Fit, best: Fit) -> Finding:
     """The gain of a fit with drift over the one without, and its parameters."""
     t = temper(best.per_value, ALIKE)
-    values = best.parameters(t)
-    size, sd, _ = values["change"]
-    change = float(np.expm1(size))
-    told = {"change": (change, float(np.hypot((1 + change) * sd, DRIFT_COURSE * change)), "1")}
+    told = {name: _change(value) for name, value in best.parameters(t).items() if name != BEND.name}
+    most = max(told.values(), key=lambda value: abs(value[0]))
+    told = {"change": most, **told}
     evidence = best.log_evidence(t) - plain.log_evidence(t)
     misfit = best.per_value
     return Finding("drift", "campaign", evidence, told, best.effect.text(told), misfit)
+
+
+def _change(log_change: tuple[float, float, str]) -> tuple[float, float, str]:
+    """The relative change and its sd, from those of its logarithm."""
+    value, sd, unit = log_change
+    change = float(np.expm1(value))
+    return change, float(np.hypot((1 + change) * sd, DRIFT_COURSE * change)), unit
 
 
 def _unchanged(recorded: Dataset, nominal: Simulation) -> bool:

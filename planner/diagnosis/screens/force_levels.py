@@ -18,11 +18,10 @@ from planner.diagnosis.laws.level_data import (
     own_parameter,
     strongest_slopes,
 )
-from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.laws.level_refits import base, bases
 from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.starting_values import starts
-from planner.diagnosis.linear.drift_fit import problem_of
-from planner.diagnosis.linear.problem import tolerances_of
+from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens import repeats, several_joints
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.diagnosis.screens.tone import screen_tone
@@ -36,8 +35,10 @@ from planner.diagnosis.screens.weighed_laws import (
 from planner.diagnosis.thresholds import (
     BY_CHANCE,
     CLEAR,
+    LAW_BY_CHANCE,
     LAW_EXPLAINS,
     LAW_HOPEFUL,
+    LAW_SURELY,
     LINEARISED,
     ONE_JOINT,
     PROPORTIONAL,
@@ -72,38 +73,55 @@ def screen(
     tone = screen_tone(recorded)
     if tone is not None:
         return (tone,)
-    plain = base(recorded, nominal)
-    misses = OpenMisses.told(plain, recorded, tolerances_of(nominal))
-    system = system_of(plain)
-    found = equivalent(recorded, system, misses)
-    if not len(found.count) or disproportion(found) < PROPORTIONAL:
-        return ()
-    by_chance = repeats.chance(recorded, misses)
-    if by_chance is not None and by_chance > BY_CHANCE:
-        return ()  # repeats at one level differ as much as levels do
-    findings = _named(recorded, nominal, found, misses, single, tell)
+    findings: tuple[Finding, ...] = ()
+    by_chance: float | None = None
+    for number, (problem, plain) in enumerate(bases(recorded, nominal)):
+        misses = OpenMisses.told(plain, recorded, tolerances_of(nominal))
+        found = equivalent(recorded, system_of(plain), misses)
+        if not number:
+            if not len(found.count) or disproportion(found) < PROPORTIONAL:
+                return ()
+            by_chance = repeats.chance(recorded, misses)
+            if by_chance is not None and by_chance > LAW_BY_CHANCE:
+                return ()  # repeats at one level differ as much as levels do
+            if several := () if single else _several(recorded, nominal, found, tell):
+                return several
+        findings = _better(findings, _named(recorded, problem, found, misses, tell))
+        if findings[0].effect != UNKNOWN and findings[0].sure > LAW_SURELY:
+            break
+    if by_chance is not None and by_chance > BY_CHANCE and findings[0].effect == UNKNOWN:
+        return ()  # what no law describes may be chance
     if by_chance is None:
         wanted = repeats.wanted(recorded)
         return tuple(replace(f, wants=wanted if f.effect == UNKNOWN else "") for f in findings)
     return findings
 
 
-def _named(
-    recorded: Dataset,
-    nominal: Simulation,
-    found: Equivalent,
-    misses: OpenMisses,
-    single: bool,
-    tell: Tell,
+def _several(
+    recorded: Dataset, nominal: Simulation, found: Equivalent, tell: Tell
 ) -> tuple[Finding, ...]:
-    """Which joints' laws make the levels differ, or `unknown`."""
+    """One law at several joints, where no single joint explains the levels."""
+    if equivalent_share(found) >= ONE_JOINT:
+        return ()
+    tell("fitting one law at all joints to the hits", 0.2)
+    return several_joints.screen(recorded, nominal)
+
+
+def _better(one: tuple[Finding, ...], other: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Of what is found from two linear fits: a law before none, then what explains more."""
+
+    def rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
+        return findings[0].effect != UNKNOWN, findings[0].sure
+
+    return max((f for f in (one, other) if f), key=rank)
+
+
+def _named(
+    recorded: Dataset, problem: Problem, found: Equivalent, misses: OpenMisses, tell: Tell
+) -> tuple[Finding, ...]:
+    """Which joint's law makes the levels differ, or `unknown`."""
     plain = misses.plain
     system, share = system_of(plain), equivalent_share(found)
-    if share < ONE_JOINT and not single:
-        tell("fitting one law at all joints to the hits", 0.2)
-    several = several_joints.screen(recorded, nominal) if share < ONE_JOINT and not single else ()
-    if several:
-        return several
     if share < LINEARISED:
         return (_unknown(found, "even with a stiffness of its own for every hit"),)
     weighed = weigh(recorded, misses, system, found, tell)
@@ -113,8 +131,7 @@ def _named(
         best, c = there[0], there[0].candidate
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
         candidates = tuple(w.candidate for w in there)
-        problem, hit = problem_of(recorded, nominal), _hardest(recorded)
-        laws = Laws(problem, plain, candidates, shares, best.temper, hit)
+        laws = Laws(problem, plain, candidates, shares, best.temper, _hardest(recorded))
         return (
             law_finding(there, laws),
             *strayed(plain, c.law.x, sd, best.at, best.per_value),

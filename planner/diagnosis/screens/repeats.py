@@ -6,6 +6,7 @@ the simulation, which only weighs.
 """
 
 from collections.abc import Sequence
+from math import factorial
 
 import numpy as np
 
@@ -28,15 +29,48 @@ AXES = "xyz"
 def chance(recorded: Dataset, misses: OpenMisses) -> float | None:
     """The chance that levels of a linear structure differ so much; None where it can't be told.
 
-    That is where so few hits were repeated at a level that even chance could make any difference.
+    Told by repeats, and by what changes the more the harder the hits are, whichever tells more.
+    None is where so few hits were repeated, or so few groups of hits have three levels, that even
+    chance could make any difference.
     """
+    told = [
+        c for c in (_by_repeats(recorded, misses), _by_order(recorded, misses)) if c is not None
+    ]
+    return min(1.0, len(told) * min(told)) if told else None
+
+
+def _by_repeats(recorded: Dataset, misses: OpenMisses) -> float | None:
+    """Hits shared out among the levels at random."""
     rng = np.random.default_rng(0)
     ways, measured, shared = 1.0, 0.0, np.zeros(SHARED_OUT)
     for number, hits in enumerate(hit_columns(recorded)):
         missed = misses.of_hits(number, hits)
         for group in _by_axis(hits):
             ways *= exchangeable.ways(_levels(group))
-            real, random = _between(group, missed, rng)
+            seen = _seen(group, missed)
+            real, random = exchangeable.between(seen, _levels(group), SHARED_OUT, rng)
+            measured, shared = measured + real, shared + random
+    if 1 / ways > BY_CHANCE:
+        return None
+    return exchangeable.chance(measured, shared)
+
+
+def _by_order(recorded: Dataset, misses: OpenMisses) -> float | None:
+    """Levels of each pose and axis in any order: all hits of a level may have missed alike."""
+    rng = np.random.default_rng(0)
+    ways, measured, shared = 1.0, 0.0, np.zeros(SHARED_OUT)
+    for number, hits in enumerate(hit_columns(recorded)):
+        missed = misses.of_hits(number, hits)
+        for axis in range(3):
+            group = [hit for hit in hits if hit.axis == axis]
+            levels = _levels(group)
+            count = len(np.unique(levels))
+            if count < 3:
+                continue
+            ways *= factorial(count) / 2  # there and back is one course
+            seen = _seen(group, missed)
+            means = np.array([seen[levels == level].mean(axis=0) for level in np.unique(levels)])
+            real, random = exchangeable.ordered(means, SHARED_OUT, rng)
             measured, shared = measured + real, shared + random
     if 1 / ways > BY_CHANCE:
         return None
@@ -74,10 +108,8 @@ def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
     return [g for g in groups if 1 < len({hit.level for hit in g}) < len(g)]
 
 
-def _between(
-    group: Sequence[Column], missed: HitMisses, rng: np.random.Generator
-) -> tuple[float, np.ndarray]:
-    """As `exchangeable.between`, with misses left open."""
+def _seen(group: Sequence[Column], missed: HitMisses) -> np.ndarray:
+    """Hits (n, m) as real rows in units of one noise for all, with misses left open."""
     lines = missed.lines
     # One weight for all: hits are to be exchangeable.
     basis, uncertain = missed.left_open(group[:2])
@@ -85,8 +117,7 @@ def _between(
     variance = 2 * variance + uncertain
     weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
     values = np.array([hit.accelerance[:, lines] for hit in group]) * np.sqrt(weight)
-    seen = whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
-    return exchangeable.between(seen, _levels(group), SHARED_OUT, rng)
+    return whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
 
 
 def _levels(group: Sequence[Column]) -> np.ndarray:

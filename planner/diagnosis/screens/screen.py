@@ -6,6 +6,7 @@ from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.screens import artefacts, drift, force_levels
 from planner.diagnosis.screens.hit_errors import HitErrors, taken_out
+from planner.diagnosis.thresholds import UNKNOWN
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, quietly
 
@@ -33,9 +34,15 @@ def screen(
     """
     found = artefacts.screen(recorded, nominal, chain=chain)
     clean = artefacts.correct(recorded, found)
-    by_level, missed, errors = force_levels.screen(clean, nominal, tell=tell), clean, ()
-    if not by_level and force_levels.differ(clean, nominal):
+    by_level, missed = force_levels.screen(clean, nominal, tell=tell), clean
+    if any(f.effect != UNKNOWN for f in by_level):
+        return Screened((*found, *by_level), clean, missed)
+    apart, errors = clean, ()
+    if by_level or force_levels.differ(clean, nominal):
         tell("estimating by how much each hit missed its axis and point", 0.3)
-        clean, errors = taken_out(clean, nominal)
-    by_time = () if by_level else drift.screen(clean, nominal)
-    return Screened((*found, *by_level, *by_time), clean, missed, errors)
+        apart, errors = taken_out(clean, nominal)
+    by_time = drift.screen(apart, nominal)
+    if by_time or not by_level:
+        # Levels are hit one after the other: what changes with time looks as if it went with them.
+        return Screened((*found, *by_time), apart, missed, errors)
+    return Screened((*found, *by_level), clean, missed)
