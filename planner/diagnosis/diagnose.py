@@ -14,7 +14,14 @@ from planner.diagnosis.misses_again import abstained, asked_again
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
-from planner.diagnosis.thresholds import ARTEFACTS, DRIFT_CRUDE, NOTHING, PAYS, SECOND_EFFECT
+from planner.diagnosis.thresholds import (
+    ARTEFACTS,
+    DRIFT_CRUDE,
+    DRIFT_GAINS,
+    NOTHING,
+    PAYS,
+    SECOND_EFFECT,
+)
 from planner.diagnosis.verdict import Together, linear_effects_apply, together
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, within
@@ -110,7 +117,7 @@ def _looked_at(
     if screened:
         early = within(tell, 0.0, 0.2)
         recorded, missed, findings = _screened(recorded, simulation, early, chain)
-    crude = [f for f in findings if f.effect == "drift" and f.misfit > DRIFT_CRUDE]
+    crude = [f for f in findings if f.effect == "drift" and _doubtful(f)]
     linear = linear_effects_apply([f for f in findings if f not in crude])
     found = diagnose(
         recorded.ended_frfs,
@@ -120,12 +127,24 @@ def _looked_at(
         bent=bool(of_levels(findings)),
         tell=within(tell, 0.2, 1.0),
     )
-    if found.verdict == "explained" and all(f.misfit > PAYS * found.best.per_value for f in crude):
+    if found.verdict == "explained" and all(_rather(found, f) for f in crude):
         # Poses that were visited one after the other differ, and so do times.
         findings = tuple(f for f in findings if f not in crude)
     if any(f.effect in ARTEFACTS for f in findings):
         found = beside_another(found)
     return _Looked(recorded, missed, findings, found)
+
+
+def _doubtful(drift: Finding) -> bool:
+    """Whether what goes with the pose may be what is told as drift."""
+    return drift.misfit > DRIFT_CRUDE or drift.gain < DRIFT_GAINS
+
+
+def _rather(found: Diagnosis, drift: Finding) -> bool:
+    """Whether linear effects explain more than drift: by far, where drift explains most."""
+    if drift.misfit > DRIFT_CRUDE:
+        return drift.misfit > PAYS * found.best.per_value
+    return found.refitted.per_value / found.best.per_value > drift.gain
 
 
 def _screened(

@@ -15,7 +15,8 @@ class Finding:
     fit that says so, ∞ where there is none. No finding is surer than `sure`, and `rivals` are other
     effects at the same place that take a share of its probability; `laws` are their fits, by which
     a further hit can be planned. `wants` says what would have to be measured for it to be told at
-    all: until then it is no more than a remark.
+    all: until then it is no more than a remark. `gain` is the factor by which χ² falls where that
+    is so little that physics has to be weighed against it.
     """
 
     effect: str
@@ -28,3 +29,4 @@ class Finding:
     rivals: tuple[tuple[str, float], ...] = ()
     laws: "Laws | None" = None
     wants: str = ""
+    gain: float = float("inf")

@@ -23,7 +23,9 @@ from planner.diagnosis.thresholds import (
     CLEAR,
     DRIFT_COURSE,
     DRIFT_CRUDE,
+    DRIFT_EVIDENCE,
     DRIFT_GAINS,
+    DRIFT_LEAST,
     DRIFT_LOG_SD,
     DRIFT_MOVED,
     DRIFT_STILL,
@@ -42,8 +44,6 @@ def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
     each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, DRIFT_LOG_SD) for i in range(count))
     free = fit(problem, Drift("campaign", each, "free"), [plain])
     step = fit(problem, Drift("campaign", (end,), "step", _since(free, problem)), [free])
-    if min(gradual.per_value, step.per_value) < AT_NOISE:
-        return plain, gradual, step
     return plain, gradual, step, *_of_joints(problem, plain)
 
 
@@ -73,7 +73,11 @@ def _since(free: Fit, problem: DriftProblem) -> float:
 
 
 def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
-    """`drift`, where the recordings change with time and not with the pose alone."""
+    """`drift`, where the recordings change with time and not with the pose alone.
+
+    It takes most of the misfit, or all that there is beyond noise: then physics that goes with the
+    pose may do so as well, and has to be weighed against it.
+    """
     recorded = recorded.most_heard
     if len(recorded.visits) < 4 or _unchanged(recorded, nominal):
         return ()
@@ -84,9 +88,12 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     back = carried_on(problem, best, Effect(""))
     plain = min((plain, back), key=lambda f: f.per_value)
     finding = evaluate(plain, best)
-    explained = plain.per_value > DRIFT_GAINS * best.per_value
-    there = explained and _sure(finding.parameters["change"])
-    return (finding,) if there and finding.log_evidence > CLEAR else ()
+    change = finding.parameters["change"]
+    there = _sure(change) and finding.log_evidence > CLEAR
+    slight = finding.log_evidence < DRIFT_EVIDENCE or abs(change[0]) < DRIFT_LEAST
+    if finding.gain < DRIFT_GAINS and (slight or best.per_value > AT_NOISE):
+        return ()
+    return (finding,) if there else ()
 
 
 def _likeliest(found: Sequence[Fit]) -> Fit:
@@ -107,7 +114,8 @@ def evaluate(plain: Fit, best: Fit) -> Finding:
     told = {"change": most, **told}
     evidence = best.log_evidence(t) - plain.log_evidence(t)
     misfit = best.per_value
-    return Finding("drift", "campaign", evidence, told, best.effect.text(told), misfit)
+    gain = plain.per_value / misfit
+    return Finding("drift", "campaign", evidence, told, best.effect.text(told), misfit, gain=gain)
 
 
 def _change(log_change: tuple[float, float, str]) -> tuple[float, float, str]:

@@ -87,7 +87,7 @@ def screen(
             if several := () if single else _several(recorded, nominal, found, tell):
                 return several
         findings = _better(findings, _named(recorded, problem, found, misses, tell))
-        if findings[0].effect != UNKNOWN and findings[0].sure > LAW_SURELY:
+        if findings[0].effect != UNKNOWN and (single or findings[0].sure > LAW_SURELY):
             break
     if by_chance is not None and by_chance > BY_CHANCE and findings[0].effect == UNKNOWN:
         return ()  # what no law describes may be chance
