@@ -86,8 +86,9 @@ def screen(
                 return ()  # repeats at one level differ as much as levels do
             if several := () if single else _several(recorded, nominal, found, tell):
                 return several
-        findings = _better(findings, _named(recorded, problem, found, misses, tell))
-        if findings[0].effect != UNKNOWN and (single or findings[0].sure > LAW_SURELY):
+        named, clear = _named(recorded, problem, found, misses, tell)
+        findings = _better(findings, named)
+        if clear or (single and findings[0].effect != UNKNOWN):
             break
     if by_chance is not None and by_chance > BY_CHANCE and findings[0].effect == UNKNOWN:
         return ()  # what no law describes may be chance
@@ -108,22 +109,22 @@ def _several(
 
 
 def _better(one: tuple[Finding, ...], other: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Of what is found from two linear fits: a law before none, then what explains more."""
+    """Of what is found from two linear fits: a law before none, then what has more evidence."""
 
     def rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
-        return findings[0].effect != UNKNOWN, findings[0].sure
+        return findings[0].effect != UNKNOWN, findings[0].log_evidence
 
     return max((f for f in (one, other) if f), key=rank)
 
 
 def _named(
     recorded: Dataset, problem: Problem, found: Equivalent, misses: OpenMisses, tell: Tell
-) -> tuple[Finding, ...]:
-    """Which joint's law makes the levels differ, or `unknown`."""
+) -> tuple[tuple[Finding, ...], bool]:
+    """Which joint's law makes the levels differ, or `unknown`; whether no other comes close."""
     plain = misses.plain
     system, share = system_of(plain), equivalent_share(found)
     if share < LINEARISED:
-        return (_unknown(found, "even with a stiffness of its own for every hit"),)
+        return (_unknown(found, "even with a stiffness of its own for every hit"),), False
     weighed = weigh(recorded, misses, system, found, tell)
     best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > LAW_EXPLAINS:
@@ -132,14 +133,12 @@ def _named(
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
         candidates = tuple(w.candidate for w in there)
         laws = Laws(problem, plain, candidates, shares, best.temper, _hardest(recorded))
-        return (
-            law_finding(there, laws),
-            *strayed(plain, c.law.x, sd, best.at, best.per_value),
-        )
+        far = strayed(plain, c.law.x, sd, best.at, best.per_value)
+        close = [w for w in weighed if w.explained > LAW_SURELY]
+        return (law_finding(there, laws), *far), len(close) == 1
     law = best.candidate.law.effect.replace("_", " ")
-    return (
-        _unknown(found, f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"),
-    )
+    how = f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"
+    return (_unknown(found, how),), False
 
 
 def differ(recorded: Dataset, nominal: Simulation) -> bool:

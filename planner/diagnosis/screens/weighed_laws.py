@@ -61,7 +61,7 @@ def weighed_laws(
     levels = levels_of(data)
     out = []
     for c in kept:
-        evidence = (levels.linear - c.chi2) / t - _volume(c, t)
+        evidence = (levels.linear - _cost(c)) / t - _volume(c, t)
         explained = levels.explained(c)
         at, per_value = system.ports[c.law.ports[0]], 2 * c.chi2 / count
         parameters = _parameters(c, t)
@@ -79,6 +79,13 @@ def levels_of(data: LevelData) -> LevelMisfit:
     return LevelMisfit(differing + strongest, strongest + values, excess)
 
 
+def _cost(candidate: LawMisfit) -> float:
+    """χ², and how far springs and inertias had to move from what is stated."""
+    mean, sd = candidate.law.law_prior()
+    own = (candidate.law.nu.ravel() - mean) / sd
+    return candidate.value - 0.5 * float(own @ own)
+
+
 def _volume(candidate: LawMisfit, temper: float) -> float:
     """What ν costs: ln of how much narrower the data make it than the prior, and its distance."""
     mean, sd = candidate.law.law_prior()
@@ -94,8 +101,8 @@ def _parameters(candidate: LawMisfit, temper: float) -> dict[str, tuple[float, f
 def shares_of_laws(weighed: Sequence[WeighedLaw]) -> tuple[list[WeighedLaw], tuple[float, ...]]:
     """The laws at the joint of the best, and the shares that all that is not explained gives."""
     at, levels = weighed[0].at, weighed[0].levels
-    there = sorted((w for w in weighed if w.at == at), key=lambda w: w.candidate.chi2)
-    chi2 = np.array([w.candidate.chi2 for w in there])
+    there = sorted((w for w in weighed if w.at == at), key=lambda w: _cost(w.candidate))
+    chi2 = np.array([_cost(w.candidate) for w in there])
     # Below what noise is expected to leave, the best law is as good as any: others count from it.
     beyond = chi2 - min(levels.expected, chi2[0])
     left = np.maximum(beyond, max(LAW_UNEXPLAINED * levels.excess, INDEPENDENT / 2))
