@@ -4,7 +4,8 @@ A pose that was visited twice tells by itself; otherwise the simulation, refitte
 course, takes what belongs to the pose.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -32,19 +33,35 @@ from planner.diagnosis.thresholds import (
 )
 from planner.dynamics.simulation import Simulation
 from planner.inference.evidence import temper
+from planner.inference.parallel import side_by_side
+
+END = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
 
 
 def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
     """The refitted simulation without drift, and with it: gradual, at once, of single joints."""
     problem = problem_of(recorded, nominal, as_built=True)
     plain = fit(problem, Effect(""))
-    end = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
-    gradual = fit(problem, Drift("campaign", (end, BEND), "gradual"), [plain])
+    kinds = side_by_side(partial(_followed, problem, plain), (_gradual, _at_once, _of_joints))
+    return plain, *(found for kind in kinds for found in kind)
+
+
+Kind = Callable[[DriftProblem, Fit], tuple[Fit, ...]]
+
+
+def _followed(problem: DriftProblem, plain: Fit, kind: Kind) -> tuple[Fit, ...]:
+    return kind(problem, plain)
+
+
+def _gradual(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
+    return (fit(problem, Drift("campaign", (END, BEND), "gradual"), [plain]),)
+
+
+def _at_once(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
     count = len(problem.order) - 1
     each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, DRIFT_LOG_SD) for i in range(count))
     free = fit(problem, Drift("campaign", each, "free"), [plain])
-    step = fit(problem, Drift("campaign", (end,), "step", _since(free, problem)), [free])
-    return plain, gradual, step, *_of_joints(problem, plain)
+    return (fit(problem, Drift("campaign", (END,), "step", _since(free, problem)), [free]),)
 
 
 def _of_joints(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
