@@ -12,9 +12,10 @@ from planner.diagnosis.linear.beyond_tolerance import with_artefacts
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
+from planner.diagnosis.linear.found import Found, distinct
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.problem import Problem, tolerances_of
-from planner.diagnosis.linear.search import Found, distinct, search
+from planner.diagnosis.linear.search import search
 from planner.diagnosis.linear.slightness import thinned, without_slight
 from planner.diagnosis.linear.sluggish import sluggish
 from planner.diagnosis.thresholds import SECOND_EFFECT, TIED

@@ -16,12 +16,11 @@ import numpy as np
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.identification.measurement_model import Tolerances
+from planner.identification.measurement_model import AIM, Tolerances
 from planner.identification.objective import TOO_SOFT
 from planner.identification.parameters import Parametrisation
 from planner.identification.simulated_visit import SimulatedPoses
 from planner.identification.visit_equations import (
-    AIM,
     AIMED,
     OWN,
     VisitEquations,

@@ -16,9 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.dynamics.motion import Turned
-from planner.robot.config import RobotConfig
+from planner.robot.config import HitsTable, ReadbackTable, RobotConfig, SensorTable
 
 ACROSS = ((1, 2), (2, 0), (0, 1))  # the two directions across each axis, in cyclic order
+
+# An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
+AIM = 0.5
+_HITS, _SENSOR = HitsTable(), SensorTable()  # what they are where robot.toml says nothing
 
 
 @dataclass(frozen=True)
@@ -30,15 +34,15 @@ class Tolerances:
     of each joint's readback, (dof,) where some are of joints that slide (m).
     """
 
-    angle_rad: float = np.deg2rad(2.0)
-    offset_m: float = 0.005
-    gain: float = 0.02
-    cross_axis: float = 0.03
-    mounting_rad: float = np.deg2rad(2.0)
-    position_m: float = 0.01
-    force_gain: float = 0.03
+    angle_rad: float = np.deg2rad(_HITS.angle_sd_deg)
+    offset_m: float = 1e-3 * _HITS.offset_sd_mm
+    gain: float = _SENSOR.gain_sd_percent / 100
+    cross_axis: float = _SENSOR.cross_axis_sd_percent / 100
+    mounting_rad: float = np.deg2rad(_SENSOR.mounting_sd_deg)
+    position_m: float = 1e-3 * _SENSOR.position_sd_mm
+    force_gain: float = _SENSOR.force_gain_sd_percent / 100
     delay_s: float = 6e-5
-    joint_rad: float | tuple[float, ...] = np.deg2rad(0.05)
+    joint_rad: float | tuple[float, ...] = np.deg2rad(ReadbackTable().joint_sd_deg)
 
     @classmethod
     def of(cls, config: RobotConfig, slides: Sequence[bool] = ()) -> "Tolerances":

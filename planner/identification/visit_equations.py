@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planner.identification.measurement_model import AIM
 from planner.identification.simulated_visit import SimulatedVisit
 from planner.inference import triangular
 
-# An aim beside the point, common to all hits along an axis, in units of a hit's own scatter.
-AIM = 0.5
 # Of an FRF: what no column describes, such as terms of second order. On generated cells (708 hits)
 # intervals of 95 % then cover 97 % of tilts and 95 % of offsets.
 RELATIVE = 0.005

@@ -1,12 +1,11 @@
 """The search for what explains FRFs: all candidates roughly, few of them closely."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from planner.diagnosis.effects.combined import Both, Family, families, together
+from planner.diagnosis.effects.combined import Both, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.all_ways import all_ways
@@ -21,6 +20,8 @@ from planner.diagnosis.linear.fit import (
     staged,
     unbent,
 )
+from planner.diagnosis.linear.found import Found, distinct
+from planner.diagnosis.linear.leaders import Place, best_of_few, leaders_of, next_leader, place_of
 from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_bent, rigid
 from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
 from planner.diagnosis.linear.stated_values import strayed
@@ -39,17 +40,7 @@ MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from f
 POINTED = 2  # suspects settled on all lines
 MOVED = 2  # effects at other places, the same
 LESSENED = 3  # explanations that are looked at without one of their effects
-FEW_EFFECTS = 2  # at once
 MOST_EFFECTS = 5  # at once, where each pays
-Place = tuple[str, str]
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """All fits on the finest lines, "none" first, and how far behind the others were left."""
-
-    finalists: tuple[Fit, ...]
-    left: tuple[tuple[Effect, float, Fit], ...]  # log evidence behind the best when it was left
 
 
 def search(
@@ -70,15 +61,15 @@ def search(
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
     found = _loosened(problem, refitted, found, effects)
-    if _best_of_few(found).per_value > AT_NOISE:
+    if best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
         found = _lessened(problem, found)
-    leaders = _leaders(found) if _best_of_few(found).per_value > AT_NOISE else []
+    leaders = leaders_of(found) if best_of_few(found).per_value > AT_NOISE else []
     led: list[Place] = []
-    while len(led) < most_leaders and (leader := _next(leaders, led, found)) is not None:
+    while len(led) < most_leaders and (leader := next_leader(leaders, led, found)) is not None:
         first = 0.6 + 0.4 * len(led) / most_leaders
-        led.append(_place(leader.effect))
+        led.append(place_of(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
         along = within(tell, first, first + 0.4 / most_leaders)
         more = _round(problem, leader, pairs, along)
@@ -95,16 +86,6 @@ def search(
     return distinct(_burdened(problem, found, effects))
 
 
-def _best_of_few(found: Found) -> Fit:
-    """The closest of one or two effects: many at once fit what only one other does as well."""
-    few = [
-        f
-        for f in found.finalists
-        if isinstance(f.effect, Family) or len(f.effect.parts()) <= FEW_EFFECTS
-    ]
-    return min(few, key=lambda f: f.per_value)
-
-
 def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """The best of `suspects`, of resonators beside them, and of families, followed to the end.
 
@@ -115,7 +96,7 @@ def _pointed(problem: Problem, found: Found, effects: Sequence[Effect]) -> tuple
     ends = _followed(problem, rough)
     ends += side_by_side(partial(staged, problem), list(filter(problem.able, families(effects))))
     missed = bool(ends) and min(f.per_value for f in ends) > AT_NOISE
-    if missed and not isinstance(_leaders(found)[0].effect, LocalResonator):
+    if missed and not isinstance(leaders_of(found)[0].effect, LocalResonator):
         ends += _followed(problem, resonant(problem, _and_best(rough, 1), effects), first=False)
     return tuple(ends)
 
@@ -239,48 +220,6 @@ def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Foun
 
 def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
     return carried_on(problem, *pair, LAST_STEPS)
-
-
-def distinct(found: Found) -> Found:
-    """Each set of effects once, at its best, though it was come upon from several sides."""
-    best: dict[frozenset[Effect], Fit] = {}
-    for f in found.finalists:
-        key = frozenset(f.effect.parts())
-        if key not in best or f.misfit(f.x).value < best[key].misfit(best[key].x).value:
-            best[key] = f
-    left = tuple(entry for entry in found.left if frozenset(entry[0].parts()) not in best)
-    return Found(tuple(best.values()), left)
-
-
-def _place(effect: Effect) -> Place:
-    return effect.name, effect.at
-
-
-def _next(leaders: list[Fit], led: list[Place], found: Found) -> Fit | None:
-    """The next single effect whose company is looked for.
-
-    Once two explain everything, that of the other too: the first was the best perhaps alone.
-    """
-    waiting = [f for f in leaders if _place(f.effect) not in led]
-    best = _best_of_few(found)
-    if best.per_value <= AT_NOISE:
-        members = [_place(e) for e in best.effect.parts()]
-        waiting = [f for f in waiting if _place(f.effect) in members]
-    return waiting[0] if waiting else None
-
-
-def _leaders(found: Found) -> list[Fit]:
-    """Single effects whose company is looked for, the best first; of a place and kind once.
-
-    Beside a second effect the best of them need not be right, so that others get their turn.
-    """
-    ranked = [found.finalists[i] for i in np.argsort(lag(found.finalists))]
-    ranked += [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
-    leaders: dict[Place, Fit] = {}
-    for f in ranked:
-        if f.effect.at and len(f.effect.parts()) == 1:
-            leaders.setdefault(_place(f.effect), f)
-    return list(leaders.values())
 
 
 def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:

@@ -1,7 +1,7 @@
 """The screen for what depends on the force level: nonlinear joints, and what no joint explains."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -21,6 +21,7 @@ from planner.diagnosis.laws.level_data import (
 from planner.diagnosis.laws.level_refits import base, bases
 from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.starting_values import starts
+from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens import repeats, several_joints
 from planner.diagnosis.screens.implausible_springs import strayed
@@ -73,29 +74,40 @@ def screen(
     tone = screen_tone(recorded)
     if tone is not None:
         return (tone,)
-    findings: tuple[Finding, ...] = ()
-    by_chance: float | None = None
-    for number, (problem, plain) in enumerate(bases(recorded, nominal)):
-        misses = OpenMisses.told(plain, recorded, tolerances_of(nominal))
-        found = equivalent(recorded, system_of(plain), misses)
-        if not number:
-            if not len(found.count) or disproportion(found) < PROPORTIONAL:
-                return ()
-            by_chance = repeats.chance(recorded, misses)
-            if by_chance is not None and by_chance > LAW_BY_CHANCE:
-                return ()  # repeats at one level differ as much as levels do
-            if several := () if single else _several(recorded, nominal, found, tell):
-                return several
-        named, clear = _named(recorded, problem, found, misses, tell)
-        findings = _better(findings, named)
+    looks = (_Compared.by(recorded, *base) for base in bases(recorded, nominal))
+    first = next(looks)
+    if not len(first.found.count) or disproportion(first.found) < PROPORTIONAL:
+        return ()
+    by_chance = repeats.chance(recorded, first.misses)
+    if by_chance is not None and by_chance > LAW_BY_CHANCE:
+        return ()  # repeats at one level differ as much as levels do
+    if several := () if single else _several(recorded, nominal, first.found, tell):
+        return several
+    findings, clear = _named(recorded, first, tell)
+    for look in looks:
         if clear or (single and findings[0].effect != UNKNOWN):
             break
-    if by_chance is not None and by_chance > BY_CHANCE and findings[0].effect == UNKNOWN:
-        return ()  # what no law describes may be chance
+        named, clear = _named(recorded, look, tell)
+        findings = max(findings, named, key=_rank)
+    if findings[0].effect != UNKNOWN:
+        return findings
     if by_chance is None:
-        wanted = repeats.wanted(recorded)
-        return tuple(replace(f, wants=wanted if f.effect == UNKNOWN else "") for f in findings)
-    return findings
+        return tuple(replace(f, wants=repeats.wanted(recorded)) for f in findings)
+    return findings if by_chance <= BY_CHANCE else ()  # what no law describes may be chance
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """Force levels compared by a linear fit, which tells what misses of hits leave open."""
+
+    problem: Problem
+    misses: OpenMisses
+    found: Equivalent
+
+    @classmethod
+    def by(cls, recorded: Dataset, problem: Problem, plain: Fit) -> "_Compared":
+        misses = OpenMisses.told(plain, recorded, tolerances_of(problem.simulation))
+        return cls(problem, misses, equivalent(recorded, system_of(plain), misses))
 
 
 def _several(
@@ -108,19 +120,14 @@ def _several(
     return several_joints.screen(recorded, nominal)
 
 
-def _better(one: tuple[Finding, ...], other: tuple[Finding, ...]) -> tuple[Finding, ...]:
-    """Of what is found from two linear fits: a law before none, then what has more evidence."""
-
-    def rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
-        return findings[0].effect != UNKNOWN, findings[0].log_evidence
-
-    return max((f for f in (one, other) if f), key=rank)
+def _rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
+    """A law before none, then what has more evidence."""
+    return findings[0].effect != UNKNOWN, findings[0].log_evidence
 
 
-def _named(
-    recorded: Dataset, problem: Problem, found: Equivalent, misses: OpenMisses, tell: Tell
-) -> tuple[tuple[Finding, ...], bool]:
+def _named(recorded: Dataset, look: _Compared, tell: Tell) -> tuple[tuple[Finding, ...], bool]:
     """Which joint's law makes the levels differ, or `unknown`; whether no other comes close."""
+    misses, found = look.misses, look.found
     plain = misses.plain
     system, share = system_of(plain), equivalent_share(found)
     if share < LINEARISED:
@@ -132,7 +139,7 @@ def _named(
         best, c = there[0], there[0].candidate
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
         candidates = tuple(w.candidate for w in there)
-        laws = Laws(problem, plain, candidates, shares, best.temper, _hardest(recorded))
+        laws = Laws(look.problem, plain, candidates, shares, best.temper, _hardest(recorded))
         far = strayed(plain, c.law.x, sd, best.at, best.per_value)
         close = [w for w in weighed if w.explained > LAW_SURELY]
         return (law_finding(there, laws), *far), len(close) == 1
