@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from rich.text import Text
+
 from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
 from planner.campaign.importing import ImportReport
 from planner.campaign.state import fold, last_acts
@@ -267,9 +269,8 @@ def _after(station: Station, course: Course, report: ImportReport) -> Course:
     if report.question is not None:  # at the pose it was moved to it does not fit either
         return course
     simulated = bool(report.measurement and report.measurement.simulated)
-    station.screen.show(session_text.import_panel(report, simulated))
-    if station.screen.console.is_terminal:  # the page goes with the next pose
-        station.say(session_text.result_line(report), "bold")
-        for alert in report.alerts:
-            station.say(alert, "yellow")
+    notes = [Text(alert, style="yellow") for alert in report.alerts]
+    notes += [Text(session_text.refusals(report), style="red")] if report.refused else []
+    notes += [Text(session_text.result_line(report), style="bold")]
+    station.screen.leave(session_text.import_panel(report, simulated), notes)
     return measured(station, course, report.pose)
