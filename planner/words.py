@@ -1,5 +1,6 @@
 """Small words that every sentence needs: counts, standard deviations, times."""
 
+import math
 from datetime import datetime
 from pathlib import Path
 
@@ -15,6 +16,14 @@ def small(value: float, form: str = ".2f") -> str:
     if value > 0 and said.strip("0.") == "":
         return f"<{10.0 ** -int(form[1:-1]):{form}}"
     return said
+
+
+def significant(value: float, digits: int = 2) -> str:
+    """A number with so many digits, in no power of ten."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:.0f}"
+    rounded = float(f"{value:.{digits}g}")
+    return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
 
 
 def short_name(path: str | Path, most: int = 24) -> str:

@@ -13,7 +13,7 @@ from planner.campaign.model import Model
 from planner.modal.modes import Mode
 from planner.report.pose_screen import PosePage, remedy_first
 from planner.report.text import SIMULATED, with_sd
-from planner.words import counted, short_name
+from planner.words import counted, short_name, significant
 
 HELP = """\
 a, Enter  import the hits that wait          r  set bad hits aside, do not import them
@@ -114,7 +114,7 @@ def _in(report: ImportReport) -> str:
 def uncertainty_line(model: Model) -> Text:
     """What the model does not know yet."""
     sd = model.frequency_sd_percent
-    each = ", ".join(f"mode {k + 1} {v:.2f} %" for k, v in enumerate(sd))
+    each = ", ".join(f"mode {k + 1} {significant(v)} %" for k, v in enumerate(sd))
     target = model.cell.config.stop.frequency_sd_percent
     return Text(f"sd of frequencies over the workspace: {each} (target {target:g} %)")
 

@@ -19,7 +19,7 @@ from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
-from planner.words import counted, local_time
+from planner.words import counted, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -256,7 +256,7 @@ class StatusReport(Answer):
             "open: " + (", ".join(p.pose for p in self.open) or "none"),
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
             "sd of frequencies over the workspace: "
-            + ", ".join(f"mode {k} {v:.2f} %" for k, v in each)
+            + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (target {self.target_frequency_sd_percent:g} %)",
             self.forecast.text + (" The target is reached." if self.done else ""),
             f"log: {counted(self.log.entries, 'entry', 'entries')}",

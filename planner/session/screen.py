@@ -106,7 +106,7 @@ class Screen:
         return captured.get()
 
     def _lines(self, note: Text) -> int:
-        return len(note.wrap(self.console, self.console.width))
+        return len(self.console.render_lines(note))
 
     def _that_fit(self, room: int) -> list[Text]:
         """The last sentences for which there are so many lines."""
