@@ -28,6 +28,10 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
 
     told("new", cell, "--robot", robot, "--campaign", campaign_toml)
     assert measured() == []
+    for command in ("next", "status"):  # of nothing measured nothing is forecast
+        said = " ".join(call(command, cell)[1].split())
+        assert "is told once two poses are measured" in said
+        assert "RMSE" not in said
     after, names = [predicted()], []
     for number in range(3):
         (proposal,) = told("next", cell)["proposals"]
@@ -37,6 +41,9 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
         assert (report["pose"], len(report["accepted"])) == (names[-1], 9)
         after.append(predicted())
     assert measured() == [(name, False) for name in names]
+    said = " ".join(call("status", cell)[1].split())
+    assert "RMSE over the workspace is about" in said
+    assert "is told once" not in said
     true = np.array([truth.modes(np.deg2rad(q), 4)[0] for q in ASKED])
     off = [np.sqrt(np.mean((p[..., 0] / true - 1) ** 2)) for p in (after[0], after[-1])]
     assert off[1] < min(0.01, off[0] / 2)

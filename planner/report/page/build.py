@@ -50,11 +50,12 @@ def _head(facts: Facts, name: str, diagnosed: bool) -> Markup:
 def _cards(facts: Facts) -> Markup:
     used, hits = facts.used, sum(len(m.accepted) for m in facts.used)
     known = facts.status.forecast
+    rmse = percent(known.rmse_percent) if known.measurements else "–"
     cards = [
         (str(len(used)), "poses measured and used"),
         (str(hits), "hits used"),
         (str(len(facts.status.refused)), "recordings refused"),
-        (percent(known.rmse_percent), "expected RMSE of frequencies over the workspace"),
+        (rmse, "expected RMSE of frequencies over the workspace"),
         (
             "reached" if facts.status.done else "not reached",
             f"target of {facts.status.target_frequency_sd_percent:g} %",
