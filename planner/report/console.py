@@ -1,4 +1,4 @@
-"""The console that every text is printed on: no line ends between a number and what goes with it."""
+"""The console that texts are printed on: no line ends between a number and what goes with it."""
 
 import re
 from collections.abc import Iterable
@@ -7,8 +7,9 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-# Spaces about ±, before a unit, and between a mode and what it has. Rich breaks lines at no-break spaces, too: it is given a
-# character that nobody uses in their place, and what it made of it is put right again.
+# Spaces about ±, before a unit, and between a mode and what it has. Rich breaks lines at no-break
+# spaces, too: it is given a character that nobody uses in their place, and what it made of that is
+# put right again.
 UNIT = r"(?:%|°|sd|dB|Hz|kHz|mm|µm|min|rpm|kg|ms|m/s²|N·m/rad|N/m|[mNs])(?![\w/·])"
 NUMBERED = r"(?<=\bmode) (?=\d)|(?<=\bmode \d) (?=\d)"
 TOGETHER = re.compile(rf"(?<=\S) (?=± ?[<\d])|(?<= ±) (?=[<\d])|(?<=\d) (?={UNIT})|{NUMBERED}")

@@ -133,7 +133,9 @@ class PoseImport(Answer):
         for mode in self.modes:
             made.add_row(*mode.cells)
         both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
-        change = ", ".join(f"{significant(before)} → {significant(after)} %" for before, after in both)
+        change = ", ".join(
+            f"{significant(before)} → {significant(after)} %" for before, after in both
+        )
         said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
         asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
         return [made, *remarks(self.remarks), said, *asked]
