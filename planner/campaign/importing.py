@@ -80,8 +80,8 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
         off = cell.robot.joints.apart(known.joints_deg, delivery.joints_deg)
         if off:
             raise InputError(
-                f"{delivery.row}: pose {delivery.pose} was imported before at joint angles "
-                f"that differ by {off}; give the new measurement another name."
+                f"{delivery.row}: pose {delivery.pose} was imported before with a joint {off} "
+                f"away; give the new measurement another name."
             )
     return delivery.joints_deg
 

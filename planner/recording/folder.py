@@ -267,8 +267,8 @@ def _same_angles(path: Path, rows: list[PoseRow], joints: JointUnits) -> None:
         off = joints.apart(known.joints_deg, row.joints_deg)
         if off:
             raise InputError(
-                f"{path}, row {row.row}: pose {row.pose} has joint angles {off} away from "
-                f"those in row {known.row}; give another pose another name."
+                f"{path}, row {row.row}: pose {row.pose} has a joint {off} away from where "
+                f"it is in row {known.row}; give another pose another name."
             )
 
 

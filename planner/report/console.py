@@ -7,11 +7,11 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-# Spaces about ±, before a unit, and between a mode and what it has. Rich breaks lines at no-break
-# spaces, too: it is given a character that nobody uses in their place, and what it made of that is
-# put right again.
+# No-break spaces, and those about ±, before a unit, and between a mode and what it has. Rich breaks
+# lines at no-break spaces, too: it is given a character that nobody uses in their place, and what
+# it made of that is put right again.
 UNIT = r"(?:%|°|sd|dB|Hz|kHz|mm|µm|min|rpm|kg|ms|m/s²|N·m/rad|N/m|[mNs])(?![\w/·])"
-NUMBERED = r"(?<=\bmode) (?=\d)|(?<=\bmode \d) (?=\d)"
+NUMBERED = r"\u00a0|(?<=\bmode) (?=\d)|(?<=\bmode \d) (?=\d)"
 TOGETHER = re.compile(rf"(?<=\S) (?=± ?[<\d])|(?<= ±) (?=[<\d])|(?<=\d) (?={UNIT})|{NUMBERED}")
 STAND_IN = "\ue000"
 
