@@ -167,9 +167,10 @@ def import_waiting(
 
 def _imported_files(station: Station, files: Sequence[Path], pose: str) -> tuple[ImportReport, ...]:
     """Import files at the poses that recordings.csv states; those it does not list at `pose`."""
-    bare = tuple(path for path in files if station.verdicts.table.row(path) is None)
-    listed = (station.inbox.folder,) if len(bare) < len(files) else ()
-    reports = station.campaign.import_paths(listed) if listed else ()
+    listing = {path: station.verdicts.table.listing(path) for path in files}
+    bare = tuple(path for path in files if listing[path] is None)
+    tables = tuple(dict.fromkeys(folder for folder in listing.values() if folder is not None))
+    reports = station.campaign.import_paths(tables) if tables else ()
     return (*reports, *(station.campaign.import_paths(bare, pose) if bare else ()))
 
 
