@@ -136,7 +136,7 @@ def recordings() -> Markup:
         "for each joint of the URDF, named as the joint: joint_1_deg. Of a joint that slides it is "
         "the place in millimetres, in a column such as rail_mm; so it is in every list of joint "
         "values, and answers then say joint_units. To a campaign, a table without any such column "
-        "is one of proposed poses, with the joints as proposed; tables may lie in subfolders. A hit "
+        "is one of proposed poses, as proposed; tables may lie in subfolders. A hit "
         "is a signed axis of the tcp frame."
     )
     return section(
