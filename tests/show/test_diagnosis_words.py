@@ -8,6 +8,7 @@ import pytest
 from matplotlib.colors import LogNorm, to_rgb
 from rich.console import Console
 
+from planner.diagnosis.odd_pose import OddPose
 from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
@@ -75,6 +76,17 @@ def _table_of(answer: DiagnosisReport):
     object.__setattr__(answer, "held_out", _Said())
     object.__setattr__(answer, "seconds", 1.0)
     return answer.text()
+
+
+def test_a_pose_at_odds_with_the_others_is_named_in_words_and_json():
+    odd = OddPose("P003", 95.1, 0.009)
+    answer = replace(report("unexplained", (UNKNOWN, 1.0)), odd_pose=odd)
+    out = StringIO()
+    Console(file=out, width=300).print(_table_of(answer))
+    assert "Pose P003 is at odds with all others" in out.getvalue()
+    assert "(misfit 0.0090, with it 95; 1 just matters)" in out.getvalue()
+    said = answer.to_json()["odd_pose"]
+    assert said == {"pose": "P003", "misfit": 95.1, "misfit_without": 0.009, "text": odd.sentence}
 
 
 class _Said:
