@@ -1,6 +1,8 @@
 """Small words that every sentence needs: counts, standard deviations, times."""
 
+import math
 from datetime import datetime
+from pathlib import Path
 
 
 def counted(count: int, one: str, more: str = "") -> str:
@@ -14,6 +16,24 @@ def small(value: float, form: str = ".2f") -> str:
     if value > 0 and said.strip("0.") == "":
         return f"<{10.0 ** -int(form[1:-1]):{form}}"
     return said
+
+
+def significant(value: float, digits: int = 2) -> str:
+    """A number with so many digits, in no power of ten."""
+    if value == 0 or not math.isfinite(value):
+        return f"{value:.0f}"
+    rounded = float(f"{value:.{digits}g}")
+    return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
+
+
+def short_name(path: str | Path, most: int = 24) -> str:
+    """The name of a file; of a long one its beginning and, as names differ there, more of its end.
+
+    So that what is said of the file has room on the line, too.
+    """
+    name = Path(path).name
+    begin = most // 3
+    return name if len(name) <= most else f"{name[:begin]}…{name[begin + 1 - most :]}"
 
 
 def local_time(utc: str) -> str:

@@ -33,7 +33,7 @@ def sort_paths(
 
     A folder with recordings.csv says itself which pose a file belongs to (`pose` then picks one,
     or renames the only one), and so do its subfolders; bare files belong to `pose` or, without it,
-    to `default_pose`.
+    to `default_pose`. A table without joints is one of proposed poses.
     """
     deliveries: list[Delivery] = []
     bare: list[Path] = []
@@ -82,7 +82,7 @@ def _from_tables(
 def _from_table(
     folder: Path, joints: JointUnits, points: PointNames, pose: str | None
 ) -> list[Delivery]:
-    recordings = read_recordings(folder, joints, points)
+    recordings = read_recordings(folder, joints, points, bare=True)
     rows: dict[str, list[PoseRow]] = {}
     for row in recordings.rows:
         rows.setdefault(row.pose, []).append(row)
@@ -97,7 +97,7 @@ def _from_table(
     return [
         Delivery(
             name,
-            group[0].joints_deg,
+            group[0].joints_deg or None,
             tuple(Source.of(r) for r in group if r.file),
             f"{folder / TABLE}, row {group[0].row}",
         )

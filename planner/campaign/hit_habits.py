@@ -2,11 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from planner.recording.records import AXES
+from planner.words import short_name
 
 SURE = 2.0  # sds from which what hits have in common is told
 Pair = tuple[float, float]
@@ -30,7 +30,7 @@ class HitMiss:
     def cells(self) -> tuple[str, str, str]:
         """A row of a table: the hit and its file, how it tilts, where it lands."""
         tilt = _beside(self.tilt_deg, self.tilt_sd_deg, self.across, "°")
-        named = f"{self.hit} {Path(self.file).name}"
+        named = f"{self.hit} {short_name(self.file, 16)}"
         return named, tilt, _beside(self.offset_mm, self.offset_sd_mm, self.across, " mm")
 
     @property

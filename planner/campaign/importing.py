@@ -71,8 +71,8 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
         stated = known or state.proposals.get(delivery.pose)
         if stated is None:
             raise InputError(
-                f"No joint angles are known for pose {delivery.pose}; import a folder with "
-                f"recordings.csv, or name a proposed pose."
+                f"No joint angles are known for pose {delivery.pose}; give recordings.csv columns "
+                f"of the joints, or name a proposed pose."
             )
         return stated.joints_deg
     cell.check_pose(delivery.joints_deg, delivery.row)
@@ -80,8 +80,8 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
         off = cell.robot.joints.apart(known.joints_deg, delivery.joints_deg)
         if off:
             raise InputError(
-                f"{delivery.row}: pose {delivery.pose} was imported before at joint angles "
-                f"that differ by {off}; give the new measurement another name."
+                f"{delivery.row}: pose {delivery.pose} was imported before with a joint {off} "
+                f"away; give the new measurement another name."
             )
     return delivery.joints_deg
 

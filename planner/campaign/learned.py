@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.identification.extended_structure import FLOOR, ExtendedModel
 from planner.identification.parameters import Priors, parametrise
-from planner.identification.result import Identification
+from planner.identification.result import Estimate, Identification
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.evidence import laplace
 
@@ -53,21 +53,29 @@ class Learned:
         return laplace(chi2, np.linalg.solve(root, away), white, np.ones(len(away)), temper)
 
     @property
-    def found(self) -> tuple[str, ...]:
+    def stated(self) -> int:
+        """How many springs, the first ones, are not of those that were added."""
+        return len(self.structure.simulation.robot.config.compliance) - self.structure.added
+
+    @property
+    def unstated(self) -> tuple[Estimate, ...]:
         """Springs that robot.toml does not state, that matter and that the recordings determine.
 
         The softest first, in units of the stiffest that is stated at the same place.
         """
-        stated = len(self.structure.simulation.robot.config.compliance) - self.structure.added
         springs = [
             e for e in self.identified.estimates
-            if e.kind == "stiffness" and min(e.blocks) >= stated
+            if e.kind == "stiffness" and min(e.blocks) >= self.stated
         ]  # fmt: skip
         told = [e for e in springs if e.log_sd < KNOWN and e.value < MATTERS * e.prior_median]
-        told.sort(key=lambda e: e.value / e.prior_median)
+        return tuple(sorted(told, key=lambda e: e.value / e.prior_median))
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """The same in words."""
         return tuple(
             f"{e.name.removeprefix('stiffness of ')} {e.value:.3g} ± {e.sd:.1g} {e.unit}"
-            for e in told
+            for e in self.unstated
         )
 
 

@@ -20,12 +20,11 @@ def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:
         sys.stdout.write(encoded(answer).decode() + "\n")
         sys.stdout.flush()
     else:
-        from rich.console import Console
+        from planner.report.console import UnbrokenConsole
 
         text = answer.text()
         if text is not None:
-            # Names of poses and files are no markup.
-            Console(markup=False, emoji=False).print(text)
+            UnbrokenConsole().print(text)
     return code
 
 

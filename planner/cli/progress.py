@@ -7,10 +7,9 @@ from typing import Any
 
 def console(quiet: bool, stderr: bool = True):
     """A rich console on stderr (or stdout), silent if `quiet`."""
-    from rich.console import Console
+    from planner.report.console import UnbrokenConsole
 
-    # Names of poses and files are no markup.
-    return Console(stderr=stderr, quiet=quiet, markup=False, emoji=False)
+    return UnbrokenConsole(stderr=stderr, quiet=quiet)
 
 
 @contextmanager

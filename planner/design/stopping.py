@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from planner.words import counted
+from planner.words import counted, significant
 
 if TYPE_CHECKING:  # a forecast that was kept is read without JAX
     from planner.design.frequency_posterior import FrequencyOutputs, Poses
@@ -51,11 +51,17 @@ class Forecast:
     def text(self) -> str:
         """One or two sentences for the engineer."""
         if self.misses:
+            few = counted(self.measurements, "pose") if self.measurements else "one pose"
             return (
                 f"How far frequencies are off over the workspace is not known: the simulation "
-                f"misses the recordings by {self.misses:.2g} times their noise, and "
-                f"{counted(self.measurements, 'pose')} cannot tell what that does elsewhere. Look "
-                f"at the hits first (axis, sign, point), or measure on."
+                f"misses the recordings by {self.misses:.2g} times their noise, and {few} cannot "
+                f"tell what that does elsewhere. Look at the hits first (axis, sign, point), or "
+                f"measure on."
+            )
+        if not self.measurements:  # of one pose nothing can be left out
+            return (
+                "How far frequencies are off over the workspace is told once two poses are "
+                "measured: until then nothing shows how far the model can be trusted."
             )
         known = f"The frequencies' RMSE over the workspace is about {percent(self.rmse_percent)}"
         share = f"{100 * self.probability:.0f} % probability"
@@ -74,9 +80,7 @@ def percent(value: float, digits: int = 2) -> str:
     """A percentage with so many digits, in no power of ten; what is over 100 is no forecast."""
     if value > MOST_PERCENT:
         return f"more than {MOST_PERCENT:.0f} %"
-    rounded = float(f"{value:.{digits}g}")
-    decimals = max(0, digits - 1 - int(np.floor(np.log10(rounded)))) if rounded > 0 else 0
-    return f"{rounded:.{decimals}f} %"
+    return f"{significant(value, digits)} %"
 
 
 def forecast(

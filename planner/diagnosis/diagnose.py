@@ -11,6 +11,7 @@ from planner.diagnosis.hidden_inertias import hidden_inertias
 from planner.diagnosis.law_beside_linear import beside, leaves_room, of_levels
 from planner.diagnosis.linear_diagnosis import Diagnosis, beside_another, diagnose
 from planner.diagnosis.misses_again import abstained, asked_again
+from planner.diagnosis.odd_pose import OddPose, odd_pose
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
@@ -29,11 +30,15 @@ from planner.progress import Tell, within
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """`recorded` as it was used, without artefacts; what explains it, judged; all candidates."""
+    """`recorded` as it was used, without artefacts; what explains it, judged; all candidates.
+
+    `odd` is the pose that is at odds with all others, where nothing explains the recordings.
+    """
 
     recorded: Dataset
     judged: JudgedDiagnosis
     whole: Together
+    odd: OddPose | None = None
 
 
 def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
@@ -72,7 +77,11 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
     if whole.verdict == "consistent":
         said = hidden_inertias(judged.diagnosis)
         recorded = replace(recorded, remarks=(*recorded.remarks, *said))
-    return Explained(recorded, judged, whole)
+    odd = None
+    if whole.verdict == "unexplained":
+        tell("looking for a pose at odds with the others", 0.97)
+        odd = odd_pose(judged.diagnosis, recorded.poses)
+    return Explained(recorded, judged, whole, odd)
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,17 +33,23 @@ def joint_columns(folder: Path) -> JointUnits:
 
 
 def read_recordings(
-    folder: Path, joints: JointUnits | Sequence[str], points: PointNames | None = None
+    folder: Path,
+    joints: JointUnits | Sequence[str],
+    points: PointNames | None = None,
+    bare: bool = False,
 ) -> RecordingsFolder:
     """The table of a recordings folder; `joints` and `points` are the robot's.
 
+    A `bare` table may have no column of joints at all, where poses alone tell how the robot stood:
+    its rows then hold none.
     Raises InputError naming file, row and remedy.
     """
     points = points or PointNames()
     path = folder / TABLE
     header, lines = _table(path)
     units = JointUnits.of(joints)
-    columns = _joint_columns(path, header, units)
+    told = not bare or any(name.endswith((ANGLE, SLIDE)) for name in header)
+    columns = _joint_columns(path, header, units) if told else ()
     for name in ("pose", "hit", "file"):
         if name not in header:
             raise InputError(f"{path} has no column {name}; add it (see its first row).")
@@ -63,7 +69,8 @@ def read_recordings(
             )
         seen[key] = number
         rows.append(row)
-    _same_angles(path, rows, units)
+    if columns:
+        _same_angles(path, rows, units)
     _distinct_files(path, rows)
     return RecordingsFolder(folder, units, tuple(rows))
 
@@ -267,8 +274,8 @@ def _same_angles(path: Path, rows: list[PoseRow], joints: JointUnits) -> None:
         off = joints.apart(known.joints_deg, row.joints_deg)
         if off:
             raise InputError(
-                f"{path}, row {row.row}: pose {row.pose} has joint angles {off} away from "
-                f"those in row {known.row}; give another pose another name."
+                f"{path}, row {row.row}: pose {row.pose} has a joint {off} away from where "
+                f"it is in row {known.row}; give another pose another name."
             )
 
 

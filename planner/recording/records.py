@@ -161,7 +161,7 @@ class PoseRow:
     """One row of recordings.csv (`file` is absolute) or of predict.csv (`hit`, `file` None).
 
     `joints_deg` are degrees, of joints that slide millimetres (`joints.JointUnits`): so it is
-    wherever a list of joint values has this name.
+    wherever a list of joint values has this name. () where the table has no column of joints.
     """
 
     pose: str

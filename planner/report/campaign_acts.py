@@ -12,6 +12,7 @@ from planner.campaign.events import Entry
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 from planner.report.log_words import act
+from planner.words import significant
 
 
 @dataclass(frozen=True)
@@ -132,5 +133,5 @@ class ConfirmedPose(Answer):
 
     def text(self) -> str:
         """One sentence."""
-        sd = ", ".join(f"{v:.1f} %" for v in self.frequency_sd_percent)
+        sd = ", ".join(f"{significant(v)} %" for v in self.frequency_sd_percent)
         return f"The hits of pose {self.confirmed} are used; sd of frequencies: {sd}."

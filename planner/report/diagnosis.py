@@ -13,7 +13,7 @@ from planner.design.extra_sensor import ExtraSensor
 from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
-from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded
+from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
 from planner.report.established_effects import EstablishedEffect, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.place_names import place_names, with_names
@@ -22,6 +22,7 @@ from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, tabl
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Explained
     from planner.diagnosis.linear_diagnosis import Diagnosis
+    from planner.diagnosis.odd_pose import OddPose
     from planner.diagnosis.verdict import Ranked
 
 SHOWN = 6  # candidates in the table
@@ -66,7 +67,8 @@ class DiagnosisReport(Answer):
 
     `undecided` are those that the recordings cannot tell apart; `sets` name, for what was found,
     the effects any one of which may stand in its place; `next_sensor` is where one more sensor
-    would part what is tied. `explained` holds the fits.
+    would part what is tied, `odd_pose` is the one at odds with all others. `explained` holds the
+    fits.
     """
 
     verdict: str
@@ -88,6 +90,7 @@ class DiagnosisReport(Answer):
     plots: tuple[str, ...] = ()
     next: NextHit | None = None
     next_sensor: ExtraSensor | None = None
+    odd_pose: "OddPose | None" = None
     seconds: float = 0.0
     explained: "Explained | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
@@ -156,6 +159,7 @@ class DiagnosisReport(Answer):
         parts: list[RenderableType] = [Text(self.verdict_text, style="bold")]
         parts += [Text(f"  {finding.text}") for finding in self.findings]
         parts.append(Text(self.where.sentence))
+        parts += [Text(self.odd_pose.sentence, style="bold")] if self.odd_pose else []
         made = table("What was considered", "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
             at = with_names(c.at or "–", self.place_names)
@@ -170,8 +174,11 @@ class DiagnosisReport(Answer):
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
     def to_json(self) -> dict[str, Any]:
-        """With the verdict in words."""
-        return super().to_json() | {"verdict_text": self.verdict_text}
+        """With the verdict, and what is said of a pose, in words."""
+        said = super().to_json() | {"verdict_text": self.verdict_text}
+        if self.odd_pose is not None:
+            said["odd_pose"] = plain(self.odd_pose) | {"text": self.odd_pose.sentence}
+        return said
 
     @property
     def verdict_text(self) -> str:
@@ -233,6 +240,7 @@ def diagnosis_report(explained: "Explained") -> DiagnosisReport:
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),
         remarks=tuple(recorded.remarks),
         simulated=recorded.simulated,
+        odd_pose=explained.odd,
         explained=explained,
     )
 

@@ -22,11 +22,11 @@ from planner.report.plot_text import plain_text
 UNIT = "mean square residual (1: just matters)"
 LEAST, DARK, MOST_SHOWN = 1e-3, 50.0, 1000.0  # residuals: of the scale; from which text is white
 MOST = 4  # poses whose FRFs are shown, those that differed most
-SIDES = (
-    ("as given", "tab:blue", ":"),
-    ("refitted", "tab:orange", "--"),
-    ("explained", "tab:red", "-"),
-)
+# Dashes over a wide line: where an explanation changes nothing, both are seen.
+REFITTED = {"label": "refitted", "color": "tab:orange", "ls": "-", "lw": 2.6, "ms": 8.0}
+EXPLAINED = {"label": "explained", "color": "tab:red", "ls": "--", "lw": 1.0, "ms": 3.5}
+GIVEN = {"label": "as given", "color": "tab:blue", "ls": ":", "lw": 1.1}
+SIDES = (GIVEN, REFITTED, EXPLAINED)
 
 
 def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") -> dict[str, Figure]:
@@ -44,7 +44,7 @@ def diagnosis_figures(found: Diagnosis, names: Sequence[str], mark: str = "") ->
     if layout != TOOL:
         mark = f"{mark}{layout.sensors[0]}, hit at {layout.hits[0]}: "
     for i, axis in enumerate(AXES):
-        for (side, _, _), h in zip(SIDES, sides, strict=True):
+        for side, h in zip((str(side["label"]) for side in SIDES), sides, strict=True):
             title = f"{mark}Map of H {axis}{axis}, simulation {side}"
             figures[f"map_{axis}{axis}_{side.replace(' ', '_')}"] = frf_map(
                 number, measured[:, i, i], h[:, i, i], lines[0], "pose, in recorded order", title,
@@ -74,9 +74,9 @@ def _overlay(
     figure = _figure(7.5, 7.0)
     panels = figure.subplots(3, 1, sharex=True)
     for i, panel in enumerate(panels):
-        panel.semilogy(lines, measured[i, i], color="black", lw=1.5, label="measured")
-        for (label, colour, style), h in zip(SIDES, curves, strict=True):
-            panel.semilogy(lines, h[i, i], style, color=colour, lw=1.1, label=label)
+        panel.semilogy(lines, measured[i, i], color="0.25", lw=4.5, label="measured")
+        for side, h in zip(SIDES, curves, strict=True):
+            panel.semilogy(lines, h[i, i], **side)
         panel.set_ylabel(f"|H {AXES[i]}{AXES[i]}| (m/s²/N)", fontsize=8)
         panel.grid(True, which="both", alpha=0.25)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
@@ -89,13 +89,10 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
     figure = _figure(9.0, 6.5)
     (bands, poses), (left, right) = figure.subplots(2, 2)
     middle = (before.edges_hz[1:] + before.edges_hz[:-1]) / 2
-    for place, label, colour in (
-        (before, "refitted", "tab:orange"),
-        (after, "explained", "tab:red"),
-    ):
-        bands.semilogy(middle, np.maximum(place.by_band, LEAST), "o-", color=colour, label=label)
-        number = np.arange(len(names))
-        poses.semilogy(number, np.maximum(place.by_pose, LEAST), "o-", color=colour, label=label)
+    number = np.arange(len(names))
+    for place, side in ((before, REFITTED), (after, EXPLAINED)):
+        bands.semilogy(middle, np.maximum(place.by_band, LEAST), marker="o", **side)
+        poses.semilogy(number, np.maximum(place.by_pose, LEAST), marker="o", **side)
     for panel, what in ((bands, "frequency (Hz)"), (poses, "pose")):
         panel.axhline(1.0, color="black", lw=0.8, ls=":")
         panel.set_xlabel(what)

@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from rich.console import Console
 from rich.text import Text
 
-_RULER = Console(width=80)  # only to ask how text wraps
+from planner.report.console import UnbrokenConsole
+
+_RULER = UnbrokenConsole(width=80)  # only to ask how text wraps
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,4 +41,5 @@ def fitted(parts: Iterable[Said], width: int, height: int) -> list[Text]:
 
 
 def _height(form: Text | None, width: int) -> int:
-    return 0 if form is None else len(form.wrap(_RULER, width))
+    options = _RULER.options.update(width=width)
+    return 0 if form is None else len(_RULER.render_lines(form, options))

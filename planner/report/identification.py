@@ -13,7 +13,7 @@ from rich.text import Text
 from planner.report.agreement import FrfSimilarity, HeldOutChange, SimilarityChange
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
 from planner.report.plot_files import Pictures
-from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
 
 if TYPE_CHECKING:
     from planner.dataset.dataset import Dataset
@@ -269,9 +269,13 @@ def identified_springs(robot: "Robot", found: "Identification") -> tuple[Identif
 
 
 def _with_sd(value: float, sd: float | None) -> str:
-    """Both with the exponent of the value."""
+    return f"{with_exponent(value)} (kept)" if sd is None else with_exponent(value, sd)
+
+
+def with_exponent(value: float, sd: float | None = None) -> str:
+    """A value, and its sd where that is given, both with the exponent of the value."""
     exponent = 0 if 0.1 <= value < 1000 or value == 0 else math.floor(math.log10(value))
     power = f"e{exponent}" if exponent else ""
-    if sd is None:
-        return f"{value / 10**exponent:.3f}{power} (kept)"
-    return f"{value / 10**exponent:.3f} ± {sd / 10**exponent:.3f}{power}"
+    scaled = value / 10**exponent
+    said = f"{scaled:.3f}" if sd is None else with_sd(scaled, sd / 10**exponent, ".3f")
+    return f"{said}{power}"

@@ -13,7 +13,7 @@ from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
-from planner.words import counted
+from planner.words import counted, significant
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
@@ -133,7 +133,9 @@ class PoseImport(Answer):
         for mode in self.modes:
             made.add_row(*mode.cells)
         both = zip(self.frequency_sd_percent_before, self.frequency_sd_percent, strict=True)
-        change = ", ".join(f"{before:.1f} → {after:.1f} %" for before, after in both)
+        change = ", ".join(
+            f"{significant(before)} → {significant(after)} %" for before, after in both
+        )
         said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
         asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
         return [made, *remarks(self.remarks), said, *asked]

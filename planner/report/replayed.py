@@ -13,6 +13,7 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.compare.counterfactual import otherwise
 from planner.compare.tasks import Run
+from planner.recording.joints import JointUnits
 from planner.replay import Step, replay
 from planner.report.answer import Answer
 from planner.report.text import table
@@ -98,15 +99,18 @@ class ReplayReport(Answer):
     otherwise: OtherAcquisition | None
     joint_units: Any = msgspec.UNSET
 
+    def _stands(self, pose: OtherPose) -> str:
+        names = [""] * len(pose.joints_deg)
+        return JointUnits.declared_as(names, self.joint_units).listed(pose.joints_deg, 0)
+
     def text(self) -> Group:
         """The steps, the verdict, and what another acquisition would have saved."""
         asked = any(step.instead for step in self.steps)
-        units = "deg" if self.joint_units is msgspec.UNSET else ", ".join(self.joint_units)
-        more = [f"instead ({units})"] if asked else []
+        more = ["instead, joints at"] if asked else []
         made = table("Replay", "entry", "event", "check", "what", "sd of frequencies (%)", *more)
         for step in self.steps:
             sd = "  ".join(f"{v:.2f}" for v in step.frequency_sd_percent)
-            poses = [" ".join(f"{v:.0f}" for v in p.joints_deg) for p in step.instead]
+            poses = [self._stands(pose) for pose in step.instead]
             made.add_row(
                 str(step.seq), step.event, step.check, step.detail, sd,
                 *(["\n".join(poses)] if asked else []),

@@ -15,7 +15,8 @@ Colour = tuple[int, int, int]
 
 HEIGHT = 100.0  # of a chart's frame, in scene units
 LEFT, RIGHT, ABOVE, BELOW = 18.0, 6.0, 22.0, 24.0  # room around the frame for numbers and names
-GREY, FAINT, BRIGHT = (150, 155, 160), (60, 64, 68), (225, 225, 225)
+GREY, FAINT, BRIGHT = (200, 204, 208), (60, 64, 68), (235, 235, 235)
+GROUND = (13, 16, 17)  # behind all that is bright, whatever theme the viewer has
 LINE, HAIR, MARK = 0.3, 0.12, 1.1  # radii of lines and points
 STROKES = 20  # of a bar
 BEHIND, BANDS, CURVES, WORDS = 1.0, 5.0, 10.0, 20.0  # what is drawn over what
@@ -111,6 +112,7 @@ def chart_view(path: str, name: str, wide: float = 2.0) -> rrb.Spatial2DView:
     return rrb.Spatial2DView(
         origin=f"/{path}",
         name=name,
+        background=GROUND,
         visual_bounds=rrb.VisualBounds2D(
             x_range=[-LEFT, wide * HEIGHT + RIGHT], y_range=[-ABOVE, HEIGHT + BELOW]
         ),

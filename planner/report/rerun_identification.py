@@ -12,6 +12,7 @@ from planner.report.identification_plots import DirectFrfs, ShownPose
 from planner.report.rerun_chart import (
     BRIGHT,
     GREY,
+    GROUND,
     Chart,
     ChartAxis,
     Curve,
@@ -117,4 +118,4 @@ def _column(count: int) -> int:
 def _map_view(path: str, name: str, count: int) -> rrb.Spatial2DView:
     wide = 3 * _column(count) * count + 2 * GAP
     bounds = rrb.VisualBounds2D(x_range=[-45, wide + 10], y_range=[-20, CELLS + 30])
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, background=GROUND, visual_bounds=bounds)

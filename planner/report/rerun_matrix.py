@@ -12,6 +12,7 @@ from planner.modal.matrix_modes import MatrixModes
 from planner.recording.geometry import Geometry
 from planner.report.rerun_chart import (
     BRIGHT,
+    GROUND,
     Chart,
     ChartAxis,
     ChartBand,
@@ -83,7 +84,7 @@ def _blueprint(found: MatrixModes, driven: int, geometry: Geometry | None) -> rr
     shapes = []
     for k, mode in enumerate(found.modes[:MOST_SHOWN], 1):
         path, title = f"modes/shape/{k}", f"{k}: {mode.frequency_hz:.4g} Hz"
-        view = rrb.Spatial3DView(origin=f"/{path}", name=title)
+        view = rrb.Spatial3DView(origin=f"/{path}", name=title, background=GROUND)
         shapes.append(chart_view(path, title, WIDE) if geometry is None else view)
     tabs.append(rrb.Grid(*shapes, name="Mode shapes"))
     tabs.append(mac_view("modes/mac", "AutoMAC", len(found.modes)))

@@ -21,6 +21,7 @@ from planner.report.modal_plots import poles_by_stability
 from planner.report.rerun_chart import (
     BRIGHT,
     GREY,
+    GROUND,
     Chart,
     ChartAxis,
     ChartBand,
@@ -106,7 +107,7 @@ def draw_mac(
 def mac_view(path: str, name: str, count: int) -> rrb.Spatial2DView:
     """The view of a MAC matrix of so many modes with all its words in sight."""
     bounds = rrb.VisualBounds2D(x_range=[-0.9, count + 0.2], y_range=[-0.6, count + 0.4])
-    return rrb.Spatial2DView(origin=f"/{path}", name=name, visual_bounds=bounds)
+    return rrb.Spatial2DView(origin=f"/{path}", name=name, background=GROUND, visual_bounds=bounds)
 
 
 def _blueprint(columns: list[int], modes: int) -> rrb.Blueprint:

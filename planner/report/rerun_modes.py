@@ -13,7 +13,7 @@ from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
 from planner.recording.points import Layout
-from planner.report.rerun_chart import BRIGHT
+from planner.report.rerun_chart import BRIGHT, GROUND
 from planner.report.rerun_modal import draw_mac, mac_view
 from planner.report.robot_motion import (
     PointShapes,
@@ -36,7 +36,12 @@ MEASURED, REST = (255, 255, 255), (85, 88, 92)
 def mode_views(count: int, eye: rrb.EyeControls3D) -> rrb.Container:
     """A view for each mode, and the MAC matrix with them."""
     views: list[rrb.View] = [
-        rrb.Spatial3DView(origin=f"/modes/mode_{k + 1}", name=f"mode {k + 1}", eye_controls=eye)
+        rrb.Spatial3DView(
+            origin=f"/modes/mode_{k + 1}",
+            name=f"mode {k + 1}",
+            background=GROUND,
+            eye_controls=eye,
+        )
         for k in range(count)
     ]
     mac = mac_view("modes/mac", "MAC: measured (rows) and simulated (columns)", count)

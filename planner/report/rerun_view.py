@@ -18,7 +18,7 @@ from planner.campaign.events import Proposal
 from planner.campaign.labels import LabelledPose
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
-from planner.report.rerun_chart import chart_view
+from planner.report.rerun_chart import GROUND, chart_view
 from planner.report.rerun_curves import WIDE, CurveDrawing, frf_views, progress_views
 from planner.report.rerun_modes import VIBRATION, ModeDrawing, mode_views
 from planner.report.rerun_robot import WORLD, RobotDrawing
@@ -234,6 +234,7 @@ def _blueprint(cell: Cell) -> rrb.Blueprint:
         origin="/",
         contents=["/robot/**", "/cell/**"],
         name=f"{cell.robot.name}; dots: workspace by sd of its frequencies, {SCALE}",
+        background=GROUND,
         spatial_information=rrb.SpatialInformation(target_frame=WORLD),
         eye_controls=_eye(cell),
     )

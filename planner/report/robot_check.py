@@ -1,6 +1,7 @@
 """Answer of `check`: what a robot's description says, and what looks wrong in it."""
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -9,6 +10,7 @@ from rich.text import Text
 
 from planner.check.examine import Examination
 from planner.check.remark import SEVERITIES, CheckRemark
+from planner.recording.joints import JointUnits
 from planner.report.answer import NOT_IN_JSON, Answer
 from planner.report.plot_files import Pictures
 from planner.report.text import drawn, number, table
@@ -69,6 +71,7 @@ class RobotCheckReport(Answer):
     poses: tuple[CheckedPose, ...]
     plots: tuple[str, ...] = ()
     rrd: str | None = None
+    joint_units: Any = msgspec.UNSET
     found: Examination | None = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     @classmethod
@@ -98,6 +101,7 @@ class RobotCheckReport(Answer):
                 for name, row in zip(robot.joint_names, limits.tolist(), strict=True)
             ),
             poses=_poses(found),
+            joint_units=robot.joints.declared,
             found=found,
         )
 
@@ -123,10 +127,10 @@ class RobotCheckReport(Answer):
                 cells = link.joint or "–", mass, place, str(link.collision_shapes)
                 masses.add_row(Text(link.link), *cells)
         modes = table("simulated modes", "pose", "frequency in Hz (damping in %), from the lowest")
-        units = ["" if joint.unit is msgspec.UNSET else " mm" for joint in self.joints]
+        names = [joint.joint for joint in self.joints]
+        joints = JointUnits.declared_as(names, self.joint_units)
         for pose in self.poses:
-            stands = zip(pose.joints_deg, units, strict=True)
-            at = ", ".join(f"{round(v)}{unit or '°'}" for v, unit in stands)
+            at = ", ".join(joints.text(i, v, 0) for i, v in enumerate(pose.joints_deg))
             modes.add_row(f"{pose.pose}: {at}", _cell(pose))
         low, high = self.band_hz
         said = [Text(f"band_hz is {low:g} to {high:g} Hz."), *map(_line, self.findings)]

@@ -6,14 +6,14 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from planner.campaign.events import Question
+from planner.campaign.events import HitRecord, Question
 from planner.campaign.hit_habits import habits
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.modal.modes import Mode
-from planner.report.pose_screen import PosePage
+from planner.report.pose_screen import PosePage, remedy_first
 from planner.report.text import SIMULATED, with_sd
-from planner.words import counted
+from planner.words import counted, short_name, significant
 
 HELP = """\
 a, Enter  import the hits that wait          r  set bad hits aside, do not import them
@@ -23,6 +23,7 @@ b, h      late hits: of the pose before, or of this one; h: unsure hits are righ
 s         star this pose                     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
+FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
 LEAST_TREND, MOST_TOLD = 4, 50  # measurements that make a trend; poses ahead it may be followed
 
 
@@ -59,13 +60,27 @@ def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
             )
     parts: list[RenderableType] = [table, *_missed(report)]
     for hit in report.refused:
-        parts.append(Text(f"refused {hit.file}: {hit.reason}", style="red"))
+        parts.append(Text(_refused(hit), style="red"))
     parts += [Text(remark, style="yellow") for remark in report.remarks]
     parts.append(uncertainty_line(report.model))
     if simulated:
         parts.append(SIMULATED)
     title = f"Pose {report.pose}: {_in(report)}"
     return Panel(Group(*parts), title=title, title_align="left", expand=False)
+
+
+def refusals(report: ImportReport) -> str:
+    """Why hits were refused; of more than fit under a page what to do alone."""
+    hits = report.refused
+    if len(hits) <= FULLY:
+        return "\n".join(_refused(hit) for hit in hits)
+    said = [f"refused {short_name(hit.file)}: {remedy_first(hit.reason)[0]}" for hit in hits]
+    more = len(said) - SHORTLY
+    return "\n".join(said[:SHORTLY] + ([f"and {more} more: planner status"] if more > 0 else []))
+
+
+def _refused(hit: HitRecord) -> str:
+    return f"refused {short_name(hit.file)}: {' '.join(remedy_first(hit.reason))}".strip()
 
 
 def _missed(report: ImportReport) -> list[RenderableType]:
@@ -99,7 +114,7 @@ def _in(report: ImportReport) -> str:
 def uncertainty_line(model: Model) -> Text:
     """What the model does not know yet."""
     sd = model.frequency_sd_percent
-    each = ", ".join(f"mode {k + 1} {v:.2f} %" for k, v in enumerate(sd))
+    each = ", ".join(f"mode {k + 1} {significant(v)} %" for k, v in enumerate(sd))
     target = model.cell.config.stop.frequency_sd_percent
     return Text(f"sd of frequencies over the workspace: {each} (target {target:g} %)")
 

@@ -14,12 +14,19 @@ from planner.campaign.events import Proposal
 from planner.campaign.state import Measurement
 from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
+from planner.report.decision_status import DecisionStatus
 from planner.report.imports import AskedOfPose
 from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json
+from planner.report.refitted_springs import (
+    NOT_KNOWN,
+    RefittedSpring,
+    refitted_springs,
+    springs_table,
+)
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, table
-from planner.words import counted, local_time
+from planner.words import counted, local_time, significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -94,60 +101,6 @@ class RefusedHit:
 
 
 @dataclass(frozen=True, eq=False)
-class DecisionStatus:
-    """How sure it is whether the cut of campaign.toml is stable, at each of the poses (u, dof).
-
-    `measurements_left` until each answer is right with the probability of [stop]; None where so
-    many cannot be foreseen: the cut is too near its limit somewhere.
-    """
-
-    speed_rpm: float
-    depth_m: float
-    joints_deg: np.ndarray
-    stable_probability: np.ndarray
-    sure: bool
-    measurements_left: int | None
-    probability: float
-
-    @classmethod
-    def of(cls, model: "Model") -> "DecisionStatus | None":
-        """Of a campaign's model; None where campaign.toml names no cut."""
-        table = model.cell.config.cut
-        if table is msgspec.UNSET or not model.labelled:
-            return None
-        from planner.campaign.decision import measurements_left
-
-        decision = model.decision
-        if decision is None:
-            return None
-        probability = model.cell.config.stop.probability
-        sure, q = decision.sure(probability), model.cell.robot.joints.shown(decision.q)
-        return cls(
-            table.speed_rpm, table.depth_m, q, decision.probability, sure,
-            measurements_left(model), probability,
-        )  # fmt: skip
-
-    @property
-    def text(self) -> str:
-        """One or two sentences."""
-        p = self.stable_probability
-        least = int(np.argmin(np.abs(p - 0.5)))
-        stable, not_stable = np.sum(p >= self.probability), np.sum(1 - p >= self.probability)
-        at = f"{self.speed_rpm:g} rpm and {1e3 * self.depth_m:g} mm"
-        said = (
-            f"The cut at {at} is stable at {stable} of {len(p)} poses, not stable at "
-            f"{not_stable}, undecided at {len(p) - stable - not_stable} (with "
-            f"{100 * self.probability:g} % probability each); least sure is pose {least + 1}, "
-            f"stable with {100 * p[least]:.0f} %. "
-        )
-        if self.sure:
-            return said + "The decision is sure."
-        if self.measurements_left is None:
-            return said + "It is too near its limit there for a few measurements to make it sure."
-        return said + f"About {self.measurements_left} more measured poses make it sure."
-
-
-@dataclass(frozen=True, eq=False)
 class ModelStatus:
     """What `status` says of the model; sds (count,) in % are over the workspace, mode by mode."""
 
@@ -161,6 +114,7 @@ class ModelStatus:
     leave_one_out: LeftOutValues
     decision: DecisionStatus | None = None
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    springs: tuple[RefittedSpring, ...] = ()
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -177,6 +131,7 @@ class ModelStatus:
             leave_one_out=left_out(model),
             decision=DecisionStatus.of(model),
             joint_units=cell.robot.joints.declared,
+            springs=refitted_springs(model),
         )
 
 
@@ -214,6 +169,7 @@ class StatusReport(Answer):
     decision: Any = msgspec.UNSET
     joint_units: Any = msgspec.UNSET
     used: int = 0  # of the measured poses, those that the model rests on
+    springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -239,7 +195,8 @@ class StatusReport(Answer):
         )
         for pose in self.measurements:
             measured.add_row(*pose.cells)
-        parts = [measured, Text("\n".join(self._lines())), *drawn(self.plots)]
+        springs = [springs_table(self.springs), Text(f"  {NOT_KNOWN}")] if self.springs else []
+        parts = [measured, *springs, Text("\n".join(self._lines())), *drawn(self.plots)]
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
     def _counts(self) -> str:
@@ -256,7 +213,7 @@ class StatusReport(Answer):
             "open: " + (", ".join(p.pose for p in self.open) or "none"),
             "skipped: " + (", ".join(s.pose for s in self.skipped) or "none"),
             "sd of frequencies over the workspace: "
-            + ", ".join(f"mode {k} {v:.2f} %" for k, v in each)
+            + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (target {self.target_frequency_sd_percent:g} %)",
             self.forecast.text + (" The target is reached." if self.done else ""),
             f"log: {counted(self.log.entries, 'entry', 'entries')}",
@@ -307,5 +264,6 @@ def status(campaign: Campaign) -> StatusReport:
         decision=msgspec.UNSET if believed.decision is None else believed.decision,
         joint_units=believed.joint_units,
         used=len(state.used),
+        springs=believed.springs,
         model=lambda: campaign.model,
     )

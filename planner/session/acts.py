@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from rich.text import Text
+
 from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
 from planner.campaign.importing import ImportReport
 from planner.campaign.state import fold, last_acts
@@ -165,9 +167,10 @@ def import_waiting(
 
 def _imported_files(station: Station, files: Sequence[Path], pose: str) -> tuple[ImportReport, ...]:
     """Import files at the poses that recordings.csv states; those it does not list at `pose`."""
-    bare = tuple(path for path in files if station.verdicts.table.row(path) is None)
-    listed = (station.inbox.folder,) if len(bare) < len(files) else ()
-    reports = station.campaign.import_paths(listed) if listed else ()
+    listing = {path: station.verdicts.table.listing(path) for path in files}
+    bare = tuple(path for path in files if listing[path] is None)
+    tables = tuple(dict.fromkeys(folder for folder in listing.values() if folder is not None))
+    reports = station.campaign.import_paths(tables) if tables else ()
     return (*reports, *(station.campaign.import_paths(bare, pose) if bare else ()))
 
 
@@ -267,9 +270,8 @@ def _after(station: Station, course: Course, report: ImportReport) -> Course:
     if report.question is not None:  # at the pose it was moved to it does not fit either
         return course
     simulated = bool(report.measurement and report.measurement.simulated)
-    station.screen.show(session_text.import_panel(report, simulated))
-    if station.screen.console.is_terminal:  # the page goes with the next pose
-        station.say(session_text.result_line(report), "bold")
-        for alert in report.alerts:
-            station.say(alert, "yellow")
+    notes = [Text(alert, style="yellow") for alert in report.alerts]
+    notes += [Text(session_text.refusals(report), style="red")] if report.refused else []
+    notes += [Text(session_text.result_line(report), style="bold")]
+    station.screen.leave(session_text.import_panel(report, simulated), notes)
     return measured(station, course, report.pose)

@@ -12,6 +12,7 @@ from planner.campaign.state import CampaignState
 from planner.report import session_text
 from planner.report.pose_screen import PosePage
 from planner.session.verdicts import HitVerdict, Part, PoseBefore
+from planner.words import significant
 
 BAD = ("repeat", "unsure", "unstated")
 
@@ -129,5 +130,5 @@ class Course:
             ends = "as many measurements as campaign.toml allows"
         return replace(
             self, measured=measured, history=history, announced=self.announced or model.done,
-            progress=f"sd of all {overall:.2f} %; {left}", stop=ends,
+            progress=f"sd of all {significant(overall)} %; {left}", stop=ends,
         )  # fmt: skip

@@ -9,6 +9,7 @@ from planner.campaign.events import Proposal
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
 from planner.session.course import BAD, Course
 from planner.session.verdicts import HitVerdict
+from planner.words import short_name
 
 
 def page_without_hits(
@@ -35,19 +36,20 @@ def page_with_hits(
 ) -> PosePage:
     """The page with the hits that wait, the files that are not whole yet, and keys that do."""
     before = course.before.pose
-    hits = tuple(_judged(one, before) for one in verdicts)
-    page = replace(
-        page, hits=hits, unfinished=tuple((one[0].name, _named(*one)) for one in waiting),
-        progress=course.progress,
-    )  # fmt: skip
+    names = [one.path.name for one in verdicts]
+    hits = tuple(_judged(one, before, names) for one in verdicts)
+    unfinished = tuple((short_name(path), _named(path, why)) for path, why in waiting)
+    page = replace(page, hits=hits, unfinished=unfinished, progress=course.progress)
     return replace(page, keys="" if auto else _keys(page, before, undoable))
 
 
-def _judged(verdict: HitVerdict, before: str) -> JudgedHit:
+def _judged(verdict: HitVerdict, before: str, names: Sequence[str]) -> JudgedHit:
     late = f"answers as {before} did: [b] it is from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
     if verdict.kind == "unsure":
         text = f"{text}, or [h]: it is right"
+    for name in names:
+        text = text.replace(name, short_name(name))
     return JudgedHit(verdict.number, verdict.axis, verdict.kind, text)
 
 
@@ -72,5 +74,6 @@ def _right_here(kinds: set[str]) -> str:
 
 def _named(path: Path, why: str) -> str:
     """What is the matter with a file, by its name alone."""
-    text = why.replace(str(path), path.name)
-    return text if path.name in text else f"{path.name} {text}"
+    name = short_name(path)
+    text = why.replace(str(path), name).replace(path.name, name)
+    return text if name in text else f"{name} {text}"

@@ -1,7 +1,7 @@
 """The session's screen: one page that is drawn anew when something changed, and a bell."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 from rich.console import Console, Group, RenderableType
 from rich.text import Text
@@ -21,6 +21,7 @@ class Screen:
         self._page: Page | None = None
         self._notes: deque[Text] = deque(maxlen=NOTES)
         self._shown = ""
+        self._left = False  # whether something stands on the screen that is not to be wiped off
         self._rung: set[tuple[str, int]] = set()
 
     def show(self, page: Page | RenderableType) -> None:
@@ -31,10 +32,23 @@ class Screen:
             self._shown = drawn
             self._draw()
 
+    def leave(self, result: RenderableType, notes: Sequence[Text]) -> None:
+        """What may be higher than the screen: printed once, and left for who scrolls back.
+
+        `notes` say the most important of it under the page that follows.
+        """
+        self._page, self._shown = None, ""
+        if self.console.is_terminal:
+            self.console.clear()
+            self._notes.extend(notes)
+            self._left = True
+        self.console.print(result)
+
     def say(self, sentence: Text) -> None:
         """A sentence under the page; the last ones stay."""
         if self.console.is_terminal:
             self._notes.append(sentence)
+        if self.console.is_terminal and self._page is not None:
             self._draw()
         else:
             self.console.print(sentence)
@@ -73,6 +87,9 @@ class Screen:
         if self._page is not None:
             parts.append(self._page(self.console.width, self._height - last))
         room = self._height - self._drawn(last).count("\n")
+        if self._left:  # as many lines as push it off the screen, into what can be scrolled back to
+            self.console.print("\n" * (self.console.height - 1))
+            self._left = False
         self.console.clear()
         self.console.print(Group(*parts, *self._that_fit(room)))
 
@@ -89,7 +106,7 @@ class Screen:
         return captured.get()
 
     def _lines(self, note: Text) -> int:
-        return len(note.wrap(self.console, self.console.width))
+        return len(self.console.render_lines(note))
 
     def _that_fit(self, room: int) -> list[Text]:
         """The last sentences for which there are so many lines."""

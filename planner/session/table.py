@@ -1,4 +1,4 @@
-"""What recordings.csv in the watched folder says of files, read anew whenever it changes."""
+"""What recordings.csv says of files, in the watched folder and those in it, read anew on change."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,49 +9,49 @@ from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
 from planner.recording.records import PoseRow
 
-Stamp = tuple[int, int] | None  # size and time of the table; None: there is none
+Stamp = tuple[int, int]  # size and time of a table
 
 
 @dataclass
 class FolderTable:
-    """The table of a folder, if it has one. Without `joints` nothing is looked up."""
+    """The tables of a folder and of those in it. Without `joints` nothing is looked up."""
 
     folder: Path | None = None
     joints: JointUnits | None = None
     points: PointNames = field(default_factory=PointNames)
-    _stamp: Stamp = None
-    _rows: dict[Path, PoseRow] = field(default_factory=dict)
-    _fault: str = ""
+    waiting: list[tuple[Path, str]] = field(default_factory=list)  # unreadable ones, and why
+    _stamps: dict[Path, Stamp] = field(default_factory=dict)
+    _rows: dict[Path, tuple[Path, PoseRow]] = field(default_factory=dict)
 
     def row(self, path: Path) -> PoseRow | None:
-        """What the table says of a file; None: nothing."""
-        self._follow()
-        return self._rows.get(path.resolve()) if self._rows else None
+        """What a table says of a file; None: nothing."""
+        found = self._rows.get(path.resolve()) if self._rows else None
+        return found[1] if found else None
 
-    @property
-    def waiting(self) -> list[tuple[Path, str]]:
-        """The table itself, where it cannot be read, with what is the matter."""
-        self._follow()
-        return [(self.folder / TABLE, self._fault)] if self.folder and self._fault else []
+    def listing(self, path: Path) -> Path | None:
+        """The folder whose table lists a file; None: none does."""
+        found = self._rows.get(path.resolve()) if self._rows else None
+        return found[0] if found else None
 
-    def _follow(self) -> None:
+    def follow(self) -> None:
+        """Read what has changed; once a look at the folder, as tables lie anywhere in it."""
         if self.folder is None or self.joints is None:
             return
-        stamp = self._now(self.folder / TABLE)
-        if stamp == self._stamp and not self._fault:  # a file that was missing may have come
+        stamps = dict(filter(None, map(_stamped, sorted(self.folder.rglob(TABLE)))))
+        if stamps == self._stamps and not self.waiting:  # a file that was missing may have come
             return
-        self._stamp, self._rows, self._fault = stamp, {}, ""
-        if stamp is None:
-            return
-        try:
-            rows = read_recordings(self.folder, self.joints, self.points).rows
-            self._rows = {row.file: row for row in rows if row.file is not None}
-        except InputError as error:
-            self._fault = str(error)
+        self._stamps, self._rows, self.waiting = stamps, {}, []
+        for path in stamps:
+            try:
+                rows = read_recordings(path.parent, self.joints, self.points, bare=True).rows
+                self._rows |= {row.file: (path.parent, row) for row in rows if row.file is not None}
+            except InputError as error:
+                self.waiting.append((path, str(error)))
 
-    def _now(self, path: Path) -> Stamp:
-        try:
-            stat = path.stat()
-        except OSError:
-            return None
-        return stat.st_size, stat.st_mtime_ns
+
+def _stamped(path: Path) -> tuple[Path, Stamp] | None:
+    try:
+        stat = path.stat()
+    except OSError:  # it was taken away meanwhile
+        return None
+    return path, (stat.st_size, stat.st_mtime_ns)

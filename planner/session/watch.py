@@ -167,6 +167,7 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
 
 def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
+    station.verdicts.table.follow()
     whole, waiting = station.inbox.scan(course.known(station.campaign.state))
     waiting += station.verdicts.table.waiting
     for path in station.inbox.ignored():

@@ -1,5 +1,7 @@
 """A campaign by its commands alone, with a measurement set aside and taken back again."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -28,6 +30,10 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
 
     told("new", cell, "--robot", robot, "--campaign", campaign_toml)
     assert measured() == []
+    for command in ("next", "status"):  # of nothing measured nothing is forecast
+        said = " ".join(call(command, cell)[1].split())
+        assert "is told once two poses are measured" in said
+        assert "RMSE" not in said
     after, names = [predicted()], []
     for number in range(3):
         (proposal,) = told("next", cell)["proposals"]
@@ -37,6 +43,9 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
         assert (report["pose"], len(report["accepted"])) == (names[-1], 9)
         after.append(predicted())
     assert measured() == [(name, False) for name in names]
+    said = " ".join(call("status", cell)[1].split())
+    assert "RMSE over the workspace is about" in said
+    assert "is told once" not in said
     true = np.array([truth.modes(np.deg2rad(q), 4)[0] for q in ASKED])
     off = [np.sqrt(np.mean((p[..., 0] / true - 1) ** 2)) for p in (after[0], after[-1])]
     assert off[1] < min(0.01, off[0] / 2)
@@ -58,3 +67,45 @@ def test_a_measurement_is_set_aside_and_taken_back(tmp_path):
     two = told("replay", cell, "--until", 5)
     assert [s["event"] for s in two["steps"]].count("imported") == 2
     assert two["frequency_sd_percent"] != pytest.approx(replayed["frequency_sd_percent"])
+
+
+def test_what_the_simulation_learned_of_each_joint_stands_beside_what_was_stated(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    cell = tmp_path / "cell"
+    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    assert told("status", cell)["springs"] == []
+    for number in range(3):
+        (proposal,) = told("next", cell)["proposals"]
+        folder = record(truth, tmp_path / f"export{number}", proposal["pose"],
+                        proposal["joints_deg"], number)  # fmt: skip
+        told("import", cell, folder)
+    springs = told("status", cell)["springs"]
+    stated = tomllib.loads(robot.read_text())["compliance"]
+    assert [(s["joint"], s["axis"]) for s in springs] == [(s["joint"], s["axis"]) for s in stated]
+    assert [s["stated"] for s in springs] == [s["stiffness"] for s in stated]
+    for spring in springs:
+        assert spring["unit"] == "N·m/rad"
+        assert not spring["identifiable"] or spring["stiffness_sd"] < 0.5 * spring["stiffness"]
+    assert any(abs(s["stiffness"] / s["stated"] - 1) > 0.03 for s in springs)  # it learned
+    _, said, _ = call("status", cell)
+    first = springs[0]
+    shown = f"{first['stiffness'] / 10 ** int(np.log10(first['stiffness'])):.3f} ±"
+    assert all(word in said for word in ("stated", "refitted ± sd", "N·m/rad", shown))
+    page = tmp_path / "report.html"
+    told("report", cell, "--out", page)
+    assert all(word in page.read_text() for word in ('id="learned"', 'href="#learned"', shown))
+
+
+def test_a_simulation_that_does_not_learn_has_no_refitted_springs(tmp_path):
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    cell = tmp_path / "cell"
+    campaign_toml.write_text(campaign_toml.read_text() + '\n[fidelity]\nsimulation = "frozen"\n')
+    told("new", cell, "--robot", robot, "--campaign", campaign_toml)
+    (proposal,) = told("next", cell)["proposals"]
+    told("import", cell, record(truth, tmp_path / "export", proposal["pose"],
+                                proposal["joints_deg"]))  # fmt: skip
+    assert told("status", cell)["springs"] == []
+    assert "refitted" not in call("status", cell)[1]
+    page = tmp_path / "report.html"
+    told("report", cell, "--out", page)
+    assert "#learned" not in page.read_text()

@@ -1,6 +1,7 @@
 """An arm on a rail, by command: millimetres in and out, modes known where nothing was measured."""
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -55,6 +56,27 @@ def test_the_log_and_answers_say_the_units(cell, capsys):
         assert low <= value <= high
     assert run(["next", str(folder)]) == 0
     assert "rail (mm)" in capsys.readouterr().out
+    told = answer(capsys, "check", folder / "robot" / "robot.toml")
+    assert told["joint_units"] == ["mm", "deg", "deg"]
+    assert told["poses"][1]["joints_deg"][0] > 100.0
+
+
+def test_what_another_acquisition_would_propose_is_said_with_units(cell, capsys):
+    folder, _, _ = cell
+    told = answer(capsys, "replay", folder, "--acquisition", "variance")
+    rail, *angles = next(p for s in told["steps"] for p in s["instead"])["joints_deg"]
+    assert run(["replay", str(folder), "--acquisition", "variance"]) == 0
+    said = re.sub(r"[\s│]+", "", capsys.readouterr().out)
+    assert f"{rail:.0f}mm,{angles[0]:.0f}°," in said  # the rest is on the next line
+
+
+def test_a_pose_that_was_imported_elsewhere_on_the_rail_is_told_in_millimetres(cell, capsys):
+    folder, truth, root = cell
+    moved = record_poses(truth, [("A", internal((500.0, 20.0, -20.0)))], root / "moved", repeats=1,
+                         hammer=HAMMER, seed=4)  # fmt: skip
+    assert run(["import", str(folder), str(moved)]) == 2
+    said = capsys.readouterr().err
+    assert re.search(r"imported before with a joint (199|200|201)\.\d+ mm away; give", said)
 
 
 def test_frequencies_at_unseen_poses(cell, capsys):

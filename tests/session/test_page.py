@@ -1,17 +1,24 @@
 """The page of a pose is never higher than the screen, and says whole what is to be done."""
 
+import io
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 from rich.text import Text
 
-from planner.campaign.events import Proposal
+from planner.campaign.events import HitRecord, Proposal
 from planner.recording.joints import JointUnits
 from planner.report.fitted_lines import Said, fitted
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do, remedy_first
+from planner.report.session_text import refusals
+from planner.session.course import Course
+from planner.session.page import page_with_hits
 from planner.session.screen import Screen
+from planner.session.verdicts import HitVerdict
+from planner.words import short_name
 
 DOUBLE = JudgedHit(
     1, "+x", "repeat",
@@ -116,6 +123,43 @@ def test_the_longest_forms_that_fit_are_taken():
     assert fitted(parts, 80, 4) == [short, long]
     assert fitted(parts, 80, 1) == [short, short]
     assert fitted([Said([None, short]), Said([short])], 80, 1) == [short]
+
+
+def test_a_result_higher_than_the_screen_stands_once_above_the_next_page():
+    drawn = io.StringIO()
+    console = Console(file=drawn, width=80, height=24, force_terminal=True, legacy_windows=False)
+    screen = Screen(console)
+    result, note = Text("\n".join(f"result {i}" for i in range(40))), Text("The last one refused.")
+    screen.show(Text("page"))
+    screen.leave(result, [note])
+    screen.say(Text("One more."))
+    screen.show(Text("page"))
+    screen.say(Text("And one."))
+    text = drawn.getvalue()
+    assert text.count("result 39") == 1
+    wiped = text.split("\x1b[2J")
+    assert wiped[2].count("\n") >= 40 + 23  # pushed off the screen, not wiped off
+    assert all(said in wiped[-1] for said in (note.plain, "One more.", "And one."))
+    assert all(len(part.split("\n")) <= 24 for part in wiped[3:])
+
+
+def test_names_of_files_leave_room_for_what_is_said_of_them(page):
+    name = "measurement_2026-11-24_cell7_left_station_hit_x_003.uff"
+    said = f"disagrees with hit 2 ({name}) (likeness 0.42): hit along x once more"
+    verdict = HitVerdict(Path("exports") / name, "+x", "unsure", said, number=1)
+    why = f"exports/{name} holds no force; export it again."
+    made = page_with_hits(page, [verdict], [(verdict.path, why)], True, False, Course())
+    text = whole(lines(made, height=40))
+    assert name not in text
+    assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (likeness 0.42)" in text
+    assert "cannot be read: measurem…n_hit_x_003.uff: Export it again." in text
+    assert short_name("exports/P001_x_1.uff") == "P001_x_1.uff"
+    refused = HitRecord(name, "", "", reason="A second pulse follows; hit once.")
+    lying = SimpleNamespace(refused=[refused] * 6)
+    told = refusals(lying).split("\n")
+    assert told[:2] == ["refused measurem…n_hit_x_003.uff: Hit once."] * 2
+    assert told[-1] == "and 2 more: planner status"
+    assert "A second pulse follows." in refusals(SimpleNamespace(refused=[refused]))
 
 
 def test_a_sentence_under_a_full_page_is_seen(page):

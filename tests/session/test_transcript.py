@@ -150,7 +150,11 @@ def test_a_session_in_which_all_goes_wrong(cell):
         assert all(len(line) <= COLUMNS for line in page.splitlines())
         assert len(page.splitlines()) <= ROWS
         good = {f"{name}.uff" for name in ("x1", "half", "y1", "y2", "z1", "z2")}
-        terminal.press("a", f"{first.pose}: 6 hits in, 3 refused", "go to pose")
+        page = terminal.press("a", f"{first.pose}: 6 hits in, 3 refused", "go to pose")
+        # Why hits were refused stays under the next page; the panel of results stands once, above.
+        for name in ("double", "weak", "clipped"):
+            assert f"refused {name}.uff: " in page
+        assert terminal.seen.count(f"─ Pose {first.pose}: 6 hits in, 3 refused ─") == 1
         assert good <= used_files(campaign.directory)
         # Hits that came late answer as the pose before did; they are asked about, and moved.
         analyser.write("late", analyser.good("+x"))

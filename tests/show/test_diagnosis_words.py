@@ -4,13 +4,15 @@ from dataclasses import fields, replace
 from io import StringIO
 
 import numpy as np
-from matplotlib.colors import LogNorm
+import pytest
+from matplotlib.colors import LogNorm, to_rgb
 from rich.console import Console
 
+from planner.diagnosis.odd_pose import OddPose
 from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
-from planner.report.diagnosis_plots import _residuals
+from planner.report.diagnosis_plots import _overlay, _residuals
 from planner.report.mismatch import MismatchShares
 from planner.report.place_names import place_names, with_names
 from planner.robot.robot import Robot
@@ -76,6 +78,17 @@ def _table_of(answer: DiagnosisReport):
     return answer.text()
 
 
+def test_a_pose_at_odds_with_the_others_is_named_in_words_and_json():
+    odd = OddPose("P003", 95.1, 0.009)
+    answer = replace(report("unexplained", (UNKNOWN, 1.0)), odd_pose=odd)
+    out = StringIO()
+    Console(file=out, width=300).print(_table_of(answer))
+    assert "Pose P003 is at odds with all others" in out.getvalue()
+    assert "(misfit 0.0090, with it 95; 1 just matters)" in out.getvalue()
+    said = answer.to_json()["odd_pose"]
+    assert said == {"pose": "P003", "misfit": 95.1, "misfit_without": 0.009, "text": odd.sentence}
+
+
 class _Said:
     sentence, poses = "", ()
 
@@ -97,3 +110,24 @@ def test_residuals_by_direction_share_a_scale_that_is_shown():
 def test_a_refit_that_is_farther_off_is_explained():
     assert "peaks are farther off" in MismatchShares(-6.3, 2.1, -34.4, -46.6).sentence
     assert "peaks" not in MismatchShares(-6.3, -9.0, -34.4, -46.6).sentence
+
+
+@pytest.mark.parametrize("picture", ["residuals", "frf"])
+def test_curves_that_agree_are_all_seen(picture):
+    """By the colours on the picture: none is covered by one that is drawn later."""
+    lines, curve = np.linspace(4.0, 60.0, 100), 10 ** np.linspace(-3.0, 1.0, 100)
+    place = Where(np.linspace(4, 60, 9), np.full(8, 3.0), np.full(3, 2.0), np.ones((3, 3)))
+    if picture == "residuals":
+        figure, colours = _residuals(place, place, ["A", "B", "C"], ""), ("tab:orange", "tab:red")
+    else:
+        same = np.broadcast_to(curve, (3, 3, 100))
+        figure = _overlay(lines, same, [0.3 * same, same, same], "")
+        colours = "0.25", "tab:blue", "tab:orange", "tab:red"
+    for legend in (*figure.legends, *(panel.get_legend() for panel in figure.axes)):
+        if legend is not None:
+            legend.set_visible(False)
+    figure.canvas.draw()
+    seen = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+    for colour in colours:
+        wanted = np.round(255 * np.array(to_rgb(colour)))
+        assert np.sum(np.max(np.abs(seen - wanted), axis=-1) <= 12) > 100, colour

@@ -53,6 +53,15 @@ def test_every_view_of_every_tab_has_something_to_draw(told):
         assert kinds & set(DRAWN[str(view.class_identifier)]), (view.name, origin)
 
 
+def test_all_is_on_a_dark_ground_whatever_theme_the_viewer_has(told):
+    """Much of it is white: measured curves, names and legends."""
+    campaign, *_ = told
+    for view in views(_blueprint(campaign.cell).root_container):
+        if str(view.class_identifier) in ("2D", "3D"):
+            (ground,) = view.properties["Background"].color.as_arrow_array().to_pylist()
+            assert all(ground >> shift & 255 < 40 for shift in (8, 16, 24)), view.name
+
+
 def test_each_tab_has_a_name(told):
     campaign, *_ = told
     tabs = _blueprint(campaign.cell).root_container.contents

@@ -60,6 +60,19 @@ def test_an_axis_of_the_arm_does_not_slide(tmp_path):
     assert "A1_mm,A2_deg,A3_deg" in program("poses", robot, "c", [PoseToDrive("P001", STANDS)])
 
 
+@pytest.mark.parametrize("on", ["an external axis", "the arm"])
+def test_urscript_says_what_it_cannot_do_and_what_can(tmp_path, external, on):
+    arm = Robot.load(make_sliding(tmp_path / "arm"))
+    robot = external if on == "an external axis" else arm
+    has = "2 such joints and 1 external axis" if robot is external else (
+        r"2 such joints and 1 that slide \(rail\)"
+    )  # fmt: skip
+    said = f"urscript can only move an arm of 6 joints that turn, and this robot has {has}; export "
+    with pytest.raises(InputError, match=f"{said}krl or rapid.* or poses, a table"):
+        program("urscript", robot, "c", [PoseToDrive("P001", STANDS)])
+    assert program("krl", external, "c", [PoseToDrive("P001", STANDS)])
+
+
 def test_a_gantry_moves_in_the_recording(tmp_path):
     toml = make_sliding(tmp_path / "robot", GANTRY, TIP)
     urdf = toml.with_name("robot.urdf")

@@ -107,12 +107,12 @@ def held_out(
     if not aside:
         return (), None
     rest = problem.at([i for i in range(len(problem.q)) if i not in aside])
-    again = [_anew(rest, refitted)]
-    again.append(again[0] if best is refitted else _anew(rest, best))
+    again = [anew(rest, refitted)]
+    again.append(again[0] if best is refitted else anew(rest, best))
     return aside, agreement(problem.at(aside), *again)
 
 
-def _anew(rest: Problem, found: Fit) -> Fit:
+def anew(rest: Problem, found: Fit) -> Fit:
     """The fit without some poses: the better of one from afar and one from the fit on all."""
     near = settle(rest, found, steps=SHORT)
     if found.effect.at:

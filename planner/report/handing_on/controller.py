@@ -8,6 +8,7 @@ from planner.errors import InputError
 from planner.robot.collision import Collisions
 from planner.robot.config import ControllerTable
 from planner.robot.robot import Robot
+from planner.words import counted
 
 ARM_AXES, EXTERNAL_AXES = 6, 6  # that KRL and RAPID have words for
 UNUSED = "9E9"  # an external axis that is not there, in RAPID
@@ -75,14 +76,14 @@ def program(
     table, axes = robot.config.controller, axes_of(robot)
     arm = [axis for axis in axes if axis[0] not in table.external]
     external = [axis for axis in axes if axis[0] in table.external]
+    if kind == "urscript":
+        _refuse_urscript(robot, [name for name, *_ in arm], len(external))
     most = ARM_AXES if kind != "poses" else len(axes)
     if len(arm) > most or len(external) > EXTERNAL_AXES:
         raise InputError(
             f"{robot.path}: {kind} has {ARM_AXES} axes of the arm, the robot {len(arm)}; name the "
             f"others in [controller] external, or export poses."
         )
-    if kind == "urscript" and (external or len(arm) != ARM_AXES):
-        raise InputError(f"{robot.path}: urscript drives {ARM_AXES} joints; export poses instead.")
     slides = [name for name, *_ in arm if robot.slides(name)]
     if kind != "poses" and slides:
         raise InputError(
@@ -99,6 +100,22 @@ def program(
         driven.append(DrivenPose(one, pose.note, turned[0], turned[1], units))
     said = heading(robot, simulated)
     return PROGRAMS[kind](identifier(name, "C_"), driven, table, said)
+
+
+def _refuse_urscript(robot: Robot, arm: Sequence[str], external: int) -> None:
+    """InputError where joints of the robot are others than the six of a UR arm."""
+    sliding = [name for name in arm if robot.slides(name)]
+    turning = len(arm) - len(sliding)
+    if turning == ARM_AXES and not sliding and not external:
+        return
+    has = counted(turning, "such joint")
+    has += f" and {len(sliding)} that slide ({', '.join(sliding)})" if sliding else ""
+    has += f" and {counted(external, 'external axis', 'external axes')}" if external else ""
+    raise InputError(
+        f"{robot.path}: urscript can only move an arm of {ARM_AXES} joints that turn, and this "
+        f"robot has {has}; export krl or rapid, whose external axes may slide, or poses, a table "
+        f"in degrees and mm."
+    )
 
 
 def unique(name: str, used: set[str]) -> str:

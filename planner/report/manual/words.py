@@ -135,7 +135,9 @@ def recordings() -> Markup:
         "it names. Joint angles are those read back from the controller, in degrees, one column "
         "for each joint of the URDF, named as the joint: joint_1_deg. Of a joint that slides it is "
         "the place in millimetres, in a column such as rail_mm; so it is in every list of joint "
-        "values, and answers then say joint_units. A hit is a signed axis of the tcp frame."
+        "values, and answers then say joint_units. To a campaign, a table without any such column "
+        "is one of proposed poses, as proposed; tables may lie in subfolders. A hit "
+        "is a signed axis of the tcp frame."
     )
     return section(
         "Recordings",

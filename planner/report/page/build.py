@@ -9,14 +9,15 @@ from planner.report.page.chapters import asked, decisions, meaning, measured, re
 from planner.report.page.explained import diagnosis
 from planner.report.page.facts import Facts
 from planner.report.page.html import Markup, document, joined, tag
+from planner.report.page.learned import learned
 from planner.report.page.pictures import frfs, maps, quality
 from planner.report.text import SIMULATED
 from planner.version import __version__
 
 CHAPTERS = (
     ("asked", "asked"), ("measured", "measured"), ("quality", "quality"), ("maps", "maps"),
-    ("frfs", "FRFs"), ("diagnosis", "diagnosis"), ("log", "log"), ("again", "reproduce"),
-    ("meaning", "reading"),
+    ("frfs", "FRFs"), ("learned", "simulation"), ("diagnosis", "diagnosis"), ("log", "log"),
+    ("again", "reproduce"), ("meaning", "reading"),
 )  # fmt: skip
 
 
@@ -24,17 +25,19 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     """All chapters; `kept_diagnosis` is the answer of a diagnosis in JSON."""
     facts = Facts.of(campaign)
     parts = [asked(facts), measured(facts), quality(facts), maps(facts), frfs(facts)]
+    parts.append(learned(facts))
     parts += [diagnosis(kept_diagnosis)] if kept_diagnosis else []
     parts += [decisions(facts), reproduce(facts), meaning()]
     name = campaign.directory.name
-    return document(f"{name}: report", _head(facts, name, bool(kept_diagnosis)), *parts)
+    without = {"diagnosis"} if kept_diagnosis is None else set()
+    without |= set() if facts.status.springs else {"learned"}
+    return document(f"{name}: report", _head(facts, name, without), *parts)
 
 
-def _head(facts: Facts, name: str, diagnosed: bool) -> Markup:
+def _head(facts: Facts, name: str, without: set[str]) -> Markup:
     now = datetime.now(UTC).isoformat(timespec="minutes")[:16].replace("T", " ")
     label = [tag("div", SIMULATED.plain, class_="label")] if facts.simulated else []
-    links = [tag("a", text, href=f"#{id_}") for id_, text in CHAPTERS
-             if diagnosed or id_ != "diagnosis"]  # fmt: skip
+    links = [tag("a", text, href=f"#{id_}") for id_, text in CHAPTERS if id_ not in without]
     said = f"{facts.status.robot} · {now} UTC · planner {__version__}"
     return joined(
         (
@@ -50,11 +53,12 @@ def _head(facts: Facts, name: str, diagnosed: bool) -> Markup:
 def _cards(facts: Facts) -> Markup:
     used, hits = facts.used, sum(len(m.accepted) for m in facts.used)
     known = facts.status.forecast
+    rmse = percent(known.rmse_percent) if known.measurements else "–"
     cards = [
         (str(len(used)), "poses measured and used"),
         (str(hits), "hits used"),
         (str(len(facts.status.refused)), "recordings refused"),
-        (percent(known.rmse_percent), "expected RMSE of frequencies over the workspace"),
+        (rmse, "expected RMSE of frequencies over the workspace"),
         (
             "reached" if facts.status.done else "not reached",
             f"target of {facts.status.target_frequency_sd_percent:g} %",

@@ -25,7 +25,7 @@ from planner.report.page.html import (
 from planner.report.text import number
 from planner.report.text import with_sd as pm
 from planner.version import __version__
-from planner.words import local_time
+from planner.words import local_time, significant
 
 
 def asked(facts: Facts) -> Markup:
@@ -236,7 +236,8 @@ def mode_rows(facts: Facts) -> list[tuple[str, ...]]:
         f, z = found.frequency_hz[:, k], 100 * found.damping_ratio[:, k]
         sd = facts.sd_percent[:, k]
         rows.append(
-            (f"mode {k + 1}", f"{f.min():.2f} to {f.max():.2f}", f"{np.sqrt(np.mean(sd**2)):.2f}",
-             f"{sd.max():.2f}", f"{z.min():.2f} to {z.max():.2f}")
+            (f"mode {k + 1}", f"{f.min():.2f} to {f.max():.2f}",
+             significant(np.sqrt(np.mean(sd**2))), significant(sd.max()),
+             f"{z.min():.2f} to {z.max():.2f}")
         )  # fmt: skip
     return rows

@@ -1,0 +1,96 @@
+"""Tables of recordings that come into the watched folder: in subfolders, and without joints."""
+
+import csv
+import io
+import shutil
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from planner.campaign.campaign import Campaign
+from planner.dataset.screened_files import Source
+from planner.recording.folder import TABLE
+from planner.session.keys import NoKeys
+from planner.session.watch import watch
+from tests.support.hit_csv import write_csv
+from tests.support.outside import call, make_cell, record
+
+
+@pytest.fixture
+def cell(tmp_path):
+    """A campaign with a proposed pose, what was recorded there, and a folder to watch."""
+    robot, campaign_toml, truth = make_cell(tmp_path)
+    campaign = Campaign.new(tmp_path / "cell", robot, campaign_toml)
+    pose = campaign.next()[0]
+    made = record(truth, tmp_path / "made", pose.pose, pose.joints_deg)
+    (tmp_path / "inbox").mkdir()
+    return campaign, pose, made, tmp_path / "inbox"
+
+
+def without(folder, unwanted):
+    """The table without some columns, and files that do not say their axis themselves."""
+    with (folder / TABLE).open() as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        path = folder / row["file"]
+        (hit,), _ = Source(path, path.name).read()
+        write_csv(path.with_suffix(".csv"), hit, stated=False)
+        path.unlink()
+        row["file"] = row["file"].replace(".uff", ".csv")
+    kept = [name for name in rows[0] if not unwanted(name)]
+    with (folder / TABLE).open("w", newline="") as file:
+        writer = csv.DictWriter(file, kept, extrasaction="ignore")
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def session(campaign, inbox, limit_s=5):
+    console = Console(width=100, record=True, file=io.StringIO(), force_terminal=False)
+    watch(campaign, inbox, console=console, keys=NoKeys(), auto=True, hits_per_pose=9,
+          quiet_s=0.05, limit_s=limit_s)  # fmt: skip
+    return " ".join(console.export_text().split())
+
+
+def test_a_table_in_a_subfolder_gives_the_readback(cell):
+    campaign, pose, made, inbox = cell
+    shutil.copytree(made, inbox / "left_station" / pose.pose)
+    session(campaign, inbox)
+    stood = campaign.state.measurements[pose.pose].joints_deg
+    assert 0 < np.max(np.abs(np.subtract(stood, pose.joints_deg))) <= 0.011
+    assert {h.repeat for h in campaign.state.used[0].accepted} == {1, 2, 3}
+
+
+@pytest.mark.parametrize("by", ["session", "import"])
+def test_a_table_without_joints_is_of_proposed_poses(cell, by):
+    """Axis and pose come from it, the joints from the proposal."""
+    campaign, pose, made, inbox = cell
+    without(made, lambda name: name.endswith("_deg"))
+    shutil.copytree(made, inbox / "export")
+    if by == "session":
+        assert "along which axis" not in session(campaign, inbox)
+    else:
+        assert call("import", campaign.directory, inbox)[0] == 0
+    (measured,) = Campaign(campaign.directory).state.used
+    assert (measured.pose, measured.joints_deg) == (pose.pose, pose.joints_deg)
+    assert len(measured.accepted) == 9
+
+
+def test_a_table_of_another_pose_without_joints_says_what_it_lacks(cell):
+    campaign, pose, made, _ = cell
+    without(made, lambda name: name.endswith("_deg"))
+    table = made / TABLE
+    table.write_text(table.read_text().replace(f"{pose.pose},", "P077,"))
+    code, _, said = call("import", campaign.directory, made)
+    assert code == 2
+    assert "No joint angles are known for pose P077; give recordings.csv columns of" in said
+
+
+def test_a_table_without_one_of_the_joints_is_not_followed_and_says_why(cell):
+    campaign, _, made, inbox = cell
+    without(made, lambda name: name == "joint_a2_deg")
+    shutil.copytree(made, inbox / "export")
+    said = session(campaign, inbox, limit_s=2)
+    assert "cannot be read: recordings.csv" in said
+    assert "has no column joint_a2_deg" in said
+    assert not campaign.state.used
