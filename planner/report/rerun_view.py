@@ -256,7 +256,7 @@ def _blueprint(cell: Cell) -> rrb.Blueprint:
             progress_views(count),
             rrb.TextDocumentView(origin="/note", name="What is what"),
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed", loop_mode="all"),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="following"),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
     )
