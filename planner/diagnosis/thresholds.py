@@ -19,10 +19,10 @@ NOTHING = 100.0  # how much likelier than each effect it is that nothing is wron
 SECOND_EFFECT = 0.2  # how much less likely one more effect is than one; chosen on generated cases
 SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; chosen
 # Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong, as
-# data sheets of gears do, that state them to a fifth or a third. Dampers scatter more, and a loss
+# data sheets of gears do, that state them to a fifth. Dampers scatter more, and a loss
 # factor may take the place of one. Chosen, looking at two robots with nothing wrong. Inertias do as
 # in any identification (CAD_INERTIAS).
-STIFFNESS_FACTOR, DAMPING_FACTOR = 1.25, 2.0
+STIFFNESS_FACTOR, DAMPING_FACTOR = 1.20, 2.0
 # By how much of its radius of gyration a body's mass lies elsewhere than stated: cables, oil and
 # covers, 8 % of it (CAD_INERTIAS), lie about as far from its centre.
 MASS_ELSEWHERE = 0.08
