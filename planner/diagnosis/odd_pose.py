@@ -9,6 +9,7 @@ from planner.diagnosis.thresholds import RESIDUAL_CLEARLY
 from planner.words import significant
 
 LEAST, MOST = 3, 12  # poses among which one can be odd; beyond, refits take long. Chosen
+TRIED = 2  # poses that refitting follows least: each takes a refit of seconds. Chosen
 AGREES = 1.0  # misfit at noise and what just does not matter
 
 
@@ -34,14 +35,17 @@ class OddPose:
 def odd_pose(found: Diagnosis, poses: Sequence[str]) -> OddPose | None:
     """The pose (named as the problem's FRFs are) without which refitting alone explains the rest.
 
-    None where there is no such pose or more than one: then it is not known which is odd.
+    None where there is no such pose among the worst, or more than one: then it is not known which.
     """
     problem, refitted = found.problem, found.refitted
     names = list(dict.fromkeys(poses))
     if refitted.per_value <= RESIDUAL_CLEARLY or not LEAST <= len(names) <= MOST:
         return None
+    misfit = {name: 0.0 for name in names}
+    for pose, chi2 in zip(poses, refitted.data.chi2, strict=True):
+        misfit[pose] += float(chi2)
     odd = []
-    for name in names:
+    for name in sorted(names, key=lambda name: -misfit[name])[:TRIED]:
         rest = problem.at([i for i, pose in enumerate(poses) if pose != name])
         without = anew(rest, refitted).per_value
         if without <= AGREES:
