@@ -25,10 +25,14 @@ LIMIT_S = 900.0
 
 @dataclass(frozen=True)
 class Scored:
-    """What was concealed, with its nats, and what was named; `sets` can't be told apart."""
+    """What was concealed, with its nats, and what was named; `sets` can't be told apart.
+
+    `beyond` are nats where FRFs err by 1 %, which need not be explained.
+    """
 
     name: str
     true: dict[Place, float]
+    beyond: dict[Place, float]
     outsider: bool
     verdict: str
     named: frozenset[Place]
@@ -53,6 +57,11 @@ class Scored:
         return frozenset(p for p, n in self.true.items() if n >= CLEARLY and p[0] != "unknown")
 
     @property
+    def mattering(self) -> frozenset[Place]:
+        """Those that are clear beyond what need not be explained."""
+        return frozenset(p for p in self.clear if self.beyond[p] >= CLEARLY)
+
+    @property
     def made_up(self) -> frozenset[Place]:
         """What was named and is not there, nor in a set of two with what is."""
         there = self.true.keys()
@@ -68,11 +77,12 @@ class Scored:
 def scored(case: Path, answer: dict[str, Any]) -> Scored:
     """One case; a diagnosis that failed named nothing."""
     secret = json.loads((case / "answer.json").read_text(encoding="utf-8"))
-    true = {(e["effect"], e["at"]): float(e.get("nats") or 0.0) for e in secret["effects"]}
+    true = {(e["effect"], e["at"]): float(e["nats"]) for e in secret["effects"]}
+    beyond = {(e["effect"], e["at"]): float(e["nats_at_1_percent"]) for e in secret["effects"]}
     verdict = answer.get("verdict", "failed")
     findings = answer.get("findings", ()) if verdict in ("explained", "unexplained") else ()
     return Scored(
-        case.name, true, secret["outside_library"], verdict,
+        case.name, true, beyond, secret["outside_library"], verdict,
         frozenset((f["effect"], f["at"]) for f in findings),
         tuple(frozenset((e["effect"], e["at"]) for e in one) for one in answer.get("sets", ())),
         answer["candidates"][0]["probability"] if "candidates" in answer else 0.0,
@@ -98,11 +108,13 @@ def summary(found: Sequence[Scored]) -> dict[str, list[bool]]:
     """By line of the table, which of those that count were right."""
     effects = [(s, p) for s in found for p in s.clear]
     physics = [(s, p) for s, p in effects if p[0] not in ARTEFACTS]
+    mattering = [(s, p) for s in found for p in s.mattering]
     outsiders = [s for s in found if s.outsider and sum(s.true.values()) >= CLEARLY]
     return {
         "nulls silent": [s.verdict == "consistent" for s in found if s.group == "null"],
         f"effects of {CLEARLY:g} nats named and placed": [s.told(p) for s, p in effects],
         "or in a set of at most two": [s.told(p, sets=True) for s, p in effects],
+        f"of these {CLEARLY:g} nats at 1 % of |H|": [s.told(p) for s, p in mattering],
         "of these physics": [s.told(p) for s, p in physics],
         "outsiders unknown": [s.verdict == "unexplained" and not s.made_up for s in outsiders],
         "nothing made up": [not s.made_up for s in found],

@@ -13,7 +13,7 @@ from tests.support.foreign_cells.spatial import cross_matrix
 from tests.support.foreign_cells.system import System, Tie
 from tests.support.foreign_cells.tree import Body
 
-GEAR_SD, OTHER_SD, DAMPING_SD, LOSS_SD = 0.25, 1.0, 0.5, 0.02
+GEAR_SD, SLIGHT_SD, OTHER_SD, DAMPING_SD, LOSS_SD = 0.25, 0.5, 1.0, 0.5, 0.02
 MASS_SD, CENTRE_SD, SECOND_SD = 0.06, 0.03, 0.08
 
 
@@ -49,18 +49,21 @@ class Adjusted:
         return elastic / self.sd + viscous / DAMPING_SD + before * s + self.moves[2] * loss
 
 
-def _sd(tie: Tie) -> float:
-    """Prior sd of a stiffness's logarithm: of a stated spring, or of another effect's."""
-    return GEAR_SD if tie.name.startswith("joint") else OTHER_SD
-
-
-def movable(tie: Tie, robot: Robot) -> bool:
-    """Stated springs can be moved, and those of other effects; what is slightly soft stays."""
-    if not tie.mutual or not isinstance(tie.law, Spring):
-        return False
+def _sd(tie: Tie, robot: Robot) -> float:
+    """Prior sd of a stiffness's logarithm: stated, slightly soft, or of another effect."""
     where, what = tie.name.split(":") if ":" in tie.name else (tie.name, "")
-    listed = [f"joint_{j + 1}" for j in robot.cross or {}]
-    return what == "gear" or where in listed or not where.startswith(("joint", "link"))
+    if what == "gear" or where in _listed(robot):
+        return GEAR_SD
+    return SLIGHT_SD if where.startswith(("joint", "link")) else OTHER_SD
+
+
+def _listed(robot: Robot) -> list[str]:
+    return [f"joint_{j + 1}" for j in robot.cross or {}]
+
+
+def movable(tie: Tie) -> bool:
+    """Stated springs can be moved, those of other effects, and bearings that are slightly soft."""
+    return tie.mutual and isinstance(tie.law, Spring)
 
 
 def gear_moves(system: System, other: System, robot: Robot) -> np.ndarray:
@@ -68,9 +71,9 @@ def gear_moves(system: System, other: System, robot: Robot) -> np.ndarray:
     moves, at = np.zeros(count(system, robot)), 0
     stiffness = {tie.name: tie.law.stiffness for tie in other.ties}
     for tie in system.ties:
-        if movable(tie, robot):
+        if movable(tie):
             ratio = stiffness.get(tie.name, tie.law.stiffness) / tie.law.stiffness
-            moves[at] = np.log(ratio) / _sd(tie)
+            moves[at] = np.log(ratio) / _sd(tie, robot)
             at += 3
     return moves
 
@@ -109,10 +112,9 @@ def adjusted(system: System, robot: Robot, moves: np.ndarray) -> System:
     """The system at `moves`: three for every movable tie, then those of inertia."""
     ties, at = [], 0
     for tie in system.ties:
-        if movable(tie, robot):
-            tie = Tie(
-                tie.name, tie.left, tie.right, Adjusted(tie.law, _sd(tie), moves[at : at + 3])
-            )
+        if movable(tie):
+            law = Adjusted(tie.law, _sd(tie, robot), moves[at : at + 3])
+            tie = Tie(tie.name, tie.left, tie.right, law)
             at += 3
         ties.append(tie)
     # Left and right must stay one object: that marks a mutual tie.
@@ -125,7 +127,7 @@ def adjusted(system: System, robot: Robot, moves: np.ndarray) -> System:
 
 def count(system: System, robot: Robot) -> int:
     """How many moves there are."""
-    return 3 * sum(movable(t, robot) for t in system.ties) + 10 * len(robot.links)
+    return 3 * sum(movable(t) for t in system.ties) + 10 * len(robot.links)
 
 
 def columns(system: System, robot: Robot, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

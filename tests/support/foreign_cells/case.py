@@ -160,12 +160,12 @@ def write_case(case: Case, folder: Path) -> None:
             files.write_hit(path, case.hits[i], case.clock, force, answer)
 
 
-def write_answer(case: Case, folder: Path, sizes: list[tuple[float, float]]) -> dict:
-    """answer.json; sizes: (change, nats) of each effect."""
+def write_answer(case: Case, folder: Path, sizes: list[tuple[float, float, float]]) -> dict:
+    """answer.json; sizes: (change, nats, nats at 1 % of |H|) of each effect."""
     told = [
         {"effect": e.effect, "at": e.at, "parameters": e.parameters, "change": round(c, 6),
-         "nats": round(n, 2)}
-        for e, (c, n) in zip(case.effects, sizes, strict=True)
+         "nats": round(n, 2), "nats_at_1_percent": round(m, 2)}
+        for e, (c, n, m) in zip(case.effects, sizes, strict=True)
     ]  # fmt: skip
     answer = {
         "effects": told, "outside_library": case.kind in OUTSIDE, "robot": case.robot.name,

@@ -22,12 +22,12 @@ def _stride(lines: int) -> int:
     return max(1, round(lines / 120))
 
 
-def sizes_of(case: Case) -> list[tuple[float, float]]:
-    """(change, nats) of every effect of a case whose recordings have been written."""
+def sizes_of(case: Case) -> list[tuple[float, float, float]]:
+    """(change, nats, nats at 1 %) of every effect of a case whose recordings have been written."""
     return [_sizes(case, effect) for effect in case.effects]
 
 
-def _sizes(case: Case, effect: Effect) -> tuple[float, float]:
+def _sizes(case: Case, effect: Effect) -> tuple[float, float, float]:
     rest = [e for e in case.effects if e is not effect]
     nonlinear = effect.law is not None
     sigma = 4.0 * case.clock.rate / case.clock.samples if nonlinear else 0.0
@@ -42,7 +42,7 @@ def _sizes(case: Case, effect: Effect) -> tuple[float, float]:
     length = case.clock.samples / case.clock.rate
     stride = max(1, round(float(np.diff(s.imag)[0]) / (2 * np.pi) * length))
     starts = _starts(case, rest, poses)
-    return float(np.sqrt(changed / plain)), nats_of(poses, case.robot, s, 1 / stride, starts)
+    return float(np.sqrt(changed / plain)), *nats_of(poses, case.robot, s, 1 / stride, starts)
 
 
 def _starts(case: Case, rest: list[Effect], poses: list[Pose]) -> list[np.ndarray]:
