@@ -13,6 +13,7 @@ from planner.diagnosis.linear_diagnosis import Diagnosis, beside_another, diagno
 from planner.diagnosis.misses_again import abstained, asked_again
 from planner.diagnosis.odd_pose import OddPose, odd_pose
 from planner.diagnosis.revoked_artefacts import taken_back
+from planner.diagnosis.screens import force_levels
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
 from planner.diagnosis.thresholds import (
@@ -22,6 +23,7 @@ from planner.diagnosis.thresholds import (
     NOTHING,
     PAYS,
     SECOND_EFFECT,
+    UNKNOWN,
 )
 from planner.diagnosis.verdict import Together, linear_effects_apply, together
 from planner.dynamics.simulation import Simulation
@@ -41,11 +43,16 @@ class Explained:
     odd: OddPose | None = None
 
 
-def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
-    """What `simulation` lacks; hits are screened unless a window is stated that they carry."""
+def explain(
+    recorded: Dataset, simulation: Simulation, tell: Tell, *, chain: bool = True
+) -> Explained:
+    """What `simulation` lacks; hits are screened unless a window is stated that they carry.
+
+    Without `chain` its artefacts are left to the effects.
+    """
     tell("looking at the measuring chain, the order in time and the force levels", 0.02)
-    screened = bool(recorded.visits) and not recorded.window_rate_1_s
-    looked = _looked_at(recorded, simulation, within(tell, 0.02, 0.6), screened)
+    as_recorded, screened = recorded, bool(recorded.visits) and not recorded.window_rate_1_s
+    looked = _looked_at(recorded, simulation, within(tell, 0.02, 0.6), screened, chain=chain)
     if looked.doubtful:
         other = _looked_at(recorded, simulation, within(tell, 0.6, 0.85), screened, chain=False)
         looked = other if other.better_than(looked) else looked
@@ -70,6 +77,8 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
     if counts:
         kept, found = taken_back(findings, judged.diagnosis)
         if len(kept) < len(findings):
+            if chain and screened and _laws_of_levels(as_recorded, simulation):
+                return explain(as_recorded, simulation, tell, chain=False)
             said = "A correction was undone: by the explanation found there was no such artefact."
             recorded = replace(recorded, remarks=(*recorded.remarks, said))
         findings, judged = kept, replace(judged, diagnosis=found)
@@ -82,6 +91,11 @@ def explain(recorded: Dataset, simulation: Simulation, tell: Tell) -> Explained:
         tell("looking for a pose at odds with the others", 0.97)
         odd = odd_pose(judged.diagnosis, recorded.poses)
     return Explained(recorded, judged, whole, odd)
+
+
+def _laws_of_levels(recorded: Dataset, simulation: Simulation) -> bool:
+    """Whether hits that were not corrected tell of a joint's law."""
+    return any(f.effect != UNKNOWN for f in force_levels.screen(recorded, simulation, single=True))
 
 
 @dataclass(frozen=True, eq=False)

