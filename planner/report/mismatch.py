@@ -23,10 +23,10 @@ class MismatchPlaces:
         if not self.bands_hz:
             return "Once refitted, the simulation is clearly off in no frequency band."
         bands = ", ".join(f"{low:.0f} to {high:.0f}" for low, high in self.bands_hz)
-        return (
-            f"Refitted without any effect, the simulation is clearly off at {bands} Hz, at "
-            f"poses {', '.join(self.poses) or '–'}, along {', '.join(self.directions) or '–'}."
-        )
+        where = f", at poses {', '.join(self.poses)}" if self.poses else ""
+        along = f", along {', '.join(self.directions)}" if self.directions else ""
+        off = f"the simulation is clearly off at {bands} Hz{where}{along}"
+        return f"Refitted without any effect, {off}."
 
 
 @dataclass(frozen=True)

@@ -79,6 +79,16 @@ def test_a_joint_that_hardens_is_found_beside_misses(hardening):
     assert found.parameters["stiffness_change"][0] > 0
 
 
+def test_a_law_that_explains_nearly_all_needs_no_repeats(hardening, linear, monkeypatch):
+    """Where repeats differ as much as levels do, only such a law is told."""
+    monkeypatch.setattr(force_levels.repeats, "chance", lambda *_: 0.5)
+    (found, *_) = force_levels.screen(hardening.recorded, hardening.simulation, single=True)
+    assert (found.effect, found.at) == ("nonlinear_stiffness", "joint_2")
+    assert force_levels.screen(linear.recorded, linear.simulation, single=True) == ()
+    monkeypatch.setattr(force_levels, "LAW_SURELY", 1.1)
+    assert force_levels.screen(hardening.recorded, hardening.simulation, single=True) == ()
+
+
 def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     """Levels that differ, by no law: misses do as much as a structure that is not linear."""
     once = linear.recorded.corrected(

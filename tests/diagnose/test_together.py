@@ -14,6 +14,7 @@ from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis, beside_anot
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.thresholds import SECOND_EFFECT
 from planner.diagnosis.verdict import linear_effects_apply, together
+from planner.report.mismatch import MismatchPlaces
 
 
 @dataclass(frozen=True)
@@ -170,3 +171,10 @@ def test_a_delay_that_the_explanation_takes_back_was_none():
 @pytest.mark.parametrize("found", [explained(-1e-3), explained(2.1e-3), explained(-2.1e-3, 0.6)])
 def test_a_delay_that_is_only_mended_or_doubted_stays(found):
     assert taken_back((DELAY,), found) == ((DELAY,), found)
+
+
+def test_what_is_off_is_said_without_gaps():
+    places = MismatchPlaces([[11.0, 18.0]], (), [])
+    assert places.sentence.endswith("the simulation is clearly off at 11 to 18 Hz.")
+    places = MismatchPlaces([[11.0, 18.0]], ("P1", "P3"), ["x"])
+    assert places.sentence.endswith("at 11 to 18 Hz, at poses P1, P3, along x.")
