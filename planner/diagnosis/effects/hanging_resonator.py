@@ -1,6 +1,7 @@
 """Something loose on a link that swings in all directions, in each at a frequency of its own."""
 
 from dataclasses import dataclass
+from itertools import combinations, product
 from typing import Any, Self
 
 import numpy as np
@@ -13,6 +14,8 @@ from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 
 TURN_SD = 1.0  # rad, of the axes of its springs
+# Starts: masses, in middling ones; frequencies from this part of the band's end to so many times it
+MASSES, FREQUENCIES, BELOW, ABOVE = (1.0, 2.5), 5, 8.0, 1.6
 WAYS = "frequency", "frequency_2", "frequency_3"
 
 
@@ -20,7 +23,7 @@ WAYS = "frequency", "frequency_2", "frequency_3"
 class HangingResonator(LocalResonator):
     """A mass on three springs at right angles, where a `LocalResonator` slides along one.
 
-    It is looked for from there (`linear.all_ways`): by itself it has too many ways to begin.
+    It is looked for from there, and by itself from many `starts` (`linear.all_ways`).
     """
 
     @classmethod
@@ -38,8 +41,18 @@ class HangingResonator(LocalResonator):
         return cls(sliding.at, quantities, sliding.low_hz, sliding.high_hz)
 
     def starts(self) -> np.ndarray:
-        """As it may be."""
-        return np.array([[q.mean for q in self.quantities]])
+        """Any three of some frequencies along any of the link's axes; light and heavy."""
+        middle = np.array([q.mean for q in self.quantities])
+        lowest = max(self.low_hz, self.high_hz / BELOW)
+        known = np.log(np.geomspace(lowest, ABOVE * self.high_hz, FREQUENCIES))
+        out = []
+        for times in MASSES:
+            for three, shift in product(combinations(known, 3), range(3)):
+                start = middle.copy()
+                start[0] += np.log(times)
+                start[1:4] = np.roll(three, shift)
+                out.append(start)
+        return np.array(out)
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         """s² m Jₚᵀ [Σ Tₖ dₖ dₖᵀ] Jₚ with the transmissibilities Tₖ of springs and dampers."""

@@ -1,4 +1,4 @@
-"""What a fit says of something that swings along one direction, asked of all three."""
+"""Something that swings in all three directions: from what a fit says of one, or from nothing."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -12,11 +12,15 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.hanging_resonator import HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of
-from planner.diagnosis.linear.fit import Fit, approached, points
-from planner.diagnosis.linear.problem import CLOSE, Problem
+from planner.diagnosis.linear.fit import Fit, approached, points, settle
+from planner.diagnosis.linear.problem import CLOSE, COARSE, Problem
+from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 
 FIRST, STEPS = 10, 24  # of all starts, and of the best
+# From nothing, at a few poses: steps of all starts, how many are followed by how many steps more,
+# and how many of these with all that is free.
+FEW, BEGUN, KEPT, FOLLOWED, CLOSER = 5, 3, 8, 12, 2
 RATIOS = tuple(product((0.5, 1.1, 2.2), repeat=2))  # of the other frequencies to the known one
 
 
@@ -27,6 +31,30 @@ def all_ways(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
     best = {id(f): f for f in (*best_of(swing, 1), *best_of(alone, 1))}
     way = [one for found in best.values() for one in _ways(found)]
     return tuple(side_by_side(partial(_loosened, problem), way))
+
+
+def hung(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
+    """Fits with a resonator on three springs at each link that may have one, from many starts.
+
+    A heavy one moves all modes at once: no fit with one direction leads to it.
+    """
+    sliding = [e for e in effects if isinstance(e, LocalResonator)]
+    return tuple(side_by_side(partial(_hung, problem), sliding))
+
+
+def _hung(problem: Problem, sliding: LocalResonator) -> Fit:
+    few = problem.at(farthest_first(problem.q)[:FEW].tolist())
+    effect = HangingResonator.of(sliding)
+    rough = few.misfit(effect, COARSE)
+    usual = rough.mean[: rough.split[1]]
+    begun = [approached(rough, [np.concatenate([usual, s])], BEGUN) for s in effect.starts()]
+    more = [approached(rough, [f.x], FOLLOWED) for f in _best(begun, KEPT)]
+    close = [settle(problem, f, CLOSE, STEPS) for f in _best(more, CLOSER)]
+    return _best(close, 1)[0]
+
+
+def _best(fits: Sequence[Fit], most: int) -> list[Fit]:
+    return sorted(fits, key=lambda f: f.misfit(f.x).value)[:most]
 
 
 def _ways(found: Fit) -> list[tuple[Fit, LocalResonator, Effect]]:

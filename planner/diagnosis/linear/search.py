@@ -8,7 +8,7 @@ import numpy as np
 from planner.diagnosis.effects.combined import Both, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear.all_ways import all_ways
+from planner.diagnosis.linear.all_ways import all_ways, hung
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
     Fit,
@@ -64,6 +64,8 @@ def search(
     if best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
+        swinging = _settled(problem, best_of(hung(problem, effects), POINTED))
+        found = Found((*found.finalists, *swinging), found.left)
         found = _lessened(problem, found)
     leaders = leaders_of(found) if best_of_few(found).per_value > AT_NOISE else []
     led: list[Place] = []
