@@ -3,12 +3,15 @@
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from planner.diagnosis.effects.hanging_resonator import HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.linear import all_ways
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.simulation import Simulation
+from planner.frf.frf import Frf
 from planner.robot.config import EffectTable
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR210
@@ -49,3 +52,29 @@ def test_as_elements_it_answers_alike(stated):
     with_it = stated.with_effects(springs, [msgspec.convert(block, EffectTable)], bodies, nothing)
     h, wanted = with_it.accelerance(q, LINES), misfit.values(x)[0]
     assert np.linalg.norm(h - wanted) < 1e-3 * np.linalg.norm(wanted)  # but for its weight
+
+
+def test_it_is_found_from_nothing(stated):
+    hangs, psi = hanging(stated)
+    q, nothing = KR210.poses(4, 3), np.full((3, 3, len(LINES)), np.nan)
+    misfit = misfit_at(Problem((), q, stated, (6.0, 60.0)), hangs, q, LINES)
+    x = misfit.mean.copy()
+    x[misfit.split[1] :] = psi
+    frfs = tuple(
+        Frf(LINES, h, 1e-4 * np.abs(h) ** 2, nothing, (3, 3, 3), (6.0, 60.0))
+        for h in misfit.values(x)[0]
+    )
+    slides = next(e for e in LocalResonator.everywhere(stated) if e.at == hangs.at)
+    (found,) = all_ways.hung(Problem(frfs, q, stated, (6.0, 60.0)), [slides])
+    known = found.named()
+    hz = sorted(np.exp(v) for name, v in known.items() if name.startswith("frequency"))
+    assert hz == pytest.approx(HUNG_HZ, rel=0.05)
+    mass = next(v for name, v in known.items() if name.startswith("mass of local_resonator"))
+    assert np.exp(mass) == pytest.approx(12.0, rel=0.2)
+
+
+@pytest.mark.parametrize("way", [np.zeros(3), np.array([0.0, -2.0, 0.0]), np.array([1.0, 1, 1])])
+def test_what_has_no_direction_yet_may_hang_as_well(way):
+    """A fit that never moved a resonator leaves its direction at 0."""
+    turned = Rotation.from_rotvec(all_ways.turned_to(way)).apply([np.linalg.norm(way), 0.0, 0.0])
+    assert turned == pytest.approx(way)

@@ -70,12 +70,19 @@ def _ways(found: Fit) -> list[tuple[Fit, LocalResonator, Effect]]:
     return made
 
 
+def turned_to(way: np.ndarray) -> np.ndarray:
+    """Rotation vector (rad) that turns x to a way (3,); 0 for one that no fit has given yet."""
+    if not way.any():
+        return np.zeros(3)
+    return Rotation.align_vectors(way[None], [[1.0, 0.0, 0.0]])[0].as_rotvec()
+
+
 def _loosened(problem: Problem, one: tuple[Fit, LocalResonator, Effect]) -> Fit:
     found, part, effect = one
     misfit, known = problem.misfit(effect, CLOSE), found.named()
     of = f"of {part.name} at {part.at}"
     way = np.array([known[f"direction_{a} {of}"] for a in "xyz"])
-    turn = Rotation.align_vectors(way[None], [[1.0, 0.0, 0.0]])[0].as_rotvec()
+    turn = turned_to(way)
     starts = []
     for ratios in RATIOS:
         x = points(misfit, found)[0]
