@@ -40,14 +40,18 @@ class HangingResonator(LocalResonator):
         )
         return cls(sliding.at, quantities, sliding.low_hz, sliding.high_hz)
 
+    @property
+    def log_frequencies(self) -> np.ndarray:
+        """ln Hz where its frequencies may begin, over the band and above."""
+        lowest = max(self.low_hz, self.high_hz / BELOW)
+        return np.log(np.geomspace(lowest, ABOVE * self.high_hz, FREQUENCIES))
+
     def starts(self) -> np.ndarray:
         """Any three of some frequencies along any of the link's axes; light and heavy."""
         middle = np.array([q.mean for q in self.quantities])
-        lowest = max(self.low_hz, self.high_hz / BELOW)
-        known = np.log(np.geomspace(lowest, ABOVE * self.high_hz, FREQUENCIES))
         out = []
         for times in MASSES:
-            for three, shift in product(combinations(known, 3), range(3)):
+            for three, shift in product(combinations(self.log_frequencies, 3), range(3)):
                 start = middle.copy()
                 start[0] += np.log(times)
                 start[1:4] = np.roll(three, shift)

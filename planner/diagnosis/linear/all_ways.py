@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.diagnosis.effects.combined import Both, together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.effects.hanging_resonator import HangingResonator
+from planner.diagnosis.effects.hanging_resonator import WAYS, HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of
 from planner.diagnosis.linear.fit import Fit, approached, points, settle
@@ -18,9 +18,10 @@ from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
 
 FIRST, STEPS = 10, 24  # of all starts, and of the best
-# From nothing, at a few poses: steps of all starts, how many are followed by how many steps more,
-# and how many of these with all that is free.
-FEW, BEGUN, KEPT, FOLLOWED, CLOSER = 5, 3, 8, 12, 2
+# From nothing, at a few poses: steps of all starts, how many are followed by how many steps more;
+# at how many links frequencies jump, how often, and how many fits are followed with all lines.
+FEW, BEGUN, KEPT, FOLLOWED = 5, 3, 8, 12
+PLACES, JUMPS, CLOSER = 2, 2, 2
 RATIOS = tuple(product((0.5, 1.1, 2.2), repeat=2))  # of the other frequencies to the known one
 
 
@@ -34,23 +35,44 @@ def all_ways(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
 
 
 def hung(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
-    """Fits with a resonator on three springs at each link that may have one, from many starts.
+    """Fits with a resonator on three springs at the likeliest links, from many starts at each.
 
     A heavy one moves all modes at once: no fit with one direction leads to it.
     """
     sliding = [e for e in effects if isinstance(e, LocalResonator)]
-    return tuple(side_by_side(partial(_hung, problem), sliding))
-
-
-def _hung(problem: Problem, sliding: LocalResonator) -> Fit:
     few = problem.at(farthest_first(problem.q)[:FEW].tolist())
-    effect = HangingResonator.of(sliding)
+    begun = side_by_side(partial(_begun, few), [HangingResonator.of(e) for e in sliding])
+    return tuple(side_by_side(partial(_jumped, problem), _best(begun, PLACES)))
+
+
+def _begun(few: Problem, effect: HangingResonator) -> Fit:
+    """The best of a link's starts, roughly."""
     rough = few.misfit(effect, COARSE)
     usual = rough.mean[: rough.split[1]]
     begun = [approached(rough, [np.concatenate([usual, s])], BEGUN) for s in effect.starts()]
-    more = [approached(rough, [f.x], FOLLOWED) for f in _best(begun, KEPT)]
-    close = [settle(problem, f, CLOSE, STEPS) for f in _best(more, CLOSER)]
-    return _best(close, 1)[0]
+    return _best([approached(rough, [f.x], FOLLOWED) for f in _best(begun, KEPT)], 1)[0]
+
+
+def _jumped(problem: Problem, rough: Fit) -> Fit:
+    """Where a frequency that is the wrong one jumps to another, then with all that is free."""
+    effect, misfit = rough.effect, rough.misfit
+    assert isinstance(effect, HangingResonator)
+    of = f" of {effect.name} at {effect.at}"
+    there = [misfit.names.index(name + of) for name in WAYS]
+    kept = [rough]
+    for _ in range(JUMPS):
+        x, before = kept[0].x, kept[0]
+        starts = [_with(x, i, f) for i in there for f in effect.log_frequencies]
+        kept = _best([*kept, *(approached(misfit, [one], FOLLOWED) for one in starts)], CLOSER)
+        if kept[0] is before:
+            break
+    return _best([settle(problem, f, CLOSE, STEPS) for f in kept], 1)[0]
+
+
+def _with(x: np.ndarray, i: int, value: float) -> np.ndarray:
+    out = x.copy()
+    out[i] = value
+    return out
 
 
 def _best(fits: Sequence[Fit], most: int) -> list[Fit]:

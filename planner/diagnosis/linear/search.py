@@ -64,7 +64,7 @@ def search(
     if best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
-        swinging = _settled(problem, best_of(hung(problem, effects), POINTED))
+        swinging = _settled(problem, hung(problem, effects))
         found = Found((*found.finalists, *swinging), found.left)
         found = _lessened(problem, found)
     leaders = leaders_of(found) if best_of_few(found).per_value > AT_NOISE else []
