@@ -10,6 +10,7 @@ from planner.diagnosis.linear.found import Found
 from planner.diagnosis.thresholds import AT_NOISE
 
 FEW_EFFECTS = 2  # at once
+FAR = 4.0  # times the best's χ² per value: what leaves more leads nowhere; chosen
 Place = tuple[str, str]
 
 
@@ -43,12 +44,17 @@ def next_leader(leaders: list[Fit], led: list[Place], found: Found) -> Fit | Non
 def leaders_of(found: Found) -> list[Fit]:
     """Single effects whose company is looked for, the best first; of a place and kind once.
 
-    Beside a second effect the best of them need not be right, so that others get their turn.
+    Beside a second effect the best of them need not be right, so that others get their turn: unless
+    they leave FAR more than it does.
     """
     ranked = [found.finalists[i] for i in np.argsort(lag(found.finalists))]
-    ranked += [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
+    single = [f for f in ranked if f.effect.at and len(f.effect.parts()) == 1]
+    least = min((f.per_value for f in single), default=np.inf)
+    single = [f for f in single if f.per_value <= FAR * least]
+    if found.finalists[0].per_value < FAR * least:  # none takes most of what refitting leaves
+        left = [fit for _, _, fit in sorted(found.left, key=lambda left: left[1])]
+        single += [f for f in left if f.effect.at and len(f.effect.parts()) == 1]
     leaders: dict[Place, Fit] = {}
-    for f in ranked:
-        if f.effect.at and len(f.effect.parts()) == 1:
-            leaders.setdefault(place_of(f.effect), f)
+    for f in single:
+        leaders.setdefault(place_of(f.effect), f)
     return list(leaders.values())
