@@ -78,7 +78,7 @@ def explain(
         kept, found = taken_back(findings, judged.diagnosis)
         if len(kept) < len(findings):
             if chain and screened and _laws_of_levels(as_recorded, simulation):
-                return explain(as_recorded, simulation, tell, chain=False)
+                return explain(as_recorded, simulation, within(tell, 0.95, 1.0), chain=False)
             said = "A correction was undone: by the explanation found there was no such artefact."
             recorded = replace(recorded, remarks=(*recorded.remarks, said))
         findings, judged = kept, replace(judged, diagnosis=found)
