@@ -66,7 +66,10 @@ def _at_once(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
 
 def _of_joints(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
     """With drift of those joints that move surely; none where even so little is followed."""
-    every = fit(problem, Drift.of_each(problem.simulation), [plain])
+    each = Drift.of_each(problem.simulation)
+    if not each.joints:  # none has a spring about its own axis
+        return ()
+    every = fit(problem, each, [plain])
     assert isinstance(every.effect, Drift)
     if every.per_value > DRIFT_CRUDE:
         return ()

@@ -120,7 +120,7 @@ def _several(
     recorded: Dataset, nominal: Simulation, found: Equivalent, tell: Tell
 ) -> tuple[Finding, ...]:
     """One law at several joints, where no single joint explains the levels."""
-    if equivalent_share(found) >= ONE_JOINT:
+    if not found.delta.shape[1] or equivalent_share(found) >= ONE_JOINT:
         return ()
     tell("fitting one law at all joints to the hits", 0.2)
     return several_joints.screen(recorded, nominal)
@@ -140,8 +140,9 @@ def _named(
     """
     misses, found = look.misses, look.found
     plain = misses.plain
-    system, share = system_of(plain), equivalent_share(found)
-    of_one = placed(found)
+    if not found.delta.shape[1]:
+        return (_unknown(found, "no joint has a spring about its own axis"),), False
+    system, share, of_one = system_of(plain), equivalent_share(found), placed(found)
     if share < LINEARISED and not of_one:
         return (_unknown(found, "even with a stiffness of its own for every hit"),), False
     weighed = weigh(recorded, misses, system, found, tell)
@@ -190,6 +191,8 @@ def equivalent_share(found: Equivalent) -> float:
 
 def placed(found: Equivalent) -> bool:
     """Whether a stiffness of its own a hit explains clearly more at one joint than at any other."""
+    if not found.delta.shape[1]:
+        return False
     first, *others = np.sort(found.chi2.sum(axis=0))
     return bool(first < PLACED * min(float(found.before.sum()), *others))
 

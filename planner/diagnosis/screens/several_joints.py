@@ -41,7 +41,6 @@ from planner.inference.parallel import side_by_side
 
 FITTED, LEAST_VISITS = 4, 3  # poses that laws are fitted to, of how many at least
 AFAR, NEAR, CLOSE = (0.3,), (0.1,), (0.03,)  # shares by which errors are softened, in turn
-GOING_WITH_SWINGS = "nonlinear_stiffness", "friction", "backlash"  # laws of several joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +137,10 @@ def _that_matter(judged: LawProblem, best: SharedLaw) -> list[int]:
 def _kinds(seen: Sequence[Refit]) -> list[tuple[Law, int]]:
     """Laws, with the sign of k, that go the way in which joints change from level to level."""
     of = {law.effect: law for law in LAWS}
-    stiffening, friction, backlash = (of[name] for name in GOING_WITH_SWINGS)
+    stiffening = of["nonlinear_stiffness"]
     if np.sum(np.log(seen[-1].stiffness / seen[0].stiffness)) > 0:
-        return [(stiffening, 1), (backlash, 1)]
-    return [(friction, 1), (stiffening, -1)]
+        return [(stiffening, 1), (of["backlash"], 1)]
+    return [(of["friction"], 1), (stiffening, -1)]
 
 
 def _changes(fit: LawMisfit, level: np.ndarray) -> np.ndarray:
