@@ -31,6 +31,7 @@ from planner.inference.least_squares import Damping, Limits, accept, begin, prop
 from planner.inference.log_space import log_sum
 
 MOST_STEPS, NOTHING_GAINED = 16, 0.5  # to where a fit is best; nats that a step is not worth
+STILL = 0.25  # nats within which log evidences are the same: a fit is then followed no farther
 # Nearly undamped, as fits are close to where they are best; after a step that led nowhere better a
 # hundred times more.
 DAMPING = Damping(first=1e-3, least=1e-3, heavier=100.0)
@@ -102,8 +103,10 @@ class InnerProducts:
         ):
             here = self
             for size in way:
-                here, one = each[size] = here.settled(size, temper, springs, steps)
-                if one.evidence < max(e.evidence for _, e in each.values()) - FALLEN:
+                most = max((e.evidence for _, e in each.values()), default=-np.inf)
+                least = most - 2 * FALLEN
+                here, one = each[size] = here.settled(size, temper, springs, steps, least)
+                if one.evidence < most - FALLEN:
                     break
         likeliest = max(each, key=lambda size: each[size][1].evidence)
         products, best = each[likeliest]
@@ -145,9 +148,16 @@ class InnerProducts:
         return np.array(left), np.array(volume), np.array(told)
 
     def settled(
-        self, size: float, temper: float, springs: Sequence[str], steps: int = MOST_STEPS
+        self,
+        size: float,
+        temper: float,
+        springs: Sequence[str],
+        steps: int = MOST_STEPS,
+        least: float = -np.inf,
     ) -> "tuple[InnerProducts, AtSize]":
         """Followed, step by step, to where it is best with a discrepancy of this size.
+
+        What has less than the `least` log evidence after a few steps is followed no farther.
 
         Damped Gauss-Newton over x, the chain and the misses of each pose being eliminated; answers
         products there, and what they say. What is told of misses, and of x, is told around itself:
@@ -155,8 +165,9 @@ class InnerProducts:
         """
         here, last = self, self.at(size, temper)
         state = begin(last.u, last, DAMPING, Limits(np.inf, last.lower, last.upper))
+        seen = [last.evidence]
         for _ in range(steps):
-            if last.evidence - last.stays < NOTHING_GAINED or state.stuck:
+            if _ended(seen, least) or last.evidence - last.stays < NOTHING_GAINED or state.stuck:
                 break
             u = propose(state)
             there = here.moved(last, u, springs)
@@ -168,6 +179,7 @@ class InnerProducts:
                 state = replace(state, at=after or last)
             if there is not None and state.at is after:
                 here, last = there, state.at
+                seen.append(last.evidence)
         return here, last
 
     def moved(self, last: AtSize, u: np.ndarray, springs: Sequence[str]) -> "InnerProducts | None":
@@ -216,6 +228,17 @@ class Worth:
     def log_evidence(self) -> float:
         """Over all sizes, as they are where nothing unknown is there."""
         return float(log_sum(self.by_size + size_priors()[0], axis=0))
+
+
+def _ended(seen: Sequence[float], least: float) -> bool:
+    """Whether log evidences stay as they are, to and fro too, or are behind for long.
+
+    Of two in turn the lower counts: steps to the other do not lead there.
+    """
+    if len(seen) < 4:
+        return False
+    same = max(abs(seen[-1] - seen[-3]), abs(seen[-2] - seen[-4])) < STILL
+    return (same and seen[-1] < seen[-2] + STILL) or max(seen[-4:]) < least
 
 
 def multiples(misfit: Misfit, springs: Sequence[str]) -> np.ndarray:

@@ -2,19 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.special import expit
 from scipy.stats import norm
 
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.discrepancy import (
-    InnerProducts,
-    Worth,
-    size_priors,
-)
+from planner.diagnosis.linear.discrepancy import Worth, size_priors
 from planner.diagnosis.linear.fit import Fit
+from planner.diagnosis.linear.followed import followed, left_of, unfollowed, worths
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.stated_values import pulled
 from planner.diagnosis.thresholds import (
@@ -78,15 +74,14 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     The first fit is "none"; `prior` are the weights of the fits before any data.
     """
     springs = stated_springs(fits[0])
-    first = np.array([_unfollowed(f, springs)[1] for f in fits])
-    hopeful = first > first.max() - HARDLY
-    rough = [_followed(f, springs, bool(h))[1] for f, h in zip(fits, hopeful, strict=True)]
-    close = np.array(rough) > max(rough) - CLOSE
+    first = np.array([evidence for _, evidence in unfollowed(fits, springs)])
+    there = followed(fits, springs, first > first.max() - HARDLY)
+    rough = np.array([evidence for _, evidence in there])
+    close = rough > rough.max() - CLOSE
     close[0] = True
-    near = [(f, springs, bool(h), bool(c)) for f, h, c in zip(fits, hopeful, close, strict=True)]
-    best = _worth(*near[int(np.argmax(rough))], 1.0)
-    t = max(best.per_value, NOISE_OVERSTATED) * _shared(fits[0])
-    worth = tuple(_worth(*one, t) for one in near)
+    per_value = left_of(there[int(np.argmax(rough))], springs)
+    t = max(per_value, NOISE_OVERSTATED) * _shared(fits[0])
+    worth = tuple(worths(there, springs, close, t))
     mismatch = tuple(Mismatch.of(f.misfit, f.x) for f in fits)
     left = np.array([m.unexplained for m in mismatch])
     seen = np.array([m.resolution for m in mismatch])
@@ -97,33 +92,6 @@ def weigh(fits: Sequence[Fit], prior: Sequence[float], seed: int = 0) -> Weights
     joint = _log_joint(worth, np.maximum(left, least), prior, matters, least, bent)
     total = float(log_sum(joint.ravel(), axis=0))
     return Weights(shares, total, t, worth, mismatch, bent[:, USUAL])
-
-
-# What is added to a set of fits is weighed with them: the others are known by then.
-@lru_cache(maxsize=128)
-def _unfollowed(fit: Fit, springs: tuple[str, ...]) -> tuple[InnerProducts, float]:
-    """A fit's products and its log evidence, by one step."""
-    products = InnerProducts.of(fit, springs)
-    return products, products.at(DISCREPANCY_USUAL, 1.0).evidence
-
-
-@lru_cache(maxsize=128)
-def _followed(fit: Fit, springs: tuple[str, ...], hopeful: bool) -> tuple[InnerProducts, float]:
-    """The same, followed to where it is best if there is hope."""
-    products, evidence = _unfollowed(fit, springs)
-    if not hopeful:
-        return products, evidence
-    products, there = products.settled(DISCREPANCY_USUAL, 1.0, springs)
-    return products, there.evidence
-
-
-@lru_cache(maxsize=256)
-def _worth(fit: Fit, springs: tuple[str, ...], hopeful: bool, close: bool, t: float) -> Worth:
-    """Where it is close, at all sizes of the discrepancy."""
-    products, _ = _followed(fit, springs, hopeful)
-    if close:
-        return products.worth(t, springs)
-    return products.worth(t, springs, (DISCREPANCY_USUAL,), steps=1)
 
 
 def _bent(fit: Fit, worth: Worth, plain: Fit) -> np.ndarray:
