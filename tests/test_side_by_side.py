@@ -11,7 +11,9 @@ from itertools import pairwise
 import pytest
 
 from planner.inference import parallel as module
-from planner.inference.parallel import side_by_side
+from planner.inference.parallel import cores, side_by_side
+
+pytestmark = pytest.mark.usefixtures("all_cores")
 
 
 def who(seconds: float) -> tuple[float, int]:
@@ -55,7 +57,13 @@ def test_a_helper_takes_its_share_in_order(helper):
     found = side_by_side(who, seconds)
     assert [s for s, _ in found] == seconds
     assert found[0][1] == os.getpid()
-    assert len({process for _, process in found}) == min(os.cpu_count() or 1, 2)
+    assert len({process for _, process in found}) == min(cores(), 2)
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no such thing")
+def test_there_is_no_helper_where_only_one_core_may_be_used(helper):
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    assert {process for _, process in helped([0.01] * 20)} == {os.getpid()}
 
 
 def test_what_is_done_is_told(helper):
@@ -109,8 +117,9 @@ def test_an_error_ends_it(helper, items):
     assert side_by_side(abs, [-1]) == [1]
 
 
-@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="there is no helper")
 def test_a_helper_ends_with_a_process_that_is_killed(tmp_path):
+    if cores() < 2:
+        pytest.skip("there is no helper")
     script = tmp_path / "unguarded.py"  # as users write them; it must not run twice either
     script.write_text(
         "import os, time\n"

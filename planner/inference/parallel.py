@@ -129,8 +129,15 @@ def _answer(name: str, work: bytes | None, item: bytes) -> Any:
     return _known[name](pickle.loads(item))
 
 
+def cores() -> int:
+    """How many cores this process may use, where the system says; else how many there are."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def _has_cores() -> bool:
-    return (os.cpu_count() or 1) > 1 and multiprocessing.parent_process() is None
+    return cores() > 1 and multiprocessing.parent_process() is None
 
 
 @cache
