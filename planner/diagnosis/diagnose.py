@@ -77,7 +77,8 @@ def explain(
     if counts:
         kept, found = taken_back(findings, judged.diagnosis)
         if len(kept) < len(findings):
-            if chain and screened and _laws_of_levels(as_recorded, simulation):
+            nothing_else = not any(e.at for e in found.candidates[0].effects)
+            if chain and screened and (nothing_else or _laws_of_levels(as_recorded, simulation)):
                 return explain(as_recorded, simulation, within(tell, 0.95, 1.0), chain=False)
             said = "A correction was undone: by the explanation found there was no such artefact."
             recorded = replace(recorded, remarks=(*recorded.remarks, said))

@@ -38,7 +38,7 @@ def _undone(finding: Finding, found: Diagnosis) -> bool:
     place = finding.effect, finding.at
     first = found.candidates[0]
     part = next((e for e in first.effects if (e.name, e.at) == place), None)
-    if part is None or first.fit is None or len(first.effects) < 2:
+    if part is None or first.fit is None:
         return False
     if sum(c.probability for c in found.candidates if place in c.places) < REVOKING:
         return False

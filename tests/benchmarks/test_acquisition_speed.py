@@ -21,7 +21,7 @@ from tests import support
 
 PYTHON = os.environ.get("PEERS_PYTHON", sys.executable)
 HAS_PEERS = "PEERS_PYTHON" in os.environ or importlib.util.find_spec("emukit") is not None
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(1200)]
+LONG = pytest.mark.timeout(1200)
 D, N, NOISE = 4, 15, 1e-4
 JITTER = 1e-8  # that GPy adds to the diagonal of the training covariance
 LENGTHS = np.array([0.5, 0.8, 1.1, 0.6])
@@ -32,14 +32,13 @@ def posterior(outputs: int) -> Posterior:
     rng = np.random.default_rng(0)
     x = rng.random((N, D))
     lengths = LENGTHS * np.linspace(1, 1.5, outputs)[:, None]
-    k = np.stack([matern52(np, x / one, x / one) for one in lengths]) + (NOISE + JITTER) * np.eye(N)
-    whiten = np.linalg.inv(np.linalg.cholesky(k))
     theta = np.column_stack([np.zeros(outputs), np.full(outputs, -50.0), np.log(lengths)])
     none = np.zeros(outputs)
     prior = Prior(none, none, none, theta, theta)
+    values, shape = np.zeros((outputs, 1)), (outputs, N)
     return Posterior(
-        x, np.zeros((outputs, N)), np.ones((outputs, N)), theta[:, None],
-        np.zeros((outputs, 1)), whiten[:, None], np.zeros((outputs, 1, N)), prior, "matern52", none,
+        x, np.zeros(shape), np.full(shape, NOISE), np.zeros(shape), np.ones(shape), theta[:, None],
+        values, prior, "matern52", none, JITTER,
     )  # fmt: skip
 
 
@@ -61,6 +60,22 @@ def timed(call):
     return value, time.perf_counter() - start, time.process_time() - own
 
 
+def test_a_small_problem_by_the_formula():
+    seen, poses = problem(1, 7, 5)
+    x, at, some = seen.posterior.x, seen.workspace.poses.x, poses.x
+
+    def k(a, b):
+        return matern52(np, a / LENGTHS, b / LENGTHS)
+
+    inverse = np.linalg.inv(k(x, x) + (NOISE + JITTER) * np.eye(N))
+    left = k(some, at) - k(some, x) @ inverse @ k(x, at)
+    own = np.diagonal(k(some, some) - k(some, x) @ inverse @ k(x, some))
+    expected = np.mean(left**2, axis=1) / (own + NOISE)
+    np.testing.assert_allclose(reduction(seen, poses, seen.workspace), expected, rtol=1e-5)
+
+
+@pytest.mark.slow
+@LONG
 @pytest.mark.skipif(not HAS_PEERS, reason="pip install 'planner[peers]', or set PEERS_PYTHON")
 def test_beside_emukit(tmp_path: Path):
     seen, poses = problem(1, 1000, 10_000)
@@ -89,6 +104,8 @@ def test_beside_emukit(tmp_path: Path):
     assert theirs_own >= 100 * own
 
 
+@pytest.mark.slow
+@LONG
 def test_full_size():
     seen, poses = problem(8, 2000, 100_000)
     runs = [timed(lambda: reduction(seen, poses, seen.workspace)) for _ in range(3)]

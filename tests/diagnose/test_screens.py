@@ -75,6 +75,15 @@ def test_a_chain_out_of_order_is_named_and_put_right(plain, simulation, wanted):
         assert np.linalg.norm(a - b) < 0.03 * np.linalg.norm(a)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "said"), [("sensor_gain sensor_y", 0), ("polarity sensor_x", 1)]
+)
+def test_at_a_single_pose_a_gain_is_left_to_the_explanation(plain, simulation, wanted, said):
+    wrong = disturbed(plain, mixed(CHANNELS[wanted]))
+    found = artefacts.screen(wrong.corrected(wrong.visits[:1]), simulation)
+    assert [f"{f.effect} {f.at}" for f in found] == [wanted] * said
+
+
 def test_delay_is_measured_and_taken_back(plain, simulation):
     late = 1.5e-3
     told = Finding("channel_delay", "sensor", 99.0, {"delay": (-late, 0.0, "s")})

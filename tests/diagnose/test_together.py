@@ -1,6 +1,6 @@
 """Screens and linear effects as one list of candidates."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import pytest
@@ -166,6 +166,14 @@ def test_a_delay_that_the_explanation_takes_back_was_none():
     assert kept == (FRICTION,)
     assert found.candidates[0].places == (("added_mass", "link_4"),)
     assert found.candidates[-1].places == (UNKNOWN,)
+
+
+def test_where_nothing_is_explained_but_the_delay_nothing_is_left_of_it():
+    found = explained(-2.09e-3)
+    alone = replace(found.candidates[0], effects=(ChannelDelay("sensor"),))
+    kept, found = taken_back((DELAY,), replace(found, candidates=(alone, *found.candidates[2:])))
+    assert kept == ()
+    assert not any(e.at for e in found.candidates[0].effects)
 
 
 @pytest.mark.parametrize("found", [explained(-1e-3), explained(2.1e-3), explained(-2.1e-3, 0.6)])
