@@ -13,8 +13,6 @@ import pytest
 from planner.inference import parallel as module
 from planner.inference.parallel import cores, side_by_side
 
-pytestmark = pytest.mark.usefixtures("all_cores")
-
 
 def who(seconds: float) -> tuple[float, int]:
     time.sleep(seconds)
@@ -62,8 +60,12 @@ def test_a_helper_takes_its_share_in_order(helper):
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="the system has no such thing")
 def test_there_is_no_helper_where_only_one_core_may_be_used(helper):
-    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    assert {process for _, process in helped([0.01] * 20)} == {os.getpid()}
+    all_cores = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(all_cores)})
+    try:
+        assert {process for _, process in helped([0.01] * 20)} == {os.getpid()}
+    finally:
+        os.sched_setaffinity(0, all_cores)
 
 
 def test_what_is_done_is_told(helper):
