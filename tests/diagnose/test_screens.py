@@ -75,12 +75,16 @@ def test_a_chain_out_of_order_is_named_and_put_right(plain, simulation, wanted):
         assert np.linalg.norm(a - b) < 0.03 * np.linalg.norm(a)
 
 
+@pytest.mark.parametrize("visits", [1, 2])
 @pytest.mark.parametrize(
     ("wanted", "said"), [("sensor_gain sensor_y", 0), ("polarity sensor_x", 1)]
 )
-def test_at_a_single_pose_a_gain_is_left_to_the_explanation(plain, simulation, wanted, said):
+def test_at_a_single_pose_a_gain_is_left_to_the_explanation(
+    plain, simulation, wanted, said, visits
+):
     wrong = disturbed(plain, mixed(CHANNELS[wanted]))
-    found = artefacts.screen(wrong.corrected(wrong.visits[:1]), simulation)
+    returned = tuple(replace(wrong.visits[0], order=float(n)) for n in range(visits))
+    found = artefacts.screen(wrong.corrected(returned), simulation)
     assert [f"{f.effect} {f.at}" for f in found] == [wanted] * said
 
 

@@ -107,7 +107,7 @@ def screen(recorded: Dataset, nominal: Simulation, *, chain: bool = True) -> tup
     if chains:
         told.append(_delay(chains, t))
     told += [f for f in (_matrix(one, t) for one in chains) if f]
-    if len(recorded.visits) < 2:  # what else the simulation lacks looks the same at a single pose
+    if len({visit.pose for visit in recorded.visits}) < 2:  # there all else may look the same
         told = [f for f in told if f.effect != "sensor_gain"]
     return tuple(f for f in told if f.log_evidence > CLEAR)
 
