@@ -1,8 +1,9 @@
 """The simulation by which a campaign predicts FRFs: the identified one, and what it may lack.
 
-What identifies the simulation between hits takes hits and measuring chain for exact, in little
-time. Here both are part of what is fitted, and the structure is widened where the FRFs speak for
-it: the base shifts and turns, links bend, something hangs on a link.
+What identifies the simulation between hits does so in little time, its structure as stated but for
+few springs. Here all poses' FRFs are fitted to the end, the measuring chain beside the simulation,
+and the structure is widened where they speak for it: the base shifts and turns, links bend,
+something hangs on a link.
 """
 
 from collections.abc import Sequence

@@ -238,7 +238,7 @@ class Model:
         """How FRFs are predicted; None before one was measured. Worked out when asked for."""
         if not self.frfs:
             return None
-        from planner.campaign.frf_of_model import frf_model_of
+        from planner.campaign.frf_prediction import frf_model_of
 
         return frf_model_of(self)
 

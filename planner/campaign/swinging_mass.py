@@ -24,7 +24,7 @@ from planner.robot.config import Resonator
 # link farther: on so many poses, for fewer have fewer wrong minima. Starts whose values differ by
 # less have met.
 FIRST_STEPS, PROMISING, LOG_STEPS, FEW, MET = 4, 4, 10, 3, 1e-4
-CLOSELY = Grade(40, 0.003)  # as an identification looks, which compares what is found
+COMPARED = Grade(40, 0.003)  # as an identification looks, which compares what is found
 
 
 def swinging(
@@ -51,15 +51,15 @@ def swinging(
     effects = LocalResonator.everywhere(structure.simulation)
     stated = parametrise(structure.simulation, structure.priors).mean
     near = [
-        settle(few, approached(f.misfit, [f.x], LOG_STEPS), CLOSELY)
+        settle(few, approached(f.misfit, [f.x], LOG_STEPS), COMPARED)
         for effect in effects
         for f in _promising(few, effect, (springs, stated))
     ]
     best = min(near, key=_value)
     # Its frequency shows before its place does.
     hertz = best.x[best.misfit.split[1] + 1]
-    near = [settle(few, f, CLOSELY) for e in effects for f in _at_frequency(few, e, best, hertz)]
-    best = settle(problem, min([best, *near], key=_value), CLOSELY)
+    near = [settle(few, f, COMPARED) for e in effects for f in _at_frequency(few, e, best, hertz)]
+    best = settle(problem, min([best, *near], key=_value), COMPARED)
     return _with(structure, best), np.exp(best.x[None, : best.misfit.split[0]])
 
 

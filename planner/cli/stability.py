@@ -80,8 +80,8 @@ def stability(
                 map_report(asked, poses or MAP_POSES, load_cut(cut), pictures, tell), as_json
             )
         if path is not None or pose == "all":
+            from planner.report.path_poses import Way
             from planner.report.stability_path import path_report
-            from planner.report.stability_way import Way
 
             way = Way(path, origin, poses or WAY_POSES, turns)
             return respond(path_report(asked, way, load_cut(cut), pictures, tell), as_json)

@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from planner import content_hash
-from planner.dataset.screened_files import ScreenedFiles, Source, Verdict, read_files, renamed
+from planner.dataset.screened_files import FileVerdict, ScreenedFiles, Source, read_files, renamed
 from planner.dataset.store import Store, user_store
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
@@ -33,7 +33,7 @@ T = TypeVar("T")
 class Averaged:
     """FRF of a pose; None where nothing could be used. `remarks` says why, or what to know."""
 
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[FileVerdict, ...]
     frf: Frf | None
     remarks: tuple[str, ...]
 
@@ -80,7 +80,7 @@ class MeasuredPose:
         return self.kept("frf", Averaged, self._average)
 
     @cached_property
-    def verdicts(self) -> tuple[Verdict, ...]:
+    def verdicts(self) -> tuple[FileVerdict, ...]:
         """One per file: none is dropped in silence."""
         # What was kept may have been read from another copy of the same files.
         both = zip(self.averaged.verdicts, self.sources, strict=True)

@@ -55,7 +55,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class FileVerdict:
     """What became of one file: accepted, or refused for a stated reason."""
 
     source: Source
@@ -75,7 +75,7 @@ class ScreenedFiles:
     the repeats of their axis; `records` are exported FRFs.
     """
 
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[FileVerdict, ...]
     hits: tuple[tuple[Hit, ...], ...]
     agreeing: tuple[Hit, ...]
     records: tuple[FrfRecord, ...]
@@ -83,7 +83,7 @@ class ScreenedFiles:
 
 def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> ScreenedFiles:
     """Read and screen the files of one pose, each hit by itself, then all beside one another."""
-    verdicts: list[Verdict] = []
+    verdicts: list[FileVerdict] = []
     hits: list[tuple[Hit, ...]] = []
     records: list[FrfRecord] = []
     for source in sources:
@@ -98,7 +98,7 @@ def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> Scr
 
 
 def _refuse_others(
-    verdicts: list[Verdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
+    verdicts: list[FileVerdict], hits: list[tuple[Hit, ...]], records: list[FrfRecord]
 ) -> None:
     """Refuse what cannot be averaged with most hits of the pose: FRFs, and other sampling rates."""
     from planner.recording.sampling_rates import sampled_otherwise
@@ -124,7 +124,7 @@ def not_averaged(name: str, why: str) -> str:
 
 def read_one(
     source: Source, band_hz: tuple[float, float]
-) -> tuple[Verdict, tuple[Hit, ...], list[FrfRecord]]:
+) -> tuple[FileVerdict, tuple[Hit, ...], list[FrfRecord]]:
     """One file, judged by itself: the verdict, its usable hits, its FRFs."""
     from planner.recording.channel_faults import by_good_sensors
     from planner.recording.driving_point import driving_point
@@ -134,11 +134,11 @@ def read_one(
         found, frfs = source.read()
         if frfs:
             simulated = any(record.simulated for record in frfs)
-            return Verdict(source, True, "", source.hit, simulated), (), list(frfs)
+            return FileVerdict(source, True, "", source.hit, simulated), (), list(frfs)
     except PlannerError as error:
         missing = isinstance(error, AxisNotStatedError)
         text = renamed(str(error), (source,))
-        return Verdict(source, False, text, axis_missing=missing), (), []
+        return FileVerdict(source, False, text, axis_missing=missing), (), []
     limits = replace(ScreeningLimits(), band_hz=band_hz)
     heard = [by_good_sensors(hit) for hit in found]
     judged = [
@@ -152,12 +152,16 @@ def read_one(
         if any(f.refuse for f in faults)
     ]
     if len(refused) == len(judged):
-        return Verdict(source, False, " ".join(refused), axis, simulated, tuple(remarks)), (), []
+        return (
+            FileVerdict(source, False, " ".join(refused), axis, simulated, tuple(remarks)),
+            (),
+            [],
+        )
     remarks += [f"One of {len(judged)} hits in {source.name} is refused: {t}" for t in refused]
     good = [hit for hit, faults in judged if not any(f.refuse for f in faults)]
     hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
     remarks = tuple(remarks)
-    return Verdict(source, True, "", axis, simulated, remarks), hits, []
+    return FileVerdict(source, True, "", axis, simulated, remarks), hits, []
 
 
 def renamed(text: str, sources: tuple[Source, ...]) -> str:
@@ -168,7 +172,7 @@ def renamed(text: str, sources: tuple[Source, ...]) -> str:
 
 
 def _agreeing(
-    hits: list[tuple[Hit, ...]], verdicts: list[Verdict], band_hz: tuple[float, float]
+    hits: list[tuple[Hit, ...]], verdicts: list[FileVerdict], band_hz: tuple[float, float]
 ) -> tuple[Hit, ...]:
     """Hits that do not disagree with the repeats of their axis; verdicts follow."""
     from planner.recording.repeats import screen_repeats

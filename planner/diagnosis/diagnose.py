@@ -20,7 +20,7 @@ from planner.diagnosis.thresholds import (
     ARTEFACTS,
     DRIFT_CRUDE,
     DRIFT_GAINS,
-    NOTHING,
+    ODDS_OF_NOTHING,
     PAYS,
     SECOND_EFFECT,
     UNKNOWN,
@@ -127,7 +127,7 @@ class _Looked:
 
     def better_than(self, corrected: "_Looked") -> bool:
         """Whether recordings as they are say more than `corrected` ones, artefacts being rare."""
-        rare = len(corrected.of_chain) * np.log(SECOND_EFFECT / NOTHING)
+        rare = len(corrected.of_chain) * np.log(SECOND_EFFECT / ODDS_OF_NOTHING)
         return linear_effects_apply(self.findings) and (
             self.found.log_evidence > corrected.found.log_evidence + rare
         )

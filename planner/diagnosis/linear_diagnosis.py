@@ -9,6 +9,7 @@ import numpy as np
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.beyond_tolerance import with_artefacts
+from planner.diagnosis.linear.damper_like_springs import damper_like
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
@@ -17,14 +18,15 @@ from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.linear.search import search
 from planner.diagnosis.linear.slightness import thinned, without_slight
-from planner.diagnosis.linear.sluggish import sluggish
-from planner.diagnosis.thresholds import SECOND_EFFECT, TIED
+from planner.diagnosis.thresholds import SECOND_EFFECT, TIED, UNKNOWN
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.identification.measured_frfs import common_band
 from planner.identification.objective import TOO_SOFT, stands
 from planner.progress import Tell, quietly
+
+Place = tuple[str, str | None]  # an effect and where it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +41,7 @@ class Candidate:
     fit: Fit | None
 
     @property
-    def places(self) -> tuple[tuple[str, str | None], ...]:
+    def places(self) -> tuple[Place, ...]:
         """(name, place) of each effect."""
         if self.fit is None:
             return (("unknown", None),)
@@ -120,7 +122,7 @@ def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: 
     best = candidates[0].fit or likeliest
     seconds = time.perf_counter() - started
     return Diagnosis(
-        _verdict(candidates), candidates, found.finalists[0], best,
+        verdict_of(candidates[0].places), candidates, found.finalists[0], best,
         weights.temper, seconds, problem, weights.log_evidence,
     )  # fmt: skip
 
@@ -168,12 +170,15 @@ def beside_another(found: Diagnosis) -> Diagnosis:
     again = [replace(c, probability=weight(c) / total) for c in found.candidates]
     candidates = tuple(sorted(again, key=lambda c: -c.probability))
     best = candidates[0].fit or found.best
-    return replace(found, verdict=_verdict(candidates), candidates=candidates, best=best)
+    return replace(
+        found, verdict=verdict_of(candidates[0].places), candidates=candidates, best=best
+    )
 
 
-def _verdict(candidates: Sequence[Candidate]) -> str:
-    first = candidates[0].places[0][0]
-    return {"none": "consistent", "unknown": "unexplained"}.get(first, "explained")
+def verdict_of(places: tuple[Place, ...]) -> str:
+    """What it means that effects at these places are the likeliest of all."""
+    first = places[0][0] if places else UNKNOWN
+    return {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
 
 
 def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
@@ -203,7 +208,7 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     shares = list(without_slight(fits, named, *own, matters))
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):
-        if shares[i] > TIED / len(fits) and sluggish(one, weights.temper):
+        if shares[i] > TIED / len(fits) and damper_like(one, weights.temper):
             unknown, shares[i] = unknown + shares[i], 0.0
     leader = int(np.argmax(shares))
     lead = prior[leader]

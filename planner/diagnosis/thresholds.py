@@ -1,4 +1,4 @@
-"""Every prior and every threshold by which the diagnosis decides, with its unit and source.
+"""The priors and thresholds behind a verdict, each with its unit and source.
 
 Numbers of starts, steps and candidates only say how long is looked, and stay where they are used.
 """
@@ -15,7 +15,7 @@ UNKNOWN = "unknown"
 
 # What there may be, before any data ------------------------------------------------------------
 
-NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong; chosen
+ODDS_OF_NOTHING = 100.0  # how much likelier than each effect it is that nothing is wrong; chosen
 SECOND_EFFECT = 0.2  # how much less likely one more effect is than one; chosen on generated cases
 SCREEN_PRIOR = 0.05  # probability of any one screen's effect before its data; chosen
 # Springs as robot.toml states them scatter by this factor (1 sd) without anything being wrong, as

@@ -11,11 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.finding import Finding
-from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
+from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis, Place, verdict_of
 from planner.diagnosis.thresholds import ARTEFACTS, SCREEN_PRIOR, SUREST_SCREEN, UNKNOWN
 from planner.inference.evidence import probability as posterior
-
-Place = tuple[str, str | None]
 
 
 @dataclass(frozen=True)
@@ -82,8 +80,7 @@ def together(
             out[key] = out.get(key, 0.0) + share * weight * part
     ranked_all = [Ranked(places, p) for places, p in out.items()]
     candidates = sorted(ranked_all, key=lambda r: -r.probability)
-    first = candidates[0].places[0][0]
-    verdict = {"none": "consistent", UNKNOWN: "unexplained"}.get(first, "explained")
+    verdict = verdict_of(candidates[0].places)
     told = tuple((f, p * (1.0 - sum(share for _, share in f.rivals))) for f, p in known)
     return Together(verdict, tuple(candidates), told, linear)
 

@@ -16,7 +16,7 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
 from planner.robot.config import EffectTable, entry_of, without_effects
-from planner.robot.foot import foot
+from planner.robot.massless_base import massless_base
 from planner.robot.robot import BASE, Robot
 from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
@@ -85,7 +85,7 @@ def _changes(diagnosis: Diagnosis, accepted: Candidate) -> _Changes:
     effects += _bearings(diagnosis, found)
     change = found.misfit.parametrisation.inertia_change(found.x[a:b])
     bodies = found.misfit.setting.simulation.elastic.bodies
-    if BASE in bodies and foot(diagnosis.problem.simulation.robot):
+    if BASE in bodies and massless_base(diagnosis.problem.simulation.robot):
         change[bodies.index(BASE)] = 0.0  # of a mass that is there so that it can move
     return _Changes(springs, effects, bodies, change)
 

@@ -16,7 +16,7 @@ import numpy as np
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
-from planner.identification.measurement_model import AIM, Tolerances
+from planner.identification.measurement_model import AIM, CHAIN_NUMBERS, Tolerances
 from planner.identification.objective import TOO_SOFT
 from planner.identification.parameters import Parametrisation
 from planner.identification.simulated_visit import SimulatedPoses
@@ -38,7 +38,6 @@ SHORTER = 0.3  # of the stride, after a step that led uphill
 # identified with hits and chain left open, one of 35 to 56 moved no hit by 0.2 of its sd, the
 # next none by 0.03.
 SETTLED = 100.0
-CHAIN = 14  # numbers of the measuring chain
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,7 @@ def tell_misses(visits: Sequence[VisitHits], known: Known, t: Tolerances, tell_b
     few = range(max(0, len(visits) - tell_by), len(visits))
     lines = int(np.clip(LINES // max(len(few), 1), FEWEST_LINES, LINES))
     common, stride = _Common(known, t), STRIDE
-    best = common.at(known.x, np.zeros(CHAIN), [visits[i] for i in few], lines)
+    best = common.at(known.x, np.zeros(CHAIN_NUMBERS), [visits[i] for i in few], lines)
     solved = best.likeliest()
     size = solved.size
     for _ in range(STEPS - 1):
@@ -165,7 +164,7 @@ class _Common:
         simulation = self.known.simulation(x)
         made = self.visits(simulation, chain, visits, lines)
         mean = np.concatenate([np.zeros(AIMED), -chain, self.known.mean - x])
-        sd = np.concatenate([np.ones(AIMED + CHAIN), self.known.sd])
+        sd = np.concatenate([np.ones(AIMED + CHAIN_NUMBERS), self.known.sd])
         return _Point(x, chain, simulation, made, mean, sd)
 
     def visits(
@@ -249,9 +248,9 @@ class _Solved:
     def step(self, stride: float) -> tuple[np.ndarray, np.ndarray]:
         """Change of the chain (14,) and of the parameters (D,), damped."""
         damping = np.zeros(len(self.right))
-        damping[AIMED + CHAIN :] = 1 / stride**2
+        damping[AIMED + CHAIN_NUMBERS :] = 1 / stride**2
         moved = np.linalg.solve(self.normal + np.diag(damping), self.right)[AIMED:]
-        return moved[:CHAIN], moved[CHAIN:]
+        return moved[:CHAIN_NUMBERS], moved[CHAIN_NUMBERS:]
 
     @cached_property
     def _common(self) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,7 @@ class Integrated:
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Estimated:
     """Estimates, in sds: `own` (n, 4c + dof) of each pose's hits and joints, `chain` (k,)."""
 
     own: np.ndarray
@@ -41,10 +41,10 @@ class Told:
 class LeftOpen:
     """B of n poses, weighted, evaluated at one point and constant from there on.
 
-    A B that changed with the parameters would favour those that make FRFs large, as their B, and
-    with it the error that is allowed, is large too. Simulated FRFs are those between the `actual`
-    ports, so that they contain the misses found so far; `crossed` (n, r, c, F), weighted, subtracts
-    these to first order, because `told` counts misses from zero.
+    B grows with the simulated FRFs, and with B the error that is allowed: were it to change with
+    the parameters, a fit would prefer those that make FRFs large. Simulated FRFs are those between
+    the `actual` ports, so that they contain the misses found so far; `crossed` (n, r, c, F),
+    weighted, subtracts these to first order, because `told` counts misses from zero.
     """
 
     poses: tuple["_PoseNumbers", ...]
@@ -103,7 +103,7 @@ class LeftOpen:
             by_pose,
         )
 
-    def told(self, residual: np.ndarray) -> Told:
+    def told(self, residual: np.ndarray) -> Estimated:
         """What weighted residuals (n, r, c, F) tell of the numbers."""
         off = residual + self.crossed
         flat = [pose.values(one[None])[0] for pose, one in zip(self.poses, off, strict=True)]
@@ -116,7 +116,7 @@ class LeftOpen:
             -np.linalg.solve(pose.factor.T, pose.own @ r + pose.across @ chain)
             for pose, r in zip(self.poses, flat, strict=True)
         ]
-        return Told(np.array(left), chain, self.hits)
+        return Estimated(np.array(left), chain, self.hits)
 
 
 @dataclass(frozen=True, eq=False)

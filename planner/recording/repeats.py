@@ -8,7 +8,7 @@ from planner.recording.band_spectra import band_spectra
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.records import AXES, Fault, Hit
 from planner.recording.sampling_rates import same_rate
-from planner.recording.screening import NOTHING
+from planner.recording.screening import SILENCE
 
 # Likeness of repeats: below the first, and by so much below what is usual, they are unlike; above
 # the last they are the same. Chosen.
@@ -143,7 +143,7 @@ class _Few:
     def _repeated(self, i: int) -> Doubt | None:
         for axis, centre in self._across(i).items():
             sizes = np.linalg.norm(self.frfs[i]), np.linalg.norm(centre)
-            ratio = float(min(sizes) / max(*sizes, NOTHING))
+            ratio = float(min(sizes) / max(*sizes, SILENCE))
             alike = _likeness(self.frfs[i], centre)
             if abs(alike) * ratio >= SAME:
                 others = tuple(int(j) for j in np.flatnonzero(self.axes == axis))
@@ -159,7 +159,7 @@ def likeness_to(hit: Hit, others: tuple[Hit, ...], band_hz: tuple[float, float])
     frf, *theirs = _frfs((hit, *same), band_hz)
     centre = _centre(np.array(theirs))
     sizes = np.linalg.norm(frf), np.linalg.norm(centre)
-    return _likeness(frf, centre) * float(min(sizes) / max(*sizes, NOTHING))
+    return _likeness(frf, centre) * float(min(sizes) / max(*sizes, SILENCE))
 
 
 @dataclass(frozen=True, eq=False)

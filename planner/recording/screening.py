@@ -9,7 +9,7 @@ from planner.recording.records import Fault, Hit
 
 LEAST_LINES = 8  # frequency lines in the band: fewer hold no mode
 QUIET_SAMPLES, ANSWER_S = 12, 0.25  # from which noise is judged, and the answer to a hit
-NOTHING = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
+SILENCE = 1e-12  # N or m/s²: below, a channel is silent; chosen, far below any noise
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class ScreeningLimits:
 def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]:
     """Faults of one hit by itself; those with `refuse` make it unusable."""
     limits, pulse = limits or ScreeningLimits(), hit.pulse
-    if pulse.peak_n < NOTHING or np.max(np.abs(hit.acceleration_m_s2)) < NOTHING:
+    if pulse.peak_n < SILENCE or np.max(np.abs(hit.acceleration_m_s2)) < SILENCE:
         return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
     faults = [*_short(hit, limits), *_weak(hit, limits), *channel_faults(hit)]
     if any(f.kind == "too_weak" for f in faults):
@@ -90,7 +90,7 @@ def _response_snr(hit: Hit) -> float | None:
     rounding = np.array([step(samples) for samples in hit.acceleration_m_s2]) / np.sqrt(12)
     noise = np.hypot(np.std(before, axis=1), rounding)
     answer = np.sqrt(np.mean((hit.acceleration_m_s2[:, after] - mean) ** 2, axis=1))
-    return float(np.max(answer / np.maximum(noise, NOTHING)))
+    return float(np.max(answer / np.maximum(noise, SILENCE)))
 
 
 def _polarity(hit: Hit) -> list[Fault]:

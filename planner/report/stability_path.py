@@ -13,10 +13,10 @@ from planner.milling.path import TURNS_DEG, PathLimits, along, by_feed
 from planner.milling.structure import Structure, beyond
 from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
+from planner.report.path_poses import Travelled, Way
 from planner.report.plot_files import Pictures
 from planner.report.stability_source import Asked, outside, structures_of_file
 from planner.report.stability_turns import TurnAdvice, turn_advice, turns_figure
-from planner.report.stability_way import Travelled, Way
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from planner.milling.cut import Cut
 from planner.milling.path import limit_at
 from planner.progress import Tell, quietly
-from planner.report.stability_way import TURNS_DEG, Travelled
+from planner.report.path_poses import TURNS_DEG, Travelled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,10 +15,10 @@ from planner.errors import NoPoseLeftError, PlannerError
 from planner.report import session_text
 from planner.report.campaign_acts import UndoneAct
 from planner.session.course import BAD, Course, PoseInProgress
+from planner.session.hit_verdicts import PoseBefore
 from planner.session.page import page_with_hits, page_without_hits
 from planner.session.skipping import ask_why, on_reason_key
 from planner.session.station import Station
-from planner.session.verdicts import PoseBefore
 from planner.words import counted
 
 ENTER = ("a", "\n", "\r")

@@ -11,7 +11,7 @@ from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
 from planner.report import session_text
 from planner.report.pose_screen import PosePage
-from planner.session.verdicts import HitVerdict, Part, PoseBefore
+from planner.session.hit_verdicts import HitVerdict, Part, PoseBefore
 from planner.words import significant
 
 BAD = ("repeat", "unsure", "unstated")

@@ -8,7 +8,7 @@ from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
 from planner.session.course import BAD, Course
-from planner.session.verdicts import HitVerdict
+from planner.session.hit_verdicts import HitVerdict
 from planner.words import short_name
 
 

@@ -8,11 +8,11 @@ from rich.text import Text
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
 from planner.session.diagnosis_process import DiagnosisProcess
+from planner.session.hit_verdicts import Verdicts
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys
 from planner.session.screen import Screen
 from planner.session.teller import Teller
-from planner.session.verdicts import Verdicts
 
 POLL_S = 0.2
 

@@ -25,6 +25,7 @@ from planner.session.acts import (
 )
 from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
+from planner.session.hit_verdicts import Verdicts
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
 from planner.session.page import page_with_hits
@@ -32,7 +33,6 @@ from planner.session.screen import Screen
 from planner.session.station import Station
 from planner.session.table import FolderTable
 from planner.session.teller import Teller
-from planner.session.verdicts import Verdicts
 
 QUIET_S = 0.6  # a file that stood still for so long is whole: a verdict comes within a second
 

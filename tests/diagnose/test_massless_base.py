@@ -10,7 +10,7 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import Both
 from planner.dynamics.simulation import Simulation
-from planner.robot.foot import foot
+from planner.robot.massless_base import foot
 from planner.robot.robot import Robot
 from tests.support.plain_arm import make_plain_arm
 

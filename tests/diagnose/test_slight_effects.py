@@ -7,10 +7,10 @@ import pytest
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.damper_like_springs import damper_like
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import COARSE
 from planner.diagnosis.linear.slightness import without_slight
-from planner.diagnosis.linear.sluggish import sluggish
 from planner.diagnosis.linear.stated_values import away, pulled
 from tests.support.exact_problem import exact_problem
 
@@ -115,5 +115,5 @@ def test_of_the_halves_of_a_link_that_bends_nothing_is_stated(at):
 @pytest.mark.parametrize(("heavier", "expected"), [(0.0, False), (np.log(60.0), True)])
 def test_what_gives_like_a_damper_is_no_structure(at, heavier, expected):
     base = at("base_compliance", "base", {"damping of base": heavier})
-    assert sluggish(base, 1.0) is expected
-    assert not sluggish(at("none", "", {}), 1.0)
+    assert damper_like(base, 1.0) is expected
+    assert not damper_like(at("none", "", {}), 1.0)

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from planner.diagnosis.effects.hanging_resonator import HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear import all_ways
+from planner.diagnosis.linear import three_axis_resonators
 from planner.diagnosis.linear.predict import misfit_at
 from planner.diagnosis.linear.problem import Problem
 from planner.dynamics.simulation import Simulation
@@ -65,7 +65,7 @@ def test_it_is_found_from_nothing(stated):
         for h in misfit.values(x)[0]
     )
     slides = next(e for e in LocalResonator.everywhere(stated) if e.at == hangs.at)
-    (found,) = all_ways.hung(Problem(frfs, q, stated, (6.0, 60.0)), [slides])
+    (found,) = three_axis_resonators.hung(Problem(frfs, q, stated, (6.0, 60.0)), [slides])
     known = found.named()
     hz = sorted(np.exp(v) for name, v in known.items() if name.startswith("frequency"))
     assert hz == pytest.approx(HUNG_HZ, rel=0.05)
@@ -76,5 +76,7 @@ def test_it_is_found_from_nothing(stated):
 @pytest.mark.parametrize("way", [np.zeros(3), np.array([0.0, -2.0, 0.0]), np.array([1.0, 1, 1])])
 def test_what_has_no_direction_yet_may_hang_as_well(way):
     """A fit that never moved a resonator leaves its direction at 0."""
-    turned = Rotation.from_rotvec(all_ways.turned_to(way)).apply([np.linalg.norm(way), 0.0, 0.0])
+    turned = Rotation.from_rotvec(three_axis_resonators.turned_to(way)).apply(
+        [np.linalg.norm(way), 0.0, 0.0]
+    )
     assert turned == pytest.approx(way)

@@ -6,8 +6,8 @@ import pytest
 from planner.dataset.hit_columns import HitColumns
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
-from planner.identification.hit_misses import CHAIN, Known, VisitHits, tell_misses
-from planner.identification.measurement_model import Tolerances
+from planner.identification.hit_misses import Known, VisitHits, tell_misses
+from planner.identification.measurement_model import CHAIN_NUMBERS, Tolerances
 from planner.identification.parameters import Priors, parametrise
 from planner.identification.simulated_visit import SimulatedPoses
 from planner.modal.residue_change import residue_changes
@@ -33,11 +33,11 @@ def made(known, x, chain):
 
 
 def test_columns_of_chain_and_parameters_are_slopes(known):
-    chain = 0.7 * np.random.default_rng(1).standard_normal(CHAIN)
+    chain = 0.7 * np.random.default_rng(1).standard_normal(CHAIN_NUMBERS)
     at = made(known, known.x, chain)
     size = np.abs(at.accelerance).max()
-    for k in range(CHAIN):
-        step = 1e-4 * np.eye(CHAIN)[k]
+    for k in range(CHAIN_NUMBERS):
+        step = 1e-4 * np.eye(CHAIN_NUMBERS)[k]
         pair = [made(known, known.x, chain + sign * step).accelerance for sign in (1, -1)]
         assert (pair[0] - pair[1]) / 2e-4 == pytest.approx(at.chain[k], abs=1e-6 * size)
     for k in (0, 1, 8, len(known.x) - 1):
@@ -50,7 +50,7 @@ def test_columns_of_chain_and_parameters_are_slopes(known):
 
 def visits(known, rng, count=3, repeats=2):
     """Hits that miss at `count` poses, with a chain within its tolerance, and the misses."""
-    chain, out, true = 0.5 * rng.standard_normal(CHAIN), [], []
+    chain, out, true = 0.5 * rng.standard_normal(CHAIN_NUMBERS), [], []
     axis = np.repeat([0, 1, 2], repeats)
     q = KR10.poses(count, 6)
     poses = SimulatedPoses.of(known.simulation(known.x), known.parametrisation, q)

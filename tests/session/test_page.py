@@ -15,9 +15,9 @@ from planner.report.fitted_lines import Said, fitted
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do, remedy_first
 from planner.report.session_text import refusals
 from planner.session.course import Course
+from planner.session.hit_verdicts import HitVerdict
 from planner.session.page import page_with_hits
 from planner.session.screen import Screen
-from planner.session.verdicts import HitVerdict
 from planner.words import short_name
 
 DOUBLE = JudgedHit(

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from planner.diagnosis.effects.effect import Quantity
-from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT
+from planner.diagnosis.thresholds import ODDS_OF_NOTHING, SECOND_EFFECT
 
 TOLERATED = 1.2  # misfit that nuisances leave where the physics is right; chosen
 UNKNOWN_PARAMETERS = 10  # what an unknown effect is charged for, half a ln(count) each; chosen
@@ -99,7 +99,9 @@ def explain(
 
 def _log_prior(changes: tuple[Change, ...]) -> float:
     """As of effects in FRFs: nothing is as likely as all single ones, a second one less."""
-    return -len(changes) * np.log(NOTHING) + max(len(changes) - 1, 0) * np.log(SECOND_EFFECT)
+    return -len(changes) * np.log(ODDS_OF_NOTHING) + max(len(changes) - 1, 0) * np.log(
+        SECOND_EFFECT
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.diagnosis.effects.effect import Effect, Setting, Transfer
-from planner.diagnosis.thresholds import NOTHING, SECOND_EFFECT
+from planner.diagnosis.thresholds import ODDS_OF_NOTHING, SECOND_EFFECT
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import Priors
@@ -24,7 +24,7 @@ class Both(Effect):
     def prior(self) -> float:
         """As if effects came independently of each other."""
         shares = np.array([m.prior for m in self.members])
-        return float(shares.prod() * (SECOND_EFFECT / NOTHING) ** (len(shares) - 1))
+        return float(shares.prod() * (SECOND_EFFECT / ODDS_OF_NOTHING) ** (len(shares) - 1))
 
     @classmethod
     def of(cls, *effects: Effect) -> "Both":

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from planner.diagnosis.thresholds import NOTHING
+from planner.diagnosis.thresholds import ODDS_OF_NOTHING
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances
@@ -100,7 +100,7 @@ class Effect:
     @property
     def prior(self) -> float:
         """Weight before any data: nothing is wrong as likely as all effects together."""
-        return 1.0 if self.at else NOTHING
+        return 1.0 if self.at else ODDS_OF_NOTHING
 
     def structure(self, simulation: Simulation) -> Simulation:
         """The simulation with further elastic degrees of freedom."""

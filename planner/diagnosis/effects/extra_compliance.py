@@ -12,7 +12,7 @@ from planner.diagnosis.thresholds import FURTHER_DAMPING_FACTOR, LOSS_FACTOR_FAC
 from planner.dynamics.simulation import Simulation
 from planner.identification.parameters import KINDS, Priors, place_name
 from planner.robot.config import Compliance, Payload
-from planner.robot.foot import foot
+from planner.robot.massless_base import massless_base
 from planner.robot.robot import BASE
 
 
@@ -44,7 +44,7 @@ class ExtraCompliance(Effect):
         return with_blocks(simulation, blocks, self._carried(simulation))
 
     def _carried(self, simulation: Simulation) -> tuple[Payload, ...]:
-        return foot(simulation.robot) if self.joint == BASE and self.gives else ()
+        return massless_base(simulation.robot) if self.joint == BASE and self.gives else ()
 
     def blocks(self, time: float) -> tuple[Compliance, ...]:
         """At the prior's median; damping is `time` in s by stiffness."""

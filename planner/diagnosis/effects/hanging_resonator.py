@@ -23,7 +23,7 @@ WAYS = "frequency", "frequency_2", "frequency_3"
 class HangingResonator(LocalResonator):
     """A mass on three springs at right angles, where a `LocalResonator` slides along one.
 
-    It is looked for from there, and by itself from many `starts` (`linear.all_ways`).
+    It is looked for from there, and by itself from many `starts` (`linear.three_axis_resonators`).
     """
 
     @classmethod

@@ -52,7 +52,7 @@ def stronger(column: Column) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class HitMisses:
+class MissesAtVisit:
     """What misses of hits at a visit do at some `lines` (F,) of its columns.
 
     `basis` (3, 4, 3, F) is B of a hit along each axis, per prior sd: two tilts, two offsets. `off`
@@ -108,7 +108,7 @@ class OpenMisses:
 
     def of_hits(
         self, visit: int, columns: Sequence[Column], lines: np.ndarray | None = None
-    ) -> HitMisses:
+    ) -> MissesAtVisit:
         """At some lines of a visit's columns."""
         lines = lines_of(columns[0]) if lines is None else lines
         basis = hit_basis(*self._responses(visit, columns[0], lines)[:2], self.tolerances)[0]
@@ -121,7 +121,7 @@ class OpenMisses:
                 for tilt in np.flatnonzero(np.array(ACROSS[hit]) == axis):
                     basis[hit, tilt] = self.tolerances.angle_rad * mean
                     off[hit, tilt] = TILTED
-        return HitMisses(lines, basis, off)
+        return MissesAtVisit(lines, basis, off)
 
     def of_chain(self, visit: int, one: Column, lines: np.ndarray) -> np.ndarray:
         """Changes (14, 3, 3, F) of all FRFs by the measuring chain's tolerance."""
@@ -146,7 +146,7 @@ def s_of(column: Column, lines: np.ndarray) -> np.ndarray:
     return 2j * np.pi * column.frequency_hz[lines] + column.rate_1_s
 
 
-def _left(misses: HitMisses, pairs: Sequence[tuple[Column, Column]]) -> float:
+def _left(misses: MissesAtVisit, pairs: Sequence[tuple[Column, Column]]) -> float:
     """χ² per value by which hits of one level differ beyond what is left open."""
     total, count = 0.0, 0
     for one, other in pairs:
@@ -204,7 +204,7 @@ class Pair:
         change = (one.accelerance - other.accelerance)[:, lines]
         return cls((one, other), lines, change, _inverse(variance))
 
-    def opened(self, misses: HitMisses) -> "Pair":
+    def opened(self, misses: MissesAtVisit) -> "Pair":
         """With the misses of both columns' hits left open."""
         basis, uncertain = misses.left_open(self.columns)
         variance = np.where(self.weight > 0, 1 / np.maximum(self.weight, 1e-300), np.inf)

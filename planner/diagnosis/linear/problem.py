@@ -38,9 +38,9 @@ PRIORS = replace(
 class Grade:
     """How closely one looks: lines a pose, relative sd of all that no simulation follows.
 
-    None: CLOSELY, and `finely` what does not matter, robot.toml's. Looked at finely from afar,
-    inertias are bent to follow what only a spring would lead to. As in `Misfit`: whether logarithms
-    are compared, and whether inertias are free.
+    None: CLOSELY, and `finely` what does not matter, robot.toml's. Far from the solution one looks
+    roughly: fine detail would bend inertias where only a spring is wrong. As in `Misfit`: whether
+    logarithms are compared, and whether inertias are free.
     """
 
     lines: int

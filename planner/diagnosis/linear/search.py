@@ -8,7 +8,6 @@ import numpy as np
 from planner.diagnosis.effects.combined import Both, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
-from planner.diagnosis.linear.all_ways import all_ways, hung
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
     Fit,
@@ -26,6 +25,7 @@ from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_
 from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
 from planner.diagnosis.linear.stated_values import strayed
 from planner.diagnosis.linear.suspects import resonant, suspects
+from planner.diagnosis.linear.three_axis_resonators import hung, three_axis_resonators
 from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS
 from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
@@ -79,7 +79,7 @@ def search(
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
     found = _moved(problem, found, effects)
     if min(f.per_value for f in found.finalists) > AT_NOISE:
-        near = _settled(problem, all_ways(problem, found.finalists))
+        near = _settled(problem, three_axis_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
     if not bent:
         found = _composed(problem, found, effects, tell)

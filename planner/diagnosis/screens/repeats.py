@@ -13,7 +13,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.dataset.level_columns import Column
 from planner.diagnosis.laws.open_misses import (
-    HitMisses,
+    MissesAtVisit,
     OpenMisses,
     hit_columns,
     real_rows,
@@ -108,7 +108,7 @@ def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
     return [g for g in groups if 1 < len({hit.level for hit in g}) < len(g)]
 
 
-def _seen(group: Sequence[Column], missed: HitMisses) -> np.ndarray:
+def _seen(group: Sequence[Column], missed: MissesAtVisit) -> np.ndarray:
     """Hits (n, m) as real rows in units of one noise for all, with misses left open."""
     lines = missed.lines
     # One weight for all: hits are to be exchangeable.

@@ -9,7 +9,7 @@ from planner.robot.robot import Robot
 SHARE = 1e-5  # of the robot's mass: changes no frequency in the band by a millionth
 
 
-def foot(robot: Robot) -> tuple[Payload, ...]:
+def massless_base(robot: Robot) -> tuple[Payload, ...]:
     """A little mass for a base to which neither the URDF nor a [[payload]] gives any, else none.
 
     Many URDFs state none, as the base stands still. Where it gives beside a joint 1 that gives

@@ -10,7 +10,7 @@ from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.thresholds import LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN
 
 
-def sluggish(fit: Fit, temper: float) -> bool:
+def damper_like(fit: Fit, temper: float) -> bool:
     """Whether a spring of an effect, added or loosened, is mostly a damper mid-band.
 
     Only of springs that FRFs tell, χ² counting 1/`temper`.

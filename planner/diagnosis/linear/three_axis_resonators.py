@@ -25,7 +25,7 @@ PLACES, JUMPS, CLOSER = 2, 2, 2
 RATIOS = tuple(product((0.5, 1.1, 2.2), repeat=2))  # of the other frequencies to the known one
 
 
-def all_ways(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
+def three_axis_resonators(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
     """Rough fits with a resonator on three springs: of the best that has one, and has it alone."""
     swing = [f for f in finalists if any(isinstance(p, LocalResonator) for p in f.effect.parts())]
     alone = [f for f in swing if len(f.effect.parts()) == 1]

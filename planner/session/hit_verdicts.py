@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planner.dataset.screened_files import Source, Verdict, not_averaged, read_one
+from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one
 from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
@@ -28,7 +28,7 @@ class HitVerdict:
     `text` of a good one says what is to be known of it, if anything is. A late one answers as
     the pose before did; an unsure one contradicts others, and nothing tells which is right. `axis`
     is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
-    they came to the pose. An import would take it where it is `weak` only.
+    they came to the pose. `weak`: it is to be repeated only because it is; an import would take it.
     """
 
     path: Path
@@ -62,7 +62,7 @@ class Verdicts:
         self._band = band_hz
         self._stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
         self.table = table or FolderTable()
-        self._read: dict[tuple, list[tuple[Verdict, tuple[Hit, ...]]]] = {}
+        self._read: dict[tuple, list[tuple[FileVerdict, tuple[Hit, ...]]]] = {}
 
     def unfit(self, path: Path) -> str:
         """Why no hit can be made of a file that reads; empty: it can."""
@@ -111,7 +111,9 @@ class Verdicts:
         )  # fmt: skip
         return tuple(asked.get(verdict.number, verdict) for verdict in late)
 
-    def _alone(self, path: Path, verdict: Verdict, own: tuple[Hit, ...], number: int) -> HitVerdict:
+    def _alone(
+        self, path: Path, verdict: FileVerdict, own: tuple[Hit, ...], number: int
+    ) -> HitVerdict:
         kind = "repeat" if verdict.reason else "good"
         kind = "unstated" if verdict.axis_missing else kind
         text = verdict.reason or " ".join(verdict.remarks)
@@ -166,7 +168,7 @@ class Verdicts:
             f"{hit.axis[-1]} once more"
         )
 
-    def _hits_of(self, path: Path) -> list[tuple[Verdict, tuple[Hit, ...]]]:
+    def _hits_of(self, path: Path) -> list[tuple[FileVerdict, tuple[Hit, ...]]]:
         """The verdict on each hit in a file by itself, and what of it is usable."""
         stat, row = path.stat(), self.table.row(path)
         key = path, stat.st_size, stat.st_mtime_ns, str(row)
