@@ -64,7 +64,7 @@ def swinging(
 
 
 def _value(fit: Fit) -> float:
-    return fit.misfit(fit.x).value
+    return fit.value
 
 
 def _promising(

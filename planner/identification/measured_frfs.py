@@ -46,6 +46,13 @@ class Measured:
         noise = None if self.noise_sd is None else self.noise_sd[poses]
         return Measured(*(part[poses] for part in parts), layout=self.layout, noise_sd=noise)
 
+    def thinned(self, step: int) -> "Measured":
+        """Of every so many-th line."""
+        parts = (self.frequency_hz, self.s, self.accelerance, self.sd)
+        noise = None if self.noise_sd is None else self.noise_sd[..., ::step]
+        few = (part[..., ::step] for part in parts)
+        return Measured(*few, tail_s=self.tail_s, layout=self.layout, noise_sd=noise)
+
     def loaded(self, matrices: Matrices, simulation: Simulation) -> Matrices:
         """Matrices between the points of `layout` with the mass of sensors that were there."""
         count = np.count_nonzero(self.used, axis=(2, 3)).reshape(len(self.used), -1, 3)

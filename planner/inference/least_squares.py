@@ -147,22 +147,35 @@ def within_box(
 
     After Stark and Parker (1995), bounded-variable least squares.
     """
-    x, free = _solved(normal, downhill), np.ones(len(downhill), dtype=bool)
+    root = _inverse_root(normal)
+    start = root.T @ (root @ downhill)
+    x, free, push = start.copy(), np.ones(len(start), dtype=bool), np.zeros(len(start))
     for _ in range(3 * len(x)):
         beyond = np.where(free, np.maximum(lower - x, x - upper), 0.0)
         if beyond[worst := int(np.argmax(beyond))] > 0:
             free[worst] = False
             x[worst] = lower[worst] if x[worst] < lower[worst] else upper[worst]
         else:
-            slope = normal @ x - downhill
-            inward = np.where(free, 0.0, np.where(x <= lower, -slope, slope))
+            inward = np.where(x <= lower, -push, push)
             if inward.max(initial=0.0) <= 1e-9 * np.abs(downhill).max(initial=0.0):
                 break
             free[int(np.argmax(inward))] = True
-        if free.any():
-            rest = downhill[free] - normal[np.ix_(free, ~free)] @ x[~free]
-            x[free] = _solved(normal[np.ix_(free, free)], rest)
+        # Of the one inverse: forces on what is held bring it from where all were free to its sides.
+        held, push = ~free, np.zeros(len(x))
+        columns = root.T @ root[:, held]
+        push[held] = _solved(columns[held], x[held] - start[held])
+        x = np.where(held, x, start + columns @ push[held])
     return x
+
+
+def _inverse_root(normal: np.ndarray) -> np.ndarray:
+    """R with Rᵀ R the inverse of a matrix (P, P), of what has curvature at all."""
+    try:
+        return triangular.inverse(np.linalg.cholesky(normal))
+    except np.linalg.LinAlgError:  # rounding has left a direction without curvature
+        values, vectors = np.linalg.eigh(normal)
+        kept = values > len(values) * np.finfo(float).eps * values[-1]
+        return vectors.T[kept] / np.sqrt(values[kept])[:, None]
 
 
 def _solved(damped: np.ndarray, downhill: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -39,6 +39,11 @@ class Fit:
     def per_value(self) -> float:
         """χ² per real value, 1 at the noise."""
         return float(self.data.chi2.sum() / max(self.misfit.counts.sum(), 1))
+
+    @cached_property
+    def value(self) -> float:
+        """−ln of the posterior density at x, but for a constant; ∞ where x cannot be."""
+        return self.misfit.value(self.x, self.data) if self.misfit.possible(self.x) else np.inf
 
     def named(self) -> dict[str, float]:
         """x by name: springs, nuisances, then the effect's own."""
@@ -87,15 +92,15 @@ class Fit:
         return out
 
 
-def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = ()) -> Fit:
-    """From the prior's median by way of logarithms, and from each warm one; on the finest lines."""
+def fit(problem: Problem, effect: Effect, warm: Sequence[Fit] = (), grade: Grade = FINE) -> Fit:
+    """From the prior's median by way of logarithms, and from each warm one; on a grade's lines."""
     coarse, close = problem.misfit(effect, COARSE), problem.misfit(effect, CLOSE)
     afar = _at(coarse, _best(coarse, [_approach(problem, effect)]))
     ends = [_best(close, points(close, afar)).x]
     for earlier in warm:
         ends.append(_best(close, points(close, earlier)).x)
-    fine = problem.misfit(effect, FINE)
-    return _at(fine, _minimise(fine, _best(close, ends).x, LOOSE, LAST_STEPS))
+    last = problem.misfit(effect, grade)
+    return _at(last, _minimise(last, _best(close, ends).x, LOOSE, LAST_STEPS))
 
 
 def staged(problem: Problem, effect: Effect) -> Fit:
@@ -104,7 +109,7 @@ def staged(problem: Problem, effect: Effect) -> Fit:
     Only for effects without parameters but springs.
     """
     ends = side_by_side(partial(_identified, problem, effect), (QUICK, PATIENT))
-    return min(ends, key=lambda f: f.misfit(f.x).value)
+    return min(ends, key=lambda f: f.value)
 
 
 def _identified(problem: Problem, effect: Effect, effort: Effort) -> Fit:
@@ -151,7 +156,7 @@ def afresh(problem: Problem, near: Fit, steps: int = AFRESH_STEPS) -> Fit:
         starts.append(_best(coarse, starts).x)
     named = (dict(zip(coarse.names, x, strict=True)) for x in starts)
     far = approached(near.misfit, [_placed(near.misfit, known) for known in named], steps)
-    return min((near, far), key=lambda f: f.misfit(f.x).value)
+    return min((near, far), key=lambda f: f.value)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:

@@ -19,7 +19,7 @@ def distinct(found: Found) -> Found:
     best: dict[frozenset[Effect], Fit] = {}
     for f in found.finalists:
         key = frozenset(f.effect.parts())
-        if key not in best or f.misfit(f.x).value < best[key].misfit(best[key].x).value:
+        if key not in best or f.value < best[key].value:
             best[key] = f
     left = tuple(entry for entry in found.left if frozenset(entry[0].parts()) not in best)
     return Found(tuple(best.values()), left)

@@ -23,6 +23,9 @@ from planner.identification.parameters import Parametrisation
 from planner.inference.least_squares import LONGEST, Quadratic
 from planner.robot.elastic_model import Matrices
 
+# Lines at least by which misses are guessed, around which all lines are taken then: misses are few
+# numbers, and what a guess is off counts in second order only.
+GUESSED_BY = 16
 STRIDE = 1.5  # sds by which an effect's own parameters may move in one step
 
 
@@ -168,8 +171,7 @@ class Misfit:
             full = full[:, :-1]
         held, slope = len(p.held), full
         if not np.array_equal(p.spread, np.eye(held)):
-            theta = np.einsum("np...,pq->nq...", full[:, :held], p.spread, optimize=True)
-            slope = np.concatenate([theta, full[:, held:]], axis=1)
+            slope = _by_theta(full, p.spread)
         if rate is not None:
             # Z is of second order in s, so that H'(s) follows from the springs' derivatives.
             e = p.size
@@ -200,14 +202,20 @@ class Misfit:
 
     def around_misses(self, x: np.ndarray) -> AroundMisses:
         """FRFs at x and what hits, chain and readback leave open, around its likeliest."""
-        assert self.tolerances is not None
+        few = self._few_lines
         if self.discrepancy is None:
-            h, turned = self.values(x)
-            first = self._around(h, None, turned)
+            h, turned = few.values(x)
+            first = few._around(h, None, turned)
         else:
-            first = self._around(*self.parts(x))
-        eta = guess(first.misses())
-        return self.around_these(x, eta)
+            first = few._around(*few.parts(x))
+        return self.around_these(x, guess(first.misses()))
+
+    @cached_property
+    def _few_lines(self) -> "Misfit":
+        """Of as many lines as tell a guess of the misses."""
+        step = max(1, self.setting.s.shape[1] // GUESSED_BY)
+        setting = replace(self.setting, s=self.setting.s[:, ::step])
+        return replace(self, measured=self.measured.thinned(step), setting=setting)
 
     def around_these(self, x: np.ndarray, eta: np.ndarray) -> AroundMisses:
         """The same around these numbers (n, l)."""
@@ -247,6 +255,12 @@ class Misfit:
         springs = self.parametrisation.elasticity(x[:a])
         return positive(mass) and stands(self.matrices, springs.stiffness)
 
+    def value(self, x: np.ndarray, data: ByPose) -> float:
+        """Data and prior together at x, of which the data say so much."""
+        away = (x - self.mean) / self.sd
+        prior = float(away @ away) * (LOG_PRIOR if self.logarithmic else 1.0)
+        return (float(data.chi2.sum()) + prior) / 2
+
     def __call__(self, x: np.ndarray) -> MisfitAtPoint:
         """Data and prior together; ∞ where x cannot be."""
         away, scale = (x - self.mean) / self.sd, 1 / self.sd
@@ -258,7 +272,7 @@ class Misfit:
             away, scale = away * np.sqrt(LOG_PRIOR), scale * np.sqrt(LOG_PRIOR)
         chi2 = float(data.chi2.sum())
         return MisfitAtPoint(
-            (chi2 + float(away @ away)) / 2,
+            self.value(x, data),
             data.gradient.sum(axis=0) + np.where(self.free, scale * away, 0.0),
             data.normal.sum(axis=0) + np.diag(scale**2),
             chi2,
@@ -273,6 +287,18 @@ class Misfit:
         least = 1e-9 * np.abs(measured) + 1e-300
         safe = np.where(np.abs(h) >= least, h, least)
         return weight * np.log(safe / measured), slope * (weight / safe)[:, None]
+
+
+def _by_theta(full: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Derivatives (n, d, r, c, F), the first of which are by held numbers, by θ in their place."""
+    n, (held, free) = len(full), spread.shape
+    out = np.empty((n, full.shape[1] - held + free, *full.shape[2:]), dtype=complex)
+    by_held, by_theta = (
+        part.reshape(n, part.shape[1], -1).view(float) for part in (full[:, :held], out[:, :free])
+    )
+    np.matmul(spread.T, by_held, out=by_theta)
+    out[:, free:] = full[:, held:]
+    return out
 
 
 def _weight(matrices: Matrices, lines: int) -> Impedance:

@@ -64,7 +64,7 @@ def farthest_bent(fit: Fit) -> tuple[str, float]:
 
 
 def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
-    """Fits with one mass at each place, where inertias were moved far to imitate one.
+    """Rough fits with one mass at each place, where inertias were moved far to imitate one.
 
     From a fit that has bent them nothing leads to the mass: each is fitted from afar too.
     """
@@ -79,12 +79,12 @@ def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[F
 
 def _from_afar(problem: Problem, found: Fit, effect: Effect) -> Fit:
     # Valleys from inertias to a mass are long: a fit that stops early is still on its way.
-    far, misfit = fit(problem, effect, [found]), problem.misfit(effect, CLOSE)
+    far, misfit = fit(problem, effect, [found], CLOSE), problem.misfit(effect, CLOSE)
     x, place = points(misfit, found)[0], misfit.names.index(f"mass of {MASS} at {_mass_at(effect)}")
     starts = [np.where(np.arange(len(x)) == place, s * misfit.sd[place], x) for s in HEAVY]
     # Either way has its own valley: the one that is steeper at first need not be the deeper one.
     ends = [approached(misfit, [start]) for start in starts if misfit.possible(start)]
-    return min((settle(problem, one) for one in (far, *ends)), key=lambda f: f.misfit(f.x).value)
+    return min((settle(problem, one, CLOSE) for one in (far, *ends)), key=lambda f: f.value)
 
 
 def _mass_at(effect: Effect) -> str:

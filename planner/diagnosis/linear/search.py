@@ -10,6 +10,7 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
+    SETTLED,
     Fit,
     afresh,
     carried_on,
@@ -142,7 +143,7 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 def _rigid(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds fits in which the best's resonators are replaced by masses that do not swing."""
-    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    best = min(found.finalists, key=lambda f: f.value)
     return Found((*found.finalists, *_settled(problem, rigid(problem, best, effects))), found.left)
 
 
@@ -167,7 +168,7 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
 
     Noise that is overstated hides a small second effect from `AT_NOISE`, not from the evidence.
     """
-    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    best = min(found.finalists, key=lambda f: f.value)
     if not best.effect.at or len(best.effect.parts()) > 1 or best.per_value > AT_NOISE:
         return found
     if lag([found.finalists[0], best])[0] < HOPELESS:  # nothing at all does nearly as well
@@ -187,7 +188,7 @@ def _lessened(problem: Problem, found: Found) -> Found:
     """
     there = [f for f in found.finalists if f.effect.at]
     less: list[tuple[Fit, Effect]] = []
-    for whole in sorted(there, key=lambda f: f.misfit(f.x).value)[:LESSENED]:
+    for whole in sorted(there, key=lambda f: f.value)[:LESSENED]:
         parts = whole.effect.parts()
         for part in parts:
             kept = [p for p in parts if p is not part]
@@ -199,7 +200,7 @@ def _lessened(problem: Problem, found: Found) -> Found:
 
 def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds pairs of the best with the stiffness of each joint whose springs it moved far."""
-    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    best = min(found.finalists, key=lambda f: f.value)
     if not best.effect.at or best.per_value > AT_NOISE:
         return found
     spared = [e for e in effects if strayed(best, e)]
@@ -210,14 +211,15 @@ def _spared(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds a mass at each place where the best moved inertias far to explain everything."""
-    best = min(found.finalists, key=lambda f: f.misfit(f.x).value)
+    best = min(found.finalists, key=lambda f: f.value)
     if any(p.artefact for p in best.effect.parts()):  # what is beside one may be all there is
         found = distinct(_lessened(problem, found))
     robots = [f for f in found.finalists if not any(p.artefact for p in f.effect.parts())]
-    best = min(robots, key=lambda f: f.misfit(f.x).value)
+    best = min(robots, key=lambda f: f.value)
     if best.per_value > AT_NOISE:
         return found
-    return Found((*found.finalists, *burdened(problem, best, effects)), found.left)
+    near = best_of(burdened(problem, best, effects), LAST)
+    return Found((*found.finalists, *_settled(problem, near, steps=SETTLED[1])), found.left)
 
 
 def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
@@ -234,7 +236,7 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     share = 0.6 / max(len(effects), 1)
     fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
     if clearly:
-        order = np.argsort([f.misfit(f.x).value for f in fits])
+        order = np.argsort([f.value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
         close = side_by_side(partial(afresh, problem), close)
         worst = max(lag([none, *close]))

@@ -128,7 +128,7 @@ def _fitted_without(problem: Problem, whole: Fit, none: Fit, kept: Sequence[Effe
 
 
 def _value(fit: Fit) -> float:
-    return fit.misfit(fit.x).value
+    return fit.value
 
 
 def _carried_on(problem: Problem, whole: Fit, kept: Sequence[Effect]) -> Fit:

@@ -76,7 +76,7 @@ def _with(x: np.ndarray, i: int, value: float) -> np.ndarray:
 
 
 def _best(fits: Sequence[Fit], most: int) -> list[Fit]:
-    return sorted(fits, key=lambda f: f.misfit(f.x).value)[:most]
+    return sorted(fits, key=lambda f: f.value)[:most]
 
 
 def _ways(found: Fit) -> list[tuple[Fit, LocalResonator, Effect]]:
