@@ -90,9 +90,9 @@ class ChainMisfit:
         The chain is as z says: else the lighter robot under a lower gain would not look the same,
         and a fit would end where it began.
         """
-        eta = self._of_chain(z)
-        h, turned = self.misfit.values(z[:-CHAIN], self._ports(eta))
-        told = guess(self._around(h, turned, eta).misses())
+        eta, few = self._of_chain(z), ChainMisfit(self.misfit.few_lines)
+        h, turned = few.misfit.values(z[:-CHAIN], few._ports(eta))
+        told = guess(few._around(h, turned, eta).misses())
         eta[:, own_numbers(eta.shape[1])] = told
         h, slope, turned = self.misfit.parts(z[:-CHAIN], self._ports(eta))
         return self._around(h, turned, eta, slope)

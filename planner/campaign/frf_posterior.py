@@ -38,7 +38,7 @@ TOLERANCE, MOST_STEPS = 5e-5, 30  # of a fit: least gain of a step, and how many
 LIGHT = Damping(first=1e-5)
 # Model errors by which a fit that knows no place to begin at comes near, and steps at each: while
 # FRFs count little, inertias and springs stay near their priors but for what matters most.
-COARSE_ERRORS, COARSE_STEPS = (0.5, 0.3, 0.1, 0.03), 20
+COARSE_ERRORS, COARSE_STEPS, COARSE_TOLERANCE = (0.5, 0.3, 0.1, 0.03), 20, 1e-3
 FOLDS = 6  # that poses are left out in, at most
 LEFT_STEPS = 3  # of a fit without a pose, from one with it
 
@@ -156,11 +156,13 @@ def fitted_afresh(problem: Problem, effect: Effect) -> FrfPosterior:
     z = np.append(x, np.zeros(CHAIN))
     for error in COARSE_ERRORS:
         objective = ChainMisfit(problem.misfit(effect, Grade(lines, error)))
-        z, _ = least(objective, z, COARSE_STEPS)
+        z, _ = least(objective, z, COARSE_STEPS, COARSE_TOLERANCE)
     return fitted(problem, effect, z)
 
 
-def least(objective: ChainMisfit, z: np.ndarray, most: int) -> tuple[np.ndarray, FrfEvidence]:
+def least(
+    objective: ChainMisfit, z: np.ndarray, most: int, tolerance: float = TOLERANCE
+) -> tuple[np.ndarray, FrfEvidence]:
     """Where at most so many steps from z lead, and what is there; nothing leaves its bounds.
 
     Where the simulation lacks physics, inertias go as far as they may: the others go on.
@@ -172,7 +174,7 @@ def least(objective: ChainMisfit, z: np.ndarray, most: int) -> tuple[np.ndarray,
     state = begin(z, objective(z), LIGHT, limits)
     for _ in range(most):
         trial = propose(state)
-        if expected(state, trial) <= TOLERANCE * state.at.value or state.stuck:
+        if expected(state, trial) <= tolerance * state.at.value or state.stuck:
             break
         state = accept(state, trial, objective(trial))
     return state.x, state.at

@@ -202,7 +202,7 @@ class Misfit:
 
     def around_misses(self, x: np.ndarray) -> AroundMisses:
         """FRFs at x and what hits, chain and readback leave open, around its likeliest."""
-        few = self._few_lines
+        few = self.few_lines
         if self.discrepancy is None:
             h, turned = few.values(x)
             first = few._around(h, None, turned)
@@ -211,7 +211,7 @@ class Misfit:
         return self.around_these(x, guess(first.misses()))
 
     @cached_property
-    def _few_lines(self) -> "Misfit":
+    def few_lines(self) -> "Misfit":
         """Of as many lines as tell a guess of the misses."""
         step = max(1, self.setting.s.shape[1] // GUESSED_BY)
         setting = replace(self.setting, s=self.setting.s[:, ::step])
@@ -292,6 +292,8 @@ class Misfit:
 def _by_theta(full: np.ndarray, spread: np.ndarray) -> np.ndarray:
     """Derivatives (n, d, r, c, F), the first of which are by held numbers, by θ in their place."""
     n, (held, free) = len(full), spread.shape
+    if np.all(spread.sum(axis=0) == 1):
+        return full[:, [*spread.argmax(axis=0), *range(held, full.shape[1])]]
     out = np.empty((n, full.shape[1] - held + free, *full.shape[2:]), dtype=complex)
     by_held, by_theta = (
         part.reshape(n, part.shape[1], -1).view(float) for part in (full[:, :held], out[:, :free])
