@@ -5,6 +5,7 @@ It has a mode of its own, which moves and splits those of the robot: no stiffnes
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import msgspec
 import numpy as np
@@ -18,12 +19,15 @@ from planner.identification.extended_structure import ExtendedModel
 from planner.identification.held_out import farthest_first
 from planner.identification.parameters import parametrise
 from planner.identification.result import Identification
+from planner.inference.parallel import side_by_side
 from planner.robot.config import Resonator
 
 # All starts at all links are followed for a few steps by logarithms, the most promising of each
 # link farther: on so many poses, for fewer have fewer wrong minima. Starts whose values differ by
 # less have met.
 FIRST_STEPS, PROMISING, LOG_STEPS, FEW, MET = 4, 4, 10, 3, 1e-4
+# Steps by which all of these come near, and how many of them are followed to the end.
+NEAR_STEPS, FOLLOWED = 8, 6
 COMPARED = Grade(40, 0.003)  # as an identification looks, which compares what is found
 
 
@@ -50,16 +54,10 @@ def swinging(
     springs = identified.mean[: len(identified.estimates)]
     effects = LocalResonator.everywhere(structure.simulation)
     stated = parametrise(structure.simulation, structure.priors).mean
-    near = [
-        settle(few, approached(f.misfit, [f.x], LOG_STEPS), COMPARED)
-        for effect in effects
-        for f in _promising(few, effect, (springs, stated))
-    ]
-    best = min(near, key=_value)
+    best = _best(few, side_by_side(partial(_promising, few, (springs, stated)), effects))
     # Its frequency shows before its place does.
-    hertz = best.x[best.misfit.split[1] + 1]
-    near = [settle(few, f, COMPARED) for e in effects for f in _at_frequency(few, e, best, hertz)]
-    best = settle(problem, min([best, *near], key=_value), COMPARED)
+    near = _best(few, side_by_side(partial(_at_frequency, few, best), effects))
+    best = settle(problem, min(best, near, key=_value), COMPARED)
     return _with(structure, best), np.exp(best.x[None, : best.misfit.split[0]])
 
 
@@ -67,10 +65,21 @@ def _value(fit: Fit) -> float:
     return fit.value
 
 
+def _best(problem: Problem, near: Sequence[Sequence[Fit]]) -> Fit:
+    """Of the nearest fits of all links the one that ends best."""
+    nearest = sorted((f for fits in near for f in fits), key=_value)[:FOLLOWED]
+    ends = side_by_side(partial(settle, problem, grade=COMPARED), nearest)
+    return min(ends, key=_value)
+
+
+def _near(problem: Problem, rough: Fit) -> Fit:
+    return settle(problem, rough, COMPARED, NEAR_STEPS)
+
+
 def _promising(
-    problem: Problem, effect: LocalResonator, springs: Sequence[np.ndarray]
+    problem: Problem, springs: Sequence[np.ndarray], effect: LocalResonator
 ) -> list[Fit]:
-    """Where a few steps lead from its starts beside springs θ (P,): the best that differ."""
+    """Where its starts beside springs θ (P,) lead: the best that differ after a few steps."""
     rough = problem.misfit(effect, GLANCE)
     tried = []
     for some in springs:
@@ -83,17 +92,18 @@ def _promising(
         if value > last * (1 + MET):
             kept.append(fit)
         last = value
-    return kept[:PROMISING]
+    ends = (approached(rough, [f.x], LOG_STEPS) for f in kept[:PROMISING])
+    return [_near(problem, f) for f in ends]
 
 
-def _at_frequency(problem: Problem, effect: LocalResonator, found: Fit, hertz: float) -> list[Fit]:
+def _at_frequency(problem: Problem, found: Fit, effect: LocalResonator) -> list[Fit]:
     """On another link, in three directions, with the frequency (its logarithm) that was found."""
-    rough = problem.misfit(effect, GLANCE)
+    rough, hertz = problem.misfit(effect, GLANCE), found.x[found.misfit.split[1] + 1]
     others, fits = found.x[: found.misfit.split[1]], []
     for psi in effect.starts()[:3]:
         x = np.append(others, psi)
         x[len(others) + 1] = hertz
-        fits.append(approached(rough, [x], LOG_STEPS))
+        fits.append(_near(problem, approached(rough, [x], LOG_STEPS)))
     return fits
 
 
