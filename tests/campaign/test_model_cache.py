@@ -24,9 +24,14 @@ POSES = "A11", "A33"
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
-    """A campaign of two poses."""
-    source, folder = shipped(NAME), tmp_path_factory.mktemp("two") / "campaign"
-    Campaign.new(folder, source / "robot" / "robot.toml", source / "campaign.toml")
+    """A campaign of two poses, whose simulation stays as it is: no model takes long."""
+    return campaign_of_two(tmp_path_factory.mktemp("two"), "\n[fidelity]\nsimulation = 'frozen'\n")
+
+
+def campaign_of_two(parent, more=""):
+    source, folder, config = shipped(NAME), parent / "campaign", parent / "campaign.toml"
+    config.write_text((source / "campaign.toml").read_text() + more)
+    Campaign.new(folder, source / "robot" / "robot.toml", config)
     campaign = Campaign(folder, Store(None))
     for pose in POSES:
         campaign.import_paths((source / "recordings",), pose)
@@ -67,7 +72,10 @@ def same(a, b):
     return all(np.array_equal(u, v) for u, v in zip(predictions(a), predictions(b), strict=True))
 
 
-def test_a_kept_model_is_the_fitted_one(folder, store, fitted):
+def test_a_kept_model_is_the_fitted_one(tmp_path, store, fitted):
+    """Of a simulation that learns, too."""
+    folder = campaign_of_two(tmp_path)
+    fitted.clear()
     first = Campaign(folder, store).model
     again = Campaign(folder, store).model
     assert len(fitted) == 1
