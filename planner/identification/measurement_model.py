@@ -242,13 +242,26 @@ def blocks(h: np.ndarray, turned: Turned, s: np.ndarray, t: Tolerances) -> tuple
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """A pose's misfit with η integrated out: χ², half gradient, normal, ln|I + BᵀB|, and E[η]."""
+    """A pose's misfit with η integrated out: χ², half gradient, normal.
+
+    `factor` (l, l) is that of I + B Bᵀ by Cholesky, `whitened` (l,) what it makes of B r.
+    """
 
     chi2: float
     gradient: np.ndarray
     normal: np.ndarray
-    log_volume: float
-    eta: np.ndarray
+    factor: np.ndarray
+    whitened: np.ndarray
+
+    @property
+    def log_volume(self) -> float:
+        """ln|I + B Bᵀ|."""
+        return 2 * float(np.sum(np.log(np.diagonal(self.factor))))
+
+    @property
+    def eta(self) -> np.ndarray:
+        """E[η] (l,)."""
+        return np.linalg.solve(self.factor.T, self.whitened)
 
 
 @dataclass(frozen=True, eq=False)
@@ -282,13 +295,7 @@ def marginal_of(parts: Sequence[Part], size: int, count: int) -> Marginal:
     factor = np.linalg.cholesky(inner)
     onto = np.linalg.solve(factor, onto)
     r, j = onto[:, 0], onto[:, 1:]
-    return Marginal(
-        chi2 - float(r @ r),
-        gradient - j.T @ r,
-        normal - j.T @ j,
-        2 * float(np.sum(np.log(np.diagonal(factor)))),
-        np.linalg.solve(factor.T, r),
-    )
+    return Marginal(chi2 - float(r @ r), gradient - j.T @ r, normal - j.T @ j, factor, r)
 
 
 def real_rows(values: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planner.campaign import frf_of_model
+from planner.campaign import frf_prediction
 from planner.campaign.campaign import Campaign
 from planner.campaign.frf_model import ErrorByZone, LeftOut, local_size, share_of
 from planner.campaign.frf_posterior import FrfPosterior
@@ -177,7 +177,7 @@ def test_what_was_worked_out_for_frfs_is_kept(tmp_path, monkeypatch):
     def refused(*given):
         raise AssertionError("worked out again")
 
-    monkeypatch.setattr(frf_of_model, "frf_model_of", refused)
+    monkeypatch.setattr(frf_prediction, "frf_model_of", refused)
     again = Campaign(tmp_path / "c", store).frf(q)
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
 

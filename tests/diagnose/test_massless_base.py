@@ -10,7 +10,7 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import Both
 from planner.dynamics.simulation import Simulation
-from planner.robot.massless_base import foot
+from planner.robot.massless_base import massless_base
 from planner.robot.robot import Robot
 from tests.support.plain_arm import make_plain_arm
 
@@ -41,7 +41,7 @@ def test_the_little_mass_changes_no_frf(simulation):
         key=lambda e: len(e.springs(simulation)),
     )
     with_foot = base.structure(simulation)
-    assert foot(with_foot.robot) == with_foot.robot.config.payload
+    assert massless_base(with_foot.robot) == with_foot.robot.config.payload
     h = with_foot.accelerance(Q, LINES)
     [light] = with_foot.robot.config.payload
     assert light.mass < 1e-3
@@ -58,4 +58,4 @@ def test_a_base_that_has_a_mass_is_given_none(tmp_path):
         'ixy="0" ixz="0" iyz="0"/></inertial></link>'
     )
     urdf.write_text(urdf.read_text().replace('<link name="base_link"/>', own))
-    assert foot(Robot.load(path)) == ()
+    assert massless_base(Robot.load(path)) == ()

@@ -80,8 +80,16 @@ class AroundMisses:
 
     def misses(self) -> np.ndarray:
         """The likeliest numbers (n, l) that are left open, in sds."""
-        size = self.eta.shape[1]
-        return np.array([-self.marginal(i).eta[:size] for i in range(len(self.eta))])
+        n, size = self.eta.shape
+        if len(self.loose):
+            return np.array([-self.marginal(i).eta[:size] for i in range(n)])
+        inner, onto = np.tile(np.eye(size), (n, 1, 1)), np.zeros((n, size))
+        for one in self.open:
+            b = one.basis.reshape(n, len(one.numbers), -1).view(float)
+            r = np.ascontiguousarray(self.residual[:, one.rows, one.columns])
+            inner[:, one.numbers[:, None], one.numbers] += b @ np.swapaxes(b, 1, 2)
+            onto[:, one.numbers] += (b @ r.reshape(n, -1).view(float)[..., None])[..., 0]
+        return -np.linalg.solve(inner, onto[..., None])[..., 0]
 
     def left(self, eta: np.ndarray) -> np.ndarray:
         """(n, r, c, F): residuals where what is left open is eta (n, l)."""
