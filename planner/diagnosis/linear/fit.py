@@ -122,10 +122,10 @@ def _identified(problem: Problem, effect: Effect, effort: Effort) -> Fit:
     return settle(problem, near)
 
 
-def glance(problem: Problem, effect: Effect, warm: Fit) -> Fit:
+def glance(problem: Problem, effect: Effect, warm: Fit, steps: int = ROUGH_STEPS) -> Fit:
     """A rough fit with inertias as they are: from the prior's median, and from an earlier fit."""
     coarse = problem.misfit(effect, COARSE)
-    ends = [_best(coarse, points(coarse, warm))]
+    ends = [_best(coarse, points(coarse, warm), steps)]
     if len(effect.parts()) == 1:
         ends.append(_best(coarse, [_approach(problem, effect)]))
     return _at(coarse, min(ends, key=lambda m: m.at.value))

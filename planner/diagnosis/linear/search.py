@@ -10,9 +10,11 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
+    ROUGH_STEPS,
     SETTLED,
     Fit,
     afresh,
+    approached,
     carried_on,
     glance,
     promise,
@@ -34,6 +36,7 @@ from planner.progress import Tell, quietly, within
 
 FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
 STEPS, LAST_STEPS = 12, 30
+BEGUN = 3  # steps of each pair, before the most promising are followed
 FEW = 5  # poses on which all are looked at where something is clearly wrong
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
@@ -232,9 +235,14 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     clearly = none.per_value > CLEARLY_WRONG
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
     look = glance if clearly else unbent if inertias_bent(none) else promise
-    looked = partial(look, few, warm=none)
+    pairs = clearly and min((len(e.parts()) for e in effects), default=0) > 1
+    looked = (
+        partial(glance, few, warm=none, steps=BEGUN) if pairs else partial(look, few, warm=none)
+    )
     share = 0.6 / max(len(effects), 1)
     fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
+    if pairs:
+        fits = _gone_on(fits)
     if clearly:
         order = np.argsort([f.value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
@@ -251,6 +259,17 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     kept, more = cut([none, *close], LAST)
     tell("settling", 0.9)
     return Found(tuple(_settled(problem, kept)), (*left, *more))
+
+
+def _gone_on(begun: Sequence[Fit]) -> list[Fit]:
+    """Rough fits, the most promising of them followed as far as `glance` goes: others as they are."""
+    order = np.argsort([f.value for f in begun])
+    best = [begun[i] for i in order[: 2 * FIRST]]
+    return side_by_side(_rough, best) + [begun[i] for i in order[2 * FIRST :]]
+
+
+def _rough(begun: Fit) -> Fit:
+    return approached(begun.misfit, [begun.x], ROUGH_STEPS - BEGUN)
 
 
 def _words(effect: Effect) -> str:
