@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from planner.truth.deviation import Spring
-from planner.truth.handling import EVERYDAY
+from planner.truth.handling import EVERYDAY, LABORATORY
 from planner.truth.load import load_truth
 from planner.truth.secret import Artefact
 from tests.support.known_robots import KR10
@@ -47,8 +47,9 @@ def leader(answer: dict) -> tuple[str, str | None]:
     return answer["candidates"][0]["effect"], answer["candidates"][0]["at"]
 
 
-def test_where_nothing_is_concealed_nothing_is_found(tmp_path):
-    answer = diagnosed(small_case(tmp_path))
+@pytest.mark.parametrize("handling", [LABORATORY, EVERYDAY], ids=["exact hits", "everyday's"])
+def test_where_nothing_is_concealed_nothing_is_found(tmp_path, handling):
+    answer = diagnosed(small_case(tmp_path, handling=handling))
     assert answer["verdict"] == "consistent"
     assert answer["findings"] == []
     assert leader(answer) == ("none", None)
@@ -59,7 +60,7 @@ def test_where_nothing_is_concealed_nothing_is_found(tmp_path):
 def test_a_soft_base_is_named_sized_and_predicted(tmp_path):
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
     extra = tuple(Spring("base", axes[a], k, 5e-4 * k) for a, k in BASE.items())
-    case = small_case(tmp_path, unlike(extra=extra))
+    case = small_case(tmp_path, unlike(extra=extra), handling=EVERYDAY)
     answer = diagnosed(case, "--predict", case.predict_csv, "--out", tmp_path / "found")
     assert answer["verdict"] == "explained"
     assert leader(answer) == ("base_compliance", "base")
@@ -86,17 +87,3 @@ def test_a_wrong_sensitivity_is_called_that_and_no_physics(tmp_path):
     (finding,) = answer["findings"]
     assert (finding["effect"], finding["at"]) == ("sensor_gain", "sensor_y")
     assert finding["parameters"]["gain"]["value"] == pytest.approx(GAIN, rel=0.02)
-
-
-def test_hits_beside_their_axes_and_an_ordinary_sensor_are_nothing(tmp_path):
-    answer = diagnosed(small_case(tmp_path, handling=EVERYDAY))
-    assert answer["verdict"] == "consistent"
-    assert answer["findings"] == []
-
-
-def test_a_soft_base_is_named_with_hits_beside_their_axes(tmp_path):
-    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0)}
-    extra = tuple(Spring("base", axes[a], k, 5e-4 * k) for a, k in BASE.items())
-    answer = diagnosed(small_case(tmp_path, unlike(extra=extra), handling=EVERYDAY))
-    assert answer["verdict"] == "explained"
-    assert leader(answer) == ("base_compliance", "base")

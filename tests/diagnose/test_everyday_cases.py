@@ -1,4 +1,8 @@
-"""Small concealed cases with everyday's hits, sensor and readback: what is said, what is not."""
+"""Small concealed cases with everyday's hits, sensor and readback: what is said, what is not.
+
+Where nothing is concealed, and of a soft base, it is the command that is asked, with the same hits:
+`tests/cli/test_diagnose_command.py`.
+"""
 
 from dataclasses import dataclass
 
@@ -22,7 +26,6 @@ from planner.truth.handling import EVERYDAY
 from planner.truth.secret import Artefact
 from tests.support.small_cases import SCATTER, small_case, unlike
 
-TILTS = tuple(Spring("base", axis, 2.5e5, 200.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
 HOSE = AttachedResonator("link_3", (0.2, 0.0, 0.1), (0.0, 0.6, 0.8), 1.2, 24.0, 0.02)
 BEARING = tuple(Spring("joint_2", axis, 2e5, 60.0) for axis in ((1.0, 0, 0), (0, 1.0, 0)))
 BEAM = BentLink("link_3", (3e4, 3e4), 3e4, 1e-3)
@@ -40,9 +43,7 @@ class Concealed:
 
 
 CASES = {
-    "nothing": Concealed(verdict="consistent"),
     "another hand, nothing": Concealed(unlike(seed=11), verdict="consistent"),
-    "soft floor": Concealed(unlike(extra=TILTS), said=(("base_compliance", "base"),)),
     "weak joint": Concealed(
         unlike(scaled=(ScaledJoint("joint_3", 0.4),)), said=(("joint_stiffness", "joint_3"),)
     ),

@@ -262,7 +262,7 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
 
 
 def _gone_on(begun: Sequence[Fit]) -> list[Fit]:
-    """Rough fits, the most promising of them followed as far as `glance` goes: others as they are."""
+    """Rough fits, the most promising of them followed as far as `glance` goes."""
     order = np.argsort([f.value for f in begun])
     best = [begun[i] for i in order[: 2 * FIRST]]
     return side_by_side(_rough, best) + [begun[i] for i in order[2 * FIRST :]]
