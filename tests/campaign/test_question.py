@@ -32,13 +32,17 @@ def pool():
 @pytest.fixture(scope="module")
 def three(tmp_path_factory, pool):
     """A campaign of three poses."""
-    source = shipped(NAME)
-    folder = tmp_path_factory.mktemp("three") / "campaign"
-    campaign = Campaign.new(folder, source / "robot" / "robot.toml", source / "campaign.toml")
+    campaign = begun(tmp_path_factory.mktemp("three"))
     for pose in MEASURED:
         (report,) = campaign.import_paths((pool.folder,), pose)
         assert report.question is None
-    return folder
+    return campaign.directory
+
+
+def begun(parent):
+    """A campaign without a measured pose."""
+    robot, config = (shipped(NAME) / name for name in ("robot/robot.toml", "campaign.toml"))
+    return Campaign.new(parent / "campaign", robot, config)
 
 
 @pytest.fixture
@@ -163,7 +167,8 @@ def test_held_hits_set_aside_are_refused_ones_and_further_ones_wait(campaign, po
     assert not again.orphans()
 
 
-def test_refused_files_stay_out_unless_they_are_named(campaign, pool):
+def test_refused_files_stay_out_unless_they_are_named(tmp_path, pool):
+    campaign = begun(tmp_path)
     files = tuple(row.file for row in pool.rows["A46"])
     version = campaign.state.model_version
     campaign.refuse("A46", files[:3])
@@ -183,7 +188,7 @@ def test_refused_files_stay_out_unless_they_are_named(campaign, pool):
     for _ in range(3):
         again.undo()
     assert not again.state.refused
-    assert list(again.state.measurements) == list(MEASURED)
+    assert not again.state.measurements
 
 
 def test_the_commands_say_it_and_answer_it(campaign, pool, tmp_path):
