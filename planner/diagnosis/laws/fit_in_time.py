@@ -103,8 +103,11 @@ def descended(
     for _ in range(rounds):
         if not np.isfinite(fit.at.value):
             break
-        fit = replace(fit, at=_sloped(problem, fit.at))
-        before, fit = fit, _stepped(problem, fit)
+        sloped = _sloped(problem, fit.at)
+        if not np.isfinite(sloped.value):
+            break
+        before = replace(fit, at=sloped)
+        fit = _stepped(problem, before)
         if not fit.gained:
             break
         fit = replace(fit, at=fit.at.sloped(None, before.at.normal))
@@ -231,11 +234,20 @@ def _weighed(
 def _with_normal(
     problem: LawProblem, at: LawMisfit, linear: LinearSlopes, slopes: np.ndarray
 ) -> LawMisfit:
-    """The objective with its gradient and Gauss-Newton matrix.
+    """The objective with its gradient and Gauss-Newton matrix; ∞ where these have no bounds.
 
     `slopes` (3 m, c, 3, F) are derivatives of FRFs by ν and by the joints' own springs, which are
-    told by them alone.
+    told by them alone. Swings that stay small may be so sensitive that these overflow.
     """
+    with np.errstate(over="ignore", invalid="ignore"):
+        gradient, normal = _gradient_and_normal(problem, at, linear, slopes)
+    bounded = np.isfinite(gradient).all() and np.isfinite(normal).all()
+    return at.sloped(gradient, normal) if bounded else LawMisfit(at.law)
+
+
+def _gradient_and_normal(
+    problem: LawProblem, at: LawMisfit, linear: LinearSlopes, slopes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     data, law, plain = problem.data, at.law, problem.plain
     assert at.residual is not None
     m, d = len(law.ports), len(plain.x)
@@ -258,4 +270,4 @@ def _with_normal(
     mean, sd = law.prior(plain)
     away = (law.coordinates - mean) / sd
     # χ² over complex values is twice half the sum over real ones.
-    return at.sloped(2 * gradient + away / sd, 2 * normal + np.diag(1 / sd**2))
+    return 2 * gradient + away / sd, 2 * normal + np.diag(1 / sd**2)
