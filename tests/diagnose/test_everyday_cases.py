@@ -89,7 +89,12 @@ def told(tmp_path, concealed: Concealed) -> DiagnosisReport:
     return diagnose(Dataset.read(case.recordings, joint_names=names, band_hz=band), robot)
 
 
-@pytest.mark.parametrize("name", CASES)
+LONG = {"link that bends"}  # a minute and more: bearings and inertias imitate it
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in LONG else ()) for n in CASES]
+)
 def test_what_is_concealed_is_named_and_nothing_else(tmp_path, name):
     concealed = CASES[name]
     found = told(tmp_path, concealed)
