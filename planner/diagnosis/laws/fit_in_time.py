@@ -146,9 +146,13 @@ def _sloped(problem: LawProblem, at: LawMisfit) -> LawMisfit:
     data, law, plain = problem.data, at.law, problem.plain
     assert at.stiffer is not None
     system = system_of(plain, law.x)
-    joints = joints_of(system, problem.hits, data.fastest_hz)
-    moved = rates(law.kind, law.k, law.a, joints, problem.hits, data.s)
-    slopes = frfs(data, system, law.ports, moved.reshape(-1, *moved.shape[2:]), 0.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        try:
+            joints = joints_of(system, problem.hits, data.fastest_hz)
+            moved = rates(law.kind, law.k, law.a, joints, problem.hits, data.s)
+        except np.linalg.LinAlgError:  # swings without bounds
+            return LawMisfit(law)
+        slopes = frfs(data, system, law.ports, moved.reshape(-1, *moved.shape[2:]), 0.0)
     blocks = system.blocks[law.ports]
     linear = problem.linear or stiffened_slopes(data, plain, law.x, blocks, at.stiffer)
     return _with_normal(problem, at, linear, slopes)
@@ -159,8 +163,10 @@ def _misfits_of_one(problem: LawProblem, laws: Sequence[LawAtJoints]) -> list[La
     linear = problem.linear
     assert linear is not None
     out = []
-    for law, (h, slopes) in zip(laws, one_joint_frfs(problem, laws), strict=True):
-        at = _weighed(problem, law, h)
+    with np.errstate(over="ignore", invalid="ignore"):  # of laws that swing without bounds
+        found = one_joint_frfs(problem, laws)
+        weighed = [_weighed(problem, law, h) for law, (h, _) in zip(laws, found, strict=True)]
+    for at, (_, slopes) in zip(weighed, found, strict=True):
         if np.isfinite(at.value):
             at = _with_normal(problem, at, linear, slopes)
         # A batch of fits holds many points: what they do not need any more is left behind.
