@@ -52,9 +52,11 @@ class Campaign(CampaignReads):
 
         Raises NoPoseLeftError when no reachable pose is left.
         """
+        from threadpoolctl import threadpool_limits
+
         from planner.campaign.proposals import propose
 
-        with self._acting():
+        with self._acting(), threadpool_limits(1):
             state = self.state
             name = acquisition or self.cell.config.acquisition.name
             same = not state.stale and state.proposed_by == name
@@ -76,10 +78,12 @@ class Campaign(CampaignReads):
         Hits far from what the model is sure of are held until `confirm`, `move` or `refuse_held`.
         Raises InputError, before anything is stored, if it is not clear what or where they are.
         """
+        from threadpoolctl import threadpool_limits
+
         from planner.campaign.deliveries import sort_paths
         from planner.campaign.importing import place
 
-        with self._acting():
+        with self._acting(), threadpool_limits(1):
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.campaign.learned import SUSPECT, Learned, lacking, likeliest
 from planner.campaign.missing_physics import (
+    BEST,
     SWINGS,
     with_loss_factors,
     with_springs,
@@ -203,8 +204,7 @@ def learn(
         return before
     lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
     structure = ExtendedModel(nominal, before.priors)
-    stated = with_loss_factors(lesson.glanced(structure), lesson)
-    learned = with_springs(stated, lesson)
+    stated, learned = _with_what_is_missing(lesson.glanced(structure), lesson)
     if stated.identified.misfit > HOPELESS and learned.identified.misfit > SWINGS:
         # Nothing explains the recordings: now it matters how nearly what is stated does.
         stated = lesson.identified(stated.structure)
@@ -214,6 +214,20 @@ def learn(
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)
     return replace(before, learned=learned, left_out=left_out)
+
+
+def _with_what_is_missing(stated: Learned, lesson: "Lesson") -> tuple[Learned, Learned]:
+    """What is stated, with loss factors where they help, and the same with springs beside it.
+
+    Springs that would imitate loss factors come second; but where what is stated is far from the
+    recordings and springs bring it to their noise, loss factors are not asked for.
+    """
+    learned = with_springs(stated, lesson) if stated.identified.misfit > HOPELESS else stated
+    if learned.identified.misfit > BEST:
+        lossy = with_loss_factors(stated, lesson)
+        if learned is stated or lossy is not stated:
+            return lossy, with_springs(lossy, lesson)
+    return stated, learned
 
 
 @dataclass(frozen=True, eq=False)

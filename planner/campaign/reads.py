@@ -135,12 +135,15 @@ class CampaignReads:
         return self._kept.result(name, kind, lambda: make(self.model))
 
     def _fitted(self, state: CampaignState) -> "Model":
+        from threadpoolctl import threadpool_limits
+
         from planner.campaign.build import build
 
         kept = self.recordings
         kept.look_through(state.used, self._kept)  # a damaged one is told now
-        model = build(self.cell, state, kept.frf, kept.hits)
-        _ = model.frequency_sd_percent  # kept with it: every command needs it
+        with threadpool_limits(1):
+            model = build(self.cell, state, kept.frf, kept.hits)
+            _ = model.frequency_sd_percent  # kept with it: every command needs it
         return model
 
     @property

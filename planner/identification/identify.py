@@ -23,6 +23,7 @@ from planner.inference.least_squares import Minimum, inverse
 SETTLED = 0.01  # squared move, in sds, that no further completion is worth
 SAME = 1e-3  # relative difference of two starts that found the same minimum
 AT_NOISE = 1.1  # misfit that no other start could better by much
+FAR = 2.0  # times what is hopeless: what measurements leave open need not follow such a fit
 STILL_GOOD = 1.5  # factor by which a warm start's misfit may grow before all is searched anew
 
 
@@ -168,7 +169,8 @@ def _plain(
         objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
     rounds = max(completions if tail else 0, problem.effort.openings if problem.tolerances else 0)
-    for _ in range(rounds):
+    far = end.at.chi2 > FAR * problem.effort.hopeless * objective.count
+    for _ in range(0 if far else rounds):
         objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
         moved = end.x - before
