@@ -62,7 +62,9 @@ def test_gain_of_one_channel(tmp_path):
 
     diagnosis = diagnose(*hidden(KR210, tmp_path, 73, channel=channel))
     assert told(diagnosis) == ("sensor_gain", "sensor_y")
-    assert abs(parameters(diagnosis)["gain"][0] - 0.8) < 0.002
+    value, sd, _ = parameters(diagnosis)["gain"]
+    assert sd < 0.015  # what ordinary tolerances of the other channels leave open of one gain
+    assert abs(value - 0.8) < 2 * sd
 
 
 def test_what_no_candidate_describes_is_unknown(tmp_path):
