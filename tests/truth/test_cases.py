@@ -164,8 +164,10 @@ def test_every_kind_of_every_robot(tmp_path, kind, robot):
     effects = json.loads(case.answer)["effects"]
     least, most = {"null": (0, 0), "pair": (2, 2), "drives": DRIVES}.get(kind, (1, 1))
     assert least <= len(effects) <= most
+    # A fan's force is 1 to 10 % of a hit's, and shakes at one frequency alone.
+    seen = 0.005 if kind == "tonal_disturbance" else 0.05
     for effect in effects:
-        assert effect["change"] > 0.05
+        assert effect["change"] > seen
 
 
 def test_an_unknown_kind_is_said_in_words(tmp_path):
