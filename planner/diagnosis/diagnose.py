@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dataset.dataset import Dataset
+from planner.diagnosis.drift_or_pose import doubtful, less_likely
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.hidden_inertias import hidden_inertias
@@ -18,10 +19,7 @@ from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
 from planner.diagnosis.thresholds import (
     ARTEFACTS,
-    DRIFT_CRUDE,
-    DRIFT_GAINS,
     ODDS_OF_NOTHING,
-    PAYS,
     SECOND_EFFECT,
     UNKNOWN,
 )
@@ -141,7 +139,7 @@ def _looked_at(
     if screened:
         early = within(tell, 0.0, 0.2)
         recorded, missed, findings = _screened(recorded, simulation, early, chain)
-    crude = [f for f in findings if f.effect == "drift" and _doubtful(f)]
+    crude = [f for f in findings if f.effect == "drift" and doubtful(f, recorded, simulation)]
     linear = linear_effects_apply([f for f in findings if f not in crude])
     found = diagnose(
         recorded.ended_frfs,
@@ -151,24 +149,12 @@ def _looked_at(
         bent=bool(of_levels(findings)),
         tell=within(tell, 0.2, 1.0),
     )
-    if found.verdict == "explained" and all(_rather(found, f) for f in crude):
+    if found.verdict == "explained" and all(less_likely(f, found) for f in crude):
         # Poses that were visited one after the other differ, and so do times.
         findings = tuple(f for f in findings if f not in crude)
     if any(f.effect in ARTEFACTS for f in findings):
         found = beside_another(found)
     return _Looked(recorded, missed, findings, found)
-
-
-def _doubtful(drift: Finding) -> bool:
-    """Whether what goes with the pose may be what is told as drift."""
-    return drift.misfit > DRIFT_CRUDE or drift.gain < DRIFT_GAINS
-
-
-def _rather(found: Diagnosis, drift: Finding) -> bool:
-    """Whether linear effects explain more than drift: by far, where drift explains most."""
-    if drift.misfit > DRIFT_CRUDE:
-        return drift.misfit > PAYS * found.best.per_value
-    return found.refitted.per_value / found.best.per_value > drift.gain
 
 
 def _screened(
