@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.diagnosis.drift_or_pose import doubtful
+from planner.diagnosis.finding import Finding
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.screens import drift
 from planner.diagnosis.screens.drift import screen
@@ -49,3 +51,28 @@ def test_drift_that_is_there_is_found(simulation):
     change, sd, _ = found.parameters["change"]
     assert change == pytest.approx(-0.15, abs=4 * sd)
     assert problem_of(moving, simulation).order[-1] == 1.0
+
+
+def test_stiffness_that_goes_with_the_angle_is_no_drift_where_no_pose_was_returned_to(simulation):
+    """Poses visited by rising angle of joint 3, whose stiffness follows it."""
+    q = KR210.poses(5, 3)
+    q = q[np.argsort(q[:, 2])]
+    joint = np.arange(len(simulation.elasticity.stiffness)) == 2
+
+    def with_angle(visit: int, level: int) -> np.ndarray:
+        return 1.0 + 0.3 * np.cos(2 * q[visit, 2] + 1.0) * joint
+
+    told = Finding("drift", "campaign", 500.0, {"change": (0.2, 0.01, "1")}, "", 1.5, gain=8.0)
+    assert doubtful(told, recorded(simulation, q, with_angle, (300.0,)), simulation)
+
+
+@pytest.mark.slow
+def test_one_joint_that_drifts_is_no_stiffness_that_goes_with_the_angle(simulation):
+    joint = np.arange(len(simulation.elasticity.stiffness)) == 2
+
+    def with_time(visit: int, level: int) -> np.ndarray:
+        return 1.0 - 0.08 * visit * joint
+
+    moving = recorded(simulation, KR210.poses(5, 3), with_time, (300.0,))
+    (found,) = screen(moving, simulation)
+    assert not doubtful(found, moving, simulation)
