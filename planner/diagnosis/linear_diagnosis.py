@@ -13,7 +13,7 @@ from planner.diagnosis.linear.damper_like_springs import damper_like
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
-from planner.diagnosis.linear.found import Found, distinct
+from planner.diagnosis.linear.found import Found, behind, distinct
 from planner.diagnosis.linear.mismatch import Mismatch
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.linear.search import search
@@ -116,7 +116,8 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
     found, weights = _weighed(problem, found, all_)
     candidates = tuple(
-        _with_discrepancy(c, found, weights) for c in _candidates(found, weights, all_)
+        _with_discrepancy(c, found, weights)
+        for c in _candidates(problem, found, weights, all_)
     )
     likeliest = found.finalists[weights.likeliest]
     best = candidates[0].fit or likeliest
@@ -198,7 +199,9 @@ def _told_of(found: Fit, temper: float) -> tuple[Effect, ...]:
     return kept or (Effect(""),)
 
 
-def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple[Candidate, ...]:
+def _candidates(
+    problem: Problem, found: Found, weights: Weights, all_: Sequence[Effect]
+) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters
     named = [_told_of(f, weights.temper) for f in fits]
@@ -213,12 +216,11 @@ def _candidates(found: Found, weights: Weights, all_: Sequence[Effect]) -> tuple
     leader = int(np.argmax(shares))
     lead = prior[leader]
     before = _priors([effect for effect, _, _ in found.left], all_)
-    best = fits[leader]
-    half = float(best.misfit.counts.sum()) / (2 * weights.temper)
-    for (_, behind, left), weight in zip(found.left, before, strict=True):
+    # It was left while nothing fitted, when little told apart; by now more would.
+    behind_best = behind(problem, fits[leader], [fit for _, _, fit in found.left], weights.temper)
+    for (_, then, left), now, weight in zip(found.left, behind_best, before, strict=True):
         fits.append(left)
-        # It was left while nothing fitted, when little told apart; by now more would.
-        since = max(behind, half * (left.per_value - best.per_value))
+        since = max(then, now)
         shares.append(shares[leader] * float(np.exp(-since)) * weight / lead)
     total = sum(shares) + unknown
     parts = [_told_of(f, weights.temper) for f in fits]
