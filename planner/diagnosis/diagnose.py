@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from planner.dataset.dataset import Dataset
-from planner.diagnosis.drift_or_pose import doubtful, less_likely
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.held_out_check import JudgedDiagnosis, judge
 from planner.diagnosis.hidden_inertias import hidden_inertias
@@ -15,11 +14,15 @@ from planner.diagnosis.misses_again import abstained, asked_again
 from planner.diagnosis.odd_pose import OddPose, odd_pose
 from planner.diagnosis.revoked_artefacts import taken_back
 from planner.diagnosis.screens import force_levels
+from planner.diagnosis.screens.drift import along_a_joint, returned
 from planner.diagnosis.screens.hit_errors import describe
 from planner.diagnosis.screens.screen import screen
 from planner.diagnosis.thresholds import (
     ARTEFACTS,
+    DRIFT_CRUDE,
+    DRIFT_GAINS,
     ODDS_OF_NOTHING,
+    PAYS,
     SECOND_EFFECT,
     UNKNOWN,
 )
@@ -139,7 +142,7 @@ def _looked_at(
     if screened:
         early = within(tell, 0.0, 0.2)
         recorded, missed, findings = _screened(recorded, simulation, early, chain)
-    crude = [f for f in findings if f.effect == "drift" and doubtful(f, recorded, simulation)]
+    crude = [f for f in findings if f.effect == "drift" and _doubtful(f, recorded)]
     linear = linear_effects_apply([f for f in findings if f not in crude])
     found = diagnose(
         recorded.ended_frfs,
@@ -149,12 +152,25 @@ def _looked_at(
         bent=bool(of_levels(findings)),
         tell=within(tell, 0.2, 1.0),
     )
-    if found.verdict == "explained" and all(less_likely(f, found) for f in crude):
+    if found.verdict == "explained" and all(_rather(found, f) for f in crude):
         # Poses that were visited one after the other differ, and so do times.
         findings = tuple(f for f in findings if f not in crude)
     if any(f.effect in ARTEFACTS for f in findings):
         found = beside_another(found)
     return _Looked(recorded, missed, findings, found)
+
+
+def _doubtful(drift: Finding, recorded: Dataset) -> bool:
+    """Whether what goes with the pose may be what is told as drift."""
+    swept = returned(recorded) is None and along_a_joint(recorded)
+    return swept or drift.misfit > DRIFT_CRUDE or drift.gain < DRIFT_GAINS
+
+
+def _rather(found: Diagnosis, drift: Finding) -> bool:
+    """Whether linear effects explain clearly more than drift."""
+    if drift.misfit > DRIFT_CRUDE:
+        return drift.misfit > PAYS * found.best.per_value
+    return found.refitted.per_value / found.best.per_value > PAYS * drift.gain
 
 
 def _screened(

@@ -116,8 +116,7 @@ def again(before: Diagnosis, frfs: Sequence[Frf], q: np.ndarray) -> Diagnosis:
 def _diagnosis(problem: Problem, found: Found, all_: Sequence[Effect], started: float) -> Diagnosis:
     found, weights = _weighed(problem, found, all_)
     candidates = tuple(
-        _with_discrepancy(c, found, weights)
-        for c in _candidates(problem, found, weights, all_)
+        _with_discrepancy(c, found, weights) for c in _candidates(problem, found, weights, all_)
     )
     likeliest = found.finalists[weights.likeliest]
     best = candidates[0].fit or likeliest

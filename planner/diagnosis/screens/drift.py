@@ -5,6 +5,7 @@ course, takes what belongs to the pose.
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,7 +17,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
 from planner.diagnosis.linear.drift_fit import DriftProblem, problem_of
-from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
+from planner.diagnosis.linear.fit import Fit, carried_on, fit, promise, settle
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
     ALIKE,
@@ -29,13 +30,17 @@ from planner.diagnosis.thresholds import (
     DRIFT_LEAST,
     DRIFT_LOG_SD,
     DRIFT_MOVED,
+    DRIFT_ORDER,
     DRIFT_STILL,
+    DRIFT_SWEPT,
 )
 from planner.dynamics.simulation import Simulation
 from planner.inference.evidence import temper
 from planner.inference.parallel import side_by_side
 
 END = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
+GRADUAL = Drift("campaign", (END, BEND), "gradual")
+ORDERS, ORDERS_DRAWN = 8, 300  # orders of the visits that time's is held against
 
 
 def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
@@ -54,7 +59,7 @@ def _followed(problem: DriftProblem, plain: Fit, kind: Kind) -> tuple[Fit, ...]:
 
 
 def _gradual(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
-    return (fit(problem, Drift("campaign", (END, BEND), "gradual"), [plain]),)
+    return (fit(problem, GRADUAL, [plain]),)
 
 
 def _at_once(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
@@ -113,7 +118,40 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     slight = finding.log_evidence < DRIFT_EVIDENCE or abs(change[0]) < DRIFT_LEAST
     if finding.gain < DRIFT_GAINS and (slight or best.per_value > AT_NOISE):
         return ()
-    return (finding,) if there else ()
+    if not there or (returned(recorded) is None and not _by_time(problem, plain, best)):
+        return ()
+    return (finding,)
+
+
+def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
+    """Whether the order in time explains clearly more than other orders of the visits would.
+
+    Where no pose was returned to, visits differ in pose as they do in time, and a course through
+    a few of them takes a part of anything that goes with the pose.
+    """
+    assert isinstance(best.effect, Drift)
+    each = Drift.of_each(problem.simulation) if best.effect.joints else GRADUAL
+    fits = [promise(problem, Effect(""), plain)]
+    for order in (problem.order, *_other_orders(problem.order)):
+        fits.append(promise(replace(problem, order=order), each, plain))
+    t = temper(min(f.per_value for f in fits), ALIKE)
+    nothing, so, *otherwise = (f.log_evidence(t) for f in fits)
+    return so - nothing > DRIFT_ORDER * max(max(otherwise) - nothing, 0.0)
+
+
+def _other_orders(order: np.ndarray) -> list[np.ndarray]:
+    """Permutations of an order (n,) that have least to do with it, forwards or backwards."""
+    rng = np.random.default_rng(0)
+    drawn = [rng.permutation(order) for _ in range(ORDERS_DRAWN)]
+    return sorted(drawn, key=lambda one: abs(np.corrcoef(one, order)[0, 1]))[:ORDERS]
+
+
+def along_a_joint(recorded: Dataset) -> bool:
+    """Whether an angle rises or falls with time: then drift is told from nothing of that joint."""
+    q = np.array([visit.q for visit in recorded.visits])
+    order = np.array([visit.order for visit in recorded.visits])
+    moves = np.ptp(q, axis=0) > 0
+    return bool(np.any([abs(np.corrcoef(one, order)[0, 1]) > DRIFT_SWEPT for one in q.T[moves]]))
 
 
 def _likeliest(found: Sequence[Fit]) -> Fit:
