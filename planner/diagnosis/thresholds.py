@@ -171,9 +171,10 @@ DRIFT_MOVED = 3.0  # sds that the change has to be away from none
 DRIFT_CRUDE = (
     2.0  # χ² per value of the fit with drift, from which what goes with the pose may be it
 )
-# Times the evidence for the best of other orders of the visits. Chosen on six cases of the second
-# engine: 2.1, 2.4, 4.3 and more where the robot drifts, 0.2 and 0.6 where something else is wrong.
-DRIFT_ORDER = 1.4
+# Nats for the order in time, and how many times those for the best of other orders. Chosen on 14
+# cases of the second engine: 32 nats and more, 1.8 times and more where the robot drifts and that
+# can be told; 2 nats, or 0.2 and 0.6 times, where something else is wrong.
+DRIFT_BY_TIME, DRIFT_ORDER = 10.0, 1.4
 DRIFT_SWEPT = 0.9  # correlation of an angle with time from which a sweep is one course
 DRIFT_STILL = 2.0  # χ² per value: a pose that answers alike when visited again has not drifted
 

@@ -23,6 +23,7 @@ from planner.diagnosis.thresholds import (
     ALIKE,
     AT_NOISE,
     CLEAR,
+    DRIFT_BY_TIME,
     DRIFT_COURSE,
     DRIFT_CRUDE,
     DRIFT_EVIDENCE,
@@ -40,7 +41,7 @@ from planner.inference.parallel import side_by_side
 
 END = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
 GRADUAL = Drift("campaign", (END, BEND), "gradual")
-ORDERS, ORDERS_DRAWN = 8, 300  # orders of the visits that time's is held against
+ORDERS, ORDERS_DRAWN = 24, 300  # orders of the visits that time's is held against
 
 
 def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
@@ -136,7 +137,7 @@ def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
         fits.append(promise(replace(problem, order=order), each, plain))
     t = temper(min(f.per_value for f in fits), ALIKE)
     nothing, so, *otherwise = (f.log_evidence(t) for f in fits)
-    return so - nothing > DRIFT_ORDER * max(max(otherwise) - nothing, 0.0)
+    return so - nothing > max(DRIFT_BY_TIME, DRIFT_ORDER * (max(otherwise) - nothing))
 
 
 def _other_orders(order: np.ndarray) -> list[np.ndarray]:
