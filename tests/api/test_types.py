@@ -8,6 +8,9 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_types_hold():
-    command = (sys.executable, "-m", "basedpyright", "--pythonpath", sys.executable)
+    settings = str(ROOT / "pyproject.toml")  # not a file of some folder above
+    command = (
+        sys.executable, "-m", "basedpyright", "-p", settings, "--pythonpath", sys.executable,
+    )  # fmt: skip
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
