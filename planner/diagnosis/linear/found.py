@@ -31,9 +31,9 @@ def distinct(found: Found) -> Found:
 
 
 def behind(problem: Problem, best: Fit, others: Sequence[Fit], temper: float) -> list[float]:
-    """By how much others, not fitted to the end, are behind the best: as `lag` where it can be.
+    """Tempered log evidence (nats) by which others, not fitted to the end, are behind the best.
 
-    That is where they were looked at closely; of rough looks χ² alone is compared.
+    As `lag` says where they were looked at closely; of rough looks χ² alone is compared.
     """
     if not others:
         return []
