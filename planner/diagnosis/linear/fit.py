@@ -137,26 +137,29 @@ def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     return approached(close, points(close, warm), PROMISE_STEPS)
 
 
-def unbent(problem: Problem, effect: Effect, warm: Fit) -> Fit:
-    """As `promise`, or as `fit` begins where that leads farther."""
-    return afresh(problem, promise(problem, effect, warm), ROUGH_STEPS)
-
-
 def afresh(problem: Problem, near: Fit, steps: int = AFRESH_STEPS) -> Fit:
     """The better of a fit and, for a single effect of the robot, one from the prior's median.
 
     From inertias and springs that were bent to fit nothing hardly anything leads to what they
     imitate.
     """
-    if len(near.effect.parts()) > 1 or near.effect.artefact:
-        return near
+    far = from_median(problem, near, steps) if begins_alone(near.effect) else near
+    return min((near, far), key=lambda f: f.value)
+
+
+def begins_alone(effect: Effect) -> bool:
+    """Whether an effect can be fitted from its prior's median: one of the robot, by itself."""
+    return len(effect.parts()) == 1 and not effect.artefact
+
+
+def from_median(problem: Problem, near: Fit, steps: int = ROUGH_STEPS) -> Fit:
+    """A fit of the same effect on the same lines, from the prior's median."""
     rough, coarse = _approach(problem, near.effect), problem.misfit(near.effect, COARSE)
     starts = [rough]
     if steps > ROUGH_STEPS:
         starts.append(_best(coarse, starts).x)
     named = (dict(zip(coarse.names, x, strict=True)) for x in starts)
-    far = approached(near.misfit, [_placed(near.misfit, known) for known in named], steps)
-    return min((near, far), key=lambda f: f.value)
+    return approached(near.misfit, [_placed(near.misfit, known) for known in named], steps)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:

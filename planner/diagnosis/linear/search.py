@@ -10,17 +10,19 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
+    AFRESH_STEPS,
     ROUGH_STEPS,
     SETTLED,
     Fit,
     afresh,
     approached,
+    begins_alone,
     carried_on,
+    from_median,
     glance,
     promise,
     settle,
     staged,
-    unbent,
 )
 from planner.diagnosis.linear.found import Found, distinct
 from planner.diagnosis.linear.leaders import Place, best_of_few, leaders_of, next_leader, place_of
@@ -38,6 +40,7 @@ FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
 STEPS, LAST_STEPS = 12, 30
 BEGUN = 3  # steps of each pair, before the most promising are followed
 FEW = 5  # poses on which all are looked at where something is clearly wrong
+FAR = 6  # of those from their priors' medians, followed where inertias hide what there is
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
 MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
@@ -234,7 +237,7 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     none, effects = settle(problem, warm, CLOSE, STEPS), list(filter(problem.able, effects))
     clearly = none.per_value > CLEARLY_WRONG
     few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
-    look = glance if clearly else unbent if inertias_bent(none) else promise
+    look = glance if clearly else promise
     pairs = clearly and min((len(e.parts()) for e in effects), default=0) > 1
     looked = (
         partial(glance, few, warm=none, steps=BEGUN) if pairs else partial(look, few, warm=none)
@@ -243,6 +246,8 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
     if pairs:
         fits = _gone_on(fits)
+    if not clearly and inertias_bent(none):
+        fits = _unbent(problem, fits)
     if clearly:
         order = np.argsort([f.value for f in fits])
         close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
@@ -259,6 +264,30 @@ def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -
     kept, more = cut([none, *close], LAST)
     tell("settling", 0.9)
     return Found(tuple(_settled(problem, kept)), (*left, *more))
+
+
+def _unbent(problem: Problem, near: Sequence[Fit]) -> list[Fit]:
+    """Fits, or those from their priors' medians that lead farther.
+
+    What begins there is far behind inertias that were bent to fit, for many steps: the best of
+    these are told apart among themselves, and followed.
+    """
+    alone = [i for i, f in enumerate(near) if begins_alone(f.effect)]
+    far = dict(
+        zip(
+            alone,
+            side_by_side(partial(from_median, problem), [near[i] for i in alone]),
+            strict=True,
+        )
+    )
+    best = sorted(alone, key=lambda i: far[i].value)[:FAR]
+    more = side_by_side(_carried_far, [far[i] for i in best])
+    far |= dict(zip(best, more, strict=True))
+    return [min((f, far.get(i, f)), key=lambda f: f.value) for i, f in enumerate(near)]
+
+
+def _carried_far(begun: Fit) -> Fit:
+    return approached(begun.misfit, [begun.x], AFRESH_STEPS - ROUGH_STEPS)
 
 
 def _gone_on(begun: Sequence[Fit]) -> list[Fit]:
