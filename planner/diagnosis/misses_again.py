@@ -40,6 +40,8 @@ def asked_again(
 
 
 def abstained(findings: tuple[Finding, ...]) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
-    """The findings that can be told, and remarks on what can't before more is measured."""
+    """The findings that can be told, and remarks: on what can't before more is measured, and on
+    what is known of the unknown."""
     told = tuple(f for f in findings if not f.wants)
-    return told, tuple(f.wants for f in findings if f.wants)
+    said = (f.wants or (f.text if f.effect == UNKNOWN else "") for f in findings)
+    return told, tuple(filter(None, said))

@@ -154,6 +154,10 @@ SEVERAL_EVIDENCE = 50.0  # nats: what is explained at other poses, by so many nu
 # explain them then; and how often they are shared out. Chosen.
 BY_CHANCE, LAW_BY_CHANCE, SHARED_OUT = 1e-3, 0.1, 4000
 
+# Root mean square of hits' misses, in prior sds of [hits], from which a hand is not their cause:
+# four times what the engineer states. Chosen.
+BEYOND_ANY_HAND = 4.0
+
 # A tone that sounds without any hit: chosen on generated cases
 TONE_WIDTH_HZ = 1.0  # half of what a tone takes up under the window
 TONE_CONCENTRATED = 0.6  # share of the levels' differences that lies there, at all poses together

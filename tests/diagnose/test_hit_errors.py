@@ -1,13 +1,18 @@
 """Hits that miss axis and point: what they do, by another engine; how it is told and taken out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.laws.level_refits import base
+from planner.diagnosis.linear.problem import tolerances_of
+from planner.diagnosis.misses_again import abstained
 from planner.diagnosis.screens.force_levels import PROPORTIONAL, disproportion
-from planner.diagnosis.screens.hit_errors import taken_out
+from planner.diagnosis.screens.hit_errors import beyond_any_hand, taken_out
+from planner.diagnosis.screens.screen import screen
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import (
@@ -162,6 +167,22 @@ def test_misses_are_told_and_taken_out(missed):
     told, true = np.array(told), np.array(true)
     for part in (slice(0, 2), slice(2, 4)):
         assert np.corrcoef(told[:, part].ravel(), true[:, part].ravel())[0, 1] > 0.9
+    assert not beyond_any_hand(errors, tolerances_of(simulation))
+    worse = [[replace(e, offset_m=6 * e.offset_m) for e in own] for own in errors]
+    assert beyond_any_hand(worse, tolerances_of(simulation))
     system = system_of(base(clean, simulation))
     assert disproportion(equivalent(visits, system)) > 10
     assert disproportion(equivalent(clean, system)) < PROPORTIONAL
+
+
+def test_misses_beyond_any_hand_are_called_unknown(missed, monkeypatch):
+    """Levels that misses alone explain, were they larger than any hand's: nothing is corrected."""
+    visits, simulation, _ = missed
+    assert screen(visits, simulation, chain=False).hit_errors
+    monkeypatch.setattr("planner.diagnosis.screens.hit_errors.BEYOND_ANY_HAND", 0.1)
+    found = screen(visits, simulation, chain=False)
+    assert [f.effect for f in found.findings] == ["unknown"]
+    assert not found.hit_errors
+    assert found.clean is visits
+    (_, (remark,)) = abstained(found.findings)
+    assert "more than any hand does" in remark

@@ -106,6 +106,9 @@ def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     assert told == ()
     assert "only repeats show which" in remark
     assert "Hit twice at each level at pose P1 along x" in remark
+    told, (remark,) = abstained((replace(found, wants=""),))
+    assert told
+    assert "not proportional to the force" in remark
 
 
 def test_without_repeats_the_order_of_levels_tells(linear):

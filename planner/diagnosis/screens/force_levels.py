@@ -165,6 +165,13 @@ def _named(
     return (_unknown(found, how),), False
 
 
+def by_no_miss(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
+    """`unknown`, where hits would have had to miss by more than any hand does."""
+    recorded = recorded.most_heard
+    found = equivalent(recorded, system_of(base(recorded, nominal)))
+    return (_unknown(found, "hits would have had to miss by more than any hand does"),)
+
+
 def differ(recorded: Dataset, nominal: Simulation) -> bool:
     """Whether FRFs of different force levels differ by more than noise, hits being exact."""
     recorded = recorded.most_heard

@@ -17,6 +17,7 @@ from planner.diagnosis.laws.open_misses import relative_misfit
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import Fit, fit, settle
 from planner.diagnosis.linear.problem import tolerances_of
+from planner.diagnosis.thresholds import BEYOND_ANY_HAND
 from planner.dynamics.gradient import response_turned
 from planner.dynamics.simulation import Simulation
 from planner.identification.measurement_model import Tolerances, hit_basis
@@ -137,6 +138,14 @@ def _solved(h: np.ndarray, weight: np.ndarray, basis: np.ndarray) -> np.ndarray:
 def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Re B* v of basis (4, r, F) and values (r, F) or (4, r, F)."""
     return np.tensordot(basis.conj(), values, axes=([-2, -1], [-2, -1])).real
+
+
+def beyond_any_hand(errors: HitErrors, tolerances: Tolerances) -> bool:
+    """Whether hits would have missed by so much that something else makes them differ."""
+    each = [error for visit in errors for error in visit]
+    tilts = np.array([e.tilt_rad for e in each]) / tolerances.angle_rad
+    offsets = np.array([e.offset_m for e in each]) / tolerances.offset_m
+    return bool(max(np.mean(tilts**2), np.mean(offsets**2)) > BEYOND_ANY_HAND**2)
 
 
 def corrected(recorded: Dataset, plain: Fit, errors: HitErrors) -> Dataset:

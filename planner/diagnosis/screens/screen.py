@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.screens import artefacts, drift, force_levels
-from planner.diagnosis.screens.hit_errors import HitErrors, taken_out
+from planner.diagnosis.screens.hit_errors import HitErrors, beyond_any_hand, taken_out
 from planner.diagnosis.thresholds import UNKNOWN
 from planner.dynamics.simulation import Simulation
 from planner.progress import Tell, quietly
@@ -41,6 +42,8 @@ def screen(
     if by_level or force_levels.differ(clean, nominal):
         tell("estimating by how much each hit missed its axis and point", 0.3)
         apart, errors = taken_out(clean, nominal)
+        if not by_level and beyond_any_hand(errors, tolerances_of(nominal)):
+            by_level = force_levels.by_no_miss(clean, nominal)
     by_time = drift.screen(apart, nominal)
     if by_time or not by_level:
         # Levels are hit one after the other: what changes with time looks as if it went with them.
