@@ -191,10 +191,20 @@ def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
     return out
 
 
-def _told_of(found: Fit, temper: float) -> tuple[Effect, ...]:
-    """The effects of a fit without artefacts as small as every measuring chain has them."""
+def of_its_own(found: Fit, temper: float) -> tuple[Effect, ...]:
+    """The effects of a fit without what is part of another of them, or of every robot.
+
+    Those are artefacts as small as every measuring chain has them, and the mean stiffness of a
+    joint whose stiffness changes with its angle.
+    """
     parts, t = found.effect.parts(), tolerances_of(found.misfit.setting.simulation)
-    kept = tuple(p for p in parts if not (p.artefact and p.usual(found.parameters(temper, p), t)))
+    uneven = {p.at for p in parts if p.name == "angle_dependent_stiffness"}
+    kept = tuple(
+        p
+        for p in parts
+        if not (p.artefact and p.usual(found.parameters(temper, p), t))
+        and not (p.name == "joint_stiffness" and p.at in uneven)
+    )
     return kept or (Effect(""),)
 
 
@@ -203,7 +213,7 @@ def _candidates(
 ) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters
-    named = [_told_of(f, weights.temper) for f in fits]
+    named = [of_its_own(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
     evidence = np.array([w.log_evidence for w in weights.worth])
     own = weights.probabilities[:-1], prior, weights.bent, evidence
@@ -222,7 +232,7 @@ def _candidates(
         since = max(then, now)
         shares.append(shares[leader] * float(np.exp(-since)) * weight / lead)
     total = sum(shares) + unknown
-    parts = [_told_of(f, weights.temper) for f in fits]
+    parts = [of_its_own(f, weights.temper) for f in fits]
     groups: dict[tuple, list[int]] = {}
     for i, own in enumerate(parts):
         groups.setdefault(tuple(sorted((p.name, p.at) for p in own)), []).append(i)

@@ -142,7 +142,8 @@ class DiagnosisReport(Answer):
         assert self.explained is not None
         found, robot = self.diagnosis, self.diagnosis.problem.simulation.robot
         parts = found.best.effect.parts()
-        places = {(e.name, e.at or None) for e in parts}
+        told = next((c.effects for c in found.candidates if c.fit is found.best), parts)
+        places = {(e.name, e.at or None) for e in told}
         # As the answer has it, so that file and table agree.
         said = [(c, {(e.effect, e.at) for e in c.effects}) for c in self.candidates]
         share = sum(c.probability for c, its in said if its == (places or {("none", None)}))

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from planner.diagnosis.effects import library
+from planner.diagnosis.effects.combined import together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.damper_like_springs import damper_like
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import COARSE
 from planner.diagnosis.linear.slightness import without_slight
 from planner.diagnosis.linear.stated_values import away, pulled
+from planner.diagnosis.linear_diagnosis import of_its_own
 from tests.support.exact_problem import exact_problem
 
 STIFF, HEAVY = 12.0, 40.0  # ln of how much stiffer than likely; kg
@@ -117,3 +119,15 @@ def test_what_gives_like_a_damper_is_no_structure(at, heavier, expected):
     base = at("base_compliance", "base", {"damping of base": heavier})
     assert damper_like(base, 1.0) is expected
     assert not damper_like(at("none", "", {}), 1.0)
+
+
+def test_the_mean_of_an_uneven_joint_is_told_with_it(at):
+    problem = at("none", "", {}).misfit
+    every = {(e.name, e.at): e for e in library(problem.setting.simulation)}
+    uneven = every["angle_dependent_stiffness", "joint_2"]
+    for place, count in (("joint_2", 1), ("joint_3", 2)):
+        both = together(uneven, every["joint_stiffness", place])
+        assert both is not None
+        told = of_its_own(Fit(both, problem, problem.mean, at("none", "", {}).data), 1.0)
+        assert len(told) == count
+        assert told[0] is uneven

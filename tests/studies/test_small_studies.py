@@ -24,7 +24,12 @@ MUST_HOLD = {
 }
 
 
-@pytest.mark.parametrize("name", registry.NAMES)
+LONG = {"busch2020", "busch2022"}  # half a minute each; the others take the same way
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.slow if n in LONG else ()) for n in registry.NAMES]
+)
 def test_a_small_study_runs_from_hits_to_claims(name, tmp_path):
     answer = conduct(name, tmp_path, True, quietly)
     assert answer.small
