@@ -40,6 +40,7 @@ FEWEST = 12  # of them a pose
 # Misfit of what is stated from which it is followed to the end only if nothing that is added fits:
 # twice what those may leave, by a search of as many steps as the last fit has.
 HOPELESS = 2 * SWINGS
+OPENINGS = 4  # rounds at most, in which what hits leave open follows the stated structure's fit
 
 
 def _effort(frfs: Sequence[Frf]) -> Effort:
@@ -253,8 +254,12 @@ class Lesson:
         return Learned(structure, found, suspect, len(self.frfs))
 
     def glanced(self, structure: ExtendedModel) -> Learned:
-        """As `identified`; not followed to the end where it is far from the recordings."""
-        effort = replace(_effort(self.frfs), hopeless=HOPELESS)
+        """As `identified`; not followed to the end where it is far from the recordings.
+
+        Where it is near, what hits leave open follows the fit more closely: as long as it has not
+        settled, springs that are not there would seem to explain what is left.
+        """
+        effort = replace(_effort(self.frfs), hopeless=HOPELESS, openings=OPENINGS)
         return self._learned(structure, self._identify(structure, None, effort))
 
     def without(self, away: np.ndarray, warm: Learned) -> Identification:

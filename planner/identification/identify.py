@@ -168,8 +168,11 @@ def _plain(
     for _ in range(2 if near and problem.tolerances else 1):
         objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    rounds = max(completions if tail else 0, problem.effort.openings if problem.tolerances else 0)
-    far = end.at.chi2 > FAR * problem.effort.hopeless * objective.count
+    hopeless = problem.effort.hopeless * objective.count
+    near_enough = end.at.chi2 < hopeless
+    openings = problem.effort.openings if near_enough else min(problem.effort.openings, 1)
+    rounds = max(completions if tail else 0, openings if problem.tolerances else 0)
+    far = end.at.chi2 > FAR * hopeless
     for _ in range(0 if far else rounds):
         objective = problem.prepared(objective, end.x, tail)
         before, end = end.x, problem.minimise(objective, end.x, number, stage, problem.effort.steps)
