@@ -109,15 +109,30 @@ def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
 
 
 def _seen(group: Sequence[Column], missed: MissesAtVisit) -> np.ndarray:
-    """Hits (n, m) as real rows in units of one noise for all, with misses left open."""
+    """Hits (n, m) as real rows in units of one noise for all, with misses left open.
+
+    There is one weight for all: hits are to be exchangeable.
+    """
     lines = missed.lines
-    # One weight for all: hits are to be exchangeable.
     basis, uncertain = missed.left_open(group[:2])
-    variance = np.mean([hit.variance[:, lines] for hit in group], axis=0)
+    h = np.array([hit.accelerance[:, lines] for hit in group])
+    values, variance = evenly_noisy(h, np.array([hit.variance[:, lines] for hit in group]))
     variance = 2 * variance + uncertain
     weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
-    values = np.array([hit.accelerance[:, lines] for hit in group]) * np.sqrt(weight)
+    values = values * np.sqrt(weight)
     return whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
+
+
+def evenly_noisy(h: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """FRFs h (n, ...) with as much noise as the noisiest has, and that variance (...).
+
+    Soft hits are noisier than hard ones. One of them beside two hard ones is a level that differs
+    from the other for no reason but its noise.
+    """
+    most = variance.max(axis=0)
+    lacking = np.where(np.isfinite(most), most - np.where(np.isfinite(most), variance, 0.0), 0.0)
+    real, imaginary = np.random.default_rng(0).standard_normal((2, *h.shape))
+    return h + np.sqrt(lacking / 2) * (real + 1j * imaginary), most
 
 
 def _levels(group: Sequence[Column]) -> np.ndarray:
