@@ -14,7 +14,7 @@ from planner.design.next_hit import NextHit, in_words
 from planner.diagnosis.thresholds import TIED, UNKNOWN
 from planner.report.agreement import HeldOutSimilarities, ThreeSimilarities
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile, encoded, plain
-from planner.report.established_effects import EstablishedEffect, established_effects
+from planner.report.established_effects import EstablishedEffect, drift_of, established_effects
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.place_names import place_names, with_names
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
@@ -215,10 +215,16 @@ class DiagnosisReport(Answer):
 
 def diagnosis_report(explained: "Explained") -> DiagnosisReport:
     """Of a diagnosis."""
+    from planner.diagnosis.linear.predict import similarity
     from planner.diagnosis.residual_location import where
 
     recorded, judged, whole = explained.recorded, explained.judged, explained.whole
-    found = judged.diagnosis
+    found, fitted = judged.diagnosis, judged.fitted
+    misfit = TwoMisfits(found.refitted.per_value, found.best.per_value)
+    drift = None if found.best.effect.at else drift_of(explained)
+    if drift is not None:
+        fitted = replace(fitted, explained=similarity(drift.problem, drift.best))
+        misfit = TwoMisfits(drift.plain.per_value, drift.best.per_value)
     place = where(found.problem, found.refitted)
     aside = tuple(recorded.poses[i] for i in judged.aside)
     names = place_names(found.problem.simulation.robot)
@@ -234,10 +240,10 @@ def diagnosis_report(explained: "Explained") -> DiagnosisReport:
             tuple(dict.fromkeys(recorded.poses[i] for i in place.poses())),
             place.directions(),
         ),
-        fit=ThreeSimilarities.of(judged.fitted),
+        fit=ThreeSimilarities.of(fitted),
         held_out=HeldOutSimilarities.at(aside, judged.held_out),
-        misfit=TwoMisfits(found.refitted.per_value, found.best.per_value),
-        shares=MismatchShares.of(found),
+        misfit=misfit,
+        shares=MismatchShares.of(found, drift),
         refused=tuple(RefusedFile(*entry) for entry in recorded.refused),
         remarks=tuple(recorded.remarks),
         simulated=recorded.simulated,

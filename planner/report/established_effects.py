@@ -10,6 +10,7 @@ from planner.report.place_names import with_names
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Explained
     from planner.diagnosis.finding import Finding
+    from planner.diagnosis.linear.drift_fit import DriftFits
     from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 
 
@@ -42,6 +43,11 @@ def established_effects(
     if whole.linear:
         found += _of_fits(explained.judged.diagnosis)
     return tuple(replace(one, text=with_names(one.text, names)) for one in found)
+
+
+def drift_of(explained: "Explained") -> "DriftFits | None":
+    """The fits behind a drift that is established."""
+    return next((f.by_time for f, _ in explained.whole.established if f.by_time), None)
 
 
 def _of_fits(found: "Diagnosis") -> tuple[EstablishedEffect, ...]:

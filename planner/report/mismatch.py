@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from planner.diagnosis.linear.drift_fit import DriftFits
     from planner.diagnosis.linear_diagnosis import Diagnosis
 
 
@@ -51,8 +52,8 @@ class MismatchShares:
     left: float
 
     @classmethod
-    def of(cls, found: "Diagnosis") -> "MismatchShares":
-        """Of a diagnosis."""
+    def of(cls, found: "Diagnosis", drift: "DriftFits | None" = None) -> "MismatchShares":
+        """Of a diagnosis; where the robot drifts, visits by themselves say what that explains."""
         from planner.diagnosis.linear.mismatch import Mismatch
         from planner.diagnosis.linear.problem import FINE
 
@@ -60,6 +61,8 @@ class MismatchShares:
         plain = found.problem.misfit(found.refitted.effect, FINE)
         best = found.problem.misfit(found.best.effect, FINE)
         last = Mismatch.of(best, found.best.x)
+        if drift is not None:
+            last = Mismatch.of(drift.best.misfit, drift.best.x)
         stated = Mismatch.of(given, given.mean).whole
         refitted = Mismatch.of(plain, found.refitted.x).whole
         shares = stated, refitted, last.whole, last.left

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from planner.diagnosis.linear.drift_fit import problem_of
+from planner.diagnosis.linear.predict import similarity
 from planner.diagnosis.screens import drift
 from planner.diagnosis.screens.drift import screen
 from planner.dynamics.simulation import Simulation
@@ -49,6 +50,11 @@ def test_drift_that_is_there_is_found(simulation):
     change, sd, _ = found.parameters["change"]
     assert change == pytest.approx(-0.15, abs=4 * sd)
     assert problem_of(moving, simulation).order[-1] == 1.0
+    fits = found.by_time
+    assert fits is not None
+    assert fits.plain.per_value > 3 * fits.best.per_value
+    refitted, explained = (similarity(fits.problem, f) for f in (fits.plain, fits.best))
+    assert explained.frac > max(0.999, refitted.frac)
 
 
 def test_no_drift_where_other_orders_of_the_visits_explain_as_much(simulation, monkeypatch):

@@ -7,6 +7,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.gradient import Inertias, motion_slopes, moved
@@ -69,6 +70,15 @@ class DriftProblem(Problem):
             return plain
         fields = {name: getattr(plain, name) for name in plain.__dataclass_fields__}
         return DriftMisfit(**fields, order=self.order)
+
+
+@dataclass(frozen=True, eq=False)
+class DriftFits:
+    """The simulation refitted to visits, without drift and with it."""
+
+    problem: DriftProblem
+    plain: Fit
+    best: Fit
 
 
 def problem_of(recorded: Dataset, nominal: Simulation, *, as_built: bool = False) -> DriftProblem:

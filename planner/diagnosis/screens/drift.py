@@ -16,7 +16,7 @@ from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
-from planner.diagnosis.linear.drift_fit import DriftProblem, problem_of
+from planner.diagnosis.linear.drift_fit import DriftFits, DriftProblem, problem_of
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, promise, settle
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
@@ -121,7 +121,7 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
         return ()
     if not there or (returned(recorded) is None and not _by_time(problem, plain, best)):
         return ()
-    return (finding,)
+    return (replace(finding, by_time=DriftFits(problem, plain, best)),)
 
 
 def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
