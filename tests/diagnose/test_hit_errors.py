@@ -10,6 +10,7 @@ from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.misses_again import abstained
+from planner.diagnosis.screens import force_levels
 from planner.diagnosis.screens.force_levels import PROPORTIONAL, disproportion
 from planner.diagnosis.screens.hit_errors import beyond_any_hand, taken_out
 from planner.diagnosis.screens.screen import screen
@@ -180,6 +181,9 @@ def test_misses_beyond_any_hand_are_called_unknown(missed, monkeypatch):
     visits, simulation, _ = missed
     assert screen(visits, simulation, chain=False).hit_errors
     monkeypatch.setattr("planner.diagnosis.screens.hit_errors.BEYOND_ANY_HAND", 0.1)
+    assert screen(visits, simulation, chain=False).hit_errors  # open misses explain the levels
+    monkeypatch.setattr(force_levels, "PROPORTIONAL", 0.01)
+    monkeypatch.setattr(force_levels, "BY_CHANCE", -1.0)
     found = screen(visits, simulation, chain=False)
     assert [f.effect for f in found.findings] == ["unknown"]
     assert not found.hit_errors
