@@ -40,7 +40,7 @@ FEWEST = 12  # of them a pose
 # Misfit of what is stated from which it is followed to the end only if nothing that is added fits:
 # twice what those may leave, by a search of as many steps as the last fit has.
 HOPELESS = 2 * SWINGS
-# So many times that at PLACED poses and fewer, where what few hits leave open leads through more
+# Factor on it at PLACED poses and fewer, where what few hits leave open leads through more
 # than that. Looked at on starts 0 to 9 of the KR10 that lacks nothing (tests: fidelity_cells).
 AMONG_FEW = 10.0
 OPENINGS = 4  # rounds at most, in which what hits leave open follows the stated structure's fit
@@ -209,7 +209,7 @@ def learn(
     lesson = Lesson(tuple(frfs), q, band_hz, before.tolerances)
     structure = ExtendedModel(nominal, before.priors)
     stated, learned = _with_what_is_missing(lesson.glanced(structure), lesson)
-    if stated.identified.misfit > HOPELESS and learned.identified.misfit > SWINGS:
+    if stated.identified.misfit > lesson.hopeless and learned.identified.misfit > SWINGS:
         # Nothing explains the recordings: now it matters how nearly what is stated does.
         stated = lesson.identified(stated.structure)
         learned = likeliest([stated, learned])
@@ -243,6 +243,11 @@ class Lesson:
     band_hz: tuple[float, float]
     tolerances: Tolerances | None
 
+    @property
+    def hopeless(self) -> float:
+        """See HOPELESS."""
+        return HOPELESS if len(self.frfs) > PLACED else AMONG_FEW * HOPELESS
+
     def identified(
         self,
         structure: ExtendedModel,
@@ -263,8 +268,7 @@ class Lesson:
         settled, springs that are not there would seem to explain what is left. Of few
         poses what seems hopeless is followed farther.
         """
-        hopeless = HOPELESS if len(self.frfs) > PLACED else AMONG_FEW * HOPELESS
-        effort = replace(_effort(self.frfs), openings=OPENINGS, hopeless=hopeless)
+        effort = replace(_effort(self.frfs), openings=OPENINGS, hopeless=self.hopeless)
         return self._learned(structure, self._identify(structure, None, effort))
 
     def without(self, away: np.ndarray, warm: Learned) -> Identification:

@@ -17,7 +17,7 @@ class Finding:
     effects at the same place that take a share of its probability; `laws` are their fits, by which
     a further hit can be planned. `wants` says what would have to be measured for it to be told at
     all: until then it is no more than a remark. `gain` is the factor by which χ² falls where that
-    is so little that physics has to be weighed against it; `by_time` are the fits that say so.
+    is so little that physics has to be weighed against it; `drift_fits` are those behind a drift.
     """
 
     effect: str
@@ -31,4 +31,4 @@ class Finding:
     laws: "Laws | None" = None
     wants: str = ""
     gain: float = float("inf")
-    by_time: "DriftFits | None" = None
+    drift_fits: "DriftFits | None" = None

@@ -192,19 +192,23 @@ def _priors(chosen: Sequence[Effect], all_: Sequence[Effect]) -> list[float]:
 
 
 def of_its_own(found: Fit, temper: float) -> tuple[Effect, ...]:
-    """The effects of a fit without what is part of another of them, or of every robot.
+    """The effects of a fit as they are named: without what is part of another of them.
 
-    Those are artefacts as small as every measuring chain has them, and the mean stiffness of a
-    joint whose stiffness changes with its angle.
+    That is the mean stiffness of a joint whose stiffness changes with its angle.
     """
-    parts, t = found.effect.parts(), tolerances_of(found.misfit.setting.simulation)
+    simulation, parts = found.misfit.setting.simulation, _beyond_tolerance(found, temper)
     uneven = {p.at for p in parts if p.name == "angle_dependent_stiffness"}
-    kept = tuple(
+    return tuple(
         p
         for p in parts
-        if not (p.artefact and p.usual(found.parameters(temper, p), t))
-        and not (p.name == "joint_stiffness" and p.at in uneven)
+        if p.name != "joint_stiffness" or p.at not in uneven or len(p.springs(simulation)) > 1
     )
+
+
+def _beyond_tolerance(found: Fit, temper: float) -> tuple[Effect, ...]:
+    """The effects of a fit without artefacts as small as every measuring chain has them."""
+    parts, t = found.effect.parts(), tolerances_of(found.misfit.setting.simulation)
+    kept = tuple(p for p in parts if not (p.artefact and p.usual(found.parameters(temper, p), t)))
     return kept or (Effect(""),)
 
 
@@ -213,7 +217,7 @@ def _candidates(
 ) -> tuple[Candidate, ...]:
     fits = list(found.finalists)
     matters = found.finalists[0].misfit.setting.simulation.robot.config.diagnose.matters
-    named = [of_its_own(f, weights.temper) for f in fits]
+    named = [_beyond_tolerance(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
     evidence = np.array([w.log_evidence for w in weights.worth])
     own = weights.probabilities[:-1], prior, weights.bent, evidence

@@ -7,9 +7,10 @@ linear. Once the averages are explained, the same hits are asked again.
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
+from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.linear_diagnosis import Diagnosis
 from planner.diagnosis.screens import force_levels
-from planner.diagnosis.screens.hit_errors import taken_out
+from planner.diagnosis.screens.hit_errors import beyond_any_hand, taken_out
 from planner.diagnosis.thresholds import AT_NOISE, UNKNOWN
 from planner.diagnosis.write_explained import possible_simulation
 from planner.progress import Tell, quietly
@@ -35,8 +36,11 @@ def asked_again(
     again = force_levels.screen(hits, simulation, single=True, tell=tell)
     if any(f.effect == UNKNOWN for f in again):
         return None
+    apart, errors = taken_out(hits, simulation)
+    if beyond_any_hand(errors, tolerances_of(simulation)):
+        return None
     kept = tuple(f for f in findings if f.effect != UNKNOWN)
-    return (*kept, *again), taken_out(hits, simulation)[0]
+    return (*kept, *again), apart
 
 
 def abstained(findings: tuple[Finding, ...]) -> tuple[tuple[Finding, ...], tuple[str, ...]]:

@@ -29,7 +29,8 @@ class Effort:
     log_steps: int = 40
     steps: int = 80
     doubtful: bool = True  # of a warm start that fits worse than before: all is searched anew
-    openings: int = 4  # rounds at most, in which what hits leave open follows the fit
+    # Rounds at most, in which what hits leave open follows the fit; beyond `hopeless` one at most.
+    openings: int = 4
     searched: int | None = None  # poses at most, spread over all, by which a start is searched
     # Misfit of the best start from which the last fit takes a few steps only: physics is missing.
     hopeless: float = np.inf

@@ -168,7 +168,7 @@ def _plain(
     for _ in range(2 if near and problem.tolerances else 1):
         objective = problem.prepared(objective, x, tail)
     end = problem.minimise(objective, x, number, stage, problem.effort.steps)
-    hopeless = problem.effort.hopeless * objective.count
+    hopeless = problem.effort.hopeless * max(objective.count, 1)
     near_enough = end.at.chi2 < hopeless
     openings = problem.effort.openings if near_enough else min(problem.effort.openings, 1)
     rounds = max(completions if tail else 0, openings if problem.tolerances else 0)

@@ -134,7 +134,7 @@ class DiagnosisReport(Answer):
 
         Raises InputError where they cannot be written.
         """
-        from planner.diagnosis.linear_diagnosis import Candidate
+        from planner.diagnosis.linear_diagnosis import Candidate, of_its_own
         from planner.diagnosis.write_explained import write_explained
         from planner.report.diagnosis_plots import diagnosis_figures
         from planner.report.plot_files import Pictures
@@ -142,7 +142,7 @@ class DiagnosisReport(Answer):
         assert self.explained is not None
         found, robot = self.diagnosis, self.diagnosis.problem.simulation.robot
         parts = found.best.effect.parts()
-        told = next((c.effects for c in found.candidates if c.fit is found.best), parts)
+        told = of_its_own(found.best, found.temper)
         places = {(e.name, e.at or None) for e in told}
         # As the answer has it, so that file and table agree.
         said = [(c, {(e.effect, e.at) for e in c.effects}) for c in self.candidates]
@@ -215,7 +215,7 @@ class DiagnosisReport(Answer):
 
 def diagnosis_report(explained: "Explained") -> DiagnosisReport:
     """Of a diagnosis."""
-    from planner.diagnosis.linear.predict import similarity
+    from planner.diagnosis.linear.predict import agreement
     from planner.diagnosis.residual_location import where
 
     recorded, judged, whole = explained.recorded, explained.judged, explained.whole
@@ -223,8 +223,8 @@ def diagnosis_report(explained: "Explained") -> DiagnosisReport:
     misfit = TwoMisfits(found.refitted.per_value, found.best.per_value)
     drift = None if found.best.effect.at else drift_of(explained)
     if drift is not None:
-        fitted = replace(fitted, explained=similarity(drift.problem, drift.best))
-        misfit = TwoMisfits(drift.plain.per_value, drift.best.per_value)
+        fitted = agreement(drift.problem, drift.refitted, drift.best)
+        misfit = TwoMisfits(drift.refitted.per_value, drift.best.per_value)
     place = where(found.problem, found.refitted)
     aside = tuple(recorded.poses[i] for i in judged.aside)
     names = place_names(found.problem.simulation.robot)

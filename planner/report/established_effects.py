@@ -47,7 +47,7 @@ def established_effects(
 
 def drift_of(explained: "Explained") -> "DriftFits | None":
     """The fits behind a drift that is established."""
-    return next((f.by_time for f, _ in explained.whole.established if f.by_time), None)
+    return next((f.drift_fits for f, _ in explained.whole.established if f.drift_fits), None)
 
 
 def _of_fits(found: "Diagnosis") -> tuple[EstablishedEffect, ...]:

@@ -53,18 +53,16 @@ class MismatchShares:
 
     @classmethod
     def of(cls, found: "Diagnosis", drift: "DriftFits | None" = None) -> "MismatchShares":
-        """Of a diagnosis; where the robot drifts, visits by themselves say what that explains."""
+        """Of a diagnosis; where the robot drifts, of its visits, each by itself."""
         from planner.diagnosis.linear.mismatch import Mismatch
         from planner.diagnosis.linear.problem import FINE
 
-        given = replace(found.problem, as_built=False).misfit(found.refitted.effect, FINE)
-        plain = found.problem.misfit(found.refitted.effect, FINE)
-        best = found.problem.misfit(found.best.effect, FINE)
-        last = Mismatch.of(best, found.best.x)
-        if drift is not None:
-            last = Mismatch.of(drift.best.misfit, drift.best.x)
+        of = found if drift is None else drift
+        given = replace(of.problem, as_built=False).misfit(of.refitted.effect, FINE)
+        plain = of.problem.misfit(of.refitted.effect, FINE)
+        last = Mismatch.of(of.problem.misfit(of.best.effect, FINE), of.best.x)
         stated = Mismatch.of(given, given.mean).whole
-        refitted = Mismatch.of(plain, found.refitted.x).whole
+        refitted = Mismatch.of(plain, of.refitted.x).whole
         shares = stated, refitted, last.whole, last.left
         return cls(*(round(10 * float(np.log10(max(share, 1e-12))), 2) for share in shares))
 

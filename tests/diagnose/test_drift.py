@@ -50,10 +50,10 @@ def test_drift_that_is_there_is_found(simulation):
     change, sd, _ = found.parameters["change"]
     assert change == pytest.approx(-0.15, abs=4 * sd)
     assert problem_of(moving, simulation).order[-1] == 1.0
-    fits = found.by_time
+    fits = found.drift_fits
     assert fits is not None
-    assert fits.plain.per_value > 3 * fits.best.per_value
-    refitted, explained = (similarity(fits.problem, f) for f in (fits.plain, fits.best))
+    assert fits.refitted.per_value > 3 * fits.best.per_value
+    refitted, explained = (similarity(fits.problem, f) for f in (fits.refitted, fits.best))
     assert explained.frac > max(0.999, refitted.frac)
 
 

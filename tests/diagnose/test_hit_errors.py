@@ -189,4 +189,4 @@ def test_misses_beyond_any_hand_are_called_unknown(missed, monkeypatch):
     assert not found.hit_errors
     assert found.clean is visits
     (_, (remark,)) = abstained(found.findings)
-    assert "more than any hand does" in remark
+    assert "more than any hand's misses" in remark

@@ -77,7 +77,7 @@ class DriftFits:
     """The simulation refitted to visits, without drift and with it."""
 
     problem: DriftProblem
-    plain: Fit
+    refitted: Fit
     best: Fit
 
 

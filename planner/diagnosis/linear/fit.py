@@ -137,13 +137,14 @@ def promise(problem: Problem, effect: Effect, warm: Fit) -> Fit:
     return approached(close, points(close, warm), PROMISE_STEPS)
 
 
-def afresh(problem: Problem, near: Fit, steps: int = AFRESH_STEPS) -> Fit:
+def afresh(problem: Problem, near: Fit) -> Fit:
     """The better of a fit and, for a single effect of the robot, one from the prior's median.
 
     From inertias and springs that were bent to fit nothing hardly anything leads to what they
     imitate.
     """
-    far = from_median(problem, near, steps) if begins_alone(near.effect) else near
+    alone = begins_alone(near.effect)
+    far = from_median(problem, near, AFRESH_STEPS) if alone else near
     return min((near, far), key=lambda f: f.value)
 
 

@@ -121,7 +121,7 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
         return ()
     if not there or (returned(recorded) is None and not _by_time(problem, plain, best)):
         return ()
-    return (replace(finding, by_time=DriftFits(problem, plain, best)),)
+    return (replace(finding, drift_fits=DriftFits(problem, plain, best)),)
 
 
 def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:

@@ -142,10 +142,16 @@ def _inner(basis: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def beyond_any_hand(errors: HitErrors, tolerances: Tolerances) -> bool:
     """Whether hits would have missed by so much that something else makes them differ."""
-    each = [error for visit in errors for error in visit]
-    tilts = np.array([e.tilt_rad for e in each]) / tolerances.angle_rad
-    offsets = np.array([e.offset_m for e in each]) / tolerances.offset_m
-    return bool(max(np.mean(tilts**2), np.mean(offsets**2)) > BEYOND_ANY_HAND**2)
+    # Of a hit that has none beside it nothing is told.
+    each = [e for visit in errors for e in visit if np.any(e.tilt_rad) or np.any(e.offset_m)]
+    if not each:
+        return False
+    tilt = float(np.sqrt(np.mean([e.tilt_rad**2 for e in each])))
+    offset = float(np.sqrt(np.mean([e.offset_m**2 for e in each])))
+    return bool(
+        tilt > BEYOND_ANY_HAND * tolerances.angle_rad
+        or offset > BEYOND_ANY_HAND * tolerances.offset_m
+    )
 
 
 def corrected(recorded: Dataset, plain: Fit, errors: HitErrors) -> Dataset:

@@ -47,7 +47,7 @@ def _by_repeats(recorded: Dataset, misses: OpenMisses) -> float | None:
         missed = misses.of_hits(number, hits)
         for group in _by_axis(hits):
             ways *= exchangeable.ways(_levels(group))
-            seen = _seen(group, missed)
+            seen = _seen(group, missed, rng)
             real, random = exchangeable.between(seen, _levels(group), SHARED_OUT, rng)
             measured, shared = measured + real, shared + random
     if 1 / ways > BY_CHANCE:
@@ -68,7 +68,7 @@ def _by_order(recorded: Dataset, misses: OpenMisses) -> float | None:
             if count < 3:
                 continue
             ways *= factorial(count) / 2  # there and back is one course
-            seen = _seen(group, missed)
+            seen = _seen(group, missed, rng)
             means = np.array([seen[levels == level].mean(axis=0) for level in np.unique(levels)])
             real, random = exchangeable.ordered(means, SHARED_OUT, rng)
             measured, shared = measured + real, shared + random
@@ -108,7 +108,7 @@ def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
     return [g for g in groups if 1 < len({hit.level for hit in g}) < len(g)]
 
 
-def _seen(group: Sequence[Column], missed: MissesAtVisit) -> np.ndarray:
+def _seen(group: Sequence[Column], missed: MissesAtVisit, rng: np.random.Generator) -> np.ndarray:
     """Hits (n, m) as real rows in units of one noise for all, with misses left open.
 
     There is one weight for all: hits are to be exchangeable.
@@ -116,14 +116,16 @@ def _seen(group: Sequence[Column], missed: MissesAtVisit) -> np.ndarray:
     lines = missed.lines
     basis, uncertain = missed.left_open(group[:2])
     h = np.array([hit.accelerance[:, lines] for hit in group])
-    values, variance = evenly_noisy(h, np.array([hit.variance[:, lines] for hit in group]))
+    values, variance = evenly_noisy(h, np.array([c.variance[:, lines] for c in group]), rng)
     variance = 2 * variance + uncertain
     weight = np.where(np.isfinite(variance), 1 / variance, 0.0)
     values = values * np.sqrt(weight)
     return whitening(basis, weight)(real_rows(values - values.mean(axis=0)))
 
 
-def evenly_noisy(h: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def evenly_noisy(
+    h: np.ndarray, variance: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """FRFs h (n, ...) with as much noise as the noisiest has, and that variance (...).
 
     Soft hits are noisier than hard ones. One of them beside two hard ones is a level that differs
@@ -131,7 +133,7 @@ def evenly_noisy(h: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, np.nd
     """
     most = variance.max(axis=0)
     lacking = np.where(np.isfinite(most), most - np.where(np.isfinite(most), variance, 0.0), 0.0)
-    real, imaginary = np.random.default_rng(0).standard_normal((2, *h.shape))
+    real, imaginary = rng.standard_normal((2, *h.shape))
     return h + np.sqrt(lacking / 2) * (real + 1j * imaginary), most
 
 

@@ -17,7 +17,7 @@ class Screened:
     """What was found, artefacts first, and the recordings without artefacts and misses of hits.
 
     `hit_errors` are empty where the hits of a pose agree without looking for their misses, and
-    where they differ because a joint is not linear.
+    where something else makes them differ: a joint that is not linear, or what is unknown.
     """
 
     findings: tuple[Finding, ...]
@@ -43,7 +43,7 @@ def screen(
         tell("estimating by how much each hit missed its axis and point", 0.3)
         apart, errors = taken_out(clean, nominal)
         if not by_level and beyond_any_hand(errors, tolerances_of(nominal)):
-            by_level = force_levels.by_no_miss(clean, nominal)
+            by_level = force_levels.not_by_misses(clean, nominal)
     by_time = drift.screen(apart, nominal)
     if by_time or not by_level:
         # Levels are hit one after the other: what changes with time looks as if it went with them.
