@@ -125,6 +125,24 @@ def test_without_repeats_the_order_of_levels_tells(linear):
 
 
 @pytest.mark.parametrize("evenly", [True, False])
+def test_soft_hits_that_scatter_more_than_is_known_of_them_are_no_other_level(evenly):
+    """Two soft hits at one place in three, one at the others, two hard ones everywhere."""
+    chances = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        told, groups = np.zeros(1 + 500), []
+        for place in range(18):
+            levels = np.array([0, 0, 1, 1] if place % 3 == 0 else [0, 1, 1])
+            sd = np.where(levels == 0, 1.5, 1.0)[:, None]
+            groups.append((sd * rng.standard_normal((len(levels), 200)), levels))
+        for seen, levels in repeats.evenly_scattered(groups, rng) if evenly else groups:
+            measured, shared = exchangeable.between(seen, levels, 500, rng)
+            told += [measured, *shared]
+        chances.append(exchangeable.chance(told[0], told[1:]))
+    assert np.mean(np.array(chances) < 0.1) < 0.3 if evenly else max(chances) < 0.02
+
+
+@pytest.mark.parametrize("evenly", [True, False])
 def test_a_soft_hit_is_noisier_and_no_other_level_for_that(evenly):
     """One soft and two hard hits of a linear structure at twenty places, forty campaigns."""
     chances = [_chance_of_a_soft_hit(np.random.default_rng(seed), evenly) for seed in range(40)]

@@ -39,17 +39,19 @@ def chance(recorded: Dataset, misses: OpenMisses) -> float | None:
     return min(1.0, len(told) * min(told)) if told else None
 
 
+Group = tuple[np.ndarray, np.ndarray]  # hits (n, m) in units of one noise, their levels (n,)
+
+
 def _by_repeats(recorded: Dataset, misses: OpenMisses) -> float | None:
     """Hits shared out among the levels at random."""
     rng = np.random.default_rng(0)
     ways, measured, shared = 1.0, 0.0, np.zeros(SHARED_OUT)
-    for number, hits in enumerate(hit_columns(recorded)):
-        missed = misses.of_hits(number, hits)
-        for group in _by_axis(hits):
-            ways *= exchangeable.ways(_levels(group))
-            seen = _seen(group, missed, rng)
-            real, random = exchangeable.between(seen, _levels(group), SHARED_OUT, rng)
-            measured, shared = measured + real, shared + random
+    for seen, levels in _groups(recorded, misses, rng):
+        if not 1 < len(np.unique(levels)) < len(levels):
+            continue
+        ways *= exchangeable.ways(levels)
+        real, random = exchangeable.between(seen, levels, SHARED_OUT, rng)
+        measured, shared = measured + real, shared + random
     if 1 / ways > BY_CHANCE:
         return None
     return exchangeable.chance(measured, shared)
@@ -59,22 +61,52 @@ def _by_order(recorded: Dataset, misses: OpenMisses) -> float | None:
     """Levels of each pose and axis in any order: all hits of a level may have missed alike."""
     rng = np.random.default_rng(0)
     ways, measured, shared = 1.0, 0.0, np.zeros(SHARED_OUT)
+    for seen, levels in _groups(recorded, misses, rng):
+        count = len(np.unique(levels))
+        if count < 3:
+            continue
+        ways *= factorial(count) / 2  # there and back is one course
+        means = np.array([seen[levels == level].mean(axis=0) for level in np.unique(levels)])
+        real, random = exchangeable.ordered(means, SHARED_OUT, rng)
+        measured, shared = measured + real, shared + random
+    if 1 / ways > BY_CHANCE:
+        return None
+    return exchangeable.chance(measured, shared)
+
+
+def _groups(recorded: Dataset, misses: OpenMisses, rng: np.random.Generator) -> list[Group]:
+    """Hits of each visit along each axis that was hit at several levels."""
+    out: list[Group] = []
     for number, hits in enumerate(hit_columns(recorded)):
         missed = misses.of_hits(number, hits)
         for axis in range(3):
             group = [hit for hit in hits if hit.axis == axis]
-            levels = _levels(group)
-            count = len(np.unique(levels))
-            if count < 3:
-                continue
-            ways *= factorial(count) / 2  # there and back is one course
-            seen = _seen(group, missed, rng)
-            means = np.array([seen[levels == level].mean(axis=0) for level in np.unique(levels)])
-            real, random = exchangeable.ordered(means, SHARED_OUT, rng)
-            measured, shared = measured + real, shared + random
-    if 1 / ways > BY_CHANCE:
-        return None
-    return exchangeable.chance(measured, shared)
+            if len({hit.level for hit in group}) > 1:
+                out.append((_seen(group, missed, rng), _levels(group)))
+    return evenly_scattered(out, rng)
+
+
+def evenly_scattered(groups: Sequence[Group], rng: np.random.Generator) -> list[Group]:
+    """Groups in which hits of every level scatter as much as those of the level that does most.
+
+    Records may be noisier than is known of them: soft hits, of which the force is noisy too,
+    differ more among themselves than hard ones. Levels without repeats scatter as the others do.
+    """
+    squares: dict[int, list[tuple[float, int]]] = {}
+    for seen, levels in groups:
+        for level in np.unique(levels).tolist():
+            own = seen[levels == level]
+            off = float(np.sum((own - own.mean(axis=0)) ** 2))
+            squares.setdefault(level, []).append((off, (len(own) - 1) * own.shape[1]))
+    sums = {level: np.sum(each, axis=0) for level, each in squares.items()}
+    scatter = {level: off / count for level, (off, count) in sums.items() if count}
+    most = max(scatter.values(), default=0.0)
+    out: list[Group] = []
+    for seen, levels in groups:
+        lacking = np.array([most - scatter.get(level, most) for level in levels.tolist()])
+        more = np.sqrt(lacking)[:, None] * rng.standard_normal(seen.shape)
+        out.append((seen + more, levels))
+    return out
 
 
 def wanted(recorded: Dataset) -> str:
@@ -100,12 +132,6 @@ def _once(hits: Sequence[Hit], recorded: Dataset) -> list[str]:
         if np.count_nonzero(counts) > 1 and np.any(counts == 1):
             out.append(AXES[axis])
     return out
-
-
-def _by_axis(hits: Sequence[Column]) -> list[list[Column]]:
-    """Hits of each axis that was hit at several levels, at one of them at least twice."""
-    groups = [[hit for hit in hits if hit.axis == axis] for axis in range(3)]
-    return [g for g in groups if 1 < len({hit.level for hit in g}) < len(g)]
 
 
 def _seen(group: Sequence[Column], missed: MissesAtVisit, rng: np.random.Generator) -> np.ndarray:
