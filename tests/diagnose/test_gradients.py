@@ -8,6 +8,7 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.hanging_resonator import HangingResonator
+from planner.diagnosis.effects.link_flexibility import LinkFlexibility
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
@@ -18,7 +19,7 @@ from tests.support.known_robots import kr210_folder
 
 EFFECTS = (
     "joint_stiffness joint_2", "transverse_compliance joint_3", "base_compliance base",
-    "link_flexibility link_2",
+    "link_flexibility link_2", "link_flexibility beam",
     "added_mass link_3", "local_resonator link_4", "local_resonator hanging",
     "angle_dependent_stiffness joint_2",
     "structural_damping joints", "sensor_rotation sensor", "sensor_gain sensor_y",
@@ -42,6 +43,9 @@ def problem(tmp_path_factory):
 def test_gradient_is_that_of_finite_differences(problem, wanted):
     effects = {f"{e.name} {e.at}": e for e in library(problem.simulation)}
     effects["local_resonator hanging"] = HangingResonator.of(effects["local_resonator link_4"])
+    bends = effects["link_flexibility link_2"]
+    assert isinstance(bends, LinkFlexibility)
+    effects["link_flexibility beam"] = bends.as_beam()
     misfit = problem.misfit(effects[wanted], Grade(12))
     start = misfit.effect.starts()[0]
     x = misfit.mean

@@ -11,7 +11,7 @@ from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.recording.records import Hit
 from planner.robot.robot import Robot
-from planner.truth.deviation import AttachedMass, AttachedResonator, Deviation, Spring
+from planner.truth.deviation import AttachedMass, AttachedResonator, BentLink, Deviation, Spring
 from planner.truth.hits import Hammer, simulate_hit
 from planner.truth.load import load_truth
 from tests.support.known_robots import KnownRobot
@@ -29,6 +29,7 @@ def hidden(
     channel: Callable[[np.ndarray], np.ndarray] = lambda a: a,
     poses: int = 8,
     said: str = "",
+    beams: tuple[BentLink, ...] = (),
 ) -> tuple[list[Frf], np.ndarray, Simulation]:
     """FRFs of 9 hits a pose, poses (n, 6) in rad, and the simulation that knows of nothing.
 
@@ -37,7 +38,8 @@ def hidden(
     path = robot.write(folder / "robot")
     path.write_text(f"{said}\n{path.read_text()}")
     scatter = Deviation(seed, stiffness=0.1, damping=0.2, inertia=0.04, com_m=0.005)
-    truth = load_truth(path, replace(scatter, extra=extra, added=added, resonators=loose))
+    hides = replace(scatter, extra=extra, added=added, resonators=loose, beams=beams)
+    truth = load_truth(path, hides)
     hammer, q, out = Hammer(), robot.poses(poses, seed), []
     for number, row in enumerate(q):
         rng, hits = np.random.default_rng([seed, number]), []

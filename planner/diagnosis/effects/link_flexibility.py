@@ -1,6 +1,6 @@
 """A link that bends or twists (Birk et al. 2025, section 2.3: elasticity of the structure)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -8,7 +8,7 @@ import scipy.linalg
 from planner.diagnosis.effects.effect import Quantity, Setting
 from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, across, told, triple
 from planner.diagnosis.effects.places import joint_of, links, own_axis
-from planner.diagnosis.thresholds import HALVES_APART_SD, LINK_STIFFNESS
+from planner.diagnosis.thresholds import HALVES_APART_SD, LINK_SHIFT_STIFFNESS, LINK_STIFFNESS
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 from planner.robot.virtual_joints import OUTER, halves_moved, inertia_basis
@@ -21,9 +21,11 @@ class LinkFlexibility(ExtraCompliance):
     """Bending about two axes and torsion, half-way to the next joint.
 
     By ψ (3,) in m the centres of the link's halves are farther off its own than those of a block.
+    `length_m` is how far the next joint is.
     """
 
     name = "link_flexibility"
+    length_m: float = 0.0
 
     @classmethod
     def everywhere(cls, simulation: Simulation) -> tuple["LinkFlexibility", ...]:
@@ -46,8 +48,27 @@ class LinkFlexibility(ExtraCompliance):
             gives = tuple(Give(triple(a), low, high) for a in axes)
             sd = HALVES_APART_SD * halves_moved(robot, link)[0]
             own = tuple(Quantity(f"apart_{a}", "m", 0.0, sd) for a in "xyz") if sd > 0 else ()
-            found += [cls(place, own, link, g) for g in (gives[:2], gives[2:], gives)]
+            found += [cls(place, own, link, g, length) for g in (gives[:2], gives[2:], gives)]
         return tuple(found)
+
+    def bends_at_one_place(self) -> bool:
+        """Whether the link has hinges across its way, and nothing that shifts its halves."""
+        return len(self.gives) > 1 and not any(give.slide for give in self.gives)
+
+    def as_beam(self) -> "LinkFlexibility":
+        """The same where the halves shift past each other too, as those of a beam do.
+
+        Two halves on a hinge of stiffness EI/L and a slide of 12 EI/L³ give at their end as a
+        uniform beam of length L: L³/(3 EI), L²/(2 EI), L/(EI).
+        """
+        low, high = (r / self.length_m**2 for r in LINK_SHIFT_STIFFNESS)
+        first, second = self.gives[:2]
+        slides = tuple(
+            replace(bending, axis=way, lower=low * bending.lower, upper=high * bending.upper,
+                    slide=True)
+            for bending, way in ((first, second.axis), (second, first.axis))
+        )  # fmt: skip
+        return replace(self, gives=(*self.gives, *slides))
 
     def impedance(self, setting: Setting, psi: np.ndarray) -> tuple[Impedance, ...]:
         """s² Σ Jᵀ ΔI(ψ) J of both halves."""

@@ -5,9 +5,11 @@ from functools import partial
 
 import numpy as np
 
+from planner.diagnosis.effects.base_compliance import BaseCompliance
 from planner.diagnosis.effects.combined import Both, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.linear.beams import as_beams
 from planner.diagnosis.linear.evidence import best_of, cut, lag
 from planner.diagnosis.linear.fit import (
     AFRESH_STEPS,
@@ -68,6 +70,7 @@ def search(
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
     found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
     found = _loosened(problem, refitted, found, effects)
+    found = _widened(problem, found, effects)
     if best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
@@ -119,6 +122,21 @@ def _loosened(problem: Problem, refitted: Fit, found: Found, effects: Sequence[E
         return found
     moved = [e for e in effects if strayed(refitted, e)]
     return Found((*found.finalists, *side_by_side(partial(staged, problem), moved)), found.left)
+
+
+def _widened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """Adds all that a base may give, and links that bend as beams, where the best has not enough.
+
+    It leaves something then, or bends inertias. Few steps lead to few of many springs.
+    """
+    best = best_of_few(found)
+    if best.per_value <= AT_NOISE and not inertias_bent(best):
+        return found
+    near = _settled(problem, as_beams(problem, found.finalists))
+    if best.per_value > AT_NOISE:
+        bases = [e for e in effects if isinstance(e, BaseCompliance)]
+        near += [staged(problem, max(bases, key=lambda e: len(e.gives)))] if bases else []
+    return Found((*found.finalists, *near), found.left)
 
 
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
