@@ -42,7 +42,7 @@ def test_kills_full_disks_and_damage(tmp_path):
 def test_500_kills_50_full_disks_50_damaged_files(tmp_path):
     if not disks_can_be_filled():
         pytest.skip("no disk of its own can be mounted here, so that none can be filled")
-    lab(tmp_path, "--kills", 700, "--stopped", 60, "--full", 50, "--damaged", 50)
+    lab(tmp_path, "--kills", 1000, "--stopped", 60, "--full", 50, "--damaged", 50)
     killed = (tmp_path / "kills.jsonl").read_text().count('"killed": true')
     print(f"{killed} kills struck")
     assert killed >= 500

@@ -27,3 +27,12 @@ def test_concealed_cases_of_another_engine(tmp_path: Path, capsys) -> None:
     lines = summary(found)
     assert all(lines["no failure"])
     assert all(lines["artefacts never physics"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "joint"), [(337, "joint_4"), (374, "joint_3")])
+def test_play_of_a_joint_that_its_weight_holds_at_one_end(tmp_path, seed, joint):
+    """Two cases at which backlash under weight was looked at when it was modelled."""
+    found = diagnosed(tmp_path, seed)
+    assert found.verdict == "explained"
+    assert found.named == {("backlash", joint)}

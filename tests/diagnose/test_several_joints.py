@@ -67,16 +67,22 @@ def test_linear_torques_at_all_joints_are_stiffer_springs(struck):
     assert np.allclose(found.stiffer, more, rtol=1e-6)
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.effect)
-def test_a_law_at_one_joint_is_what_it_is_by_itself(struck, law):
+@pytest.mark.parametrize(
+    ("law", "rest"),
+    [*((law, 0.0) for law in LAWS), (DEAD_ZONE, 1e-4), (DEAD_ZONE, -1e-4)],
+    ids=lambda value: value.effect if isinstance(value, Law) else f"{value:g} beyond the gap",
+)
+def test_a_law_at_one_joint_is_what_it_is_by_itself(struck, law, rest):
     """Dahl's slope jumps where a joint turns, so that Newton's steps end elsewhere by a little."""
     system, hits, _, s = struck
     joints, port = joints_of(system, hits, 500.0), 2
+    joints = replace(joints, rest=np.full((6, 6), rest))
     k, a = np.full(6, 1e-6 * joints.stiffness[0]), np.full(6, 3e-4)
     k[port] = 0.5 * joints.stiffness[port]
     together = torque_spectra(law, k, a, joints, hits, s).spectrum[port]
     view = seen(system, port, hits, 500.0)
-    alone = torques([(law, slice(0, 6))], np.full(6, k[port]), np.full(6, 3e-4), np.zeros(6), view)
+    numbers = np.full(6, k[port]), np.full(6, 3e-4), np.zeros(6)
+    alone = torques([(law, slice(0, 6))], *numbers, view, np.full(6, rest))
     expected = spectra(alone, hits, s)
     assert np.allclose(together, expected, atol=5e-3 * np.abs(expected).max())
 

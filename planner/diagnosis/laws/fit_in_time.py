@@ -21,7 +21,7 @@ from planner.diagnosis.laws.level_data import (
 )
 from planner.diagnosis.laws.one_joint_response import Strokes, seen, side_by_side_views, spectra
 from planner.diagnosis.laws.one_joint_response import torques as one_joint_torques
-from planner.diagnosis.laws.several_joint_response import joints_of, rates, torque_spectra
+from planner.diagnosis.laws.several_joint_response import Joints, joints_of, rates, torque_spectra
 from planner.diagnosis.linear.fit import Fit
 from planner.inference.least_squares import Damping, Iterate, accept, begin, propose
 from planner.inference.parallel import side_by_side
@@ -127,7 +127,7 @@ def _stepped(problem: LawProblem, fit: Iterate[LawMisfit]) -> Iterate[LawMisfit]
 
 def _misfit_of_several(problem: LawProblem, law: LawAtJoints) -> LawMisfit:
     data, system = problem.data, system_of(problem.plain, law.x)
-    joints = joints_of(system, problem.hits, data.fastest_hz)
+    joints = _joints(problem, law, system)
     with np.errstate(over="ignore", invalid="ignore"):
         try:
             found = torque_spectra(law.kind, law.k, law.a, joints, problem.hits, data.s)
@@ -135,6 +135,11 @@ def _misfit_of_several(problem: LawProblem, law: LawAtJoints) -> LawMisfit:
             return LawMisfit(law)
         h = frfs(data, system, law.ports, found.spectrum[None])[0]
         return _weighed(problem, law, h, found.stiffer)
+
+
+def _joints(problem: LawProblem, law: LawAtJoints, system: System) -> Joints:
+    joints = joints_of(system, problem.hits, problem.data.fastest_hz)
+    return replace(joints, rest=law.rest_at(problem.hits.visit))
 
 
 def _sloped(problem: LawProblem, at: LawMisfit) -> LawMisfit:
@@ -148,7 +153,7 @@ def _sloped(problem: LawProblem, at: LawMisfit) -> LawMisfit:
     system = system_of(plain, law.x)
     with np.errstate(over="ignore", invalid="ignore"):
         try:
-            joints = joints_of(system, problem.hits, data.fastest_hz)
+            joints = _joints(problem, law, system)
             moved = rates(law.kind, law.k, law.a, joints, problem.hits, data.s)
         except np.linalg.LinAlgError:  # swings without bounds
             return LawMisfit(law)
@@ -181,7 +186,7 @@ def one_joint_frfs(
     data, hits = problem.data, problem.hits
     systems = [system_of(problem.plain, law.x) for law in laws]
     c = len(data.h)
-    views, follow, numbers = [], [], []
+    views, follow, numbers, rest = [], [], [], []
     shifts = np.concatenate([np.zeros((1, 2)), STEP * np.eye(2), np.zeros((1, 2))])
     for number, (law, system) in enumerate(zip(laws, systems, strict=True)):
         port = int(law.ports[0])
@@ -190,12 +195,14 @@ def one_joint_frfs(
         moved = [replace(law, nu=law.nu + shift[:, None]) for shift in shifts]
         extra = [0.0, 0.0, 0.0, STEP * own]
         numbers += [(m.k[0], m.a[0], e) for m, e in zip(moved, extra, strict=True)]
+        rest += 4 * [law.rest_at(hits.visit)[:, 0]]
         first, last = 4 * number * c, 4 * (number + 1) * c
         if follow and follow[-1][0] is law.kind:  # neighbours that follow the same law, as one
             first = follow.pop()[1].start
         follow.append((law.kind, slice(first, last)))
     k, a, extra = np.repeat(np.array(numbers), c, axis=0).T
-    torque = one_joint_torques(follow, k, a, extra, side_by_side_views(views))
+    view = side_by_side_views(views)
+    torque = one_joint_torques(follow, k, a, extra, view, np.concatenate(rest))
     parts = spectra(torque, hits, data.s).reshape(len(laws), 4, 1, c, -1)
     out = []
     for law, system, part in zip(laws, systems, parts, strict=True):
@@ -228,13 +235,14 @@ def _weighed(
     """χ² and the objective of FRFs (c, 3, F)."""
     data = problem.data
     residual = data.compared(data.h) - data.compared(h)
-    chi2 = float(np.sum(data.chi2(residual)))
+    each = data.chi2(residual)
+    chi2, differing = float(np.sum(each)), float(np.sum(each[data.weaker[:, 0, 0]]))
     mean, sd = law.prior(problem.plain)
     away = (law.coordinates - mean) / sd
     value = chi2 + 0.5 * float(away @ away)
     if not np.isfinite(value):
         return LawMisfit(law)
-    return LawMisfit(law, chi2, value, residual, stiffer)
+    return LawMisfit(law, chi2, value, differing, residual, stiffer)
 
 
 def _with_normal(

@@ -27,7 +27,8 @@ class LawAtJoints:
     k is the share times the joints' stiffness `scale` (m,) in N·m/rad, ln a is `middle` (m,) + ν.
     With `sign` 0 ν holds the share itself, which may change its sign; otherwise its logarithm.
     `ports` (m,) are the joints, as numbered by `System.ports`; of those that `slides` (m,) says,
-    k is in N/m and a in m.
+    k is in N/m and a in m. `rest` (n, m) is the state of the law (see `Law`) before each visit's
+    hits, if it is not 0.
     """
 
     kind: Law
@@ -38,6 +39,11 @@ class LawAtJoints:
     x: np.ndarray
     nu: np.ndarray
     slides: tuple[bool, ...] = ()
+    rest: np.ndarray | None = None
+
+    def rest_at(self, visit: np.ndarray) -> np.ndarray:
+        """(c, m): the state before hits of these visits (c,)."""
+        return np.zeros((len(visit), len(self.ports))) if self.rest is None else self.rest[visit]
 
     @property
     def effect(self) -> str:
@@ -113,7 +119,8 @@ class LawAtJoints:
 class LawMisfit:
     """The objective of a law: χ² over complex values, and the value χ² + prior/2 = −ln posterior.
 
-    `residual` (c, 3, F) is measured less simulated, of what is compared; `stiffer` (c, m) in
+    `differing` is the part of χ² that levels differ by more or less than simulated. `residual`
+    (c, 3, F) is measured less simulated, of what is compared; `stiffer` (c, m) in
     N·m/rad is what the law adds to the joints' stiffness, on the whole, while a hit rings. Gradient
     (D + 2 m,) and Gauss-Newton matrix are those of the value, `normal` that of the last step where
     they were not asked for.
@@ -122,6 +129,7 @@ class LawMisfit:
     law: LawAtJoints
     chi2: float = np.inf
     value: float = np.inf
+    differing: float = np.inf
     residual: np.ndarray | None = None
     stiffer: np.ndarray | None = None
     _gradient: np.ndarray | None = None

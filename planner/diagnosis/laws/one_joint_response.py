@@ -181,17 +181,20 @@ def torques(
     a: np.ndarray,
     extra: np.ndarray,
     port: Seen,
+    rest: np.ndarray | None = None,
 ) -> np.ndarray:
     """Torque (n, c) of every hit: its law's, and `extra` (c,) times the angle.
 
-    `laws` says which columns follow which law; k, a (c,) are its numbers.
+    `laws` says which columns follow which law; k, a (c,) are its numbers, `rest` (c,) its state
+    before.
     """
     n, c = port.free.shape
+    rest = np.zeros(c) if rest is None else rest
     out = np.empty((n, c))
     for law, part in laws:
         for first in range(part.start, part.stop, COLUMNS):
             some = slice(first, min(first + COLUMNS, part.stop))
-            numbers = [_filled(v[some], 1.0) for v in (k, a, extra, port.gives)]
+            numbers = [_filled(v[some], 1.0) for v in (k, a, extra, port.gives, rest)]
             poles = [_filled(v[:, some]) for v in (port.grow, port.drive)]
             free = _filled(port.free[:, some], sizes=(STEPS, COLUMNS))
             torque = _torques(law.step, *numbers, *poles, free)
@@ -214,6 +217,7 @@ def _torques(
     a: Array,
     extra: Array,
     gives: Array,
+    rest: Array,
     grow: Array,
     drive: Array,
     free: Array,
@@ -236,8 +240,8 @@ def _torques(
         real, imaginary = real + drive.real * torque[None], imaginary + drive.imag * torque[None]
         return (real, imaginary, now, after, now - before), torque
 
-    z, rest = jnp.zeros(grow.shape), jnp.zeros(k.shape)
-    return jax.lax.scan(following, (z, z, rest, rest, rest), free)[1]
+    z, still = jnp.zeros(grow.shape), jnp.zeros(k.shape)
+    return jax.lax.scan(following, (z, z, still, rest, still), free)[1]
 
 
 def spectra(torque: np.ndarray, hits: Strokes, s: np.ndarray) -> np.ndarray:

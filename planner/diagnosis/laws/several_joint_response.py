@@ -34,7 +34,8 @@ class Joints:
     grow (c, p, 1), drive (c, 2 p, m): z ← grow z + drive τ gives what earlier torques leave, `felt`
     (c, m, 2 p) the angles that follow, real and imaginary parts of z being rows of their own;
     `gives` (c, m, m): the angles that torques give within their own step; `free` (n, c, m) in rad:
-    the angles without torques; `stiffness` (m,) of the springs.
+    the angles without torques; `stiffness` (m,) of the springs; `rest` (c, m) is the state of the
+    law before, if it is not 0.
     """
 
     grow: np.ndarray
@@ -43,6 +44,7 @@ class Joints:
     gives: np.ndarray
     free: np.ndarray
     stiffness: np.ndarray
+    rest: np.ndarray | None = None
 
 
 def joints_of(system: System, hits: Strokes, fastest_hz: float) -> Joints:
@@ -110,7 +112,8 @@ def instants(law: Law, k: np.ndarray, a: np.ndarray, joints: Joints) -> Iterator
     """Every hit step by step; k, a (m,) are the law's numbers at each joint."""
     _, c, m = joints.free.shape
     z = np.zeros((c, 2 * joints.grow.shape[1], 1))
-    before, state, rise = np.zeros((c, m)), np.zeros((c, m)), np.zeros((c, m))
+    before, rise = np.zeros((c, m)), np.zeros((c, m))
+    state = np.zeros((c, m)) if joints.rest is None else joints.rest
     inverse, one = np.zeros((c, m, m)), np.eye(m)
     slope = law.step(np, k, a, state, before, before)[1] + np.zeros((c, m))
     for i, alone in enumerate(joints.free):

@@ -11,6 +11,9 @@ EFFECTIVE = 0.7  # of the largest swing: not all modes peak at once
 ROUGH = 0.05  # error of an equivalent stiffness, in shares of the joint's
 MOST, MOST_LACKING = 5.0, 0.9  # of k, in shares of the joint's stiffness
 ASIDE = (-4, 0, 4, 8)  # steps of the grid to the neighbours: fading hits look like smaller a
+GAPS = (0.02, 0.06, 0.2, 0.6, 1.5)  # the same, of joints that hang
+WEIGHTLESS = 1e-3  # sag, times the same: of joints that turn about an upright axis
+BORNE = (0.02, 0.06, 0.2, 0.6)  # share of the weight that such a gear bears
 GRID = np.geomspace(0.01, 4.0, 28)  # a, times the median swing at the highest level
 
 
@@ -49,6 +52,31 @@ def starts(
                         )
                     )  # fmt: skip
     return out
+
+
+def hanging_starts(
+    found: Equivalent, system: System, port: int, x: np.ndarray, sag: np.ndarray
+) -> list[LawAtJoints]:
+    """Backlash of a joint that its weight holds at one flank of the gap.
+
+    By `sag` (n,) in rad its spring gives at each visit under all of the weight, of which
+    compensator and brake bear a part. What hangs so leaves the flank where it swings farther: it
+    grows softer, then stiffer.
+    """
+    law = next(law for law in LAWS if law.effect == "backlash")
+    scale = float(system.elasticity.stiffness[system.blocks[port]])
+    middle = float(np.median(found.swing[:, 1, port]))
+    if np.max(np.abs(sag)) < WEIGHTLESS * middle:
+        return []
+    slides, ports = system.slides[port : port + 1], np.array([port])
+    return [
+        LawAtJoints(
+            law, 1, ports, np.array([scale]), np.log([middle]), x.copy(),
+            np.array([[np.log(MOST_LACKING)], [np.log(a)]]), slides, borne * sag[:, None],
+        )
+        for borne in BORNE
+        for a in GAPS
+    ]  # fmt: skip
 
 
 def _at(

@@ -32,7 +32,8 @@ Step = Callable[[Any, Any, Any, Any, Any, Any], Torque]
 class Law:
     """`step(xp, k, a, state, before, now)` tells what a motion from `before` to `now` does.
 
-    `xp` is the array library, numpy or jax.numpy. The state is 0 at rest. `signed`: k may be
+    `xp` is the array library, numpy or jax.numpy. The state is 0 at rest, of backlash how far
+    beyond the gap's edge (rad, signed) the weight holds the joint then. `signed`: k may be
     negative. `least_share` bounds k from below in shares of the joint's linear stiffness,
     `most_share` from above.
     """
@@ -87,9 +88,11 @@ def _stiffening(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> T
 
 
 def _dead_zone(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> Torque:
-    """Within ± a the spring lacks k."""
-    inside = xp.abs(now) < a
-    return -k * xp.clip(now, -a, a), xp.where(inside, -k, 0.0), state
+    """Within ± a the spring lacks k; what hangs rests beyond the edge, not in the middle."""
+    rest = state + a * xp.sign(state)
+    there = now + rest
+    lacking = xp.clip(there, -a, a) - xp.clip(rest, -a, a)
+    return -k * lacking, xp.where(xp.abs(there) < a, -k, 0.0), state
 
 
 def _dahl(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> Torque:

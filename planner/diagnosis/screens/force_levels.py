@@ -20,7 +20,7 @@ from planner.diagnosis.laws.level_data import (
 )
 from planner.diagnosis.laws.level_refits import base, bases
 from planner.diagnosis.laws.open_misses import OpenMisses
-from planner.diagnosis.laws.starting_values import starts
+from planner.diagnosis.laws.starting_values import hanging_starts, starts
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens import repeats, several_joints
@@ -60,6 +60,7 @@ ROUNDS, MORE, LAST, AGAIN = 3, 6, 4, 2
 HOPELESS = 10.0  # times the best χ² after ROUNDS
 # Poorly known directions may go far in the last rounds.
 LAST_DAMPING = Damping(first=1e-7, least=1e-10, most=2e4, lighter=0.1, heavier=10.0)
+OTHERWISE = (0.5, 0.7, 0.85, 1.2, 1.5, 2.0)  # times the share of the weight that a gear bears
 TOLERANCE = 1e-5  # of the objective, that a last round must gain
 
 
@@ -89,7 +90,7 @@ def screen(
     if several := () if single else _several(recorded, nominal, first.found, tell):
         return several
     least = LAW_SURELY if as_repeats else None
-    findings, clear = _named(recorded, first, tell, least)
+    findings, clear = _named(recorded, first, tell, least, held=True)
     for look in looks:
         if clear or (single and findings[0].effect != UNKNOWN):
             break
@@ -132,22 +133,34 @@ def _rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
 
 
 def _named(
-    recorded: Dataset, look: _Compared, tell: Tell, least: float | None = None
+    recorded: Dataset,
+    look: _Compared,
+    tell: Tell,
+    least: float | None = None,
+    *,
+    held: bool = False,
 ) -> tuple[tuple[Finding, ...], bool]:
     """Which joint's law makes the levels differ, or `unknown`; whether no other comes close.
 
     `least` is the share of the differences that a law has to explain, if it is not the usual one.
+    `held`: gears that the weight holds at one flank of their gap are looked at too.
     """
     misses, found = look.misses, look.found
     plain = misses.plain
     if not found.delta.shape[1]:
         return (_unknown(found, "no joint has a spring about its own axis"),), False
     system, share, of_one = system_of(plain), equivalent_share(found), placed(found)
-    if share < LINEARISED and not of_one:
-        return (_unknown(found, "even with a stiffness of its own for every hit"),), False
-    weighed = weigh(recorded, misses, system, found, tell)
-    best = weighed[0]
+    weighed = weigh(recorded, misses, system, found, tell) if share > LINEARISED or of_one else ()
     least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
+    if held and (not weighed or weighed[0].explained < least):
+        hanging = weigh(recorded, misses, system, found, tell, hanging=True)
+        if hanging and (not weighed or hanging[0].explained > weighed[0].explained):
+            same = hanging[0].candidate.law.effect, hanging[0].at
+            others = (w for w in weighed if (w.candidate.law.effect, w.at) != same)
+            weighed = (hanging[0], *others)
+    if not weighed:
+        return (_unknown(found, "even with a stiffness of its own for every hit"),), False
+    best = weighed[0]
     if best.log_evidence > CLEAR and best.explained > least:
         there, shares = shares_of_laws(weighed)
         best, c = there[0], there[0].candidate
@@ -224,9 +237,19 @@ def _excess(found: Equivalent) -> float:
 
 
 def weigh(
-    recorded: Dataset, misses: OpenMisses, system: System, found: Equivalent, tell: Tell = quietly
+    recorded: Dataset,
+    misses: OpenMisses,
+    system: System,
+    found: Equivalent,
+    tell: Tell = quietly,
+    *,
+    hanging: bool = False,
 ) -> tuple[WeighedLaw, ...]:
-    """Every law at the joints that come into question, fitted in time, most probable first."""
+    """Every law at the joints that come into question, fitted in time, most probable first.
+
+    With `hanging` only backlash of the likeliest joint, which its weight holds at one flank of the
+    gap: none where it has no weight to bear.
+    """
     plain = misses.plain
     data = level_data(recorded, plain, misses)
     problem = LawProblem(data, plain, data.hits, strongest_slopes(data, plain))
@@ -234,17 +257,24 @@ def weigh(
     order = np.argsort(left)[:JOINTS]
     ports = [int(j) for j in order if left[j] < ALSO * left[order[0]]]
     begin = []
+    if hanging:
+        sag = plain.misfit.setting.simulation.elastic.sag(recorded.q)
+        laws = hanging_starts(found, system, ports[0], plain.x, sag[:, system.blocks[ports[0]]])
+        begin, ports = [problem.start(law, BATCH_DAMPING) for law in laws], []
+        if not begin:
+            return ()
     for port in ports:
         own = own_parameter(plain, int(system.blocks[port]))
         laws = starts(found, system, port, plain.x, own)
         begin += [problem.start(law, BATCH_DAMPING) for law in laws]
     tell("fitting every law at single joints to the hits", 0.5)
     begun = _best_of_each(advance(problem, begin, 0), STARTS)
-    rough = _best_of_each(advance(problem, begun, ROUNDS), 1)
+    rough = _held_otherwise(problem, _best_of_each(advance(problem, begun, ROUNDS), 1))
     best = min(fit.at.chi2 for fit in rough)
     tell("following the best laws", 0.6)
     kept = advance(problem, [f for f in rough if f.at.chi2 < HOPELESS * best], MORE)
-    ends, levels = [fit.at for fit in kept], levels_of(data)
+    kept = _held_otherwise(problem, kept)
+    ends, levels = [fit.at for fit in kept], levels_of(data, system)
     first = min(ends, key=lambda c: c.value)
     # Laws are weighed one against the other: those half-way would be wronged.
     told = [c for c in ends if c is first or levels.explained(c) > LAW_HOPEFUL]
@@ -252,6 +282,19 @@ def weigh(
     last = side_by_side(partial(_followed, problem, found), told)
     rest = (c for c in ends if all(c is not t for t in told))
     return weighed_laws(data, system, [*last, *rest])
+
+
+def _held_otherwise(
+    problem: LawProblem, fits: Sequence[Iterate[LawMisfit]]
+) -> list[Iterate[LawMisfit]]:
+    """Fits, or those of joints of which gears bear another share of the weight, where it fits."""
+    out = []
+    for fit in fits:
+        law = fit.at.law
+        held = [replace(law, rest=law.rest * f) for f in OTHERWISE] if law.rest is not None else []
+        begin = [problem.start(one, BATCH_DAMPING) for one in held]
+        out.append(min([fit, *advance(problem, begin, 1)], key=lambda one: one.at.value))
+    return out
 
 
 def _followed(problem: LawProblem, found: Equivalent, at: LawMisfit) -> LawMisfit:

@@ -7,6 +7,7 @@ import numpy as np
 
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import System
+from planner.diagnosis.laws.fit_in_time import frfs
 from planner.diagnosis.laws.law_at_joints import LawMisfit, Laws
 from planner.diagnosis.laws.level_data import LevelData
 from planner.diagnosis.laws.torque_laws import behaviour
@@ -16,19 +17,36 @@ from planner.inference.evidence import occam, temper, unexplained_shares
 
 @dataclass(frozen=True)
 class LevelMisfit:
-    """Σ weight |error|²: of a linear joint, what noise alone would leave, and the former's excess.
+    """Σ weight |error|² of a linear joint: of the differences between levels, of the strongest.
 
-    A linear simulation says that levels do not differ; of the strongest only the noise is counted,
-    because a linear fit could still follow them.
+    `values` is what noise alone would leave of the differences. A linear simulation says that
+    levels do not differ; how closely it follows the strongest may be owed to anything else.
     """
 
-    linear: float
-    expected: float
-    excess: float
+    differing: float
+    strongest: float
+    values: float
+
+    @property
+    def linear(self) -> float:
+        """All that a linear joint leaves."""
+        return self.differing + self.strongest
+
+    @property
+    def expected(self) -> float:
+        """What it would leave if the differences were noise."""
+        return self.values + self.strongest
+
+    @property
+    def excess(self) -> float:
+        """What there is to be explained."""
+        return max(self.differing - self.values, 1e-9)
 
     def explained(self, candidate: LawMisfit) -> float:
-        """Share of the excess that a law takes away."""
-        return 1 - max(candidate.chi2 - self.expected, 0.0) / self.excess
+        """Share of the excess that a law takes away, the strongest being followed as closely."""
+        differing = max(candidate.differing - self.values, 0.0)
+        strongest = max(candidate.chi2 - candidate.differing - self.strongest, 0.0)
+        return 1 - (differing + strongest) / self.excess
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +76,7 @@ def weighed_laws(
     """
     count = 2 * int(np.count_nonzero(data.weight))
     t = temper(min(2 * c.chi2 for c in kept) / count, ALIKE)
-    levels = levels_of(data)
+    levels = levels_of(data, system)
     out = []
     for c in kept:
         evidence = (levels.linear - _cost(c)) / t - _volume(c, t)
@@ -69,14 +87,14 @@ def weighed_laws(
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 
 
-def levels_of(data: LevelData) -> LevelMisfit:
-    """What a linear joint leaves of the differences between levels, and what noise alone would."""
-    weaker = data.weaker[:, 0, 0]
-    differing = float(np.sum(data.chi2(data.compared(data.h))[weaker]))
-    strongest = float(np.count_nonzero(data.weight[~weaker]))
-    values = float(np.count_nonzero(data.weight[weaker]))
-    excess = max(differing - values, 1e-9)
-    return LevelMisfit(differing + strongest, strongest + values, excess)
+def levels_of(data: LevelData, system: System) -> LevelMisfit:
+    """What a linear joint leaves of the levels, by a linear `system`."""
+    weaker, still = data.weaker[:, 0, 0], np.zeros((1, 1, *data.force.shape))
+    linear = frfs(data, system, np.array([0]), still)[0]
+    each = data.chi2(data.compared(data.h) - np.where(data.weaker, 0.0, linear))
+    noise = np.count_nonzero(data.weight, axis=(1, 2))
+    strongest = max(float(np.sum(each[~weaker])), float(np.sum(noise[~weaker])))
+    return LevelMisfit(float(np.sum(each[weaker])), strongest, float(np.sum(noise[weaker])))
 
 
 def _cost(candidate: LawMisfit) -> float:
@@ -122,6 +140,8 @@ def law_finding(there: Sequence[WeighedLaw], laws: Laws) -> Finding:
         f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
         f"change with the force.{_or_else(there[1:], laws.probability[1:])}"
     )
+    if best.candidate.law.rest is not None:
+        text = f"{text} At rest its weight holds it at one end of the gap."
     return Finding(
         name, best.at, best.log_evidence, best.parameters, text, best.per_value, best.explained,
         tuple(rivals.items()), laws,
