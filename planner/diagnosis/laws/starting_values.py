@@ -54,7 +54,7 @@ def starts(
     return out
 
 
-def hanging_starts(
+def held_starts(
     found: Equivalent, system: System, port: int, x: np.ndarray, sag: np.ndarray
 ) -> list[LawAtJoints]:
     """Backlash of a joint that its weight holds at one flank of the gap.

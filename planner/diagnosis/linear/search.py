@@ -3,47 +3,31 @@
 from collections.abc import Sequence
 from functools import partial
 
-import numpy as np
-
 from planner.diagnosis.effects.base_compliance import BaseCompliance
 from planner.diagnosis.effects.combined import Both, families, together
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.beams import as_beams
-from planner.diagnosis.linear.evidence import best_of, cut, lag
+from planner.diagnosis.linear.evidence import best_of, lag
 from planner.diagnosis.linear.fit import (
-    AFRESH_STEPS,
-    ROUGH_STEPS,
     SETTLED,
     Fit,
-    afresh,
-    approached,
-    begins_alone,
     carried_on,
-    from_median,
-    glance,
-    promise,
     settle,
     staged,
 )
 from planner.diagnosis.linear.found import Found, distinct
 from planner.diagnosis.linear.leaders import Place, best_of_few, leaders_of, next_leader, place_of
 from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_bent, rigid
-from planner.diagnosis.linear.problem import CLOSE, FINE, Grade, Problem
+from planner.diagnosis.linear.problem import CLOSE, Problem
+from planner.diagnosis.linear.rounds import HOPELESS, LAST, LAST_STEPS, STEPS, one_round, settled
 from planner.diagnosis.linear.stated_values import strayed
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear.three_axis_resonators import hung, three_axis_resonators
-from planner.diagnosis.thresholds import AT_NOISE, CLEARLY_WRONG, PAYS
-from planner.identification.held_out import farthest_first
+from planner.diagnosis.thresholds import AT_NOISE, PAYS
 from planner.inference.parallel import side_by_side
 from planner.progress import Tell, quietly, within
 
-FIRST, LAST = 10, 4  # candidates followed, and settled on all lines
-STEPS, LAST_STEPS = 12, 30
-BEGUN = 3  # steps of each pair, before the most promising are followed
-FEW = 5  # poses on which all are looked at where something is clearly wrong
-FAR = 6  # effects begun at their priors' medians that are followed, where inertias are bent
-HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fits
 MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
 POINTED = 2  # suspects settled on all lines
@@ -68,13 +52,13 @@ def search(
     most_leaders = MOST_LEADERS_BENT if bent else MOST_LEADERS
     if not effects:
         return Found((settle(problem, refitted, CLOSE, STEPS),), ())
-    found = _round(problem, refitted, effects, within(tell, 0.0, 0.6))
+    found = one_round(problem, refitted, effects, within(tell, 0.0, 0.6))
     found = _loosened(problem, refitted, found, effects)
     found = _widened(problem, found, effects)
     if best_of_few(found).per_value > AT_NOISE:
         tell("letting it give and carry everywhere", 0.6)
         found = Found((*found.finalists, *_pointed(problem, found, effects)), found.left)
-        swinging = _settled(problem, hung(problem, effects))
+        swinging = settled(problem, hung(problem, effects))
         found = Found((*found.finalists, *swinging), found.left)
         found = _lessened(problem, found)
     leaders = leaders_of(found) if best_of_few(found).per_value > AT_NOISE else []
@@ -84,12 +68,12 @@ def search(
         led.append(place_of(leader.effect))
         pairs = [p for e in effects if (p := together(leader.effect, e)) is not None]
         along = within(tell, first, first + 0.4 / most_leaders)
-        more = _round(problem, leader, pairs, along)
+        more = one_round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
     found = _moved(problem, found, effects)
     if min(f.per_value for f in found.finalists) > AT_NOISE:
-        near = _settled(problem, three_axis_resonators(problem, found.finalists))
+        near = settled(problem, three_axis_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
     if not bent:
         found = _composed(problem, found, effects, tell)
@@ -132,7 +116,7 @@ def _widened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found
     best = best_of_few(found)
     if best.per_value <= AT_NOISE and not inertias_bent(best):
         return found
-    near = _settled(problem, as_beams(problem, found.finalists))
+    near = settled(problem, as_beams(problem, found.finalists))
     if best.per_value > AT_NOISE:
         bases = [e for e in effects if isinstance(e, BaseCompliance)]
         near += [staged(problem, max(bases, key=lambda e: len(e.gives)))] if bases else []
@@ -142,13 +126,7 @@ def _widened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found
 def _followed(problem: Problem, rough: Sequence[Fit], first: bool = True) -> list[Fit]:
     """The best rough fits (with `first`, the first one too), the best of them on all lines."""
     few = _and_best(rough, LAST) if first else best_of(rough, LAST)
-    return _settled(problem, best_of(_settled(problem, few, CLOSE, STEPS), POINTED))
-
-
-def _settled(
-    problem: Problem, fits: Sequence[Fit], grade: Grade = FINE, steps: int = LAST_STEPS
-) -> list[Fit]:
-    return side_by_side(partial(settle, problem, grade=grade, steps=steps), fits)
+    return settled(problem, best_of(settled(problem, few, CLOSE, STEPS), POINTED))
 
 
 def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
@@ -162,13 +140,13 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     if best.per_value <= AT_NOISE:
         return found
     near = best_of(elsewhere(problem, best, effects), MOVED)
-    return Found((*found.finalists, *_settled(problem, near)), found.left)
+    return Found((*found.finalists, *settled(problem, near)), found.left)
 
 
 def _rigid(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds fits in which the best's resonators are replaced by masses that do not swing."""
     best = min(found.finalists, key=lambda f: f.value)
-    return Found((*found.finalists, *_settled(problem, rigid(problem, best, effects))), found.left)
+    return Found((*found.finalists, *settled(problem, rigid(problem, best, effects))), found.left)
 
 
 def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: Tell) -> Found:
@@ -180,7 +158,7 @@ def _composed(problem: Problem, found: Found, effects: Sequence[Effect], tell: T
             break
         more = [t for e in effects if (t := together(best.effect, e)) is not None]
         tell("looking for more effects", 0.97)
-        grown = _round(problem, best, more, quietly)
+        grown = one_round(problem, best, more, quietly)
         before = best.per_value
         found = Found((*found.finalists, *grown.finalists[1:]), (*found.left, *grown.left))
         best = min(found.finalists, key=lambda f: f.per_value)
@@ -201,7 +179,7 @@ def _accompanied(problem: Problem, found: Found, effects: Sequence[Effect], tell
     pairs = [t for e in effects if (t := together(best.effect, e)) is not None]
     if not pairs:
         return found
-    more = _round(problem, best, pairs, quietly)
+    more = one_round(problem, best, pairs, quietly)
     return Found((*found.finalists, *more.finalists[1:]), (*found.left, *more.left))
 
 
@@ -243,81 +221,8 @@ def _burdened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Foun
     if best.per_value > AT_NOISE:
         return found
     near = best_of(burdened(problem, best, effects), LAST)
-    return Found((*found.finalists, *_settled(problem, near, steps=SETTLED[1])), found.left)
+    return Found((*found.finalists, *settled(problem, near, steps=SETTLED[1])), found.left)
 
 
 def _carried_on(problem: Problem, pair: tuple[Fit, Effect]) -> Fit:
     return carried_on(problem, *pair, LAST_STEPS)
-
-
-def _round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell) -> Found:
-    """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
-    none, effects = settle(problem, warm, CLOSE, STEPS), list(filter(problem.able, effects))
-    clearly = none.per_value > CLEARLY_WRONG
-    few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
-    look = glance if clearly else promise
-    pairs = clearly and min((len(e.parts()) for e in effects), default=0) > 1
-    looked = (
-        partial(glance, few, warm=none, steps=BEGUN) if pairs else partial(look, few, warm=none)
-    )
-    share = 0.6 / max(len(effects), 1)
-    fits = side_by_side(looked, effects, lambda n, count: tell(_words(effects[n]), share * count))
-    if pairs:
-        fits = _gone_on(fits)
-    if not clearly and inertias_bent(none):
-        fits = _unbent(problem, fits)
-    if clearly:
-        order = np.argsort([f.value for f in fits])
-        close = _settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
-        close = side_by_side(partial(afresh, problem), close)
-        worst = max(lag([none, *close]))
-        left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
-    else:
-        kept, left = cut([none, *fits], FIRST)
-        if min(lag([none, *fits])[1:]) - lag([none, *fits])[0] > -HOPELESS:
-            kept, more = cut([none, *fits], 1)
-            return Found((settle(problem, none),), tuple(more))
-        close = _settled(problem, kept[1:], CLOSE, STEPS)
-    tell("following the best", 0.8)
-    kept, more = cut([none, *close], LAST)
-    tell("settling", 0.9)
-    return Found(tuple(_settled(problem, kept)), (*left, *more))
-
-
-def _unbent(problem: Problem, near: Sequence[Fit]) -> list[Fit]:
-    """Fits, or those from their priors' medians that lead farther.
-
-    What begins there is far behind inertias that were bent to fit, for many steps: the best of
-    these are told apart among themselves, and followed.
-    """
-    alone = [i for i, f in enumerate(near) if begins_alone(f.effect)]
-    far = dict(
-        zip(
-            alone,
-            side_by_side(partial(from_median, problem), [near[i] for i in alone]),
-            strict=True,
-        )
-    )
-    best = sorted(alone, key=lambda i: far[i].value)[:FAR]
-    more = side_by_side(_carried_far, [far[i] for i in best])
-    far |= dict(zip(best, more, strict=True))
-    return [min((f, far.get(i, f)), key=lambda f: f.value) for i, f in enumerate(near)]
-
-
-def _carried_far(begun: Fit) -> Fit:
-    return approached(begun.misfit, [begun.x], AFRESH_STEPS - ROUGH_STEPS)
-
-
-def _gone_on(begun: Sequence[Fit]) -> list[Fit]:
-    """Rough fits, the most promising of them followed as far as `glance` goes."""
-    order = np.argsort([f.value for f in begun])
-    best = [begun[i] for i in order[: 2 * FIRST]]
-    return side_by_side(_rough, best) + [begun[i] for i in order[2 * FIRST :]]
-
-
-def _rough(begun: Fit) -> Fit:
-    return approached(begun.misfit, [begun.x], ROUGH_STEPS - BEGUN)
-
-
-def _words(effect: Effect) -> str:
-    return " and ".join(f"{p.name.replace('_', ' ')} at {p.at}" for p in effect.parts())
