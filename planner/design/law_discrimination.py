@@ -36,8 +36,12 @@ class TellingForces:
 
 
 def undecided(laws: Laws) -> Laws:
-    """Those of the laws that the recordings leave tied, as probable as they were."""
-    tied = [i for i, share in enumerate(laws.probability) if share > TIED]
+    """Those of the laws that the recordings leave tied, as probable as they were.
+
+    Not play of a gear that bears weight: how that goes with the swing, its pose says.
+    """
+    both = zip(laws.probability, laws.candidates, strict=True)
+    tied = [i for i, (share, c) in enumerate(both) if share > TIED and not c.law.borne]
     return replace(
         laws,
         candidates=tuple(laws.candidates[i] for i in tied),

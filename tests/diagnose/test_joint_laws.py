@@ -40,7 +40,7 @@ def test_what_hangs_leaves_its_flank_only_where_it_swings_far():
     """Bearing on one flank, 0.2 beyond the edge of a gap of ± 0.3: slack between −0.2 and −0.8."""
     now = np.array([1.0, 0.0, -0.2, -0.5, -0.8, -3.0])
     for way in (1.0, -1.0):
-        rest, one = np.full(6, 0.2 * way), np.ones(6)
+        rest, one = np.full(6, 0.5 * way), np.ones(6)
         torque, slope, after = DEAD_ZONE.step(np, one, 0.3 * one, rest, 0 * one, way * now)
         assert np.allclose(torque, way * np.array([0.0, 0.0, 0.0, 0.3, 0.6, 0.6]))
         assert slope[[0, 1, 3, 5]] == pytest.approx([0.0, 0.0, -1.0, 0.0])

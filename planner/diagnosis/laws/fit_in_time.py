@@ -195,7 +195,7 @@ def one_joint_frfs(
         moved = [replace(law, nu=law.nu + shift[:, None]) for shift in shifts]
         extra = [0.0, 0.0, 0.0, STEP * own]
         numbers += [(m.k[0], m.a[0], e) for m, e in zip(moved, extra, strict=True)]
-        rest += 4 * [law.rest_at(hits.visit)[:, 0]]
+        rest += [m.rest_at(hits.visit)[:, 0] for m in moved]
         first, last = 4 * number * c, 4 * (number + 1) * c
         if follow and follow[-1][0] is law.kind:  # neighbours that follow the same law, as one
             first = follow.pop()[1].start

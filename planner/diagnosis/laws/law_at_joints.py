@@ -17,6 +17,7 @@ from planner.diagnosis.thresholds import (
 )
 from planner.inference.least_squares import Limits
 
+FIRMEST = 0.99  # of a joint's stiffness, lacking in its gap
 LONGEST = 0.7  # of a step: in the logarithms of the law, in sds of the linear parameters
 
 
@@ -27,8 +28,8 @@ class LawAtJoints:
     k is the share times the joints' stiffness `scale` (m,) in N·m/rad, ln a is `middle` (m,) + ν.
     With `sign` 0 ν holds the share itself, which may change its sign; otherwise its logarithm.
     `ports` (m,) are the joints, as numbered by `System.ports`; of those that `slides` (m,) says,
-    k is in N/m and a in m. `rest` (n, m) is the state of the law (see `Law`) before each visit's
-    hits, if it is not 0.
+    k is in N/m and a in m. Springs of the joints' stiffness would give by `sag` (n, m) under their
+    weight at each visit (rad, of joints that slide m), of which gears bear the share `borne`.
     """
 
     kind: Law
@@ -39,11 +40,19 @@ class LawAtJoints:
     x: np.ndarray
     nu: np.ndarray
     slides: tuple[bool, ...] = ()
-    rest: np.ndarray | None = None
+    sag: np.ndarray | None = None
+    borne: float = 0.0
 
     def rest_at(self, visit: np.ndarray) -> np.ndarray:
-        """(c, m): the state before hits of these visits (c,)."""
-        return np.zeros((len(visit), len(self.ports))) if self.rest is None else self.rest[visit]
+        """(c, m): how far from the middle of their gap (as `sag`) joints are before these hits.
+
+        There a spring that lacks k within ± a bears the weight.
+        """
+        if self.sag is None:
+            return np.zeros((len(visit), len(self.ports)))
+        held, share = self.borne * self.sag[visit], np.clip(self.k / self.scale, 0.0, FIRMEST)
+        beyond = held + share * self.a * np.sign(held)
+        return np.where(np.abs(beyond) > self.a, beyond, held / (1 - share))
 
     @property
     def effect(self) -> str:
@@ -119,11 +128,10 @@ class LawAtJoints:
 class LawMisfit:
     """The objective of a law: χ² over complex values, and the value χ² + prior/2 = −ln posterior.
 
-    `differing` is the part of χ² that levels differ by more or less than simulated. `residual`
-    (c, 3, F) is measured less simulated, of what is compared; `stiffer` (c, m) in
-    N·m/rad is what the law adds to the joints' stiffness, on the whole, while a hit rings. Gradient
-    (D + 2 m,) and Gauss-Newton matrix are those of the value, `normal` that of the last step where
-    they were not asked for.
+    `differing` is the χ² of what weaker hits differ from the strongest by. `residual` (c, 3, F) is
+    measured less simulated, of what is compared; `stiffer` (c, m) in N·m/rad is what the law adds
+    to the joints' stiffness, on the whole, while a hit rings. Gradient (D + 2 m,) and Gauss-Newton
+    matrix are those of the value, `normal` that of the last step where they were not asked for.
     """
 
     law: LawAtJoints

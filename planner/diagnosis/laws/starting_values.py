@@ -1,5 +1,7 @@
 """Where the fits in time begin: laws fitted to equivalent stiffness against swing."""
 
+from itertools import product
+
 import numpy as np
 
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System
@@ -11,9 +13,11 @@ EFFECTIVE = 0.7  # of the largest swing: not all modes peak at once
 ROUGH = 0.05  # error of an equivalent stiffness, in shares of the joint's
 MOST, MOST_LACKING = 5.0, 0.9  # of k, in shares of the joint's stiffness
 ASIDE = (-4, 0, 4, 8)  # steps of the grid to the neighbours: fading hits look like smaller a
-GAPS = (0.02, 0.06, 0.2, 0.6, 1.5)  # the same, of joints that hang
-WEIGHTLESS = 1e-3  # sag, times the same: of joints that turn about an upright axis
-BORNE = (0.02, 0.06, 0.2, 0.6)  # share of the weight that such a gear bears
+BORNE = (0.02, 0.06, 0.2, 0.6)  # share of the weight that a gear bears
+SLACK = (0.5, 0.98)  # of their stiffness, that they lack in the gap
+# Of such joints, times the median swing at the highest level: a; and the sag of those that turn
+# about an upright axis.
+GAPS, WEIGHTLESS = (0.03, 0.15, 0.6), 1e-3
 GRID = np.geomspace(0.01, 4.0, 28)  # a, times the median swing at the highest level
 
 
@@ -57,11 +61,11 @@ def starts(
 def held_starts(
     found: Equivalent, system: System, port: int, x: np.ndarray, sag: np.ndarray
 ) -> list[LawAtJoints]:
-    """Backlash of a joint that its weight holds at one flank of the gap.
+    """Backlash of a joint that its weight holds at one end of the gap.
 
     By `sag` (n,) in rad its spring gives at each visit under all of the weight, of which
-    compensator and brake bear a part. What hangs so leaves the flank where it swings farther: it
-    grows softer, then stiffer.
+    compensator and brake bear a part. Where it swings farther it leaves that end: it grows
+    softer, then stiffer.
     """
     law = next(law for law in LAWS if law.effect == "backlash")
     scale = float(system.elasticity.stiffness[system.blocks[port]])
@@ -72,10 +76,9 @@ def held_starts(
     return [
         LawAtJoints(
             law, 1, ports, np.array([scale]), np.log([middle]), x.copy(),
-            np.array([[np.log(MOST_LACKING)], [np.log(a)]]), slides, borne * sag[:, None],
+            np.array([[np.log(slack)], [np.log(a)]]), slides, sag[:, None], borne,
         )
-        for borne in BORNE
-        for a in GAPS
+        for borne, slack, a in product(BORNE, SLACK, GAPS)
     ]  # fmt: skip
 
 

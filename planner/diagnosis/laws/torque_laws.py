@@ -33,7 +33,7 @@ class Law:
     """`step(xp, k, a, state, before, now)` tells what a motion from `before` to `now` does.
 
     `xp` is the array library, numpy or jax.numpy. The state is 0 at rest, of backlash how far
-    beyond the gap's edge (rad, signed) the weight holds the joint then. `signed`: k may be
+    from the middle of the gap the weight holds the joint then, in its unit. `signed`: k may be
     negative. `least_share` bounds k from below in shares of the joint's linear stiffness,
     `most_share` from above.
     """
@@ -88,10 +88,9 @@ def _stiffening(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> T
 
 
 def _dead_zone(xp: Any, k: Any, a: Any, state: Any, before: Any, now: Any) -> Torque:
-    """Within ± a the spring lacks k; what hangs rests beyond the edge, not in the middle."""
-    rest = state + a * xp.sign(state)
-    there = now + rest
-    lacking = xp.clip(there, -a, a) - xp.clip(rest, -a, a)
+    """Within ± a of the middle the spring lacks k; the state is where it rests."""
+    there = now + state
+    lacking = xp.clip(there, -a, a) - xp.clip(state, -a, a)
     return -k * lacking, xp.where(xp.abs(there) < a, -k, 0.0), state
 
 

@@ -15,8 +15,10 @@ MOST = 2  # fits of which that is asked
 
 def as_beams(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
     """Rough fits in which the links of the best fits that have bending ones are beams."""
-    there = [f for f in finalists if any(map(_bends, f.effect.parts()))]
-    return tuple(side_by_side(partial(_as_beam, problem), best_of(there, MOST)))
+    there: dict[frozenset[tuple[str, str]], Fit] = {}
+    for f in best_of([f for f in finalists if any(map(_bends, f.effect.parts()))], len(finalists)):
+        there.setdefault(frozenset((p.name, p.at) for p in f.effect.parts()), f)
+    return tuple(side_by_side(partial(_as_beam, problem), list(there.values())[:MOST]))
 
 
 def _bends(effect: object) -> bool:

@@ -32,6 +32,7 @@ MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fi
 MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
 POINTED = 2  # suspects settled on all lines
 MOVED = 2  # effects at other places, the same
+TILTS = 2  # of a base, that rounds fit closely enough
 LESSENED = 3  # explanations that are looked at without one of their effects
 MOST_EFFECTS = 5  # at once, where each pays
 
@@ -118,8 +119,8 @@ def _widened(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found
         return found
     near = settled(problem, as_beams(problem, found.finalists))
     if best.per_value > AT_NOISE:
-        bases = [e for e in effects if isinstance(e, BaseCompliance)]
-        near += [staged(problem, max(bases, key=lambda e: len(e.gives)))] if bases else []
+        bases = (e for e in effects if isinstance(e, BaseCompliance) and len(e.gives) > TILTS)
+        near += [staged(problem, e) for e in bases if problem.able(e)]
     return Found((*found.finalists, *near), found.left)
 
 

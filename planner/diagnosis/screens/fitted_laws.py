@@ -58,7 +58,7 @@ def weigh_held(
     """
     plain = misses.plain
     port = int(np.argmin(found.chi2.sum(axis=0)))
-    sag = plain.misfit.setting.simulation.elastic.sag(recorded.q)[:, system.blocks[port]]
+    sag = plain.misfit.setting.simulation.elastic.sag(recorded.visit_q)[:, system.blocks[port]]
     begin = held_starts(found, system, port, plain.x, sag)
     return _fitted(_problem(recorded, misses), begin, system, found, tell) if begin else ()
 
@@ -101,8 +101,8 @@ def _held_otherwise(
     out = []
     for fit in fits:
         law = fit.at.law
-        held = [replace(law, rest=law.rest * f) for f in OTHERWISE] if law.rest is not None else []
-        begin = [problem.start(one, BATCH_DAMPING) for one in held]
+        shares = {min(law.borne * factor, 1.0) for factor in OTHERWISE} - {law.borne}
+        begin = [problem.start(replace(law, borne=share), BATCH_DAMPING) for share in shares]
         out.append(min([fit, *advance(problem, begin, 1)], key=lambda one: one.at.value))
     return out
 

@@ -130,10 +130,10 @@ def _named(
     weighed = _weighed(recorded, look, tell, least, held=held)
     if not weighed:
         return (_unknown(found, "even with a stiffness of its own for every hit"),), False
-    best = weighed[0]
+    there, shares = shares_of_laws(weighed)
+    best = there[0]
     if best.log_evidence > CLEAR and best.explained > least:
-        there, shares = shares_of_laws(weighed)
-        best, c = there[0], there[0].candidate
+        c = best.candidate
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
         candidates = tuple(w.candidate for w in there)
         laws = Laws(look.problem, plain, candidates, shares, best.temper, _hardest(recorded))

@@ -19,23 +19,25 @@ from planner.inference.evidence import occam, temper, unexplained_shares
 class LevelMisfit:
     """Σ weight |error|² of a linear joint: of the differences between levels, of the strongest.
 
-    `values` is what noise alone would leave of the differences. A linear simulation says that
-    levels do not differ; how closely it follows the strongest may be owed to anything else.
+    `values` is what noise alone would leave of the differences, `noise` of the strongest. A linear
+    simulation says that levels do not differ; how closely it follows the strongest may be owed to
+    anything else, and another linear fit could follow them to the noise.
     """
 
     differing: float
     strongest: float
     values: float
+    noise: float
 
     @property
     def linear(self) -> float:
-        """All that a linear joint leaves."""
-        return self.differing + self.strongest
+        """What a linear joint leaves at least."""
+        return self.differing + self.noise
 
     @property
     def expected(self) -> float:
-        """What it would leave if the differences were noise."""
-        return self.values + self.strongest
+        """What noise alone would leave."""
+        return self.values + self.noise
 
     @property
     def excess(self) -> float:
@@ -44,6 +46,8 @@ class LevelMisfit:
 
     def explained(self, candidate: LawMisfit) -> float:
         """Share of the excess that a law takes away, the strongest being followed as closely."""
+        if not np.isfinite(candidate.chi2):
+            return -np.inf
         differing = max(candidate.differing - self.values, 0.0)
         strongest = max(candidate.chi2 - candidate.differing - self.strongest, 0.0)
         return 1 - (differing + strongest) / self.excess
@@ -92,9 +96,10 @@ def levels_of(data: LevelData, system: System) -> LevelMisfit:
     weaker, still = data.weaker[:, 0, 0], np.zeros((1, 1, *data.force.shape))
     linear = frfs(data, system, np.array([0]), still)[0]
     each = data.chi2(data.compared(data.h) - np.where(data.weaker, 0.0, linear))
-    noise = np.count_nonzero(data.weight, axis=(1, 2))
-    strongest = max(float(np.sum(each[~weaker])), float(np.sum(noise[~weaker])))
-    return LevelMisfit(float(np.sum(each[weaker])), strongest, float(np.sum(noise[weaker])))
+    count = np.count_nonzero(data.weight, axis=(1, 2))
+    values, noise = float(np.sum(count[weaker])), float(np.sum(count[~weaker]))
+    strongest = max(float(np.sum(each[~weaker])), noise)
+    return LevelMisfit(float(np.sum(each[weaker])), strongest, values, noise)
 
 
 def _cost(candidate: LawMisfit) -> float:
@@ -140,8 +145,9 @@ def law_finding(there: Sequence[WeighedLaw], laws: Laws) -> Finding:
         f"{a:.3g} ± {a_sd:.1g} {other}); it explains {100 * best.explained:.0f} % of how FRFs "
         f"change with the force.{_or_else(there[1:], laws.probability[1:])}"
     )
-    if best.candidate.law.rest is not None:
-        text = f"{text} At rest its weight holds it at one end of the gap."
+    if borne := best.candidate.law.borne:
+        held = f"At rest {100 * borne:.2g} % of its weight hold it at one end of the gap."
+        text = f"{text} {held}"
     return Finding(
         name, best.at, best.log_evidence, best.parameters, text, best.per_value, best.explained,
         tuple(rivals.items()), laws,
