@@ -132,7 +132,7 @@ def _named(
         return (_unknown(found, "even with a stiffness of its own for every hit"),), False
     there, shares = shares_of_laws(weighed)
     best = there[0]
-    if best.log_evidence > CLEAR and best.explained > least:
+    if min(best.log_evidence, best.gain) > CLEAR and best.explained > least:
         c = best.candidate
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
         candidates = tuple(w.candidate for w in there)

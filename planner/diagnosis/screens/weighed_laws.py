@@ -69,6 +69,14 @@ class WeighedLaw:
     parameters: dict[str, tuple[float, float, str]]
     temper: float
 
+    @property
+    def gain(self) -> float:
+        """By how much more the differences between levels speak for it, in nats.
+
+        Its evidence also holds what else it made fit: that is no law of levels.
+        """
+        return (self.levels.differing - self.candidate.differing) / self.temper
+
 
 def weighed_laws(
     data: LevelData, system: System, kept: Sequence[LawMisfit]
