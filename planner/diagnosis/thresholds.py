@@ -39,7 +39,7 @@ ACROSS_STIFFNESS = 0.2, 20.0  # of a joint across its axis, times that about its
 SLIGHTLY_ACROSS = 50.0, 2000.0
 LINK_STIFFNESS = 0.1, 10.0  # of a link, times that of the joint that moves it about its own axis
 # Of its halves past each other, times that of bending by its length squared: 12 of a uniform beam,
-# less where shear gives too, more where one place gives most.
+# less where shear gives too, more where one place gives most. Chosen.
 LINK_SHIFT_STIFFNESS = 6.0, 50.0
 FURTHER_DAMPING_FACTOR = 8.0  # either way, of the damping of springs that are not stated
 # Prior sd of where a bending link's halves have their centres, of their distance: where a link's

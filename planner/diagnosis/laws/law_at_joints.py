@@ -44,9 +44,9 @@ class LawAtJoints:
     borne: float = 0.0
 
     def rest_at(self, visit: np.ndarray) -> np.ndarray:
-        """(c, m): how far from the middle of their gap (as `sag`) joints are before these hits.
+        """(c, m): how far from the middle of their gap joints rest, before hits of visits (c,).
 
-        There a spring that lacks k within ± a bears the weight.
+        In the unit of `sag`. There a spring that lacks k within ± a bears the weight's share.
         """
         if self.sag is None:
             return np.zeros((len(visit), len(self.ports)))

@@ -13,7 +13,8 @@ EFFECTIVE = 0.7  # of the largest swing: not all modes peak at once
 ROUGH = 0.05  # error of an equivalent stiffness, in shares of the joint's
 MOST, MOST_LACKING = 5.0, 0.9  # of k, in shares of the joint's stiffness
 ASIDE = (-4, 0, 4, 8)  # steps of the grid to the neighbours: fading hits look like smaller a
-BORNE = (0.02, 0.06, 0.2, 0.6)  # share of the weight that a gear bears
+# Share of the weight that a gear bears. This and the next two: chosen, looking at two cases.
+BORNE = (0.02, 0.06, 0.2, 0.6)
 SLACK = (0.5, 0.98)  # of their stiffness, that they lack in the gap
 # Of such joints, times the median swing at the highest level: a; and the sag of those that turn
 # about an upright axis.

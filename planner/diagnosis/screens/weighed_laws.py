@@ -100,7 +100,7 @@ def weighed_laws(
 
 
 def levels_of(data: LevelData, system: System) -> LevelMisfit:
-    """What a linear joint leaves of the levels, by a linear `system`."""
+    """What a linear `system` leaves of the strongest hits, and of what weaker ones differ by."""
     weaker, still = data.weaker[:, 0, 0], np.zeros((1, 1, *data.force.shape))
     linear = frfs(data, system, np.array([0]), still)[0]
     each = data.chi2(data.compared(data.h) - np.where(data.weaker, 0.0, linear))
