@@ -9,7 +9,7 @@ import numpy as np
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.beyond_tolerance import with_artefacts
-from planner.diagnosis.linear.damper_like_springs import damper_like
+from planner.diagnosis.linear.damper_like_springs import as_structure
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
@@ -152,10 +152,10 @@ def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Fo
 
 def _with_discrepancy(candidate: Candidate, found: Found, weights: Weights) -> Candidate:
     """The candidate with its fit where the discrepancy's likeliest size lets it be."""
-    fit = candidate.fit
-    number = next((i for i, f in enumerate(found.finalists) if f is fit), None)
-    if fit is None or number is None or candidate.probability < TIED:
+    fit, effects = candidate.fit, [f.effect for f in found.finalists]
+    if fit is None or fit.effect not in effects or candidate.probability < TIED:
         return candidate
+    number = effects.index(fit.effect)
     springs, size = stated_springs(found.finalists[0]), weights.worth[number].size
     return replace(candidate, fit=settled_with(fit, springs, size))
 
@@ -224,8 +224,12 @@ def _candidates(
     shares = list(without_slight(fits, named, *own, matters))
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):
-        if shares[i] > TIED / len(fits) and damper_like(one, weights.temper):
+        if shares[i] < TIED / len(fits):
+            continue
+        if (structure := as_structure(one, fits[0], weights.temper)) is None:
             unknown, shares[i] = unknown + shares[i], 0.0
+        else:
+            fits[i] = structure
     leader = int(np.argmax(shares))
     lead = prior[leader]
     before = _priors([effect for effect, _, _ in found.left], all_)

@@ -98,6 +98,7 @@ LEFT_FACTOR = 1.5
 # c·ω/k mid-band from which a spring that gives is no bearing, link or foot (welded frames: 0.01,
 # rubber feet: 0.3), where the FRFs tell ln k to within the second. Chosen.
 LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN = 1.0, 0.3
+DAMPER_WORTH = 0.01  # of what an effect explains: such springs may as well be stiff. Chosen.
 SOMETHING_UNKNOWN = 0.05  # probability, before any data, that something of no library is there
 # Where it is, each stated stiffness and inertia is with this probability pulled away by so many of
 # its tolerances. Chosen, looking at concealed cases of seeds 52001 to 52015.

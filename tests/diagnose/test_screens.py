@@ -150,7 +150,9 @@ def test_a_pose_that_answers_as_before_has_not_drifted(plain):
 def test_without_drift_its_misfit_is_the_plain_one_and_gradients_agree(plain, simulation):
     problem = problem_of(plain, simulation)
     quantities = (Quantity("change", "1", 0.0, 0.2), Quantity("bend", "1", 0.0, 3.0))
-    for law, own in ((Drift("campaign", quantities), 2), (Drift.of_each(simulation), 7)):
+    gradual, step = Drift("campaign", quantities), Drift.at_once(0.5)
+    laws = gradual, gradual.of_each(simulation), step, step.of_each(simulation)
+    for law, own in zip(laws, (2, 7, 1, 6), strict=True):
         misfit = problem.misfit(law, Grade(8))
         still = problem.misfit(Effect(""), Grade(8))
         x = misfit.mean

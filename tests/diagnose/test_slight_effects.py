@@ -1,6 +1,7 @@
 """A slight effect is given up only where the rest need not go far to take its place."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.damper_like_springs import damper_like
+from planner.diagnosis.linear.damper_like_springs import as_structure
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import COARSE
 from planner.diagnosis.linear.slightness import without_slight
@@ -114,11 +115,33 @@ def test_of_the_halves_of_a_link_that_bends_nothing_is_stated(at):
     assert moved(at("none", "", {"i_xx of joint_3": 5.0}), none) > moved(none, none) + 5
 
 
-@pytest.mark.parametrize(("heavier", "expected"), [(0.0, False), (np.log(60.0), True)])
-def test_what_gives_like_a_damper_is_no_structure(at, heavier, expected):
-    base = at("base_compliance", "base", {"damping of base": heavier})
-    assert damper_like(base, 1.0) is expected
-    assert not damper_like(at("none", "", {}), 1.0)
+def answering(fit: Fit, like: np.ndarray) -> Fit:
+    """The fit, had the robot answered as it does at `like`, known to 1 %."""
+    h = fit.misfit.response(like)[0]
+    sd = 0.01 * np.abs(h)
+    measured = replace(fit.misfit.measured, accelerance=h, sd=sd, noise_sd=sd)
+    misfit = replace(fit.misfit, measured=measured)
+    return Fit(fit.effect, misfit, fit.x, misfit.by_pose(fit.x))
+
+
+def with_its_frfs(fit: Fit, other: Fit) -> Fit:
+    """Another fit to the same FRFs."""
+    misfit = replace(other.misfit, measured=fit.misfit.measured)
+    return Fit(other.effect, misfit, other.x, misfit.by_pose(other.x))
+
+
+@pytest.mark.parametrize("structure", [False, True])
+def test_what_gives_like_a_damper_is_no_structure(at, structure):
+    """Unless its springs may as well be stiff: where they explain what is like a damper, or not."""
+    none, base = at("none", "", {}), at("base_compliance", "base", {})
+    slow = at("base_compliance", "base", {"damping of base": np.log(60.0)})
+    stiff = at("base_compliance", "base", {"stiffness of base": 1.9})
+    fit = answering(slow, stiff.x if structure else slow.x)
+    told = as_structure(fit, with_its_frfs(fit, none), 1.0)
+    assert (told is not None) is structure
+    assert told is None or told.per_value < 0.01
+    assert as_structure(base, none, 1.0) is base
+    assert as_structure(none, none, 1.0) is none
 
 
 def test_the_mean_of_an_uneven_joint_is_told_with_it(at):

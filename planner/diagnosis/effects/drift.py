@@ -5,7 +5,7 @@ those of some joints about their own axes, each by its own ψ, all with one cour
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from planner.diagnosis.effects.places import joint_of, joints
 from planner.diagnosis.thresholds import DRIFT_BEND_SD, DRIFT_LOG_SD
 from planner.dynamics.simulation import Simulation
 
+CHANGE = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
 BEND = Quantity("bend", "1", 0.0, DRIFT_BEND_SD)
 
 
@@ -21,7 +22,7 @@ BEND = Quantity("bend", "1", 0.0, DRIFT_BEND_SD)
 class Drift(Effect):
     """ψ(order) of one kind: "gradual" (end, bend), "step" (size, after `since`), "free" (each).
 
-    A gradual one may be of single `joints`: an end of each, and a bend of all.
+    All but "free" may be of single `joints`, each by its own size; a gradual one has one bend.
     """
 
     kind: str = "gradual"
@@ -31,17 +32,26 @@ class Drift(Effect):
     name = "drift"
 
     @classmethod
-    def of_joints(cls, chosen: Sequence[str]) -> "Drift":
-        """Gradual, each of these joints ("joint_1" and so on) by its own amount."""
-        ends = (Quantity(change_of(joint), "1", 0.0, DRIFT_LOG_SD) for joint in chosen)
-        return cls("campaign", (*ends, BEND), joints=tuple(chosen))
+    def of_all(cls) -> "Drift":
+        """Gradual, of all springs together."""
+        return cls("campaign", (CHANGE, BEND))
 
     @classmethod
-    def of_each(cls, simulation: Simulation) -> "Drift":
+    def at_once(cls, since: float) -> "Drift":
+        """Of all springs together, after `since`."""
+        return cls("campaign", (CHANGE,), "step", since)
+
+    def of_joints(self, chosen: Sequence[str]) -> "Drift":
+        """The same course, each of these joints ("joint_1" and so on) by its own amount."""
+        own = tuple(Quantity(change_of(joint), "1", 0.0, DRIFT_LOG_SD) for joint in chosen)
+        bend = (BEND,) if self.kind == "gradual" else ()
+        return replace(self, quantities=(*own, *bend), joints=tuple(chosen))
+
+    def of_each(self, simulation: Simulation) -> "Drift":
         """As `of_joints`, of all that have a spring of their own."""
         robot = simulation.robot
         sprung = {block.joint for block in robot.config.compliance if robot.is_own(block)}
-        return cls.of_joints([place for place, name in joints(simulation) if name in sprung])
+        return self.of_joints([place for place, name in joints(simulation) if name in sprung])
 
     def members(self, simulation: Simulation) -> np.ndarray:
         """(e, g) of 0 and 1: which elastic degrees of freedom go with which of g factors."""
@@ -57,7 +67,8 @@ class Drift(Effect):
         """ψ(order) (n, g) of each factor, and its derivatives (n, p, g)."""
         if self.kind == "step":
             after = (order >= self.since).astype(float)
-            return psi[0] * after[:, None], after[:, None, None]
+            slope = np.einsum("n,gh->ngh", after, np.eye(len(psi)))
+            return after[:, None] * psi, slope
         if self.kind == "free":
             slope = np.vstack([np.zeros(len(psi)), np.eye(len(psi))])
             return np.append(0.0, psi)[:, None], slope[:, :, None]

@@ -6,24 +6,48 @@ frequency. Over a band that is what a spring does beside a damper far larger tha
 
 import numpy as np
 
-from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.thresholds import LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN
+from planner.diagnosis.linear.fit import Fit, follow
+from planner.diagnosis.thresholds import DAMPER_WORTH, LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN
+
+STIFF = 1.5  # prior sds above its median where a spring changes little
 
 
-def damper_like(fit: Fit, temper: float) -> bool:
-    """Whether a spring of an effect, added or loosened, is mostly a damper mid-band.
+def as_structure(fit: Fit, none: Fit, temper: float) -> Fit | None:
+    """The fit, if need be with its springs that are like dampers stiff instead.
 
-    Only of springs that FRFs tell, χ² counting 1/`temper`.
+    None where those explain a part of what `none` leaves, χ² counting 1/`temper`. A spring that
+    FRFs tell only together with another, in series, may become a damper for next to nothing.
+    """
+    slow = _damper_like(fit, temper)
+    if not slow:
+        return fit
+    x, misfit = fit.x.copy(), fit.misfit
+    for spring, damper in slow:
+        x[spring] = misfit.mean[spring] + STIFF * misfit.sd[spring]
+        if damper is not None:
+            x[damper] = misfit.mean[damper]
+    if not misfit.possible(x):
+        return None
+    stiff = follow(misfit, x)
+    nothing, some, all_ = (f.log_evidence(temper) for f in (none, stiff, fit))
+    worth = all_ - some > DAMPER_WORTH * (all_ - nothing)
+    return None if worth or _damper_like(stiff, temper) else stiff
+
+
+def _damper_like(fit: Fit, temper: float) -> list[tuple[int, int | None]]:
+    """Which springs of an effect, added or loosened, are mostly dampers mid-band; their dampers.
+
+    Only of springs that FRFs tell.
     """
     misfit = fit.misfit
     added = {n for part in fit.effect.parts() for n in part.springs(misfit.setting.simulation)}
     springs = [n for n in added if n.startswith("stiffness of ")]
     if not springs:
-        return False
+        return []
     lines = misfit.measured.frequency_hz
     mid_rad_s = 2 * np.pi * float(np.sqrt(lines.min() * lines.max()))
     sd = np.sqrt(np.diagonal(np.linalg.inv(fit.precision(temper))))
-    place = {name: i for i, name in enumerate(misfit.names)}
+    place, out = {name: i for i, name in enumerate(misfit.names)}, []
     for stiffness in springs:
         k = place.get(stiffness)
         if k is None or sd[k] > STIFFNESS_KNOWN:
@@ -35,5 +59,5 @@ def damper_like(fit: Fit, temper: float) -> bool:
         viscous = 0.0 if c is None else np.exp(fit.x[c] - fit.x[k]) * mid_rad_s
         structural = 0.0 if eta is None else np.exp(fit.x[eta])
         if viscous + structural > LOSS_OF_NO_STRUCTURE:
-            return True
-    return False
+            out.append((k, c))
+    return out

@@ -199,13 +199,13 @@ def approached(misfit: Misfit, starts: Sequence[np.ndarray], steps: int = ROUGH_
 def carried_on(problem: Problem, fit: Fit, effect: Effect, steps: int = SETTLED[1]) -> Fit:
     """An effect fitted to the end from where another fit, perhaps of other data, is."""
     misfit = problem.misfit(effect, FINE)
-    return _settled(misfit, points(misfit, fit)[0], steps)
+    return follow(misfit, points(misfit, fit)[0], steps)
 
 
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
     misfit = problem.misfit(found.effect, grade)
-    return _settled(misfit, _placed(misfit, found.named()), steps)
+    return follow(misfit, _placed(misfit, found.named()), steps)
 
 
 def _placed(misfit: Misfit, known: Mapping[str, float]) -> np.ndarray:
@@ -213,7 +213,8 @@ def _placed(misfit: Misfit, known: Mapping[str, float]) -> np.ndarray:
     return np.array([known.get(n, m) for n, m in zip(misfit.names, misfit.mean, strict=True)])
 
 
-def _settled(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
+def follow(misfit: Misfit, x: np.ndarray, steps: int = SETTLED[1]) -> Fit:
+    """The fit to which x leads, until nothing more is to be gained."""
     return _at(misfit, _minimise(misfit, x, SETTLED[0], steps))
 
 

@@ -32,6 +32,7 @@ STEPS, LAST_STEPS = 12, 30
 BEGUN = 3  # steps of each pair, before the most promising are followed
 FEW = 5  # poses on which all are looked at where something is clearly wrong
 FAR = 6  # effects begun at their priors' medians that are followed, where inertias are bent
+BESIDE = 5  # pairs begun where their leader's fit ended, that are followed
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 
 
@@ -39,7 +40,7 @@ def one_round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell
     """Candidates beside what `warm` has: roughly all, closely few, to the end the best."""
     none, effects = settle(problem, warm, CLOSE, STEPS), list(filter(problem.able, effects))
     clearly = none.per_value > CLEARLY_WRONG
-    few = problem.at(farthest_first(problem.q)[:FEW].tolist()) if clearly else problem
+    few = _few(problem) if clearly else problem
     look = glance if clearly else promise
     pairs = clearly and min((len(e.parts()) for e in effects), default=0) > 1
     looked = (
@@ -53,10 +54,13 @@ def one_round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell
         fits = _unbent(problem, fits)
     if clearly:
         order = np.argsort([f.value for f in fits])
-        close = settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
+        first = FIRST - BESIDE if pairs else FIRST
+        close = settled(problem, [fits[i] for i in order[:first]], CLOSE, STEPS)
         close = side_by_side(partial(afresh, problem), close)
+        if pairs:
+            close += beside(problem, none, effects)
         worst = max(lag([none, *close]))
-        left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
+        left = [(fits[i].effect, worst, fits[i]) for i in order[first:]]
     else:
         kept, left = cut([none, *fits], FIRST)
         if min(lag([none, *fits])[1:]) - lag([none, *fits])[0] > -HOPELESS:
@@ -67,6 +71,18 @@ def one_round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell
     kept, more = cut([none, *close], LAST)
     tell("settling", 0.9)
     return Found(tuple(settled(problem, kept)), (*left, *more))
+
+
+def beside(problem: Problem, leader: Fit, pairs: Sequence[Effect]) -> list[Fit]:
+    """Pairs begun where another fit ended, the most promising followed."""
+    few = _few(problem)
+    begun = side_by_side(partial(promise, few, warm=leader), pairs)
+    order = np.argsort([f.value for f in begun])
+    return settled(problem, [begun[i] for i in order[:BESIDE]], CLOSE, STEPS)
+
+
+def _few(problem: Problem) -> Problem:
+    return problem.at(farthest_first(problem.q)[:FEW].tolist())
 
 
 def _unbent(problem: Problem, near: Sequence[Fit]) -> list[Fit]:
@@ -96,8 +112,8 @@ def _carried_far(begun: Fit) -> Fit:
 def _gone_on(begun: Sequence[Fit]) -> list[Fit]:
     """Rough fits, the most promising of them followed as far as `glance` goes."""
     order = np.argsort([f.value for f in begun])
-    best = [begun[i] for i in order[: 2 * FIRST]]
-    return side_by_side(_rough, best) + [begun[i] for i in order[2 * FIRST :]]
+    best = [begun[i] for i in order[:FIRST]]
+    return side_by_side(_rough, best) + [begun[i] for i in order[FIRST:]]
 
 
 def _rough(begun: Fit) -> Fit:

@@ -17,10 +17,25 @@ from planner.diagnosis.linear.fit import (
     staged,
 )
 from planner.diagnosis.linear.found import Found, distinct
-from planner.diagnosis.linear.leaders import Place, best_of_few, leaders_of, next_leader, place_of
+from planner.diagnosis.linear.leaders import (
+    FEW_EFFECTS,
+    Place,
+    best_of_few,
+    leaders_of,
+    next_leader,
+    place_of,
+)
 from planner.diagnosis.linear.other_places import burdened, elsewhere, inertias_bent, rigid
 from planner.diagnosis.linear.problem import CLOSE, Problem
-from planner.diagnosis.linear.rounds import HOPELESS, LAST, LAST_STEPS, STEPS, one_round, settled
+from planner.diagnosis.linear.rounds import (
+    HOPELESS,
+    LAST,
+    LAST_STEPS,
+    STEPS,
+    beside,
+    one_round,
+    settled,
+)
 from planner.diagnosis.linear.stated_values import strayed
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear.three_axis_resonators import hung, three_axis_resonators
@@ -32,6 +47,7 @@ MOST_LEADERS = 5  # single effects whose company is looked for, while nothing fi
 MOST_LEADERS_BENT = 2  # the same, where a nonlinear joint keeps anything from fitting
 POINTED = 2  # suspects settled on all lines
 MOVED = 2  # effects at other places, the same
+EXCHANGED = 2  # pairs with another effect in the stead of one, the same
 TILTS = 2  # of a base, that rounds fit closely enough
 LESSENED = 3  # explanations that are looked at without one of their effects
 MOST_EFFECTS = 5  # at once, where each pays
@@ -72,7 +88,7 @@ def search(
         more = one_round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
-    found = _moved(problem, found, effects)
+    found = _exchanged(problem, _moved(problem, found, effects), effects)
     if min(f.per_value for f in found.finalists) > AT_NOISE:
         near = settled(problem, three_axis_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
@@ -141,6 +157,23 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     if best.per_value <= AT_NOISE:
         return found
     near = best_of(elsewhere(problem, best, effects), MOVED)
+    return Found((*found.finalists, *settled(problem, near)), found.left)
+
+
+def _exchanged(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """Adds pairs in which another effect stands for one of the best pair's.
+
+    What one effect leads to, another explains more closely: it is begun where the pair ended.
+    """
+    best = min(found.finalists, key=lambda f: f.per_value)
+    parts = best.effect.parts()
+    if len(parts) != FEW_EFFECTS or any(p.artefact for p in parts):
+        return found
+    near: list[Fit] = []
+    for kept in parts:
+        others = (e for e in effects if e not in parts)
+        pairs = [p for e in others if (p := together(kept, e)) is not None]
+        near += best_of(beside(problem, best, pairs), EXCHANGED)
     return Found((*found.finalists, *settled(problem, near)), found.left)
 
 

@@ -17,7 +17,7 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
 from planner.diagnosis.linear.drift_fit import DriftFits, DriftProblem, problem_of
-from planner.diagnosis.linear.fit import Fit, carried_on, fit, promise, settle
+from planner.diagnosis.linear.fit import Fit, carried_on, fit, glance, promise, settle
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.thresholds import (
     ALIKE,
@@ -39,8 +39,7 @@ from planner.dynamics.simulation import Simulation
 from planner.inference.evidence import temper
 from planner.inference.parallel import side_by_side
 
-END = Quantity("change", "1", 0.0, DRIFT_LOG_SD)
-GRADUAL = Drift("campaign", (END, BEND), "gradual")
+GRADUAL = Drift.of_all()
 ORDERS, ORDERS_DRAWN = 24, 300  # orders of the visits that time's is held against
 
 
@@ -48,31 +47,33 @@ def fits(recorded: Dataset, nominal: Simulation) -> tuple[Fit, ...]:
     """The refitted simulation without drift, and with it: gradual, at once, of single joints."""
     problem = problem_of(recorded, nominal, as_built=True)
     plain = fit(problem, Effect(""))
-    kinds = side_by_side(partial(_followed, problem, plain), (_gradual, _at_once, _of_joints))
-    return plain, *(found for kind in kinds for found in kind)
+    courses = side_by_side(partial(_followed, problem, plain), (_gradual, _at_once))
+    single = side_by_side(partial(_of_joints, problem, plain), courses)
+    return plain, *courses, *(found for kind in single for found in kind)
 
 
-Kind = Callable[[DriftProblem, Fit], tuple[Fit, ...]]
+Kind = Callable[[DriftProblem, Fit], Fit]
 
 
-def _followed(problem: DriftProblem, plain: Fit, kind: Kind) -> tuple[Fit, ...]:
+def _followed(problem: DriftProblem, plain: Fit, kind: Kind) -> Fit:
     return kind(problem, plain)
 
 
-def _gradual(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
-    return (fit(problem, GRADUAL, [plain]),)
+def _gradual(problem: DriftProblem, plain: Fit) -> Fit:
+    return fit(problem, GRADUAL, [plain])
 
 
-def _at_once(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
+def _at_once(problem: DriftProblem, plain: Fit) -> Fit:
     count = len(problem.order) - 1
     each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, DRIFT_LOG_SD) for i in range(count))
     free = fit(problem, Drift("campaign", each, "free"), [plain])
-    return (fit(problem, Drift("campaign", (END,), "step", _since(free, problem)), [free]),)
+    return fit(problem, Drift.at_once(_since(free, problem)), [free])
 
 
-def _of_joints(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
+def _of_joints(problem: DriftProblem, plain: Fit, together: Fit) -> tuple[Fit, ...]:
     """With drift of those joints that move surely; none where even so little is followed."""
-    each = Drift.of_each(problem.simulation)
+    assert isinstance(together.effect, Drift)
+    each = together.effect.of_each(problem.simulation)
     if not each.joints:  # none has a spring about its own axis
         return ()
     every = fit(problem, each, [plain])
@@ -81,7 +82,7 @@ def _of_joints(problem: DriftProblem, plain: Fit) -> tuple[Fit, ...]:
         return ()
     values = every.parameters(temper(every.per_value, ALIKE))
     moved = [j for j in every.effect.joints if _sure(values[change_of(j)])]
-    return (fit(problem, Drift.of_joints(moved), [every]),) if moved else ()
+    return (fit(problem, every.effect.of_joints(moved), [every]),) if moved else ()
 
 
 def _sure(change: tuple[float, float, str]) -> bool:
@@ -131,10 +132,13 @@ def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
     a few of them takes a part of anything that goes with the pose.
     """
     assert isinstance(best.effect, Drift)
-    each = Drift.of_each(problem.simulation) if best.effect.joints else GRADUAL
-    fits = [promise(problem, Effect(""), plain)]
+    course = best.effect if best.effect.kind == "step" else GRADUAL
+    each = course.of_each(problem.simulation) if best.effect.joints else course
+    # Where much is left, the way to a fit with drift is longer than few steps.
+    look = promise if best.per_value <= DRIFT_CRUDE else glance
+    fits = [look(problem, Effect(""), plain)]
     for order in (problem.order, *_other_orders(problem.order)):
-        fits.append(promise(replace(problem, order=order), each, plain))
+        fits.append(look(replace(problem, order=order), each, plain))
     t = temper(min(f.per_value for f in fits), ALIKE)
     nothing, so, *otherwise = (f.log_evidence(t) for f in fits)
     return so - nothing > max(DRIFT_BY_TIME, DRIFT_ORDER * (max(otherwise) - nothing))
