@@ -54,13 +54,12 @@ def one_round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell
         fits = _unbent(problem, fits)
     if clearly:
         order = np.argsort([f.value for f in fits])
-        first = FIRST - BESIDE if pairs else FIRST
-        close = settled(problem, [fits[i] for i in order[:first]], CLOSE, STEPS)
+        close = settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
         close = side_by_side(partial(afresh, problem), close)
         if pairs:
             close += beside(problem, none, effects)
         worst = max(lag([none, *close]))
-        left = [(fits[i].effect, worst, fits[i]) for i in order[first:]]
+        left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
     else:
         kept, left = cut([none, *fits], FIRST)
         if min(lag([none, *fits])[1:]) - lag([none, *fits])[0] > -HOPELESS:
@@ -112,8 +111,8 @@ def _carried_far(begun: Fit) -> Fit:
 def _gone_on(begun: Sequence[Fit]) -> list[Fit]:
     """Rough fits, the most promising of them followed as far as `glance` goes."""
     order = np.argsort([f.value for f in begun])
-    best = [begun[i] for i in order[:FIRST]]
-    return side_by_side(_rough, best) + [begun[i] for i in order[FIRST:]]
+    best = [begun[i] for i in order[: 2 * FIRST]]
+    return side_by_side(_rough, best) + [begun[i] for i in order[2 * FIRST :]]
 
 
 def _rough(begun: Fit) -> Fit:
