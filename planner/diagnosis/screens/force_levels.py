@@ -132,7 +132,9 @@ def _named(
         return (_unknown(found, "even with a stiffness of its own for every hit"),), False
     there, shares = shares_of_laws(weighed)
     best = there[0]
-    if min(best.log_evidence, best.gain) > CLEAR and best.explained > least:
+    # Where it is surely this joint, what a linear fit lacks elsewhere says nothing of its law.
+    evidence = best.gain if of_one else min(best.log_evidence, best.gain)
+    if evidence > CLEAR and best.explained > least:
         c = best.candidate
         sd = np.sqrt(np.diagonal(c.covariance(best.temper))[: len(c.law.x)])
         candidates = tuple(w.candidate for w in there)
@@ -141,7 +143,8 @@ def _named(
         close = [w for w in weighed if w.explained > LAW_SURELY]
         finding = law_finding(there, laws)
         if of_one:  # surely this joint, of whatever shape its law is
-            finding = replace(finding, sure=max(finding.sure, SURE_OF_JOINT))
+            sure = max(finding.sure, SURE_OF_JOINT)
+            finding = replace(finding, sure=sure, log_evidence=evidence)
         return (finding, *far), len(close) == 1
     law = best.candidate.law.effect.replace("_", " ")
     how = f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"
