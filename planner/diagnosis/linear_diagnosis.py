@@ -9,7 +9,7 @@ import numpy as np
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.beyond_tolerance import with_artefacts
-from planner.diagnosis.linear.damper_like_springs import as_structure
+from planner.diagnosis.linear.damper_like_springs import as_structures, damper_like
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
@@ -136,6 +136,7 @@ def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Fo
     def weights(fits: Sequence[Fit]) -> Weights:
         return weigh(fits, _priors([f.effect for f in fits], all_))
 
+    found = replace(found, finalists=as_structures(found.finalists))
     first = weights(found.finalists)
     number = int(np.argmax(first.probabilities[:-1]))
     likeliest = found.finalists[number]
@@ -152,10 +153,10 @@ def _weighed(problem: Problem, found: Found, all_: Sequence[Effect]) -> tuple[Fo
 
 def _with_discrepancy(candidate: Candidate, found: Found, weights: Weights) -> Candidate:
     """The candidate with its fit where the discrepancy's likeliest size lets it be."""
-    fit, effects = candidate.fit, [f.effect for f in found.finalists]
-    if fit is None or fit.effect not in effects or candidate.probability < TIED:
+    fit = candidate.fit
+    number = next((i for i, f in enumerate(found.finalists) if f is fit), None)
+    if fit is None or number is None or candidate.probability < TIED:
         return candidate
-    number = effects.index(fit.effect)
     springs, size = stated_springs(found.finalists[0]), weights.worth[number].size
     return replace(candidate, fit=settled_with(fit, springs, size))
 
@@ -224,12 +225,8 @@ def _candidates(
     shares = list(without_slight(fits, named, *own, matters))
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):
-        if shares[i] < TIED / len(fits):
-            continue
-        if (structure := as_structure(one, fits[0], weights.temper)) is None:
+        if shares[i] > TIED / len(fits) and damper_like(one, weights.temper):
             unknown, shares[i] = unknown + shares[i], 0.0
-        else:
-            fits[i] = structure
     leader = int(np.argmax(shares))
     lead = prior[leader]
     before = _priors([effect for effect, _, _ in found.left], all_)

@@ -9,7 +9,7 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.damper_like_springs import as_structure
+from planner.diagnosis.linear.damper_like_springs import _as_structure, as_structures, damper_like
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import COARSE
 from planner.diagnosis.linear.slightness import without_slight
@@ -17,6 +17,8 @@ from planner.diagnosis.linear.stated_values import away, pulled
 from planner.diagnosis.linear_diagnosis import of_its_own
 from tests.support.exact_problem import exact_problem
 
+SOFT, BASE = ("transverse_compliance", "joint_2"), ("base_compliance", "base")
+BOTH = "transverse_compliance and base_compliance", "joint_2 and base"
 STIFF, HEAVY = 12.0, 40.0  # ln of how much stiffer than likely; kg
 Moved = dict[str, float]
 
@@ -26,6 +28,9 @@ def at(tmp_path_factory) -> Callable[[str, str, Moved], Fit]:
     """A fit with one effect, some of its entries moved by so much from their priors' means."""
     problem = exact_problem(tmp_path_factory.mktemp("robot"))
     every = {(e.name, e.at): e for e in library(problem.simulation)} | {("none", ""): Effect("")}
+    both = together(every[SOFT], every[BASE])
+    assert both is not None
+    every[BOTH] = both
 
     def made(name: str, place: str, moved: Moved) -> Fit:
         effect = every[name, place]
@@ -131,17 +136,31 @@ def with_its_frfs(fit: Fit, other: Fit) -> Fit:
 
 
 @pytest.mark.parametrize("structure", [False, True])
-def test_what_gives_like_a_damper_is_no_structure(at, structure):
-    """Unless its springs may as well be stiff: where they explain what is like a damper, or not."""
-    none, base = at("none", "", {}), at("base_compliance", "base", {})
-    slow = at("base_compliance", "base", {"damping of base": np.log(60.0)})
+def test_springs_like_dampers_are_stiff_where_that_loses_little(at, structure):
+    """What gives like a damper is no structure; but where a stiff base is, it stands for that."""
+    base, slow = (
+        at("base_compliance", "base", {"damping of base": by}) for by in (0.0, np.log(60.0))
+    )
     stiff = at("base_compliance", "base", {"stiffness of base": 1.9})
     fit = answering(slow, stiff.x if structure else slow.x)
-    told = as_structure(fit, with_its_frfs(fit, none), 1.0)
-    assert (told is not None) is structure
-    assert told is None or told.per_value < 0.01
-    assert as_structure(base, none, 1.0) is base
-    assert as_structure(none, none, 1.0) is none
+    none = with_its_frfs(fit, at("none", "", {}))
+    assert damper_like(fit, 1.0)
+    assert not damper_like(base, 1.0)
+    told = _as_structure(fit, none, 1.0)
+    assert damper_like(told, 1.0) is not structure
+    assert not structure or told.per_value < 0.01
+
+
+def test_beside_a_strong_effect_a_spring_like_a_damper_is_worth_its_own(at):
+    """Far less than the strong effect is, and yet all that the base explains."""
+    softer = {"stiffness of joint_2": -2.0}
+    slow = {"damping of base": np.log(60.0) + 3.0, "stiffness of base": 3.0}
+    fit = at(*BOTH, slow | softer)
+    fit = answering(fit, fit.x)
+    none, soft = (with_its_frfs(fit, at(*one)) for one in (("none", "", {}), (*SOFT, softer)))
+    nothing, strong, all_ = (f.log_evidence(1.0) for f in (none, soft, fit))
+    assert strong - nothing > 100 * (all_ - strong) > 0
+    assert as_structures([none, soft, fit])[2] is fit
 
 
 def test_the_mean_of_an_uneven_joint_is_told_with_it(at):

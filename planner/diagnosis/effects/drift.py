@@ -20,9 +20,10 @@ BEND = Quantity("bend", "1", 0.0, DRIFT_BEND_SD)
 
 @dataclass(frozen=True)
 class Drift(Effect):
-    """ψ(order) of one kind: "gradual" (end, bend), "step" (size, after `since`), "free" (each).
+    """ψ(order) of one kind: "gradual" (change at the end, bend), "step" (change from `since` on),
+    "free" (a change of each visit).
 
-    All but "free" may be of single `joints`, each by its own size; a gradual one has one bend.
+    All but "free" may be of single `joints`, each by its own change; a gradual one has one bend.
     """
 
     kind: str = "gradual"
@@ -38,11 +39,11 @@ class Drift(Effect):
 
     @classmethod
     def at_once(cls, since: float) -> "Drift":
-        """Of all springs together, after `since`."""
+        """Of all springs together, from `since` on."""
         return cls("campaign", (CHANGE,), "step", since)
 
     def of_joints(self, chosen: Sequence[str]) -> "Drift":
-        """The same course, each of these joints ("joint_1" and so on) by its own amount."""
+        """The same course, each of these joints ("joint_1" and so on) by its own change."""
         own = tuple(Quantity(change_of(joint), "1", 0.0, DRIFT_LOG_SD) for joint in chosen)
         bend = (BEND,) if self.kind == "gradual" else ()
         return replace(self, quantities=(*own, *bend), joints=tuple(chosen))

@@ -4,41 +4,76 @@ A drive's controller, a brake that slips or rubber yields slowly, with a stiffne
 frequency. Over a band that is what a spring does beside a damper far larger than any structure has.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
+from planner.diagnosis.linear.evidence import lag, temper_of
 from planner.diagnosis.linear.fit import Fit, follow
 from planner.diagnosis.thresholds import DAMPER_WORTH, LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN
 
 STIFF = 1.5  # prior sds above its median where a spring changes little
+BEHIND = 500.0  # log evidence behind the best, from which a fit is left as it is
 
 
-def as_structure(fit: Fit, none: Fit, temper: float) -> Fit | None:
-    """The fit, if need be with its springs that are like dampers stiff instead.
+@dataclass(frozen=True)
+class _Slow:
+    """A spring that is like a damper: places in x of its stiffness and of what damps it."""
 
-    None where those explain a part of what `none` leaves, χ² counting 1/`temper`. A spring that
-    FRFs tell only together with another, in series, may become a damper for next to nothing.
+    spring: int
+    damped_by: tuple[int, ...]
+
+
+def as_structures(finalists: Sequence[Fit]) -> tuple[Fit, ...]:
+    """Fits, those with springs like dampers with these stiff instead, where that loses little.
+
+    A spring that FRFs tell only together with another, in series, may become a damper for next to
+    nothing.
     """
-    slow = _damper_like(fit, temper)
-    if not slow:
+    behind, t = lag(finalists), temper_of(finalists)
+    return tuple(
+        _as_structure(f, _without(f, finalists, t), t) if far < BEHIND else f
+        for f, far in zip(finalists, behind, strict=True)
+    )
+
+
+def _without(fit: Fit, finalists: Sequence[Fit], temper: float) -> Fit:
+    """The best fit without one of the effects whose springs are like dampers."""
+    names, simulation = fit.misfit.names, fit.misfit.setting.simulation
+    slow = {names[s.spring] for s in _slow_springs(fit, temper)}
+    parts = fit.effect.parts()
+    there = {(p.name, p.at) for p in parts if slow.intersection(p.springs(simulation))}
+    others = [f for f in finalists if there.isdisjoint((p.name, p.at) for p in f.effect.parts())]
+    return max(others or finalists[:1], key=lambda f: f.log_evidence(temper))
+
+
+def _as_structure(fit: Fit, without: Fit, temper: float) -> Fit:
+    slow, misfit = _slow_springs(fit, temper), fit.misfit
+    stated = [misfit.parametrisation.parameters[s.spring].stated for s in slow]
+    if not slow or any(stated):  # a stated spring that is made stiff is another claim
         return fit
-    x, misfit = fit.x.copy(), fit.misfit
-    for spring, damper in slow:
-        x[spring] = misfit.mean[spring] + STIFF * misfit.sd[spring]
-        if damper is not None:
-            x[damper] = misfit.mean[damper]
+    x = fit.x.copy()
+    for one in slow:
+        x[one.spring] = misfit.mean[one.spring] + STIFF * misfit.sd[one.spring]
+        x[list(one.damped_by)] = misfit.mean[list(one.damped_by)]
     if not misfit.possible(x):
-        return None
+        return fit
     stiff = follow(misfit, x)
-    nothing, some, all_ = (f.log_evidence(temper) for f in (none, stiff, fit))
-    worth = all_ - some > DAMPER_WORTH * (all_ - nothing)
-    return None if worth or _damper_like(stiff, temper) else stiff
+    nothing, some, all_ = (f.log_evidence(temper) for f in (without, stiff, fit))
+    little = all_ - some < DAMPER_WORTH * (all_ - nothing)
+    return stiff if little and not damper_like(stiff, temper) else fit
 
 
-def _damper_like(fit: Fit, temper: float) -> list[tuple[int, int | None]]:
-    """Which springs of an effect, added or loosened, are mostly dampers mid-band; their dampers.
+def damper_like(fit: Fit, temper: float) -> bool:
+    """Whether a spring of an effect, added or loosened, is mostly a damper mid-band.
 
-    Only of springs that FRFs tell.
+    Only of springs that FRFs tell, χ² counting 1/`temper`.
     """
+    return bool(_slow_springs(fit, temper))
+
+
+def _slow_springs(fit: Fit, temper: float) -> list[_Slow]:
     misfit = fit.misfit
     added = {n for part in fit.effect.parts() for n in part.springs(misfit.setting.simulation)}
     springs = [n for n in added if n.startswith("stiffness of ")]
@@ -59,5 +94,5 @@ def _damper_like(fit: Fit, temper: float) -> list[tuple[int, int | None]]:
         viscous = 0.0 if c is None else np.exp(fit.x[c] - fit.x[k]) * mid_rad_s
         structural = 0.0 if eta is None else np.exp(fit.x[eta])
         if viscous + structural > LOSS_OF_NO_STRUCTURE:
-            out.append((k, c))
+            out.append(_Slow(k, tuple(i for i in (c, eta) if i is not None)))
     return out

@@ -32,7 +32,7 @@ STEPS, LAST_STEPS = 12, 30
 BEGUN = 3  # steps of each pair, before the most promising are followed
 FEW = 5  # poses on which all are looked at where something is clearly wrong
 FAR = 6  # effects begun at their priors' medians that are followed, where inertias are bent
-BESIDE = 5  # pairs begun where their leader's fit ended, that are followed
+CARRIED = 5  # effects begun where another fit ended, that are followed
 HOPELESS = 1.0  # tempered log evidence that the best of all would have to gain to be followed
 
 
@@ -57,9 +57,11 @@ def one_round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell
         close = settled(problem, [fits[i] for i in order[:FIRST]], CLOSE, STEPS)
         close = side_by_side(partial(afresh, problem), close)
         if pairs:
-            close += beside(problem, none, effects)
+            close = _best_of_each([*close, *carried_from(problem, none, effects)])
         worst = max(lag([none, *close]))
-        left = [(fits[i].effect, worst, fits[i]) for i in order[FIRST:]]
+        followed = {frozenset(f.effect.parts()) for f in close}
+        rest = [fits[i] for i in order[FIRST:]]
+        left = [(f.effect, worst, f) for f in rest if frozenset(f.effect.parts()) not in followed]
     else:
         kept, left = cut([none, *fits], FIRST)
         if min(lag([none, *fits])[1:]) - lag([none, *fits])[0] > -HOPELESS:
@@ -72,12 +74,20 @@ def one_round(problem: Problem, warm: Fit, effects: Sequence[Effect], tell: Tell
     return Found(tuple(settled(problem, kept)), (*left, *more))
 
 
-def beside(problem: Problem, leader: Fit, pairs: Sequence[Effect]) -> list[Fit]:
-    """Pairs begun where another fit ended, the most promising followed."""
-    few = _few(problem)
-    begun = side_by_side(partial(promise, few, warm=leader), pairs)
+def carried_from(problem: Problem, ended: Fit, effects: Sequence[Effect]) -> list[Fit]:
+    """Effects begun where another fit ended, the most promising followed."""
+    able, few = list(filter(problem.able, effects)), _few(problem)
+    begun = side_by_side(partial(promise, few, warm=ended), able)
     order = np.argsort([f.value for f in begun])
-    return settled(problem, [begun[i] for i in order[:BESIDE]], CLOSE, STEPS)
+    return settled(problem, [begun[i] for i in order[:CARRIED]], CLOSE, STEPS)
+
+
+def _best_of_each(fits: Sequence[Fit]) -> list[Fit]:
+    """Each set of effects once, at its best."""
+    best: dict[frozenset[Effect], Fit] = {}
+    for f in sorted(fits, key=lambda f: f.value):
+        best.setdefault(frozenset(f.effect.parts()), f)
+    return list(best.values())
 
 
 def _few(problem: Problem) -> Problem:

@@ -32,7 +32,7 @@ from planner.diagnosis.linear.rounds import (
     LAST,
     LAST_STEPS,
     STEPS,
-    beside,
+    carried_from,
     one_round,
     settled,
 )
@@ -88,7 +88,9 @@ def search(
         more = one_round(problem, leader, pairs, along)
         kept = tuple(f for f in more.finalists if len(f.effect.parts()) > 1)
         found = Found((*found.finalists, *kept), (*found.left, *more.left))
-    found = _exchanged(problem, _moved(problem, found, effects), effects)
+    found = _moved(problem, found, effects)
+    if not bent:
+        found = exchanged(problem, found, effects)
     if min(f.per_value for f in found.finalists) > AT_NOISE:
         near = settled(problem, three_axis_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
@@ -160,10 +162,11 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     return Found((*found.finalists, *settled(problem, near)), found.left)
 
 
-def _exchanged(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+def exchanged(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
     """Adds pairs in which another effect stands for one of the best pair's.
 
-    What one effect leads to, another explains more closely: it is begun where the pair ended.
+    A wrong effect may have led the fit near the minimum of the right one, so each other effect is
+    begun where the pair ended; also where that is at the noise: the right one is closer still.
     """
     best = min(found.finalists, key=lambda f: f.per_value)
     parts = best.effect.parts()
@@ -173,7 +176,7 @@ def _exchanged(problem: Problem, found: Found, effects: Sequence[Effect]) -> Fou
     for kept in parts:
         others = (e for e in effects if e not in parts)
         pairs = [p for e in others if (p := together(kept, e)) is not None]
-        near += best_of(beside(problem, best, pairs), EXCHANGED)
+        near += best_of(carried_from(problem, best, pairs), EXCHANGED)
     return Found((*found.finalists, *settled(problem, near)), found.left)
 
 

@@ -28,6 +28,7 @@ from planner.diagnosis.thresholds import (
     DRIFT_CRUDE,
     DRIFT_EVIDENCE,
     DRIFT_GAINS,
+    DRIFT_KNOWN,
     DRIFT_LEAST,
     DRIFT_LOG_SD,
     DRIFT_MOVED,
@@ -40,6 +41,7 @@ from planner.inference.evidence import temper
 from planner.inference.parallel import side_by_side
 
 GRADUAL = Drift.of_all()
+STEP_VISITS = 6  # from which on a step can be told: there are 25 ways to part visits in two
 ORDERS, ORDERS_DRAWN = 24, 300  # orders of the visits that time's is held against
 
 
@@ -64,16 +66,21 @@ def _gradual(problem: DriftProblem, plain: Fit) -> Fit:
 
 
 def _at_once(problem: DriftProblem, plain: Fit) -> Fit:
+    free = fit(problem, _each_visit(problem), [plain])
+    return fit(problem, Drift.at_once(_since(free, problem.order)), [free])
+
+
+def _each_visit(problem: DriftProblem) -> Drift:
+    """Each visit after the first with a change of its own."""
     count = len(problem.order) - 1
     each = tuple(Quantity(f"visit_{i + 2}", "1", 0.0, DRIFT_LOG_SD) for i in range(count))
-    free = fit(problem, Drift("campaign", each, "free"), [plain])
-    return fit(problem, Drift.at_once(_since(free, problem)), [free])
+    return Drift("campaign", each, "free")
 
 
-def _of_joints(problem: DriftProblem, plain: Fit, together: Fit) -> tuple[Fit, ...]:
+def _of_joints(problem: DriftProblem, plain: Fit, course: Fit) -> tuple[Fit, ...]:
     """With drift of those joints that move surely; none where even so little is followed."""
-    assert isinstance(together.effect, Drift)
-    each = together.effect.of_each(problem.simulation)
+    assert isinstance(course.effect, Drift)
+    each = course.effect.of_each(problem.simulation)
     if not each.joints:  # none has a spring about its own axis
         return ()
     every = fit(problem, each, [plain])
@@ -81,7 +88,8 @@ def _of_joints(problem: DriftProblem, plain: Fit, together: Fit) -> tuple[Fit, .
     if every.per_value > DRIFT_CRUDE:
         return ()
     values = every.parameters(temper(every.per_value, ALIKE))
-    moved = [j for j in every.effect.joints if _sure(values[change_of(j)])]
+    told = {j: values[change_of(j)] for j in every.effect.joints}
+    moved = [j for j, change in told.items() if _sure(change) and change[1] < DRIFT_KNOWN]
     return (fit(problem, every.effect.of_joints(moved), [every]),) if moved else ()
 
 
@@ -90,13 +98,15 @@ def _sure(change: tuple[float, float, str]) -> bool:
     return abs(value) > DRIFT_MOVED * sd
 
 
-def _since(free: Fit, problem: DriftProblem) -> float:
-    """Where the visits' own ψ fall apart into two groups."""
-    psi = np.append(0.0, free.x[free.misfit.split[1] :])
-    ways = range(1, len(psi))
+def _since(free: Fit, order: np.ndarray) -> float:
+    """Where the visits' own ψ fall apart into two groups, in this order (n,) of them.
+
+    A single visit that differs from all others may differ by its pose.
+    """
+    psi = np.append(0.0, free.x[free.misfit.split[1] :])[np.argsort(order)]
+    ways = range(2, len(psi) - 1)
     spread = [psi[:i].var() * i + psi[i:].var() * (len(psi) - i) for i in ways]
-    cut = 1 + int(np.argmin(spread))
-    return float(problem.order[cut])
+    return float(np.sort(order)[ways[int(np.argmin(spread))]])
 
 
 def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
@@ -109,6 +119,8 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     if len(recorded.visits) < 4 or _unchanged(recorded, nominal):
         return ()
     plain, *found = fits(recorded, nominal)
+    if returned(recorded) is None and len(recorded.visits) < STEP_VISITS:
+        found = [f for f in found if isinstance(f.effect, Drift) and f.effect.kind != "step"]
     problem = problem_of(recorded, nominal, as_built=True)
     best = settle(problem, _likeliest(found))
     # A fit that drift led out of a wrong minimum gains by that alone: it does without drift too.
@@ -132,16 +144,29 @@ def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
     a few of them takes a part of anything that goes with the pose.
     """
     assert isinstance(best.effect, Drift)
-    course = best.effect if best.effect.kind == "step" else GRADUAL
-    each = course.of_each(problem.simulation) if best.effect.joints else course
-    # Where much is left, the way to a fit with drift is longer than few steps.
+    orders = [problem.order, *_other_orders(problem.order)]
+    # Where much is left, the way to a fit with drift is longer than a few steps: then roughly, on
+    # fewer lines and with inertias as they are.
     look = promise if best.per_value <= DRIFT_CRUDE else glance
+    courses: list[Drift] = [GRADUAL] * len(orders)
+    if best.effect.kind == "step":
+        orders, courses = _steps(glance(problem, _each_visit(problem), plain), orders)
     fits = [look(problem, Effect(""), plain)]
-    for order in (problem.order, *_other_orders(problem.order)):
+    for order, course in zip(orders, courses, strict=True):
+        each = course.of_each(problem.simulation) if best.effect.joints else course
         fits.append(look(replace(problem, order=order), each, plain))
     t = temper(min(f.per_value for f in fits), ALIKE)
     nothing, so, *otherwise = (f.log_evidence(t) for f in fits)
     return so - nothing > max(DRIFT_BY_TIME, DRIFT_ORDER * (max(otherwise) - nothing))
+
+
+def _steps(free: Fit, orders: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[Drift]]:
+    """Each order with a step where it is likeliest, without those that part visits as the first."""
+    since = [_since(free, order) for order in orders]
+    after = [order >= cut for order, cut in zip(orders, since, strict=True)]
+    other = [bool(np.any(a != after[0]) and np.any(a == after[0])) for a in after]
+    kept = [0, *np.flatnonzero(other).tolist()]
+    return [orders[i] for i in kept], [Drift.at_once(since[i]) for i in kept]
 
 
 def _other_orders(order: np.ndarray) -> list[np.ndarray]:
@@ -161,12 +186,13 @@ def along_a_joint(recorded: Dataset) -> bool:
 
 def _likeliest(found: Sequence[Fit]) -> Fit:
     """Of all joints together unless single ones, which are more numbers, tell clearly more."""
-    together = min(found[:2], key=lambda f: f.per_value)
-    for single in found[2:]:
-        t = temper(single.per_value, ALIKE)
-        if single.log_evidence(t) > together.log_evidence(t) + CLEAR:
-            return single
-    return together
+    single = [f for f in found if isinstance(f.effect, Drift) and f.effect.joints]
+    together = min((f for f in found if f not in single), key=lambda f: f.per_value)
+    if not single:
+        return together
+    t = temper(min(f.per_value for f in found), ALIKE)
+    best = max(single, key=lambda f: f.log_evidence(t))
+    return best if best.log_evidence(t) > together.log_evidence(t) + CLEAR else together
 
 
 def evaluate(plain: Fit, best: Fit) -> Finding:

@@ -125,14 +125,18 @@ def _named(
     plain = misses.plain
     if not found.delta.shape[1]:
         return (_unknown(found, "no joint has a spring about its own axis"),), False
-    of_one = placed(found)
+    of_one = placed(found)  # at the joint whose own stiffness for every hit leaves least
+    surely = system_of(plain).ports[int(np.argmin(found.chi2.sum(axis=0)))] if of_one else ""
     least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
     weighed = _weighed(recorded, look, tell, least, held=held)
+    if of_one:
+        weighed = tuple(w for w in weighed if w.at == surely)
     if not weighed:
         return (_unknown(found, "even with a stiffness of its own for every hit"),), False
     there, shares = shares_of_laws(weighed)
     best = there[0]
-    # Where it is surely this joint, what a linear fit lacks elsewhere says nothing of its law.
+    # Where it is surely this joint, what a linear fit lacks elsewhere says nothing of its law, and
+    # only the differences between levels count, less what the law's own numbers cost.
     evidence = best.gain if of_one else min(best.log_evidence, best.gain)
     if evidence > CLEAR and best.explained > least:
         c = best.candidate

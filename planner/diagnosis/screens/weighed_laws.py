@@ -57,7 +57,7 @@ class LevelMisfit:
 class WeighedLaw:
     """A law at a joint: its log evidence over a linear joint, and the share that it explains.
 
-    `levels` is what it was to explain.
+    `levels` is what it was to explain, `volume` what its own numbers cost, in nats.
     """
 
     candidate: LawMisfit
@@ -68,14 +68,16 @@ class WeighedLaw:
     per_value: float
     parameters: dict[str, tuple[float, float, str]]
     temper: float
+    volume: float
 
     @property
     def gain(self) -> float:
-        """By how much more the differences between levels speak for it, in nats.
+        """Log evidence by the differences between levels alone, over a linear joint.
 
-        Its evidence also holds what else it made fit: that is no law of levels.
+        `log_evidence` also holds what else the law made fit, or did not: that is no law of levels.
         """
-        return (self.levels.differing - self.candidate.differing) / self.temper
+        differing = self.levels.differing - self.candidate.differing
+        return differing / self.temper - self.volume
 
 
 def weighed_laws(
@@ -91,11 +93,13 @@ def weighed_laws(
     levels = levels_of(data, system)
     out = []
     for c in kept:
-        evidence = (levels.linear - _cost(c)) / t - _volume(c, t)
+        volume = _volume(c, t)
+        evidence = (levels.linear - _cost(c)) / t - volume
         explained = levels.explained(c)
         at, per_value = system.ports[c.law.ports[0]], 2 * c.chi2 / count
         parameters = _parameters(c, t)
-        out.append(WeighedLaw(c, at, evidence, explained, levels, per_value, parameters, t))
+        own = at, evidence, explained, levels, per_value, parameters, t, volume
+        out.append(WeighedLaw(c, *own))
     return tuple(sorted(out, key=lambda w: -w.log_evidence))
 
 
