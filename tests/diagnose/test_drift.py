@@ -51,21 +51,16 @@ def test_drift_that_is_there_is_found(simulation):
     assert explained.frac > max(0.999, refitted.frac)
 
 
-@pytest.mark.parametrize("restless", [0.0, 0.03])
-def test_joints_that_change_at_once_are_told(simulation, restless):
-    """Each by its own change; where springs also differ from pose to pose, nothing fits closely."""
+def test_a_step_is_told_where_springs_also_differ_from_pose_to_pose(simulation):
+    """Nothing fits closely then, and other steps are tried in other orders of the visits."""
     rng = np.random.default_rng(5)
-    factor = 1 + restless * rng.standard_normal((8, len(simulation.elasticity.stiffness)))
+    factor = 1 + 0.03 * rng.standard_normal((8, len(simulation.elasticity.stiffness)))
     factor[4:, :3] *= (0.75, 0.85, 0.8)
     moving = recorded(simulation, KR210.poses(8, 3), lambda visit, level: factor[visit], (300.0,))
     (found,) = screen(moving, simulation)
-    assert (found.misfit > drift.DRIFT_CRUDE) is bool(restless)
+    assert found.misfit > drift.DRIFT_CRUDE
     assert "at once" in found.text
     assert -0.26 < found.parameters["change"][0] < -0.13
-    if not restless:
-        told = [found.parameters[f"change of joint_{n}"] for n in (1, 2, 3)]
-        for (value, spread, _), true in zip(told, (-0.25, -0.15, -0.2), strict=True):
-            assert value == pytest.approx(true, abs=4 * spread)
 
 
 def test_a_small_step_of_one_joint_is_none_of_a_gradual_course(simulation):
@@ -73,9 +68,11 @@ def test_a_small_step_of_one_joint_is_none_of_a_gradual_course(simulation):
     factor[3:, 1] *= 0.97
     moving = recorded(simulation, KR210.poses(6, 3), lambda visit, level: factor[visit], (300.0,))
     _, *found = drift.fits(moving, simulation)
-    course = drift._likeliest(found).effect
-    assert isinstance(course, Drift)
-    assert (course.kind, course.since, course.joints) == ("step", 0.6, ("joint_2",))
+    best = drift._likeliest(found)
+    assert isinstance(best.effect, Drift)
+    assert (best.effect.kind, best.effect.joints) == ("step", ("joint_2",))
+    assert best.effect.since == pytest.approx(0.6)
+    assert best.x[-1] == pytest.approx(np.log(0.97), abs=0.003)
 
 
 def test_no_drift_where_other_orders_of_the_visits_explain_as_much(simulation, monkeypatch):

@@ -148,7 +148,8 @@ def _named(
         finding = law_finding(there, laws)
         if of_one:  # surely this joint, of whatever shape its law is
             sure = max(finding.sure, SURE_OF_JOINT)
-            finding = replace(finding, sure=sure, log_evidence=evidence)
+            known = max(finding.log_evidence, evidence)
+            finding = replace(finding, sure=sure, log_evidence=known)
         return (finding, *far), len(close) == 1
     law = best.candidate.law.effect.replace("_", " ")
     how = f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"
