@@ -15,6 +15,7 @@ from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
 from planner.diagnosis.linear.found import Found, behind, distinct
 from planner.diagnosis.linear.mismatch import Mismatch
+from planner.diagnosis.linear.other_places import named_as_mass
 from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.linear.search import search
 from planner.diagnosis.linear.slightness import thinned, without_slight
@@ -223,6 +224,7 @@ def _candidates(
     evidence = np.array([w.log_evidence for w in weights.worth])
     own = weights.probabilities[:-1], prior, weights.bent, evidence
     shares = list(without_slight(fits, named, *own, matters))
+    shares = named_as_mass(fits, shares)
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):
         if shares[i] > TIED / len(fits) and damper_like(one, weights.temper):

@@ -13,7 +13,7 @@ from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.places import links
 from planner.diagnosis.linear.fit import Fit, approached, fit, points, settle
 from planner.diagnosis.linear.problem import CLOSE, Problem
-from planner.diagnosis.thresholds import INERTIA_STRAYED
+from planner.diagnosis.thresholds import INERTIA_HIDES, INERTIA_STRAYED, TIED
 from planner.inference.parallel import side_by_side
 
 MOVABLE = MASS, RESONATOR = "added_mass", "local_resonator"
@@ -61,6 +61,25 @@ def farthest_bent(fit: Fit) -> tuple[str, float]:
     body = fit.misfit.names[a + most].split(" of ", 1)[1]
     named = {joint: link.replace("_", " ") for link, joint in links(fit.misfit.setting.simulation)}
     return named.get(body, body), float(away[most])
+
+
+def named_as_mass(fits: Sequence[Fit], shares: Sequence[float]) -> list[float]:
+    """Shares of fits, that of the first, which has no effect, given to a mass that it hides.
+
+    So it is where the first is the likeliest, but bends a link's inertias farther than any robot's
+    are off (INERTIA_HIDES), and a mass on that link explains as much.
+    """
+    out, (link, away) = list(shares), farthest_bent(fits[0])
+    masses = [
+        i
+        for i, f in enumerate(fits)
+        if [(p.name, p.at.replace("_", " ")) for p in f.effect.parts()] == [(MASS, link)]
+    ]
+    most = max(masses, key=lambda i: shares[i], default=0)
+    if out[0] < max(out) or away < INERTIA_HIDES or not masses or out[most] < TIED * out[0]:
+        return out
+    out[0], out[most] = 0.0, out[most] + out[0]
+    return out
 
 
 def burdened(problem: Problem, found: Fit, effects: Sequence[Effect]) -> tuple[Fit, ...]:
