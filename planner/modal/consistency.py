@@ -13,7 +13,12 @@ from itertools import combinations
 import numpy as np
 
 from planner.frf.matrix import FrfMatrix
-from planner.modal.exchanged import Exchange, exchanged_instead, exchanges, turning_helps
+from planner.modal.exchanged import (
+    Exchange,
+    exchanged_by_neighbours,
+    exchanges,
+    turning_helps,
+)
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.matrix_sides import Sides
 from planner.modal.odd_entries import odd_entries, place
@@ -89,7 +94,7 @@ def check(
     swapped: tuple[Exchange, ...] = ()
     # Two exchanged points may look like two turned signs: one fault is likelier than two.
     if len(rows) == 1 and not turned:
-        swapped = exchanged_instead(sides, geometry, rows[0])
+        swapped = exchanged_by_neighbours(sides, geometry)
     elif enough and not turning_helps(sides, turned):
         swapped = exchanges(sides, geometry)
     turned, rows = ((), ()) if swapped else (turned, rows)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planner.modal.matrix_sides import Sides
-from planner.modal.row_places import exchange_is_clearer, exchanged_nodes
+from planner.modal.node_places import exchanged_nodes
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
 
@@ -54,22 +54,15 @@ def exchanges(sides: Sides, geometry: Geometry | None) -> tuple[Exchange, ...]:
     motions = sides.motions
     if motions is None:
         return ()
-    found = _against_columns(sides, *motions)
-    if found or geometry is None:
-        return found
-    pair = exchanged_nodes(sides.rows, motions[0].real, geometry)
-    return () if pair is None else (_named(sides, pair),)
+    return _against_columns(sides, *motions) or exchanged_by_neighbours(sides, geometry)
 
 
-def exchanged_instead(sides: Sides, geometry: Geometry | None, row: Dof) -> tuple[Exchange, ...]:
-    """Points whose exchange explains more than a turned sign of a row, where there are any."""
+def exchanged_by_neighbours(sides: Sides, geometry: Geometry | None) -> tuple[Exchange, ...]:
+    """Points that were exchanged, told by the neighbours alone."""
     if sides.motions is None or geometry is None:
         return ()
-    shapes = sides.motions[0].real
-    pair, turned = exchanged_nodes(sides.rows, shapes, geometry), sides.rows.index(row)
-    if pair is None or not exchange_is_clearer(sides.rows, shapes, geometry, pair, turned):
-        return ()
-    return (_named(sides, pair),)
+    pair = exchanged_nodes(sides.rows, sides.motions[0].real, geometry)
+    return () if pair is None else (_named(sides, pair),)
 
 
 def _named(sides: Sides, pair: tuple[str, str]) -> Exchange:

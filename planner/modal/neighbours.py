@@ -50,10 +50,10 @@ def expected(
 def _from_neighbours(
     fields: Sequence[np.ndarray], motion: np.ndarray, sd: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Mean and variance (n,) of every point from the known others, by the likeliest field.
+    """Mean and variance (n,; ∞: nothing is known) of every point from the known others.
 
-    Known points, each left out in turn, tell how far off that is: in proportion to how far the
-    points around move, for a mode may move a part of the structure only.
+    By the likeliest field. Known points, each left out in turn, tell how far off that is: in
+    proportion to how far the points around move, for a mode may move a part of the structure only.
     """
     known = _known(motion, sd)
     if np.count_nonzero(known) < LEAST_KNOWN:
@@ -70,11 +70,14 @@ def _from_neighbours(
         mean[known], variance[known] = motion[known] - off, single
         near = field[:, known] ** 2
         near[known, np.arange(single.size)] = 0.0
-        variance *= near @ square / np.sum(near, axis=1) + LEAST_AROUND * np.mean(square)
+        weight, usual = np.sum(near, axis=1), np.full(len(near), np.mean(square))
+        around = np.divide(near @ square, weight, out=usual.copy(), where=weight > 0)
+        variance *= around + LEAST_AROUND * usual
         scale = float(np.mean(np.abs(off) ** 2 / variance[known]))
         unlikely = np.sum(np.log(variance[known])) + single.size * np.log(max(scale, 1e-300))
         if unlikely < best:
-            best, found = float(unlikely), (mean, scale * variance)
+            # Whom no known point is related to, nothing is foretold of.
+            best, found = float(unlikely), (mean, np.where(weight > 0, scale * variance, np.inf))
     if found is not None:
         # What was measured, as far as it was, may say that this point is not like the others.
         found = found[0], np.maximum(found[1], np.abs(motion - found[0]) ** 2 - 2 * sd**2)

@@ -1,13 +1,11 @@
-"""Rows of a matrix under a wrong sign or name, where only the places of the points show it.
+"""Rows of a matrix under a wrong sign, where only the places of the points show it.
 
 How a point should move in all modes is foretold from the others, each left out in turn. A row that
-is the opposite of what is foretold was measured with a turned sign; two nodes whose rows fit each
-other's places, and not their own, were exchanged.
+is the opposite of what is foretold was measured with a turned sign.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -22,10 +20,6 @@ LEAST_ROWS, LEAST_MODES = 8, 3
 # right rows came near; the clearest was another row where that brought 0.86 as much, never below.
 TURNED, STATED, SECOND = 0.35, 2.0, 0.8
 LEAST_MOTION = 0.3  # of the mean over all rows: points that hardly move say nothing
-# Two nodes are exchanged where their surprise is at least SURPRISED times that of the usual node,
-# is less than EXPLAINED of that after the exchange, and an exchange of one of them with any other
-# brings less than RIVAL as much. Chosen as above; the few likeliest are looked at.
-SURPRISED, EXPLAINED, RIVAL, LIKELIEST = 4.0, 0.3, 0.67, 12
 MOST = 0.1  # share of rows that can be wrong: beyond, the geometry is
 
 
@@ -114,66 +108,3 @@ def _clearest(found: Foretold, moves: np.ndarray) -> int | None:
     # Another row might be turned instead if little is left for it once this one is turned.
     rival = (gain > SECOND * gain[k]) & (after < gain / 2)
     return int(found.index[k]) if np.count_nonzero(rival) <= 1 else None
-
-
-def exchanged_nodes(
-    dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry
-) -> tuple[str, str] | None:
-    """Two nodes whose rows fit each other's places, None where no two clearly do."""
-    found = foretold(dofs, shapes, geometry)
-    if found is None:
-        return None
-    rows: dict[str, dict[str, int]] = {}
-    for k, row in enumerate(found.index):
-        rows.setdefault(dofs[row].node, {})[dofs[row].positive.direction] = k
-    each = np.sum(found.surprise, axis=1)
-    surprise = {node: sum(each[k] for k in own.values()) for node, own in rows.items()}
-    usual = float(np.median(list(surprise.values())))
-    gains = {
-        (a, b): _gain(found, *_both(rows[a], rows[b]))
-        for a, b in combinations(rows, 2)
-        if rows[a].keys() == rows[b].keys()  # measured in the same directions
-    }
-    for a, b in sorted(gains, key=lambda pair: -gains[pair])[:LIKELIEST]:
-        before = surprise[a] + surprise[b]
-        rivals = [gain for pair, gain in gains.items() if len({a, b} & set(pair)) == 1]
-        sure = before > 2 * SURPRISED * usual and max(rivals, default=0.0) < RIVAL * gains[a, b]
-        if sure and _left(found, *_both(rows[a], rows[b])) < EXPLAINED * before:
-            return a, b
-    return None
-
-
-def exchange_is_clearer(
-    dofs: Sequence[Dof], shapes: np.ndarray, geometry: Geometry, pair: tuple[str, str], row: int
-) -> bool:
-    """Whether two exchanged nodes explain more than one row (index) with a turned sign."""
-    found = foretold(dofs, shapes, geometry)
-    if found is None:
-        return False
-    own = [
-        {dofs[i].positive.direction: k for k, i in enumerate(found.index) if dofs[i].node == node}
-        for node in pair
-    ]
-    turned = found.gain[np.flatnonzero(found.index == row)]
-    return bool(np.all(_gain(found, *_both(*own)) > turned))
-
-
-def _both(one: dict[str, int], other: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (k,) of two nodes, direction by direction."""
-    return np.array(list(one.values())), np.array([other[direction] for direction in one])
-
-
-def _left(found: Foretold, one: np.ndarray, other: np.ndarray) -> float:
-    """Surprise at two nodes, their rows exchanged."""
-    values, both = found.values.copy(), np.concatenate([one, other])
-    values[both] = values[np.concatenate([other, one])]
-    return float(np.sum(Foretold(found.index, values, found.precision).surprise[both]))
-
-
-def _gain(found: Foretold, one: np.ndarray, other: np.ndarray) -> float:
-    """Fall of −2 log likelihood where the rows (k,) of two nodes are exchanged."""
-    both = np.concatenate([one, other])
-    change = found.values[np.concatenate([other, one])] - found.values[both]
-    slope = found.precision[both] @ found.values
-    curve = found.precision[np.ix_(both, both)] @ change
-    return -float(np.sum(change * (2 * slope + curve)))

@@ -1,12 +1,18 @@
 """Turned signs and exchanged points, told by how their neighbours move."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
+from planner.modal.consistency import check
+from planner.modal.matrix_modes import modes_of_matrix
 from planner.modal.motion_fields import motion_fields
-from planner.modal.row_places import exchanged_nodes, turned_rows
+from planner.modal.node_places import _exchanged, _gains, _nodes, exchanged_nodes
+from planner.modal.row_places import Foretold, turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
+from tests.support.rough_hammer_sets import geometry_of, rough_set, spoiled
 from tests.support.struck_structures import dof_of, unit_mass_shapes
 from tests.support.structures import plate
 
@@ -56,6 +62,60 @@ def test_two_exchanged_points_are_told(sheet, pair):
     exchanged = shapes.copy()
     exchanged[list(pair)] = shapes[list(pair[::-1])]
     assert set(exchanged_nodes(dofs, exchanged, place)) == {dofs[k].node for k in pair}
+
+
+def test_three_mixed_up_points_are_not_told_as_two(sheet):
+    """Nor are signs turned at a node, in one direction or in all."""
+    dofs, shapes, place = sheet
+    mixed, turned = shapes.copy(), shapes.copy()
+    mixed[[10, 30, 41]] = shapes[[30, 41, 10]]
+    turned[22] *= -1
+    for wrong in (mixed, turned):
+        assert exchanged_nodes(dofs, wrong, place) is None
+
+
+@pytest.fixture(scope="module")
+def frame():
+    """Nodes measured along x, y and z; poles, and the modes that were established."""
+    case = rough_set(3040, kind="frame")
+    found = modes_of_matrix(case.matrix, case.band_hz, geometry_of(case)).found
+    hz = np.abs(found.fit.poles) / (2 * np.pi)
+    low, high = case.band_hz
+    return case, found, np.flatnonzero((hz > low) & (hz < high) & (found.weak <= 1))
+
+
+@pytest.mark.parametrize("pair", [(3, 15), (21, 24), (2, 19)])
+def test_exchanged_nodes_of_a_frame_are_told(frame, pair):
+    """One of them alone, under the other's name, explains most: both explain clearly more."""
+    case, found, modes = frame
+    owner = np.array(case.structure.nodes)
+    order = np.arange(owner.size)
+    one, two = (np.flatnonzero(owner == node) for node in pair)
+    order[one], order[two] = two, one
+    matrix, poles = spoiled(case, found, order, np.ones((owner.size, 3)))
+    checks = check(matrix, poles, modes, geometry_of(case))
+    assert len(checks.faults) == 1
+    assert {dof.node for dof in checks.untied} == {str(node) for node in pair}
+    assert check(case.matrix, found, modes, geometry_of(case)).faults == ()
+
+
+def test_gains_are_those_of_the_likelihood():
+    rng = np.random.default_rng(4)
+    root = rng.normal(size=(13, 13))
+    found = Foretold(np.arange(13), rng.normal(size=(13, 5)), root @ root.T)
+    dofs = [Dof(node, axis) for node in "abcd" for axis in "xyz"] + [Dof("e", "z")]
+    nodes = _nodes(dofs)
+    gains = _gains(found, nodes)
+
+    def unlikely(f):
+        return np.sum(f.values * (f.precision @ f.values))
+
+    for (i, one), (j, two) in product(enumerate(nodes), repeat=2):
+        if i == j or "e" in (one.name, two.name):
+            assert gains[i, j] == -np.inf
+        else:
+            fall = unlikely(found) - unlikely(_exchanged(found, one, two))
+            assert gains[i, j] == pytest.approx(fall)
 
 
 def test_points_of_unknown_place_and_few_modes_say_nothing(sheet):
