@@ -149,7 +149,7 @@ def _looked_at(
         recorded.q,
         simulation,
         effects=None if linear or leaves_room(findings) else (),
-        bent=bool(of_levels(findings)),
+        bent=any(not f.slight for f in of_levels(findings)),
         tell=within(tell, 0.2, 1.0),
     )
     if found.verdict == "explained" and all(_rather(found, f) for f in crude):

@@ -16,8 +16,9 @@ class Finding:
     fit that says so, ∞ where there is none. No finding is surer than `sure`, and `rivals` are other
     effects at the same place that take a share of its probability; `laws` are their fits, by which
     a further hit can be planned. `wants` says what would have to be measured for it to be told at
-    all: until then it is no more than a remark. `gain` is the factor by which χ² falls where that
-    is so little that physics has to be weighed against it; `drift_fits` are those behind a drift.
+    all: until then it is no more than a remark, and what is `slight` stays one. `gain` is the
+    factor by which χ² falls where that is so little that physics has to be weighed against it;
+    `drift_fits` are those behind a drift.
     """
 
     effect: str
@@ -30,5 +31,6 @@ class Finding:
     rivals: tuple[tuple[str, float], ...] = ()
     laws: "Laws | None" = None
     wants: str = ""
+    slight: bool = False
     gain: float = float("inf")
     drift_fits: "DriftFits | None" = None

@@ -44,8 +44,8 @@ def asked_again(
 
 
 def abstained(findings: tuple[Finding, ...]) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
-    """The findings that can be told, and remarks: on what can't before more is measured, and on
-    what is known of the unknown."""
-    told = tuple(f for f in findings if not f.wants)
+    """The findings that can be told and matter, and remarks: on what can't be told before more is
+    measured, and on what is known of the unknown."""
+    told = tuple(f for f in findings if not f.wants and not f.slight)
     said = (f.wants or (f.text if f.effect == UNKNOWN else "") for f in findings)
     return told, tuple(filter(None, said))

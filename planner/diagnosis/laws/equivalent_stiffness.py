@@ -113,7 +113,7 @@ class Equivalent:
     `swing` (m, 2, J) in rad: the joint's largest angle at the two levels, were it linear. `delta`
     (m, J) N·m/rad complex: by how much it is stiffer (and lossier) than at the strongest level;
     `precision` (m, J) is 1/E|error|²; `chi2` (m, J) what is left, `before` (m,) without, over
-    `count` (m,) values.
+    `count` (m,) values. `power` (m,) is what `before` would be were there nothing at one level.
     """
 
     visit: np.ndarray
@@ -125,6 +125,7 @@ class Equivalent:
     chi2: np.ndarray
     before: np.ndarray
     count: np.ndarray
+    power: np.ndarray
 
 
 def equivalent(recorded: Dataset, system: System, misses: OpenMisses | None = None) -> Equivalent:
@@ -150,8 +151,10 @@ def equivalent(recorded: Dataset, system: System, misses: OpenMisses | None = No
                 found = _delta(full, axis, lines, pair, scale)
                 before = float(pair.product(pair.change, pair.change))
                 count = int(np.count_nonzero(pair.weight))
+                whole = group[-1].accelerance[:, lines]
+                power = float(pair.product(whole, whole))
                 swung = np.array([largest, swings[-1]])
-                rows.append((number, axis, weaker.level, swung, *found, before, count))
+                rows.append((number, axis, weaker.level, swung, *found, before, count, power))
     parts = [np.array(part) for part in zip(*rows, strict=True)]
     return Equivalent(*parts)
 

@@ -29,6 +29,7 @@ from planner.diagnosis.thresholds import (
     LAW_EXPLAINS,
     LAW_OF_ITS_OWN,
     LAW_SURELY,
+    LEVELS_MATTER,
     LINEARISED,
     ONE_JOINT,
     PLACED,
@@ -45,8 +46,9 @@ def screen(
 ) -> tuple[Finding, ...]:
     """Nonlinear joints; `unknown` where the level matters and no joint's law explains it.
 
-    Without repeats `unknown` says what it wants. `single`: a law of several joints is not looked
-    for. Of several sensors and hit points, the ones most heard tell.
+    It is slight where averages over the levels are off by less than matters. Without repeats
+    `unknown` says what it wants. `single`: a law of several joints is not looked for. Of several
+    sensors and hit points, the ones most heard tell.
     """
     recorded = recorded.most_heard
     if len(recorded.level_n) < 2:
@@ -92,6 +94,11 @@ class _Compared:
         misses = OpenMisses.told(plain, recorded, tolerances_of(problem.simulation))
         return cls(problem, misses, equivalent(recorded, system_of(plain), misses))
 
+    @property
+    def matters(self) -> float:
+        """How far FRFs of a level may be off their average, as a share of |H|."""
+        return LEVELS_MATTER * self.problem.simulation.robot.config.diagnose.matters
+
 
 def _several(
     recorded: Dataset, nominal: Simulation, found: Equivalent, tell: Tell
@@ -124,7 +131,7 @@ def _named(
     misses, found = look.misses, look.found
     plain = misses.plain
     if not found.delta.shape[1]:
-        return (_unknown(found, "no joint has a spring about its own axis"),), False
+        return (_unknown(look, "no joint has a spring about its own axis"),), False
     of_one = placed(found)  # at the joint whose own stiffness for every hit leaves least
     surely = system_of(plain).ports[int(np.argmin(found.chi2.sum(axis=0)))] if of_one else ""
     least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
@@ -132,7 +139,7 @@ def _named(
     if of_one:
         weighed = tuple(w for w in weighed if w.at == surely)
     if not weighed:
-        return (_unknown(found, "even with a stiffness of its own for every hit"),), False
+        return (_unknown(look, "even with a stiffness of its own for every hit"),), False
     there, shares = shares_of_laws(weighed)
     best = there[0]
     # Where it is surely this joint, what a linear fit lacks elsewhere says nothing of its law, and
@@ -153,7 +160,7 @@ def _named(
         return (finding, *far), len(close) == 1
     law = best.candidate.law.effect.replace("_", " ")
     how = f"the best, {law} at {best.at}, explains {100 * best.explained:.0f} %"
-    return (_unknown(found, how),), False
+    return (_unknown(look, how),), False
 
 
 def _weighed(
@@ -187,7 +194,8 @@ def not_by_misses(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]
         "Hits along one axis of a pose differ by more than any hand's misses explain, and not by "
         "their force alone. Look for play, loose parts, or contact with the surroundings."
     )
-    return (Finding(UNKNOWN, None, _excess(first.found) / 2, {}, text),)
+    slight = off_the_average(first.found) < first.matters
+    return (Finding(UNKNOWN, None, _excess(first.found) / 2, {}, text, slight=slight),)
 
 
 def differ(recorded: Dataset, nominal: Simulation) -> bool:
@@ -199,13 +207,26 @@ def differ(recorded: Dataset, nominal: Simulation) -> bool:
     return bool(len(found.count)) and disproportion(found) >= PROPORTIONAL
 
 
-def _unknown(found: Equivalent, how: str) -> Finding:
+def _unknown(look: _Compared, how: str) -> Finding:
+    slight = off_the_average(look.found) < look.matters
     text = (
         "The response is not proportional to the force, and neither a single joint nor one law at "
-        f"several joints describes how: {how}. Look for contact with the surroundings, loose "
-        "parts or clearance."
+        f"several joints describes how: {how}. "
+    ) + (
+        f"It is off the average over force levels by {100 * off_the_average(look.found):.1f} %, "
+        "which is too little to matter."
+        if slight
+        else "Look for contact with the surroundings, loose parts or clearance."
     )
-    return Finding("unknown", None, _excess(found) / 2, {}, text)
+    return Finding(UNKNOWN, None, _excess(look.found) / 2, {}, text, slight=slight)
+
+
+def off_the_average(found: Equivalent) -> float:
+    """How far FRFs of a force level are off their average over levels, as a share of |H|, rms.
+
+    By half of what levels at both ends differ by, beyond noise and misses of hits.
+    """
+    return float(np.sqrt(max(_excess(found), 0.0) / max(found.power.sum(), 1e-300))) / 2
 
 
 def equivalent_share(found: Equivalent) -> float:

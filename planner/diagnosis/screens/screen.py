@@ -45,7 +45,9 @@ def screen(
         if not by_level and beyond_any_hand(errors, tolerances_of(nominal)):
             by_level = force_levels.not_by_misses(clean, nominal)
     by_time = drift.screen(apart, nominal)
-    if by_time or not by_level:
+    if by_time:
         # Levels are hit one after the other: what changes with time looks as if it went with them.
         return Screened((*found, *by_time), apart, missed, errors)
+    if all(f.slight for f in by_level):
+        return Screened((*found, *by_level), apart, missed, errors)
     return Screened((*found, *by_level), clean, missed)
