@@ -42,9 +42,10 @@ class Scored:
 
     `group` is null, single, artefact, pair or outsider. `said` is the first candidate, `named` what
     is told as there, `false_names` what of it is not there. `right`: what was said first is what
-    is there; what nothing tells of (DETECTABLE) may be left out. `detectability` is the smallest
-    relative change of the spectra by an effect; `covered` counts parameters inside and all that can
-    be compared; `frac` is global FRAC of the predictions with the true FRFs.
+    was concealed; what nothing tells of (DETECTABLE) may be left out. `holds`: the same, where a
+    small imperfection of the robot may be said too, for it is there. `detectability` is the
+    smallest relative change of the spectra by an effect; `covered` counts parameters inside and all
+    that can be compared; `frac` is global FRAC of the predictions with the true FRFs.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Scored:
     shown: tuple[Shown, ...]
     probability: float
     right: bool
+    holds: bool
     detectability: float
     covered: tuple[int, int]
     frac: float
@@ -74,7 +76,7 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
         shown = tuple(_shown(e, False, False) for e in answer["effects"])
         return Scored(
             name, group, answer["robot"], true, (("failed", None),), (), (), "failed", shown,
-            1.0, False, change, (0, 0), np.nan, np.nan, (np.nan, np.nan),
+            1.0, False, False, change, (0, 0), np.nan, np.nan, (np.nan, np.nan),
         )  # fmt: skip
     first = told["candidates"][0]
     said = tuple(_place(e) for e in first["effects"])
@@ -85,7 +87,9 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
     shown = tuple(
         _shown(e, _place(e) in named, bool(wide[_place(e)] & set(named))) for e in answer["effects"]
     )
-    there = {*true, *(_place(e) for e in answer.get("imperfections", ()))}
+    small = {_place(e) for e in answer.get("imperfections", ())}
+    there = {*true, *small}
+    rest = tuple(p for p in said if p not in small or p in true)
     held = told["held_out"]
     own = tuple(
         float("nan") if held[k]["frac"] is None else held[k]["frac"]
@@ -95,7 +99,8 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
         name, group, answer["robot"], true, said, named,
         tuple(p for p in named if p not in there and not wide[p] & there),
         told["verdict"], shown, first["probability"], _right(answer, shown, said),
-        change, _covered(answer, told), _frac(answer, told), told["seconds"], (own[0], own[1]),
+        _right(answer, shown, rest), change, _covered(answer, told), _frac(answer, told),
+        told["seconds"], (own[0], own[1]),
     )  # fmt: skip
 
 
@@ -190,7 +195,7 @@ def _frac(answer: dict[str, Any], told: dict[str, Any]) -> float:
 def by_probability(scored: Sequence[Scored]) -> list[tuple[np.ndarray, np.ndarray]]:
     """Stated probabilities and what of it was right, by those of BINS equal bins that hold any."""
     p = np.array([s.probability for s in scored])
-    right = np.array([s.right for s in scored], dtype=float)
+    right = np.array([s.holds for s in scored], dtype=float)
     place = np.minimum((p * BINS).astype(int), BINS - 1)
     return [(p[place == k], right[place == k]) for k in np.unique(place)]
 

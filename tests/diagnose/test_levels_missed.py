@@ -101,6 +101,10 @@ def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     assert repeats.chance(once, misses_of(replace(linear, recorded=once))) is None
     monkeypatch.setattr(force_levels, "disproportion", lambda found: 2.0)
     monkeypatch.setattr(force_levels, "equivalent_share", lambda found: 0.2)
+    (slight,) = force_levels.screen(once, linear.simulation, single=True)
+    assert slight.slight
+    assert slight.wants == ""  # nobody has to hit again for what is too little to matter
+    monkeypatch.setattr(force_levels, "LEVELS_MATTER", 0.0)
     (found,) = force_levels.screen(once, linear.simulation, single=True)
     assert found.effect == UNKNOWN
     told, (remark,) = abstained((found,))
@@ -110,6 +114,35 @@ def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     told, (remark,) = abstained((replace(found, wants=""),))
     assert told
     assert "not proportional to the force" in remark
+
+
+@pytest.mark.parametrize("louder", [0.05, 0.4])
+def test_what_differs_by_little_and_no_law_describes_is_a_remark(linear, monkeypatch, louder):
+    """Hard hits that are answered louder, at all frequencies: as by no joint."""
+    hardest = len(linear.recorded.level_n) - 1
+
+    def answered(hit: Hit) -> Hit:
+        more = 1 + louder * (linear.recorded.level(hit) == hardest)
+        return replace(hit, acceleration_m_s2=more * hit.acceleration_m_s2)
+
+    changed = linear.recorded.corrected(
+        replace(v, hits=tuple(answered(h) for h in v.hits)) for v in linear.recorded.visits
+    )
+    monkeypatch.setattr(force_levels.repeats, "chance", lambda *_: 0.0)
+    # As the averages of two levels of three are: half of what the hardest hits differ by.
+    compared = equivalent(changed, system_of(base(changed, linear.simulation)), misses_of(linear))
+    assert force_levels.off_the_average(compared) == pytest.approx(
+        louder / (1 + louder) / 2, abs=0.02
+    )
+    (found,) = force_levels.screen(changed, linear.simulation, single=True)
+    assert found.effect == UNKNOWN
+    assert found.slight == (louder < 0.1)
+    screened = screen(changed, linear.simulation)
+    assert any(f.effect == UNKNOWN for f in screened.findings)
+    assert bool(screened.hit_errors) == found.slight  # averages are used as if all were linear
+    told, (remark,) = abstained(tuple(f for f in screened.findings if f.effect == UNKNOWN))
+    assert bool(told) == (not found.slight)
+    assert ("too little to matter" in remark) == found.slight
 
 
 def test_without_repeats_the_order_of_levels_tells(linear):

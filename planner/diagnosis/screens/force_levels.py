@@ -77,7 +77,8 @@ def screen(
     if findings[0].effect != UNKNOWN:
         return findings
     if by_chance is None:
-        return tuple(replace(f, wants=repeats.wanted(recorded)) for f in findings)
+        wanted = repeats.wanted(recorded)
+        return tuple(f if f.slight else replace(f, wants=wanted) for f in findings)
     return findings if by_chance <= BY_CHANCE else ()  # what no law describes may be chance
 
 
