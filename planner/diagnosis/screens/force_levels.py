@@ -195,8 +195,7 @@ def not_by_misses(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]
         "Hits along one axis of a pose differ by more than any hand's misses explain, and not by "
         "their force alone. Look for play, loose parts, or contact with the surroundings."
     )
-    slight = off_the_average(first.found) < first.matters
-    return (Finding(UNKNOWN, None, _excess(first.found) / 2, {}, text, slight=slight),)
+    return (Finding(UNKNOWN, None, _excess(first.found) / 2, {}, text),)
 
 
 def differ(recorded: Dataset, nominal: Simulation) -> bool:
