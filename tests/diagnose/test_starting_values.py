@@ -19,7 +19,7 @@ def begun(law, share):
     nothing, column = np.zeros(len(SWING)), np.ones((len(SWING), 1))
     found = Equivalent(
         nothing, nothing, nothing, SWING[:, :, None], delta[:, None], 1e2 * column,
-        nothing, nothing, nothing,
+        nothing, nothing, nothing, nothing,
     )  # fmt: skip
     springs = SimpleNamespace(stiffness=np.array([SCALE]))
     ports = {"ports": ("joint_1",), "slides": ()}
