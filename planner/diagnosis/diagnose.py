@@ -65,7 +65,7 @@ def explain(
     if again is not None:
         findings, recorded = again[0], replace(again[1], remarks=recorded.remarks)
         linear = linear_effects_apply(findings)
-    both = beside(recorded, findings, found, closer) if screened and again is None else None
+    both = beside(missed, findings, found, closer) if screened and again is None else None
     if both is not None:
         findings, found = both
     elif not linear:

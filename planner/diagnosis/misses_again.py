@@ -23,7 +23,7 @@ def asked_again(
 
     `hits` are the recordings with their misses, `findings` those made without knowing that
     explanation. None where nothing unknown was found in the force levels, where the averages are
-    not explained to their noise, or where the levels still differ.
+    not explained to their noise, or where the levels still differ by what matters.
     """
     first = found.candidates[0]
     if not any(f.effect == UNKNOWN for f in findings) or first.fit is None:
@@ -34,7 +34,7 @@ def asked_again(
     if simulation is None:
         return None
     again = force_levels.screen(hits, simulation, single=True, tell=tell)
-    if any(f.effect == UNKNOWN for f in again):
+    if any(f.effect == UNKNOWN and not f.slight for f in again):
         return None
     apart, errors = taken_out(hits, simulation)
     if beyond_any_hand(errors, tolerances_of(simulation)):

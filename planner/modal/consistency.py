@@ -104,7 +104,7 @@ def check(
     single, entries = odd_entries(sides) if enough else ([], [])
     faults += single
     odd = tuple((sides.rows[row], sides.columns[column]) for row, column in entries)
-    untied = tuple(dof for e in swapped for dof in (e.first, e.second))
+    untied = tuple(dof for dof in sides.columns if any(e.concerns(dof) for e in swapped))
     told = () if faults else _remarks(reciprocity)
     if not driving:
         told = (*told, "No point was hit where it was felt: shapes are not scaled.")

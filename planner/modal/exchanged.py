@@ -24,13 +24,19 @@ class Exchange:
     """Two points whose rows fit each other's places.
 
     `stated` and `exchanged` are how much rows differ from columns, relatively; NaN where only the
-    neighbours tell.
+    neighbours tell: of nodes then, in all their directions.
     """
 
     first: Dof
     second: Dof
     stated: float
     exchanged: float
+
+    def concerns(self, dof: Dof) -> bool:
+        """Whether the row of a point stands elsewhere."""
+        if np.isnan(self.stated):
+            return dof.node in (self.first.node, self.second.node)
+        return dof in (self.first, self.second)
 
     @property
     def text(self) -> str:
@@ -66,7 +72,7 @@ def exchanged_by_neighbours(sides: Sides, geometry: Geometry | None) -> tuple[Ex
 
 
 def _named(sides: Sides, pair: tuple[str, str]) -> Exchange:
-    """Two nodes of which only the neighbours tell."""
+    """Two nodes of which only the neighbours tell, in all directions."""
     first, second = (next(dof for dof in sides.rows if dof.node == node) for node in pair)
     return Exchange(first, second, float("nan"), float("nan"))
 

@@ -192,17 +192,21 @@ def _frac(answer: dict[str, Any], told: dict[str, Any]) -> float:
     return metrics.direct_mean(metrics.agreement(size[..., inside], simulated).global_frac)
 
 
-def by_probability(scored: Sequence[Scored]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Stated probabilities and what of it was right, by those of BINS equal bins that hold any."""
+def by_probability(
+    scored: Sequence[Scored], *, held: bool = False
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Stated probabilities and what of it was right, by those of BINS equal bins that hold any.
+
+    With `held` an imperfection of the robot may be said, too.
+    """
     p = np.array([s.probability for s in scored])
-    right = np.array([s.holds for s in scored], dtype=float)
+    right = np.array([s.holds if held else s.right for s in scored], dtype=float)
     place = np.minimum((p * BINS).astype(int), BINS - 1)
     return [(p[place == k], right[place == k]) for k in np.unique(place)]
 
 
-def calibration_error(scored: Sequence[Scored]) -> float:
-    """Expected calibration error of what was said first."""
-    gaps = [
-        abs(p.mean() - right.mean()) * (len(p) / len(scored)) for p, right in by_probability(scored)
-    ]
+def calibration_error(scored: Sequence[Scored], *, held: bool = False) -> float:
+    """Expected calibration error of what was said first; `held` as in `by_probability`."""
+    bins = by_probability(scored, held=held)
+    gaps = [abs(p.mean() - right.mean()) * (len(p) / len(scored)) for p, right in bins]
     return float(np.sum(gaps))

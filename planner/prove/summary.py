@@ -21,6 +21,7 @@ def summary(scored: Sequence[Scored]) -> dict[str, Any]:
         "clearly": {measure: clearly(effects, measure) for measure in MEASURES},
         **_silence(scored, groups),
         "calibration_error": calibration_error(scored),
+        "calibration_error_with_imperfections": calibration_error(scored, held=True),
         "coverage90": share([inside for s in scored for inside in _inside(s)]),
     }
     return plain(found) | _fits(scored)

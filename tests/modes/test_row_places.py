@@ -1,5 +1,6 @@
 """Turned signs and exchanged points, told by how their neighbours move."""
 
+import re
 from itertools import product
 
 import numpy as np
@@ -64,6 +65,15 @@ def test_two_exchanged_points_are_told(sheet, pair):
     assert set(exchanged_nodes(dofs, exchanged, place)) == {dofs[k].node for k in pair}
 
 
+def test_one_of_two_exchanged_pairs_is_told(sheet):
+    dofs, shapes, place = sheet
+    mixed = shapes.copy()
+    mixed[[10, 30, 4, 49]] = shapes[[30, 10, 49, 4]]
+    told = exchanged_nodes(dofs, mixed, place)
+    assert told is not None
+    assert set(told) in ({dofs[10].node, dofs[30].node}, {dofs[4].node, dofs[49].node})
+
+
 def test_three_mixed_up_points_are_not_told_as_two(sheet):
     """Nor are signs turned at a node, in one direction or in all."""
     dofs, shapes, place = sheet
@@ -84,18 +94,22 @@ def frame():
     return case, found, np.flatnonzero((hz > low) & (hz < high) & (found.weak <= 1))
 
 
-@pytest.mark.parametrize("pair", [(3, 15), (21, 24), (2, 19)])
+@pytest.mark.parametrize("pair", [(3, 15), (21, 24), (2, 19), "reference"])
 def test_exchanged_nodes_of_a_frame_are_told(frame, pair):
     """One of them alone, under the other's name, explains most: both explain clearly more."""
     case, found, modes = frame
+    if pair == "reference":
+        pair = case.structure.nodes[case.references[0]], 19
     owner = np.array(case.structure.nodes)
     order = np.arange(owner.size)
     one, two = (np.flatnonzero(owner == node) for node in pair)
     order[one], order[two] = two, one
     matrix, poles = spoiled(case, found, order, np.ones((owner.size, 3)))
     checks = check(matrix, poles, modes, geometry_of(case))
-    assert len(checks.faults) == 1
-    assert {dof.node for dof in checks.untied} == {str(node) for node in pair}
+    (fault,) = checks.faults
+    assert re.match(rf"Nodes ({pair[0]} and {pair[1]}|{pair[1]} and {pair[0]}) are", fault)
+    touched = [dof for dof in case.matrix.references if dof.node in {str(node) for node in pair}]
+    assert list(checks.untied) == touched
     assert check(case.matrix, found, modes, geometry_of(case)).faults == ()
 
 

@@ -97,7 +97,8 @@ def test_an_imperfection_is_no_false_name_and_no_silence():
     assert found.false_names == ()
     assert not found.right
     assert found.holds
-    assert calibration_error([found]) == pytest.approx(0.1)
+    assert calibration_error([found]) == pytest.approx(0.9)
+    assert calibration_error([found], held=True) == pytest.approx(0.1)
     assert summary([found])["nulls_silent"]["right"] == 0
     assert score("a", null, told(("friction", "joint_3"))).false_names == (("friction", "joint_3"),)
 

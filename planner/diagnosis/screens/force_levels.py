@@ -96,7 +96,7 @@ class _Compared:
         return cls(problem, misses, equivalent(recorded, system_of(plain), misses))
 
     @property
-    def matters(self) -> float:
+    def levels_matter(self) -> float:
         """How far FRFs of a level may be off their average, as a share of |H|."""
         return LEVELS_MATTER * self.problem.simulation.robot.config.diagnose.matters
 
@@ -208,13 +208,14 @@ def differ(recorded: Dataset, nominal: Simulation) -> bool:
 
 
 def _unknown(look: _Compared, how: str) -> Finding:
-    slight = off_the_average(look.found) < look.matters
+    off = 100 * off_the_average(look.found)
+    slight = off < 100 * look.levels_matter
     text = (
         "The response is not proportional to the force, and neither a single joint nor one law at "
         f"several joints describes how: {how}. "
     ) + (
-        f"It is off the average over force levels by {100 * off_the_average(look.found):.1f} %, "
-        "which is too little to matter."
+        f"FRFs of single force levels are off their average by {off:.1f} % of |H| (rms) at most: "
+        f"too little to matter, which begins at {100 * look.levels_matter:g} % here."
         if slight
         else "Look for contact with the surroundings, loose parts or clearance."
     )
@@ -224,9 +225,12 @@ def _unknown(look: _Compared, how: str) -> Finding:
 def off_the_average(found: Equivalent) -> float:
     """How far FRFs of a force level are off their average over levels, as a share of |H|, rms.
 
-    By half of what levels at both ends differ by, beyond noise and misses of hits.
+    By half of what they differ by from the strongest level, beyond noise and misses of hits; at the
+    visit where that is most: contact and loose parts need not be everywhere.
     """
-    return float(np.sqrt(max(_excess(found), 0.0) / max(found.power.sum(), 1e-300))) / 2
+    here = found.visit == np.unique(found.visit)[:, None]
+    excess = np.maximum(here @ (found.before - found.count), 0.0)
+    return float(np.sqrt(np.max(excess / np.maximum(here @ found.power, 1e-300)))) / 2
 
 
 def equivalent_share(found: Equivalent) -> float:

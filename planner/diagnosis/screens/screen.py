@@ -17,7 +17,8 @@ class Screened:
     """What was found, artefacts first, and the recordings without artefacts and misses of hits.
 
     `hit_errors` are empty where the hits of a pose agree without looking for their misses, and
-    where something else makes them differ: a joint that is not linear, or what is unknown.
+    where something else that matters makes them differ: a joint that is not linear, or what is
+    unknown.
     """
 
     findings: tuple[Finding, ...]
@@ -42,8 +43,9 @@ def screen(
     if by_level or force_levels.differ(clean, nominal):
         tell("estimating by how much each hit missed its axis and point", 0.3)
         apart, errors = taken_out(clean, nominal)
-        if not by_level and beyond_any_hand(errors, tolerances_of(nominal)):
-            by_level = force_levels.not_by_misses(clean, nominal)
+        slight = all(f.slight for f in by_level)
+        if slight and beyond_any_hand(errors, tolerances_of(nominal)):
+            by_level = force_levels.not_by_misses(clean, nominal) or by_level
     by_time = drift.screen(apart, nominal)
     if by_time:
         # Levels are hit one after the other: what changes with time looks as if it went with them.
