@@ -11,6 +11,7 @@ from planner.campaign.missing_physics import (
     SWINGS,
     with_loss_factors,
     with_springs,
+    with_strayed_springs_again,
     with_swinging_mass,
 )
 from planner.dynamics.simulation import Simulation
@@ -214,6 +215,7 @@ def learn(
         stated = lesson.identified(stated.structure)
         learned = likeliest([stated, learned])
     learned = with_swinging_mass(stated, learned, lesson)
+    learned = with_strayed_springs_again(learned, lesson)
     left_out = None
     if not learned.fits and len(frfs) > 1:
         left_out = _left_out(learned, lesson, before.count)

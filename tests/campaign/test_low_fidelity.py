@@ -1,12 +1,14 @@
 """A low fidelity that learns: identified from recordings, uncertain where it should be, doubted."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from planner.campaign.learned import lacking
-from planner.campaign.low_fidelity import OF_EXACT_HITS, LowFidelity, learn
+from planner.campaign.low_fidelity import OF_EXACT_HITS, Lesson, LowFidelity, learn
+from planner.campaign.missing_physics import with_strayed_springs_again
 from planner.dynamics.simulation import Simulation
 from planner.frf.estimator import estimate
 from planner.identification.feasible_inertias import pseudo_inertia
@@ -59,6 +61,29 @@ def test_with_the_right_physics_few_poses_teach_the_whole_workspace(right):
     assert rmse(after, other, true_hz) < 0.005
     assert after.left_out is None
     assert after.remark == ""
+
+
+def test_a_spring_that_strayed_begins_where_it_is_stated_once_more(tmp_path):
+    path = make_arm(tmp_path, transverse=True)
+    frfs, q, _, _ = measured(path, 3)
+    lesson = Lesson(tuple(frfs), q, BAND_HZ, Tolerances())
+    before = LowFidelity(COUNT, Simulation(Robot.load(path)), Tolerances())
+    learned = learn(before, frfs, q, BAND_HZ).learned
+    assert learned is not None
+    assert with_strayed_springs_again(learned, lesson) is learned
+    found = learned.identified
+    number, spring = next((i, e) for i, e in enumerate(found.estimates) if e.kind == "stiffness")
+    lost = replace(spring, value=spring.prior_median * np.exp(-4 * spring.prior_log_sd))
+    mean = found.mean.copy()
+    mean[number] = np.log(lost.value)
+    estimates = tuple(lost if e is spring else e for e in found.estimates)
+    strayed = replace(found, estimates=estimates, mean=mean, misfit=2 * found.misfit)
+    again = with_strayed_springs_again(replace(learned, identified=strayed), lesson).identified
+    assert again.misfit < 1.2 * found.misfit
+    assert again.estimates[number].value == pytest.approx(spring.value, rel=0.05)
+    exact = replace(lesson, tolerances=None)
+    lost_again = with_strayed_springs_again(replace(learned, identified=strayed), exact)
+    assert lost_again.identified is strayed
 
 
 def test_what_the_parameters_leave_open_covers_the_error(right):
