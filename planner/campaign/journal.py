@@ -70,7 +70,7 @@ def parse(data: bytes, name: str = "log.jsonl") -> LogContent:
         end = data.find(b"\n", position)
         stop = len(data) if end < 0 else end + 1
         entry, new_check = _read_line(data[position:stop], check, len(entries) + 1, name)
-        if entry is None:
+        if entry is None or (end < 0 and not data.endswith(b"}")):
             # A write that was cut short leaves the beginning of one line: no newline, no other.
             seq = len(entries) + 1
             whole, _ = _read_line(data[position : stop - 1], check, seq, name)

@@ -53,6 +53,12 @@ def test_a_newline_lost_before_the_last_line_is_damage_not_a_torn_line():
         parse(log[:at] + b"\0" + log[at + 1 :])
 
 
+@pytest.mark.parametrize("blank", [b" ", b"\t", b"\r"])
+def test_a_blank_in_the_stead_of_the_last_newline_is_damage(blank):
+    with pytest.raises(JournalError, match="damaged"):
+        parse(log_of(EVENTS)[:-1] + blank)
+
+
 @settings(deadline=None)
 @given(st.data())
 def test_a_changed_byte_is_found(data):
