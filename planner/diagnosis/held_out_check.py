@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from planner.diagnosis.linear.predict import ThreefoldSimilarity, agreement, held_out
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
-from planner.diagnosis.thresholds import HELD_OUT_DOUBTED, HELD_OUT_WORSE
+from planner.diagnosis.thresholds import HELD_OUT_DOUBTED, HELD_OUT_GROWN, HELD_OUT_WORSE
 
 LESSER = 3  # parts of an explanation that are tried where the whole fails at poses set aside
 
@@ -42,7 +42,12 @@ def judge(found: Diagnosis) -> JudgedDiagnosis:
 
 
 def _fails(judged: ThreefoldSimilarity) -> bool:
-    return judged.explained.frac < judged.refitted.frac - HELD_OUT_WORSE
+    """Whether it predicts worse; where both predict well, by how much of the little that is off."""
+    before, after = judged.refitted, judged.explained
+    grown = 1 - after.frac > HELD_OUT_GROWN * (1 - before.frac)
+    return after.frac < before.frac - HELD_OUT_WORSE or (
+        grown and after.frobenius < before.frobenius
+    )
 
 
 def _lesser(found: Diagnosis) -> list[Diagnosis]:

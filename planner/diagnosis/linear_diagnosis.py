@@ -9,7 +9,11 @@ import numpy as np
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.linear.beyond_tolerance import with_artefacts
-from planner.diagnosis.linear.damper_like_springs import as_structures, damper_like
+from planner.diagnosis.linear.damper_like_springs import (
+    as_structures,
+    beside_dampers,
+    damper_like,
+)
 from planner.diagnosis.linear.discrepancy import settled_with
 from planner.diagnosis.linear.evidence import Weights, stated_springs, weigh
 from planner.diagnosis.linear.fit import Fit, carried_on, fit, settle
@@ -222,8 +226,9 @@ def _candidates(
     named = [_beyond_tolerance(f, weights.temper) for f in fits]
     prior = _priors([f.effect for f in fits], all_)
     evidence = np.array([w.log_evidence for w in weights.worth])
-    own = weights.probabilities[:-1], prior, weights.bent, evidence
-    shares = list(without_slight(fits, named, *own, matters))
+    shares = beside_dampers(fits, weights.probabilities[:-1], evidence, weights.temper)
+    own = prior, weights.bent, evidence
+    shares = list(without_slight(fits, named, shares, *own, matters))
     shares = named_as_mass(fits, shares)
     unknown = float(weights.probabilities[-1])
     for i, one in enumerate(fits):

@@ -1,12 +1,17 @@
 """A resonator that was fitted on a neighbouring link is found on its own; ties are carried on."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.fit import fit, settle
+from planner.diagnosis.linear import search
+from planner.diagnosis.linear.fit import Fit, fit, settle
+from planner.diagnosis.linear.found import Found
 from planner.diagnosis.linear.other_places import elsewhere
-from planner.diagnosis.linear.problem import Problem
+from planner.diagnosis.linear.problem import COARSE, Problem
 from planner.diagnosis.linear_diagnosis import again, diagnose
 from planner.truth.deviation import AttachedResonator
 from tests.support.concealed import hidden
@@ -37,6 +42,22 @@ def test_it_is_found_from_the_next_link(recorded, neighbour):
     assert best.effect.at == "link_3"
     assert best.per_value < 1.0
     assert wrong.per_value > 1.3 * best.per_value
+
+
+@pytest.mark.parametrize("bent", [0.0, 4.0])
+def test_at_the_noise_it_is_asked_elsewhere_where_inertias_are_bent(recorded, monkeypatch, bent):
+    """They may make up for the wrong place, up to the noise."""
+    frfs, q, simulation = recorded
+    resonators = of_kind(recorded, "local_resonator")
+    problem = Problem(tuple(frfs), q, simulation, simulation.robot.config.band_hz)
+    near = settle(problem, fit(problem, resonators["link_4"], grade=COARSE), COARSE, steps=1)
+    x = near.misfit.mean.copy()
+    x[near.misfit.split[0]] += bent * near.misfit.sd[near.misfit.split[0]]
+    silent = replace(near, x=x, data=replace(near.data, chi2=np.zeros(len(q))))
+    asked: list[Fit] = []
+    monkeypatch.setattr(search, "elsewhere", lambda _, found, __: asked.append(found) or ())
+    search._moved(problem, Found((silent,), ()), list(resonators.values()))
+    assert asked == ([silent] if bent else [])
 
 
 def test_joints_are_not_moved(recorded):

@@ -60,6 +60,22 @@ def test_what_predicts_worse_is_given_up(found, monkeypatch):
     assert shares[0] >= 0.95
 
 
+@pytest.mark.parametrize(
+    ("off", "less", "kept"), [(1.6, 0.003, False), (1.6, -0.003, True), (1.05, 0.003, True)]
+)
+def test_where_both_predict_well_what_predicts_clearly_worse_is_given_up(
+    found, monkeypatch, off, less, kept
+):
+    """By how much of the little that is off, if the Frobenius similarity (less so) agrees."""
+    aside, agreed = module.held_out(found.problem, found.refitted, found.best)
+    assert agreed is not None
+    before = replace(agreed.refitted, frac=0.9990, frobenius=0.96)
+    after = replace(agreed.explained, frac=1 - off * 0.0010, frobenius=0.96 - less)
+    near = replace(agreed, refitted=before, explained=after)
+    monkeypatch.setattr(module, "held_out", lambda *_: (aside, near))
+    assert (judge(found).diagnosis is found) is kept
+
+
 def test_refitting_alone_is_not_given_up(found, monkeypatch):
     aside, agreed = module.held_out(found.problem, found.refitted, found.best)
     assert agreed is not None

@@ -9,7 +9,12 @@ import pytest
 from planner.diagnosis.effects import library
 from planner.diagnosis.effects.combined import together
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.linear.damper_like_springs import _as_structure, as_structures, damper_like
+from planner.diagnosis.linear.damper_like_springs import (
+    _as_structure,
+    as_structures,
+    beside_dampers,
+    damper_like,
+)
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import COARSE
 from planner.diagnosis.linear.slightness import without_slight
@@ -161,6 +166,26 @@ def test_beside_a_strong_effect_a_spring_like_a_damper_is_worth_its_own(at):
     nothing, strong, all_ = (f.log_evidence(1.0) for f in (none, soft, fit))
     assert strong - nothing > 100 * (all_ - strong) > 0
     assert as_structures([none, soft, fit])[2] is fit
+
+
+@pytest.mark.parametrize(("worth", "kept"), [(0.001, False), (0.2, True)])
+def test_a_strong_effect_is_told_without_a_damper_beside_it(at, worth, kept):
+    """Unless the damper is worth much of what both explain: that is no structure's then."""
+    softer = {"stiffness of joint_2": -2.0}
+    both = at(*BOTH, softer | {"damping of base": np.log(60.0)})
+    both = answering(both, both.x)
+    assert damper_like(both, 1.0)
+    fits = [with_its_frfs(both, at("none", "", {})), with_its_frfs(both, at(*SOFT, softer)), both]
+    evidence = np.array([-1e4, -1e4 * worth, 0.0])
+    shares = beside_dampers(fits, [0.0, 0.1, 0.9], evidence, 1.0)
+    np.testing.assert_allclose(shares, [0.0, 0.1, 0.9] if kept else [0.0, 1.0, 0.0])
+
+
+def test_a_damper_by_itself_is_given_to_nothing(at):
+    slow = at("base_compliance", "base", {"damping of base": np.log(60.0)})
+    slow = answering(slow, slow.x)
+    fits = [with_its_frfs(slow, at("none", "", {})), slow]
+    assert beside_dampers(fits, [0.0, 1.0], np.array([-1e4, 0.0]), 1.0).tolist() == [0.0, 1.0]
 
 
 def test_the_mean_of_an_uneven_joint_is_told_with_it(at):

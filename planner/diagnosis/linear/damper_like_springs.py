@@ -11,7 +11,13 @@ import numpy as np
 
 from planner.diagnosis.linear.evidence import lag, temper_of
 from planner.diagnosis.linear.fit import Fit, follow
-from planner.diagnosis.thresholds import DAMPER_WORTH, LOSS_OF_NO_STRUCTURE, STIFFNESS_KNOWN
+from planner.diagnosis.thresholds import (
+    DAMPER_ASIDE,
+    DAMPER_WORTH,
+    LOSS_OF_NO_STRUCTURE,
+    STIFFNESS_KNOWN,
+    TIED,
+)
 
 STIFF = 1.5  # prior sds above its median where a spring changes little
 BEHIND = 500.0  # log evidence behind the best, from which a fit is left as it is
@@ -40,12 +46,38 @@ def as_structures(finalists: Sequence[Fit]) -> tuple[Fit, ...]:
 
 def _without(fit: Fit, finalists: Sequence[Fit], temper: float) -> Fit:
     """The best fit without one of the effects whose springs are like dampers."""
+    others = [f for f in finalists if _spared(f, fit, temper)]
+    return max(others or finalists[:1], key=lambda f: f.log_evidence(temper))
+
+
+def _spared(other: Fit, fit: Fit, temper: float) -> bool:
+    """Whether another fit has none of the effects of `fit` whose springs are like dampers."""
     names, simulation = fit.misfit.names, fit.misfit.setting.simulation
     slow = {names[s.spring] for s in _slow_springs(fit, temper)}
     parts = fit.effect.parts()
     there = {(p.name, p.at) for p in parts if slow.intersection(p.springs(simulation))}
-    others = [f for f in finalists if there.isdisjoint((p.name, p.at) for p in f.effect.parts())]
-    return max(others or finalists[:1], key=lambda f: f.log_evidence(temper))
+    return there.isdisjoint((p.name, p.at) for p in other.effect.parts())
+
+
+def beside_dampers(
+    fits: Sequence[Fit], shares: Sequence[float], evidence: np.ndarray, temper: float
+) -> np.ndarray:
+    """Shares (k,) of fits, those with springs like dampers given to what they have beside these.
+
+    So it is where the likeliest fit without the dampers explains nearly as much: that something is
+    slow there too says nothing against it. The first fit is "none"; `evidence` (k,) is that of
+    each.
+    """
+    out = np.array(shares, dtype=float)
+    for i, one in enumerate(fits):
+        if out[i] < TIED / len(fits) or not damper_like(one, temper):
+            continue
+        others = [k for k, f in enumerate(fits) if k and f is not one and _spared(f, one, temper)]
+        most = max(others, key=lambda k: evidence[k], default=i)
+        lost, gained = evidence[i] - evidence[most], evidence[i] - evidence[0]
+        if most != i and lost < DAMPER_ASIDE * gained:
+            out[most], out[i] = out[most] + out[i], 0.0
+    return out
 
 
 def _as_structure(fit: Fit, without: Fit, temper: float) -> Fit:

@@ -39,6 +39,10 @@ def _moved(problem: Problem, found: Fit, move: tuple[Effect, Effect, Effect]) ->
     part, to, effect = move
     misfit, known = problem.misfit(effect, CLOSE), found.named()
     starts = np.array(points(misfit, found))
+    # From springs and inertias that made up for the wrong place nothing leads to the right one.
+    usual = starts.copy()
+    usual[:, : misfit.split[1]] = misfit.mean[: misfit.split[1]]
+    starts = np.concatenate([starts, usual])
     for name in KEPT:
         before, now = f"{name} of {part.name} at {part.at}", f"{name} of {to.name} at {to.at}"
         if before in known:

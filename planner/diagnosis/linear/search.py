@@ -154,9 +154,12 @@ def _and_best(rough: Sequence[Fit], most: int) -> list[Fit]:
 
 
 def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """Adds fits whose masses and resonators stand elsewhere, where the best misses the noise."""
+    """Adds fits whose masses and resonators stand elsewhere, where the best has not enough.
+
+    It misses the noise then, or bends inertias.
+    """
     best = min(found.finalists, key=lambda f: f.per_value)
-    if best.per_value <= AT_NOISE:
+    if best.per_value <= AT_NOISE and not inertias_bent(best):
         return found
     near = best_of(elsewhere(problem, best, effects), MOVED)
     return Found((*found.finalists, *settled(problem, near)), found.left)
