@@ -9,10 +9,12 @@ import numpy as np
 
 from planner.diagnosis.thresholds import ARTEFACTS
 from planner.frf import metrics
+from planner.robot.config import DiagnoseTable
 
 BINS = 10
 Z90 = 1.645
 DETECTABLE = 5.0  # nats: below, not to name an effect is right; e⁵ is odds of 150
+MATTERS = DiagnoseTable().matters  # of |H|: what a diagnosis need not explain
 LARGEST_SET = 2  # places that can't be told apart and yet count as told
 
 Place = tuple[str, str | None]
@@ -24,8 +26,8 @@ class Shown:
     """A concealed effect: how much tells of it, and what the answer made of it.
 
     `nats`: with the robot's own numbers refitted, hits and chain known; `nats_open`: those unknown
-    too. `named`: effect and place are named; `in_set`: or they are in a set of at most two that
-    can't be told apart.
+    too. `left`: by how much of |H| a refitted robot without it is off. `named`: effect and place
+    are named; `in_set`: or they are in a set of at most two that can't be told apart.
     """
 
     effect: str
@@ -34,6 +36,12 @@ class Shown:
     nats_open: float
     named: bool
     in_set: bool
+    left: float
+
+    @property
+    def matters(self) -> bool:
+        """Whether the recordings tell of it, and a refitted robot would be off by what matters."""
+        return self.nats_open >= DETECTABLE and self.left >= MATTERS
 
 
 @dataclass(frozen=True)
@@ -43,7 +51,9 @@ class Scored:
     `group` is null, single, artefact, pair or outsider. `said` is the first candidate, `named` what
     is told as there, `false_names` what of it is not there. `right`: what was said first is what
     was concealed; what nothing tells of (DETECTABLE) may be left out. `holds`: the same, where a
-    small imperfection of the robot may be said too, for it is there. `detectability` is the
+    small imperfection of the robot may be said too, for it is there. `fair`: what `holds`, or that
+    nothing is said of effects without which a refitted robot would be off by less than what
+    matters: "consistent" says no more. `detectability` is the
     smallest relative change of the spectra by an effect; `covered` counts parameters inside and all
     that can be compared; `frac` is global FRAC of the predictions with the true FRFs.
     """
@@ -60,6 +70,7 @@ class Scored:
     probability: float
     right: bool
     holds: bool
+    fair: bool
     detectability: float
     covered: tuple[int, int]
     frac: float
@@ -76,7 +87,7 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
         shown = tuple(_shown(e, False, False) for e in answer["effects"])
         return Scored(
             name, group, answer["robot"], true, (("failed", None),), (), (), "failed", shown,
-            1.0, False, False, change, (0, 0), np.nan, np.nan, (np.nan, np.nan),
+            1.0, False, False, False, change, (0, 0), np.nan, np.nan, (np.nan, np.nan),
         )  # fmt: skip
     first = told["candidates"][0]
     said = tuple(_place(e) for e in first["effects"])
@@ -91,6 +102,8 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
     there = {*true, *small}
     rest = tuple(p for p in said if p not in small or p in true)
     held = told["held_out"]
+    holds = _right(answer, shown, rest)
+    silent = told["verdict"] == "consistent" and not any(e.matters for e in shown)
     own = tuple(
         float("nan") if held[k]["frac"] is None else held[k]["frac"]
         for k in ("refitted", "explained")
@@ -99,7 +112,7 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
         name, group, answer["robot"], true, said, named,
         tuple(p for p in named if p not in there and not wide[p] & there),
         told["verdict"], shown, first["probability"], _right(answer, shown, said),
-        _right(answer, shown, rest), change, _covered(answer, told), _frac(answer, told),
+        holds, holds or silent, change, _covered(answer, told), _frac(answer, told),
         told["seconds"], (own[0], own[1]),
     )  # fmt: skip
 
@@ -110,7 +123,8 @@ def _place(effect: dict[str, Any]) -> Place:
 
 def _shown(effect: dict[str, Any], named: bool, in_set: bool) -> Shown:
     nats, opened = effect["nats"], effect["nats_open"]
-    return Shown(effect["effect"], effect["at"], nats, opened, named, named or in_set)
+    left = effect.get("left", effect["change"])  # proofs of old did not ask
+    return Shown(effect["effect"], effect["at"], nats, opened, named, named or in_set, left)
 
 
 def _named(told: dict[str, Any], said: Sequence[Place]) -> tuple[Place, ...]:
@@ -193,20 +207,20 @@ def _frac(answer: dict[str, Any], told: dict[str, Any]) -> float:
 
 
 def by_probability(
-    scored: Sequence[Scored], *, held: bool = False
+    scored: Sequence[Scored], by: str = "right"
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Stated probabilities and what of it was right, by those of BINS equal bins that hold any.
 
-    With `held` an imperfection of the robot may be said, too.
+    `by` says what counts as right: "right", "holds" or "fair" of `Scored`.
     """
     p = np.array([s.probability for s in scored])
-    right = np.array([s.holds if held else s.right for s in scored], dtype=float)
+    right = np.array([getattr(s, by) for s in scored], dtype=float)
     place = np.minimum((p * BINS).astype(int), BINS - 1)
     return [(p[place == k], right[place == k]) for k in np.unique(place)]
 
 
-def calibration_error(scored: Sequence[Scored], *, held: bool = False) -> float:
-    """Expected calibration error of what was said first; `held` as in `by_probability`."""
-    bins = by_probability(scored, held=held)
+def calibration_error(scored: Sequence[Scored], by: str = "right") -> float:
+    """Expected calibration error of what was said first; `by` as in `by_probability`."""
+    bins = by_probability(scored, by)
     gaps = [abs(p.mean() - right.mean()) * (len(p) / len(scored)) for p, right in bins]
     return float(np.sum(gaps))

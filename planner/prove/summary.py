@@ -20,8 +20,10 @@ def summary(scored: Sequence[Scored]) -> dict[str, Any]:
         "curves": {measure: curve(effects, measure) for measure in MEASURES},
         "clearly": {measure: clearly(effects, measure) for measure in MEASURES},
         **_silence(scored, groups),
+        **_of_what_matters(scored),
         "calibration_error": calibration_error(scored),
-        "calibration_error_with_imperfections": calibration_error(scored, held=True),
+        "calibration_error_with_imperfections": calibration_error(scored, "holds"),
+        "calibration_error_of_what_matters": calibration_error(scored, "fair"),
         "coverage90": share([inside for s in scored for inside in _inside(s)]),
     }
     return plain(found) | _fits(scored)
@@ -45,6 +47,20 @@ def _silence(scored: Sequence[Scored], groups: dict[str, list[Scored]]) -> dict[
             [any(name not in ARTEFACTS for name, _ in s.false_names) for s in artefacts]
         ),
         "failed": share([s.verdict == "failed" for s in scored]),
+    }
+
+
+def _of_what_matters(scored: Sequence[Scored]) -> dict[str, Any]:
+    """The same where refitting the robot would leave more than a diagnosis may leave unsaid."""
+    effects = [e for e in nameable(scored) if e.nats_open >= CLEARLY_NATS and e.matters]
+    outsiders = [s for s in scored if s.group == "outsider" and s.shown[0].matters]
+    return {
+        "named_that_matter": share([e.named for e in effects]),
+        "in_set_that_matter": share([e.in_set for e in effects]),
+        "outsiders_unknown_that_matter": share(
+            [s.verdict == "unexplained" and not s.false_names for s in outsiders]
+        ),
+        "fair": share([s.fair for s in scored]),
     }
 
 

@@ -22,14 +22,16 @@ class Nats:
     nats: that robot has other stiffnesses, dampings and inertias, within what they scatter by;
     hits, chain and noise are known. nats_known: it has the true ones. nats_open: misses of hits,
     readback and measuring chain are unknown too, within what they scatter by. change: of the
-    accelerations' spectra within the band, relative (root of the sum of squares). All are of
-    records under an exponential window, which counts up to half too little, never too much.
+    accelerations' spectra within the band, relative (root of the sum of squares); left: what of
+    that the best robot without the effect leaves. All are of records under an exponential window,
+    which counts up to half too little, never too much.
     """
 
     nats: float
     nats_known: float
     nats_open: float
     change: float
+    left: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,7 @@ class _Sums:
 
     def __init__(self) -> None:
         self.known: np.ndarray | float = 0.0  # of robot and effect
+        self.plain: np.ndarray | float = 0.0  # the same in m/s², not in units of the noise
         self.open: np.ndarray | float = 0.0  # of robot, chain and effect, hits and poses free
         self.size = self.change = 0.0  # of spectra and their change, squared
 
@@ -91,7 +94,16 @@ class _Sums:
         all_known = float(known[-1, -1]) / 2
         refitted = min(most, all_known, _left(known) / 2)
         opened = min(refitted, _left(whole) / 2)
-        return Nats(refitted, all_known, opened, float(np.sqrt(self.change / self.size)))
+        change = float(np.sqrt(self.change / self.size))
+        left = self._unfollowed(known) if np.isinf(most) else change
+        return Nats(refitted, all_known, opened, change, min(change, left))
+
+    def _unfollowed(self, known: np.ndarray) -> float:
+        """Relative size of what is left of the effect once a robot without it is fitted."""
+        free = len(known) - 1
+        fitted = np.linalg.solve(np.eye(free) + known[:free, :free], known[:free, free])
+        off = np.append(-fitted, 1.0)
+        return float(np.sqrt(max(0.0, off @ self.plain @ off) / self.size))
 
 
 def _left(products: np.ndarray) -> float:
@@ -154,6 +166,8 @@ def _add(
         at = np.vstack([at.real, at.imag])
         alone = at[:, -1 - one.robot.shape[1] :]
         found.known = found.known + alone.T @ alone
+        bare = alone / np.tile(white, (2, 1))
+        found.plain = found.plain + bare.T @ bare
         found.size += float(np.sum(np.abs(seen) ** 2))
         found.change += float(np.sum(np.abs(change) ** 2))
         whole = whole + _without(at.T @ at, one.hit.shape[1])

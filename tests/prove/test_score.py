@@ -18,12 +18,15 @@ MASS, BASE, NOISE_OF = ("added_mass", "link_3"), ("base_compliance", "base"), ("
 UNKNOWN = ("unknown", None)
 
 
-def answer(*effects, outside=False, nats=1e3, imperfections=()):
+def answer(*effects, outside=False, nats=1e3, imperfections=(), left=0.1):
     return {
         "robot": "kr210",
         "outside_library": outside,
         "effects": [
-            {"effect": e, "at": at, "parameters": p, "change": 0.5, "nats": nats, "nats_open": nats}
+            {
+                **{"effect": e, "at": at, "parameters": p, "nats": nats, "nats_open": nats},
+                **{"change": 0.5, "left": left},
+            }
             for e, at, p in effects
         ],
         "imperfections": [{"effect": e, "at": at} for e, at in imperfections],
@@ -98,9 +101,29 @@ def test_an_imperfection_is_no_false_name_and_no_silence():
     assert not found.right
     assert found.holds
     assert calibration_error([found]) == pytest.approx(0.9)
-    assert calibration_error([found], held=True) == pytest.approx(0.1)
+    assert calibration_error([found], "holds") == pytest.approx(0.1)
     assert summary([found])["nulls_silent"]["right"] == 0
     assert score("a", null, told(("friction", "joint_3"))).false_names == (("friction", "joint_3"),)
+
+
+def test_consistent_says_that_nothing_matters_not_that_nothing_is_there():
+    """A robot that can be refitted to within less than what matters is said to be consistent."""
+    slight, large = (
+        score("a", answer((*UNKNOWN, {}), outside=True, left=left), told(NOISE_OF))
+        for left in (0.002, 0.05)
+    )
+    assert [s.right for s in (slight, large)] == [False, False]
+    assert [s.fair for s in (slight, large)] == [True, False]
+    assert calibration_error([slight, large], "fair") == pytest.approx(0.4)
+    figures = summary([slight, large])
+    assert figures["outsiders_unknown_that_matter"]["of"] == 1
+    assert figures["outsiders_unknown"]["of"] == 2
+    unfounded = score("a", answer((*UNKNOWN, {}), outside=True, left=0.002), told(MASS))
+    assert not unfounded.fair
+    small = score("a", answer((*MASS, {}), left=0.002), told(MASS))
+    assert small.fair
+    named = summary([small, score("b", answer((*MASS, {})), told(MASS))])["named_that_matter"]
+    assert (named["right"], named["of"]) == (1, 1)
 
 
 def test_curves_put_effects_into_bins_of_nats():

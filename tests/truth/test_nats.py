@@ -69,6 +69,8 @@ def test_it_grows_with_the_square_of_a_small_effect_and_of_the_noise(path):
     assert quieter.nats_known == pytest.approx(4 * one.nats_known, rel=1e-6)
     # A robot may have other inertias and springs anyway: that takes nearly all of it.
     assert 0 < one.nats < 0.1 * one.nats_known
+    assert 0 < one.left < 0.5 * one.change
+    assert two.left == pytest.approx(2 * one.left, rel=0.05)
 
 
 def test_what_scatters_anyway_tells_hardly_more_than_its_prior(path):
@@ -77,6 +79,7 @@ def test_what_scatters_anyway_tells_hardly_more_than_its_prior(path):
     spring = told(path, Deviation(scaled=scaled), record_s=2.56)
     assert spring.nats_known > 300
     assert spring.nats < 1e-4 * spring.nats_known  # half a record's end that is cut off remains
+    assert spring.left < 0.02 * spring.change
 
 
 def test_open_hits_and_chain_leave_less(path):
@@ -84,6 +87,7 @@ def test_open_hits_and_chain_leave_less(path):
     clean, real = told(path, ripple), told(path, ripple, EVERYDAY)
     assert clean.nats_open == pytest.approx(clean.nats, rel=1e-6)
     assert 0 < real.nats_open < real.nats <= real.nats_known
+    assert 0 < real.left <= real.change
 
 
 def test_one_effect_of_several_can_be_left_out():
