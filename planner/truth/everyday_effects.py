@@ -28,9 +28,10 @@ from planner.truth.scene import (
     some_joint,
     triple,
 )
-from planner.truth.secret import JointDrift, Secret
+from planner.truth.secret import JointDrift, LoadChange, Secret
 
 REFERENCE_HZ = 15.0  # at which speeds of joints are estimated
+CHANGED_TOOL = 0.25  # how often properties change because the tool does
 
 
 def _in_joint(effect: str, scene: Scene, secret: Secret, joint: str, law: JointLaw) -> Drawn:
@@ -154,7 +155,9 @@ def angle_dependent_stiffness(scene: Scene, secret: Secret, rng: np.random.Gener
 
 
 def drift(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """Joints warm up each by itself: some much, some hardly."""
+    """Joints warm up each by itself, some much, some hardly; or another tool half-way through."""
+    if rng.random() < CHANGED_TOOL:
+        return _changed_tool(scene, secret, rng)
     course = str(rng.choice(["linear", "warming", "step"]))
     size = scene.size * rng.uniform(0.12, 0.35) * rng.choice([-1, 1])
     own = {f"joint_{n}": float(size * rng.uniform(0.1, 1.5)) for n in range(1, 7)}
@@ -162,6 +165,13 @@ def drift(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     law = JointDrift((*before, *((joint, change, course) for joint, change in own.items())))
     parameters: Parameters = {"course": course, **own}
     return Drawn("drift", "campaign", parameters, replace(secret, drift=law))
+
+
+def _changed_tool(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
+    factor = 1 + scene.size * log_uniform(rng, 0.1, 0.6)
+    load = LoadChange("spindle", factor, float(rng.uniform(0.3, 0.7)))
+    parameters: Parameters = {"load_factor": factor, "start": load.start}
+    return Drawn("drift", "campaign", parameters, replace(secret, load=load))
 
 
 EVERYDAY_EFFECTS: dict[str, Draw] = {

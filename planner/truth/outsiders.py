@@ -19,7 +19,7 @@ from planner.truth.scene import (
     some_joint,
     triple,
 )
-from planner.truth.secret import LoadChange, Secret
+from planner.truth.secret import Secret
 
 
 def _unknown(cause: str, change: Secret, **numbers: float | str | list[float]) -> Drawn:
@@ -97,13 +97,6 @@ def loose_anchor(scene: Scene, secret: Secret, rng: np.random.Generator) -> Draw
     return _unknown("loose_anchor", change, stiffness=stiffness, half_gap_rad=law.gap)
 
 
-def changed_load(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
-    """Somebody changed the tool half-way through the campaign."""
-    factor = 1 + scene.size * log_uniform(rng, 0.1, 0.6)
-    load = LoadChange("spindle", factor, float(rng.uniform(0.3, 0.7)))
-    return _unknown("changed_load", replace(secret, load=load), factor=factor, start=load.start)
-
-
 def quadratic_damping(scene: Scene, secret: Secret, rng: np.random.Generator) -> Drawn:
     """A balancer's oil: torque with the square of a joint's speed."""
     joint = some_joint(rng, 3)
@@ -131,7 +124,6 @@ MORE_OUTSIDERS: dict[str, Draw] = {
     "turning_spindle": turning_spindle,
     "servo_loop": servo_loop,
     "loose_anchor": loose_anchor,
-    "changed_load": changed_load,
     "quadratic_damping": quadratic_damping,
     "coupled_stiffness": coupled_stiffness,
 }

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.predict import similarity
@@ -73,6 +74,37 @@ def test_a_small_step_of_one_joint_is_none_of_a_gradual_course(simulation):
     assert (best.effect.kind, best.effect.joints) == ("step", ("joint_2",))
     assert best.effect.since == pytest.approx(0.6)
     assert best.x[-1] == pytest.approx(np.log(0.97), abs=0.003)
+
+
+@pytest.mark.parametrize("heavier_first", [False, True])
+def test_a_tool_that_was_changed_is_told_as_such(tmp_path, heavier_first):
+    """Not as springs that all grew softer, or stiffer, at once."""
+    path, other = KR210.write(tmp_path / "robot"), tmp_path / "robot" / "heavier.toml"
+    tool = '\n[[payload]]\nlink = "link_6"\nmass = 25.0\ncom_m = [0.05, 0.02, 0.15]\n'
+    other.write_text(path.read_text() + tool)
+    both = [Simulation(Robot.load(toml)) for toml in (path, other)]
+    if heavier_first:
+        both.reverse()
+    first, then = (recorded(one, KR210.poses(6, 3), peaks_n=(300.0,)).visits for one in both)
+    changed = Dataset.of_visits((*first[:3], *then[3:]), both[0].robot.config.band_hz)
+    (found,) = screen(changed, both[0])
+    assert (found.effect, found.at) == ("drift", "campaign")
+    mass, sd, unit = found.parameters["mass"]
+    assert unit == "kg"
+    assert abs(mass) == pytest.approx(25.0, abs=4 * sd + 0.5)
+    assert (mass < 0) is heavier_first
+    assert "From visit 4 of the campaign on, link_6 carries 2" in found.text
+    assert ("less" if heavier_first else "more") in found.text
+    assert found.misfit < 1.2
+
+
+def test_springs_that_all_grow_softer_are_no_load(simulation):
+    factor = np.ones((6, len(simulation.elasticity.stiffness)))
+    factor[3:] *= 0.94
+    moving = recorded(simulation, KR210.poses(6, 3), lambda visit, level: factor[visit], (300.0,))
+    (found,) = screen(moving, simulation)
+    assert "mass" not in found.parameters
+    assert found.parameters["change"][0] == pytest.approx(-0.06, abs=0.01)
 
 
 def test_no_drift_where_other_orders_of_the_visits_explain_as_much(simulation, monkeypatch):

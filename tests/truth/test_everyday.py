@@ -85,6 +85,21 @@ def test_every_effect_does_something_and_goes_with_its_size(name, tmp_path):
     assert changes[0] < 0.15 * np.linalg.norm(plain)  # a base's long lever is the most
 
 
+def test_what_changes_with_time_is_what_gives_or_what_is_carried(tmp_path):
+    """A joint that grows softer, or another tool: half-way through both differ from before."""
+    scene, secret, path = scene_of("kr210", tmp_path)
+    drawn = [EVERYDAY["drift"](scene, secret, np.random.default_rng(n)) for n in range(12)]
+    assert {(d.effect, d.at) for d in drawn} == {("drift", "campaign")}
+    tools = [d for d in drawn if d.secret.load is not None]
+    assert 0 < len(tools) < len(drawn)
+    assert all("load_factor" in d.parameters for d in tools)
+    for one in (tools[0], next(d for d in drawn if d.secret.load is None)):
+        early, late = (heard(scene, one.secret, path, progress) for progress in (0.0, 1.0))
+        assert np.linalg.norm(late - early) > 1e-4 * np.linalg.norm(early)
+    [without] = {lacking(d.secret, secret, d.secret).load for d in tools}
+    assert without is None
+
+
 def test_a_case_says_what_it_should_and_hides_the_rest(tmp_path):
     case = make_case("friction", "kr210", 2, tmp_path, REAL)
     answer = json.loads(case.answer)

@@ -13,6 +13,7 @@ import numpy as np
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.drift import BEND, Drift, change_of
 from planner.diagnosis.effects.effect import Effect, Quantity
+from planner.diagnosis.effects.load_change import LoadChange
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
@@ -122,7 +123,7 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     if returned(recorded) is None and len(recorded.visits) < STEP_VISITS:
         found = [f for f in found if isinstance(f.effect, Drift) and f.effect.kind != "step"]
     problem = problem_of(recorded, nominal, as_built=True)
-    best = settle(problem, _likeliest(found))
+    best = _or_load(problem, plain, settle(problem, _likeliest(found)))
     # A fit that drift led out of a wrong minimum gains by that alone: it does without drift too.
     back = carried_on(problem, best, Effect(""))
     plain = min((plain, back), key=lambda f: f.per_value)
@@ -137,27 +138,55 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     return (replace(finding, drift_fits=DriftFits(problem, plain, best)),)
 
 
+def _or_load(problem: DriftProblem, plain: Fit, best: Fit) -> Fit:
+    """A step of springs, or the load of the last link that changed then, if that tells more.
+
+    Springs that are all softer move modes as a heavier tool does. Where nothing fits closely, which
+    of both it is can't be told.
+    """
+    if not isinstance(best.effect, Drift) or best.effect.kind != "step":
+        return best
+    load = LoadChange.of_last_link(problem.simulation, problem.order >= best.effect.since)
+    if load is None:
+        return best
+    loaded = settle(problem, fit(problem, load, [plain, best]))
+    if loaded.per_value > DRIFT_CRUDE:
+        return best
+    t = temper(min(best.per_value, loaded.per_value), ALIKE)
+    return loaded if loaded.log_evidence(t) > best.log_evidence(t) + CLEAR else best
+
+
 def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
     """Whether the order in time explains clearly more than other orders of the visits would.
 
     Where no pose was returned to, visits differ in pose as they do in time, and a course through
     a few of them takes a part of anything that goes with the pose.
     """
-    assert isinstance(best.effect, Drift)
+    assert isinstance(best.effect, Drift | LoadChange)
     orders = [problem.order, *_other_orders(problem.order)]
-    # Where much is left, the way to a fit with drift is longer than a few steps: then roughly, on
-    # fewer lines and with inertias as they are.
-    look = promise if best.per_value <= DRIFT_CRUDE else glance
+    # Where much is left, the way to a fit with drift is longer than a few steps, and so is that to
+    # a load: then roughly, on fewer lines and with inertias as they are.
+    near = best.per_value <= DRIFT_CRUDE and isinstance(best.effect, Drift)
+    look = promise if near else glance
     courses: list[Drift] = [GRADUAL] * len(orders)
-    if best.effect.kind == "step":
+    if isinstance(best.effect, LoadChange) or best.effect.kind == "step":
         orders, courses = _steps(glance(problem, _each_visit(problem), plain), orders)
     fits = [look(problem, Effect(""), plain)]
     for order, course in zip(orders, courses, strict=True):
-        each = course.of_each(problem.simulation) if best.effect.joints else course
+        each = _as(best.effect, course, order, problem.simulation)
         fits.append(look(replace(problem, order=order), each, plain))
     t = temper(min(f.per_value for f in fits), ALIKE)
     nothing, so, *otherwise = (f.log_evidence(t) for f in fits)
     return so - nothing > max(DRIFT_BY_TIME, DRIFT_ORDER * (max(otherwise) - nothing))
+
+
+def _as(
+    best: Drift | LoadChange, course: Drift, order: np.ndarray, simulation: Simulation
+) -> Effect:
+    """What the best fit has, in another order (n,) of the visits."""
+    if isinstance(best, LoadChange):
+        return best.at_visits(order >= course.since)
+    return course.of_each(simulation) if best.joints else course
 
 
 def _steps(free: Fit, orders: Sequence[np.ndarray]) -> tuple[list[np.ndarray], list[Drift]]:
@@ -198,9 +227,12 @@ def _likeliest(found: Sequence[Fit]) -> Fit:
 def evaluate(plain: Fit, best: Fit) -> Finding:
     """The gain of a fit with drift over the one without, and its parameters."""
     t = temper(best.per_value, ALIKE)
-    told = {name: _change(value) for name, value in best.parameters(t).items() if name != BEND.name}
-    most = max(told.values(), key=lambda value: abs(value[0]))
-    told = {"change": most, **told}
+    values = best.parameters(t)
+    if isinstance(best.effect, LoadChange):
+        told = {"change": _share(best, values["mass"]), **values}
+    else:
+        told = {name: _change(value) for name, value in values.items() if name != BEND.name}
+        told = {"change": max(told.values(), key=lambda value: abs(value[0])), **told}
     evidence = best.log_evidence(t) - plain.log_evidence(t)
     misfit = best.per_value
     gain = plain.per_value / misfit
@@ -212,6 +244,14 @@ def _change(log_change: tuple[float, float, str]) -> tuple[float, float, str]:
     value, sd, unit = log_change
     change = float(np.expm1(value))
     return change, float(np.hypot((1 + change) * sd, DRIFT_COURSE * change)), unit
+
+
+def _share(found: Fit, mass: tuple[float, float, str]) -> tuple[float, float, str]:
+    """A mass in kg as a share of that of the link that carries it."""
+    assert isinstance(found.effect, LoadChange)
+    elastic = found.misfit.setting.simulation.elastic
+    own = float(elastic.inertia[elastic.bodies.index(found.effect.joint)][0])
+    return mass[0] / own, mass[1] / own, "1"
 
 
 def _unchanged(recorded: Dataset, nominal: Simulation) -> bool:
