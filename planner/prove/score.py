@@ -51,11 +51,11 @@ class Scored:
     `group` is null, single, artefact, pair or outsider. `said` is the first candidate, `named` what
     is told as there, `false_names` what of it is not there. `right`: what was said first is what
     was concealed; what nothing tells of (DETECTABLE) may be left out. `holds`: the same, where a
-    small imperfection of the robot may be said too, for it is there. `fair`: what `holds`, or that
-    nothing is said of effects without which a refitted robot would be off by less than what
-    matters: "consistent" says no more. `detectability` is the
-    smallest relative change of the spectra by an effect; `covered` counts parameters inside and all
-    that can be compared; `frac` is global FRAC of the predictions with the true FRFs.
+    small imperfection of the robot may be said too, for it is there. `fair`: what `holds`, and what
+    says all that matters and nothing that is not there: "consistent" means no more than that a
+    refitted robot is off by less than what matters. `detectability` is the smallest relative change
+    of the spectra by an effect; `covered` counts parameters inside and all that can be compared;
+    `frac` is global FRAC of the predictions with the true FRFs.
     """
 
     name: str
@@ -103,7 +103,7 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
     rest = tuple(p for p in said if p not in small or p in true)
     held = told["held_out"]
     holds = _right(answer, shown, rest)
-    silent = told["verdict"] == "consistent" and not any(e.matters for e in shown)
+    fair = holds or _fair(shown, said, there)
     own = tuple(
         float("nan") if held[k]["frac"] is None else held[k]["frac"]
         for k in ("refitted", "explained")
@@ -112,7 +112,7 @@ def score(name: str, answer: dict[str, Any], told: dict[str, Any]) -> Scored:
         name, group, answer["robot"], true, said, named,
         tuple(p for p in named if p not in there and not wide[p] & there),
         told["verdict"], shown, first["probability"], _right(answer, shown, said),
-        holds, holds or silent, change, _covered(answer, told), _frac(answer, told),
+        holds, fair, change, _covered(answer, told), _frac(answer, told),
         told["seconds"], (own[0], own[1]),
     )  # fmt: skip
 
@@ -144,6 +144,12 @@ def _right(answer: dict[str, Any], shown: Sequence[Shown], said: Sequence[Place]
     if not known or ("unknown", None) in wanted:
         return not claimed and unknown == bool(wanted)
     return wanted <= claimed <= known
+
+
+def _fair(shown: Sequence[Shown], said: Sequence[Place], there: set[Place]) -> bool:
+    """Whether what is said is `there`, and nothing that matters is left unsaid."""
+    matter = {(s.effect, s.at) for s in shown if s.matters}
+    return matter <= set(said) and all(p in there for p in said if p != ("none", None))
 
 
 def _group(answer: dict[str, Any], true: Sequence[Place]) -> str:

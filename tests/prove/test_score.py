@@ -122,6 +122,11 @@ def test_consistent_says_that_nothing_matters_not_that_nothing_is_there():
     assert not unfounded.fair
     small = score("a", answer((*MASS, {}), left=0.002), told(MASS))
     assert small.fair
+    hose = answer((*UNKNOWN, {}), outside=True, left=0.002, imperfections=[BASE])
+    assert score("a", hose, told(BASE)).fair
+    assert not score("a", hose | {"effects": []}, told(UNKNOWN)).fair
+    strong = answer((*UNKNOWN, {}), outside=True, imperfections=[BASE])
+    assert not score("a", strong, told(BASE)).fair
     named = summary([small, score("b", answer((*MASS, {})), told(MASS))])["named_that_matter"]
     assert (named["right"], named["of"]) == (1, 1)
 
