@@ -4,7 +4,12 @@ from dataclasses import dataclass, replace
 
 from planner.diagnosis.linear.predict import ThreefoldSimilarity, agreement, held_out
 from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
-from planner.diagnosis.thresholds import HELD_OUT_DOUBTED, HELD_OUT_GROWN, HELD_OUT_WORSE
+from planner.diagnosis.thresholds import (
+    HELD_OUT_DOUBTED,
+    HELD_OUT_GROWN,
+    HELD_OUT_SHOWS,
+    HELD_OUT_WORSE,
+)
 
 LESSER = 3  # parts of an explanation that are tried where the whole fails at poses set aside
 
@@ -45,9 +50,9 @@ def _fails(judged: ThreefoldSimilarity) -> bool:
     """Whether it predicts worse; where both predict well, by how much of the little that is off."""
     before, after = judged.refitted, judged.explained
     grown = 1 - after.frac > HELD_OUT_GROWN * (1 - before.frac)
-    return after.frac < before.frac - HELD_OUT_WORSE or (
-        grown and after.frobenius < before.frobenius
-    )
+    shows = before.frac - after.frac > HELD_OUT_SHOWS
+    less_alike = before.frobenius - after.frobenius > HELD_OUT_SHOWS
+    return after.frac < before.frac - HELD_OUT_WORSE or (grown and shows and less_alike)
 
 
 def _lesser(found: Diagnosis) -> list[Diagnosis]:

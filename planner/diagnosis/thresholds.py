@@ -136,7 +136,7 @@ HELD_OUT_WORSE = 0.002  # of the Global FRAC at poses set aside: refitting alone
 # Factor on 1 - Global FRAC at poses set aside, from which an explanation predicts worse although
 # both predict well, if the Frobenius similarity falls too. Chosen looking at 116 explanations of
 # concealed cases: a wrong one had 1.6, of all others none more than 1.07.
-HELD_OUT_GROWN = 1.2
+HELD_OUT_GROWN, HELD_OUT_SHOWS = 1.2, 2e-4  # the second of either: less says nothing. Chosen
 HELD_OUT_DOUBTED = 0.05  # what is left of the probability of explanations that predict worse
 REVOKING = 0.9  # probability of the opposite artefact that revokes one
 REVOKED_LEFT = 0.05  # of the correction, that at most is left of it

@@ -7,7 +7,7 @@ import numpy as np
 
 from planner.diagnosis.thresholds import ARTEFACTS
 from planner.prove.curves import CLEARLY_NATS, MEASURES, clearly, curve, nameable, share
-from planner.prove.score import DETECTABLE, Scored, calibration_error
+from planner.prove.score import DETECTABLE, Scored, Shown, calibration_error
 from planner.report.answer import plain
 
 
@@ -52,8 +52,12 @@ def _silence(scored: Sequence[Scored], groups: dict[str, list[Scored]]) -> dict[
 
 def _of_what_matters(scored: Sequence[Scored]) -> dict[str, Any]:
     """The same where refitting the robot would leave more than a diagnosis may leave unsaid."""
-    effects = [e for e in nameable(scored) if e.nats_open >= CLEARLY_NATS and e.matters]
-    outsiders = [s for s in scored if s.group == "outsider" and s.shown[0].matters]
+
+    def clear(one: Shown) -> bool:
+        return one.nats_open >= CLEARLY_NATS and one.matters
+
+    effects = [e for e in nameable(scored) if clear(e)]
+    outsiders = [s for s in scored if s.group == "outsider" and clear(s.shown[0])]
     return {
         "named_that_matter": share([e.named for e in effects]),
         "in_set_that_matter": share([e.in_set for e in effects]),

@@ -23,7 +23,8 @@ class Nats:
     hits, chain and noise are known. nats_known: it has the true ones. nats_open: misses of hits,
     readback and measuring chain are unknown too, within what they scatter by. change: of the
     accelerations' spectra within the band, relative (root of the sum of squares); left: what of
-    that the best robot without the effect leaves. All are of records under an exponential window,
+    that the best robot without the effect leaves; of a joint's own stiffness, which refitting tells
+    by itself, all of it. All are of records under an exponential window,
     which counts up to half too little, never too much.
     """
 

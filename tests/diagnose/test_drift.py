@@ -93,7 +93,7 @@ def test_a_tool_that_was_changed_is_told_as_such(tmp_path, heavier_first):
     assert unit == "kg"
     assert abs(mass) == pytest.approx(25.0, abs=4 * sd + 0.5)
     assert (mass < 0) is heavier_first
-    assert "From visit 4 of the campaign on, link_6 carries 2" in found.text
+    assert "From the visit of P4 on, link_6 carries 2" in found.text
     assert ("less" if heavier_first else "more") in found.text
     assert found.misfit < 1.2
 

@@ -61,7 +61,8 @@ def test_what_predicts_worse_is_given_up(found, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("off", "less", "kept"), [(1.6, 0.003, False), (1.6, -0.003, True), (1.05, 0.003, True)]
+    ("off", "less", "kept"),
+    [(1.6, 0.003, False), (1.6, -0.003, True), (1.6, 1e-5, True), (1.05, 0.003, True)],
 )
 def test_where_both_predict_well_what_predicts_clearly_worse_is_given_up(
     found, monkeypatch, off, less, kept

@@ -184,8 +184,10 @@ def test_a_strong_effect_is_told_without_a_damper_beside_it(at, worth, kept):
 def test_a_damper_by_itself_is_given_to_nothing(at):
     slow = at("base_compliance", "base", {"damping of base": np.log(60.0)})
     slow = answering(slow, slow.x)
-    fits = [with_its_frfs(slow, at("none", "", {})), slow]
-    assert beside_dampers(fits, [0.0, 1.0], np.array([-1e4, 0.0]), 1.0).tolist() == [0.0, 1.0]
+    none, other = (with_its_frfs(slow, at(*one, {})) for one in (("none", ""), SOFT))
+    evidence = np.array([-1e4, -10.0, 0.0])  # another explanation is none of its parts
+    shares = beside_dampers([none, other, slow], [0.0, 0.0, 1.0], evidence, 1.0)
+    assert shares.tolist() == [0.0, 0.0, 1.0]
 
 
 def test_the_mean_of_an_uneven_joint_is_told_with_it(at):

@@ -118,6 +118,9 @@ def test_consistent_says_that_nothing_matters_not_that_nothing_is_there():
     figures = summary([slight, large])
     assert figures["outsiders_unknown_that_matter"]["of"] == 1
     assert figures["outsiders_unknown"]["of"] == 2
+    faint = score("a", answer((*UNKNOWN, {}), outside=True, nats=10.0), told(NOISE_OF))
+    assert summary([faint])["outsiders_unknown_that_matter"]["of"] == 0
+    assert not faint.fair
     unfounded = score("a", answer((*UNKNOWN, {}), outside=True, left=0.002), told(MASS))
     assert not unfounded.fair
     small = score("a", answer((*MASS, {}), left=0.002), told(MASS))

@@ -15,20 +15,21 @@ BESIDE = 0.5  # prior sds of its place, by which a load is begun beside the link
 
 @dataclass(frozen=True)
 class LoadChange(AddedMass):
-    """What the last link carries more (or less) at those visits, of all in order, that have it."""
+    """What the last link carries more (or less) at some visits, the first of them of a pose."""
 
     carried: tuple[bool, ...] = ()
+    since_pose: str = ""
 
     name = "drift"
 
     @classmethod
-    def of_last_link(cls, simulation: Simulation, carried: np.ndarray) -> Self | None:
-        """At visits (n,) bool; None where no link carries anything."""
+    def of_last_link(cls, simulation: Simulation, carried: np.ndarray, pose: str) -> Self | None:
+        """At visits (n,) bool from one of a `pose` on; None where no link carries anything."""
         masses = AddedMass.everywhere(simulation)
         if not masses:
             return None
         last = masses[-1]
-        return cls(last.at, last.quantities, last.joint, tuple(carried.tolist()))
+        return cls(last.at, last.quantities, last.joint, tuple(carried.tolist()), pose)
 
     def at_visits(self, carried: np.ndarray) -> "LoadChange":
         """The same at other visits (n,) bool."""
@@ -57,8 +58,7 @@ class LoadChange(AddedMass):
         """See `Effect.text`."""
         mass, sd, _ = values["mass"]
         what = "more" if mass > 0 else "less"
-        since = self.carried.index(True) + 1
         return (
-            f"From visit {since} of the campaign on, {self.at} carries {abs(mass):.3g} ± {sd:.1g} "
+            f"From the visit of {self.since_pose} on, {self.at} carries {abs(mass):.3g} ± {sd:.1g} "
             f"kg {what} than before: was the tool changed, or something left there or taken off?"
         )

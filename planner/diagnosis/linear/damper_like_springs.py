@@ -59,20 +59,26 @@ def _spared(other: Fit, fit: Fit, temper: float) -> bool:
     return there.isdisjoint((p.name, p.at) for p in other.effect.parts())
 
 
+def _rest(other: Fit, fit: Fit, temper: float) -> bool:
+    """Whether another fit has but effects of `fit`, none of them like a damper."""
+    own, whole = ({(p.name, p.at) for p in f.effect.parts()} for f in (other, fit))
+    return own < whole and _spared(other, fit, temper) and not damper_like(other, temper)
+
+
 def beside_dampers(
-    fits: Sequence[Fit], shares: Sequence[float], evidence: np.ndarray, temper: float
+    fits: Sequence[Fit], shares: Sequence[float] | np.ndarray, evidence: np.ndarray, temper: float
 ) -> np.ndarray:
     """Shares (k,) of fits, those with springs like dampers given to what they have beside these.
 
-    So it is where the likeliest fit without the dampers explains nearly as much: that something is
-    slow there too says nothing against it. The first fit is "none"; `evidence` (k,) is that of
-    each.
+    So it is where the likeliest fit of the other effects of one explains nearly as much: that
+    something is slow there too says nothing against them. The first fit is "none"; `evidence` (k,)
+    is that of each.
     """
     out = np.array(shares, dtype=float)
     for i, one in enumerate(fits):
         if out[i] < TIED / len(fits) or not damper_like(one, temper):
             continue
-        others = [k for k, f in enumerate(fits) if k and f is not one and _spared(f, one, temper)]
+        others = [k for k, f in enumerate(fits) if k and _rest(f, one, temper)]
         most = max(others, key=lambda k: evidence[k], default=i)
         lost, gained = evidence[i] - evidence[most], evidence[i] - evidence[0]
         if most != i and lost < DAMPER_ASIDE * gained:

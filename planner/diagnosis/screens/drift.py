@@ -43,6 +43,7 @@ from planner.inference.parallel import side_by_side
 
 GRADUAL = Drift.of_all()
 STEP_VISITS = 6  # from which on a step can be told: there are 25 ways to part visits in two
+LIGHTEST = 0.05  # of a middling link's mass, that a link counts as having: a flange may have none
 ORDERS, ORDERS_DRAWN = 24, 300  # orders of the visits that time's is held against
 
 
@@ -123,7 +124,8 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     if returned(recorded) is None and len(recorded.visits) < STEP_VISITS:
         found = [f for f in found if isinstance(f.effect, Drift) and f.effect.kind != "step"]
     problem = problem_of(recorded, nominal, as_built=True)
-    best = _or_load(problem, plain, settle(problem, _likeliest(found)))
+    poses = [visit.pose for visit in recorded.visits]
+    best = _or_load(problem, plain, settle(problem, _likeliest(found)), poses)
     # A fit that drift led out of a wrong minimum gains by that alone: it does without drift too.
     back = carried_on(problem, best, Effect(""))
     plain = min((plain, back), key=lambda f: f.per_value)
@@ -138,7 +140,7 @@ def screen(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
     return (replace(finding, drift_fits=DriftFits(problem, plain, best)),)
 
 
-def _or_load(problem: DriftProblem, plain: Fit, best: Fit) -> Fit:
+def _or_load(problem: DriftProblem, plain: Fit, best: Fit, poses: Sequence[str]) -> Fit:
     """A step of springs, or the load of the last link that changed then, if that tells more.
 
     Springs that are all softer move modes as a heavier tool does. Where nothing fits closely, which
@@ -146,7 +148,9 @@ def _or_load(problem: DriftProblem, plain: Fit, best: Fit) -> Fit:
     """
     if not isinstance(best.effect, Drift) or best.effect.kind != "step":
         return best
-    load = LoadChange.of_last_link(problem.simulation, problem.order >= best.effect.since)
+    after = problem.order >= best.effect.since
+    first = int(np.argmin(np.where(after, problem.order, np.inf)))
+    load = LoadChange.of_last_link(problem.simulation, after, poses[first])
     if load is None:
         return best
     loaded = settle(problem, fit(problem, load, [plain, best]))
@@ -251,6 +255,7 @@ def _share(found: Fit, mass: tuple[float, float, str]) -> tuple[float, float, st
     assert isinstance(found.effect, LoadChange)
     elastic = found.misfit.setting.simulation.elastic
     own = float(elastic.inertia[elastic.bodies.index(found.effect.joint)][0])
+    own = max(own, LIGHTEST * float(np.mean([body[0] for body in elastic.inertia])))
     return mass[0] / own, mass[1] / own, "1"
 
 
