@@ -11,9 +11,9 @@ from functools import partial
 import numpy as np
 
 from planner.dataset.dataset import Dataset
+from planner.diagnosis.effects.changed_load import ChangedLoad
 from planner.diagnosis.effects.drift import BEND, Drift, change_of
 from planner.diagnosis.effects.effect import Effect, Quantity
-from planner.diagnosis.effects.load_change import LoadChange
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, lines_of
@@ -150,7 +150,7 @@ def _or_load(problem: DriftProblem, plain: Fit, best: Fit, poses: Sequence[str])
         return best
     after = problem.order >= best.effect.since
     first = int(np.argmin(np.where(after, problem.order, np.inf)))
-    load = LoadChange.of_last_link(problem.simulation, after, poses[first])
+    load = ChangedLoad.of_last_link(problem.simulation, after, poses[first])
     if load is None:
         return best
     loaded = settle(problem, fit(problem, load, [plain, best]))
@@ -166,14 +166,14 @@ def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
     Where no pose was returned to, visits differ in pose as they do in time, and a course through
     a few of them takes a part of anything that goes with the pose.
     """
-    assert isinstance(best.effect, Drift | LoadChange)
+    assert isinstance(best.effect, Drift | ChangedLoad)
     orders = [problem.order, *_other_orders(problem.order)]
     # Where much is left, the way to a fit with drift is longer than a few steps, and so is that to
     # a load: then roughly, on fewer lines and with inertias as they are.
     near = best.per_value <= DRIFT_CRUDE and isinstance(best.effect, Drift)
     look = promise if near else glance
     courses: list[Drift] = [GRADUAL] * len(orders)
-    if isinstance(best.effect, LoadChange) or best.effect.kind == "step":
+    if isinstance(best.effect, ChangedLoad) or best.effect.kind == "step":
         orders, courses = _steps(glance(problem, _each_visit(problem), plain), orders)
     fits = [look(problem, Effect(""), plain)]
     for order, course in zip(orders, courses, strict=True):
@@ -185,10 +185,10 @@ def _by_time(problem: DriftProblem, plain: Fit, best: Fit) -> bool:
 
 
 def _as(
-    best: Drift | LoadChange, course: Drift, order: np.ndarray, simulation: Simulation
+    best: Drift | ChangedLoad, course: Drift, order: np.ndarray, simulation: Simulation
 ) -> Effect:
     """What the best fit has, in another order (n,) of the visits."""
-    if isinstance(best, LoadChange):
+    if isinstance(best, ChangedLoad):
         return best.at_visits(order >= course.since)
     return course.of_each(simulation) if best.joints else course
 
@@ -232,7 +232,7 @@ def evaluate(plain: Fit, best: Fit) -> Finding:
     """The gain of a fit with drift over the one without, and its parameters."""
     t = temper(best.per_value, ALIKE)
     values = best.parameters(t)
-    if isinstance(best.effect, LoadChange):
+    if isinstance(best.effect, ChangedLoad):
         told = {"change": _share(best, values["mass"]), **values}
     else:
         told = {name: _change(value) for name, value in values.items() if name != BEND.name}
@@ -252,7 +252,7 @@ def _change(log_change: tuple[float, float, str]) -> tuple[float, float, str]:
 
 def _share(found: Fit, mass: tuple[float, float, str]) -> tuple[float, float, str]:
     """A mass in kg as a share of that of the link that carries it."""
-    assert isinstance(found.effect, LoadChange)
+    assert isinstance(found.effect, ChangedLoad)
     elastic = found.misfit.setting.simulation.elastic
     own = float(elastic.inertia[elastic.bodies.index(found.effect.joint)][0])
     own = max(own, LIGHTEST * float(np.mean([body[0] for body in elastic.inertia])))

@@ -14,7 +14,7 @@ BESIDE = 0.5  # prior sds of its place, by which a load is begun beside the link
 
 
 @dataclass(frozen=True)
-class LoadChange(AddedMass):
+class ChangedLoad(AddedMass):
     """What the last link carries more (or less) at some visits, the first of them of a pose."""
 
     carried: tuple[bool, ...] = ()
@@ -31,7 +31,7 @@ class LoadChange(AddedMass):
         last = masses[-1]
         return cls(last.at, last.quantities, last.joint, tuple(carried.tolist()), pose)
 
-    def at_visits(self, carried: np.ndarray) -> "LoadChange":
+    def at_visits(self, carried: np.ndarray) -> "ChangedLoad":
         """The same at other visits (n,) bool."""
         return replace(self, carried=tuple(carried.tolist()))
 
