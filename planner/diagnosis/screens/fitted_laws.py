@@ -50,16 +50,25 @@ def weigh(
 
 
 def weigh_held(
-    recorded: Dataset, misses: OpenMisses, system: System, found: Equivalent, tell: Tell = quietly
+    recorded: Dataset,
+    misses: OpenMisses,
+    system: System,
+    found: Equivalent,
+    tell: Tell = quietly,
+    *,
+    everywhere: bool = False,
 ) -> tuple[WeighedLaw, ...]:
     """Backlash of the likeliest joint, which its weight holds at one end of the gap.
 
-    Nothing where it has no weight to bear.
+    Nothing where it has no weight to bear. `everywhere`: of all joints, where equivalent
+    stiffnesses do not tell which.
     """
     plain = misses.plain
-    port = int(np.argmin(found.chi2.sum(axis=0)))
-    sag = plain.misfit.setting.simulation.elastic.sag(recorded.visit_q)[:, system.blocks[port]]
-    begin = held_starts(found, system, port, plain.x, sag)
+    order = np.argsort(found.chi2.sum(axis=0)).tolist()
+    sag = plain.misfit.setting.simulation.elastic.sag(recorded.visit_q)[:, system.blocks]
+    begin: list[LawAtJoints] = []
+    for port in order if everywhere else order[:1]:
+        begin += held_starts(found, system, port, plain.x, sag[:, port])
     return _fitted(_problem(recorded, misses), begin, system, found, tell) if begin else ()
 
 

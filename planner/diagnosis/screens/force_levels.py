@@ -62,7 +62,7 @@ def screen(
         return ()
     by_chance = repeats.chance(recorded, first.misses)
     as_repeats = by_chance is not None and by_chance > LAW_BY_CHANCE
-    if as_repeats and not placed(first.found):
+    if as_repeats and not placed(first.found) and not first.rattles:
         return ()  # repeats at one level differ as much as levels do
     single = single or as_repeats
     if several := () if single else _several(recorded, nominal, first.found, tell):
@@ -100,6 +100,16 @@ class _Compared:
         """How far FRFs of a level may be off their average, as a share of |H|."""
         return LEVELS_MATTER * self.problem.simulation.robot.config.diagnose.matters
 
+    @property
+    def rattles(self) -> bool:
+        """Whether hits differ by what matters, and no stiffness of its own for every hit says how.
+
+        So does a gear that its weight holds at one end of its gap, and that some hits lift off:
+        repeats differ as levels do then.
+        """
+        unlike_a_spring = equivalent_share(self.found) <= LINEARISED and not placed(self.found)
+        return unlike_a_spring and off_the_average(self.found) > self.levels_matter
+
 
 def _several(
     recorded: Dataset, nominal: Simulation, found: Equivalent, tell: Tell
@@ -136,7 +146,7 @@ def _named(
     of_one = placed(found)  # at the joint whose own stiffness for every hit leaves least
     surely = system_of(plain).ports[int(np.argmin(found.chi2.sum(axis=0)))] if of_one else ""
     least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
-    weighed = _weighed(recorded, look, tell, least, held=held)
+    weighed = _weighed(recorded, look, tell, held=held)
     if of_one:
         weighed = tuple(w for w in weighed if w.at == surely)
     if not weighed:
@@ -165,16 +175,16 @@ def _named(
 
 
 def _weighed(
-    recorded: Dataset, look: _Compared, tell: Tell, least: float, *, held: bool
+    recorded: Dataset, look: _Compared, tell: Tell, *, held: bool
 ) -> tuple[WeighedLaw, ...]:
-    """All laws, and with `held`, where none explains enough, play of a gear that bears weight."""
+    """All laws, and with `held`, where none explains all, play of a gear that bears weight."""
     misses, found = look.misses, look.found
     system, weighed = system_of(misses.plain), ()
     if equivalent_share(found) > LINEARISED or placed(found):
         weighed = weigh(recorded, misses, system, found, tell)
-    if not held or (weighed and weighed[0].explained > least):
+    if not held or (weighed and weighed[0].explained > LAW_SURELY):
         return weighed
-    first = weigh_held(recorded, misses, system, found, tell)[:1]
+    first = weigh_held(recorded, misses, system, found, tell, everywhere=look.rattles)[:1]
     if not first or (weighed and weighed[0].explained > first[0].explained):
         return weighed
     same = first[0].candidate.law.effect, first[0].at
