@@ -128,6 +128,16 @@ class Equivalent:
     power: np.ndarray
 
 
+def telling(swings: np.ndarray) -> float:
+    """Of largest angles (m,) of a joint the one that tells its law: half of all squares is beyond.
+
+    Hits across its axis, or far from it, hardly swing a joint.
+    """
+    swings = np.sort(swings)
+    squares = np.cumsum(swings**2)
+    return float(swings[np.searchsorted(squares, squares[-1] / 2)])
+
+
 def equivalent(recorded: Dataset, system: System, misses: OpenMisses | None = None) -> Equivalent:
     """Fit Δ of every joint, by itself, to every pair of levels.
 

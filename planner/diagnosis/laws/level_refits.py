@@ -12,9 +12,16 @@ from scipy import optimize
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.effects.effect import Effect
-from planner.diagnosis.laws.equivalent_stiffness import receptances, swing, system_of
+from planner.diagnosis.laws.equivalent_stiffness import (
+    System,
+    receptances,
+    swing,
+    system_of,
+    telling,
+)
+from planner.diagnosis.laws.law_at_joints import LawAtJoints
 from planner.diagnosis.laws.starting_values import faded
-from planner.diagnosis.laws.torque_laws import LEAST_SHARE, Law
+from planner.diagnosis.laws.torque_laws import LAWS, LEAST_SHARE, Law
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import Fit, fit
 from planner.diagnosis.linear.problem import FINE, GLANCE, Problem
@@ -82,6 +89,29 @@ def refits(recorded: Dataset, nominal: Simulation) -> tuple[Refit, ...]:
     return tuple(out)
 
 
+def starts_by_level(
+    seen: Sequence[Refit], system: System, port: int, x: np.ndarray, own: int
+) -> list[LawAtJoints]:
+    """Every law (and sign of k) of a joint as springs tell it that follow the force level.
+
+    Of strongly bent laws single hits tell no stiffness: while they ring it changes too much.
+    """
+    scale, out = float(system.elasticity.stiffness[system.blocks[port]]), []
+    middle = float(np.log(telling(seen[-1].swing[:, port])))
+    for law in LAWS:
+        for sign in (1, -1) if law.signed else (1,):
+            moved = x.copy()
+            moved[own], share, angle = begin(seen, law, sign, scale, port, middle)
+            nu = np.array([[sign * np.exp(share) if law.signed else share], [angle]])
+            out.append(
+                LawAtJoints(
+                    law, 0 if law.signed else 1, np.array([port]), np.array([scale]),
+                    np.array([middle]), moved, nu, system.slides[port : port + 1],
+                )
+            )  # fmt: skip
+    return out
+
+
 def begin(
     seen: Sequence[Refit], law: Law, sign: int, scale: float, joint: int, middle: float
 ) -> tuple[float, float, float]:
@@ -90,7 +120,7 @@ def begin(
     `scale` in N·m/rad and `middle` (ln rad) are about where the stiffness and a lie.
     """
     told = np.log([level.stiffness[joint] for level in seen])
-    swings = [np.median(level.swing[:, joint]) for level in seen]
+    swings = np.array([telling(level.swing[:, joint]) for level in seen])
     most = np.log(MOST_LACKING if law.effect == "backlash" or sign < 0 else MOST_SHARE)
 
     sd = [LINEAR_SD, LAW_LOG_SHARE_SD, LAW_ANGLE_LOG_SD]

@@ -16,6 +16,7 @@ from planner.diagnosis.laws.level_data import (
     own_parameter,
     strongest_slopes,
 )
+from planner.diagnosis.laws.level_refits import Refit, starts_by_level
 from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.laws.starting_values import held_starts, starts
 from planner.diagnosis.screens.weighed_laws import WeighedLaw, levels_of, weighed_laws
@@ -36,9 +37,17 @@ TOLERANCE = 1e-5  # of the objective, that a last round must gain
 
 
 def weigh(
-    recorded: Dataset, misses: OpenMisses, system: System, found: Equivalent, tell: Tell = quietly
+    recorded: Dataset,
+    misses: OpenMisses,
+    system: System,
+    found: Equivalent,
+    tell: Tell = quietly,
+    seen: Sequence[Refit] = (),
 ) -> tuple[WeighedLaw, ...]:
-    """Every law at the joints that come into question, fitted in time, most probable first."""
+    """Every law at the joints that come into question, fitted in time, most probable first.
+
+    Fits begin where hits by themselves say, and where `seen` refits of force levels do.
+    """
     plain, problem = misses.plain, _problem(recorded, misses)
     left = found.chi2.sum(axis=0)
     order = np.argsort(left)[:JOINTS]
@@ -46,6 +55,7 @@ def weigh(
     for port in (int(j) for j in order if left[j] < ALSO * left[order[0]]):
         own = own_parameter(plain, int(system.blocks[port]))
         begin += starts(found, system, port, plain.x, own)
+        begin += starts_by_level(seen, system, port, plain.x, own) if seen else []
     return _fitted(problem, begin, system, found, tell)
 
 

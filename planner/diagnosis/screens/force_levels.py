@@ -1,5 +1,6 @@
 """The screen for what depends on the force level: nonlinear joints, and what no joint explains."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from planner.dataset.level_columns import Column
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, equivalent, system_of
 from planner.diagnosis.laws.law_at_joints import Laws
-from planner.diagnosis.laws.level_refits import base, bases
+from planner.diagnosis.laws.level_refits import base, bases, refits
 from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import Problem, tolerances_of
@@ -143,10 +144,10 @@ def _named(
     plain = misses.plain
     if not found.delta.shape[1]:
         return (_unknown(look, "no joint has a spring about its own axis"),), False
-    of_one = placed(found)  # at the joint whose own stiffness for every hit leaves least
-    surely = system_of(plain).ports[int(np.argmin(found.chi2.sum(axis=0)))] if of_one else ""
-    least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
     weighed = _weighed(recorded, look, tell, held=held)
+    surely = _surely_at(look, weighed)
+    of_one = bool(surely)
+    least = least or (LAW_OF_ITS_OWN if of_one else LAW_EXPLAINS)
     if of_one:
         weighed = tuple(w for w in weighed if w.at == surely)
     if not weighed:
@@ -174,14 +175,30 @@ def _named(
     return (_unknown(look, how),), False
 
 
+def _surely_at(look: _Compared, weighed: Sequence[WeighedLaw]) -> str:
+    """The joint that surely is not linear, of whatever shape its law is; "" where none is.
+
+    That whose own stiffness for every hit leaves least or, where hits tell no stiffness, whose law.
+    """
+    if placed(look.found):
+        ports = system_of(look.misses.plain).ports
+        return ports[int(np.argmin(look.found.chi2.sum(axis=0)))]
+    if not look.rattles or not weighed:
+        return ""
+    first = max(weighed, key=lambda w: w.explained)
+    others = max((w.explained for w in weighed if w.at != first.at), default=0.0)
+    return first.at if 1 - first.explained < PLACED * (1 - max(others, 0.0)) else ""
+
+
 def _weighed(
     recorded: Dataset, look: _Compared, tell: Tell, *, held: bool
 ) -> tuple[WeighedLaw, ...]:
     """All laws, and with `held`, where none explains all, play of a gear that bears weight."""
     misses, found = look.misses, look.found
     system, weighed = system_of(misses.plain), ()
-    if equivalent_share(found) > LINEARISED or placed(found):
-        weighed = weigh(recorded, misses, system, found, tell)
+    if equivalent_share(found) > LINEARISED or placed(found) or look.rattles:
+        seen = refits(recorded, look.problem.simulation) if look.rattles else ()
+        weighed = weigh(recorded, misses, system, found, tell, seen)
     if not held or (weighed and weighed[0].explained > LAW_SURELY):
         return weighed
     first = weigh_held(recorded, misses, system, found, tell, everywhere=look.rattles)[:1]
