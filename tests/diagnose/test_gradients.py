@@ -9,6 +9,7 @@ from planner.diagnosis.effects import library
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.hanging_resonator import HangingResonator
 from planner.diagnosis.effects.link_flexibility import LinkFlexibility
+from planner.diagnosis.effects.two_hanging_resonators import TwoHangingResonators
 from planner.diagnosis.linear.problem import Grade, Problem
 from planner.dynamics.simulation import Simulation
 from planner.frf.frf import Frf
@@ -21,6 +22,7 @@ EFFECTS = (
     "joint_stiffness joint_2", "transverse_compliance joint_3", "base_compliance base",
     "link_flexibility link_2", "link_flexibility beam",
     "added_mass link_3", "local_resonator link_4", "local_resonator hanging",
+    "local_resonator two",
     "angle_dependent_stiffness joint_2",
     "structural_damping joints", "sensor_rotation sensor", "sensor_gain sensor_y",
     "polarity sensor_x", "channel_delay sensor", "exponential_window sensor",
@@ -43,6 +45,7 @@ def problem(tmp_path_factory):
 def test_gradient_is_that_of_finite_differences(problem, wanted):
     effects = {f"{e.name} {e.at}": e for e in library(problem.simulation)}
     effects["local_resonator hanging"] = HangingResonator.of(effects["local_resonator link_4"])
+    effects["local_resonator two"] = TwoHangingResonators.of(effects["local_resonator link_4"])
     bends = effects["link_flexibility link_2"]
     assert isinstance(bends, LinkFlexibility)
     effects["link_flexibility beam"] = bends.as_beam()

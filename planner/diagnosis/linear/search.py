@@ -36,6 +36,7 @@ from planner.diagnosis.linear.rounds import (
     one_round,
     settled,
 )
+from planner.diagnosis.linear.second_resonators import second_resonators
 from planner.diagnosis.linear.stated_values import strayed
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear.three_axis_resonators import hung, three_axis_resonators
@@ -93,6 +94,8 @@ def search(
         found = exchanged(problem, found, effects)
     if min(f.per_value for f in found.finalists) > AT_NOISE:
         near = settled(problem, three_axis_resonators(problem, found.finalists))
+        found = Found((*found.finalists, *near), found.left)
+        near = settled(problem, second_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
     if not bent:
         found = _composed(problem, found, effects, tell)

@@ -13,6 +13,7 @@ from planner.diagnosis.effects.hanging_resonator import WAYS, HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
 from planner.diagnosis.linear.evidence import best_of
 from planner.diagnosis.linear.fit import Fit, approached, points, settle
+from planner.diagnosis.linear.objective import Misfit
 from planner.diagnosis.linear.problem import CLOSE, COARSE, Problem
 from planner.identification.held_out import farthest_first
 from planner.inference.parallel import side_by_side
@@ -41,26 +42,34 @@ def hung(problem: Problem, effects: Sequence[Effect]) -> tuple[Fit, ...]:
     """
     sliding = [e for e in effects if isinstance(e, LocalResonator)]
     few = problem.at(farthest_first(problem.q)[:FEW].tolist())
-    begun = side_by_side(partial(_begun, few), [HangingResonator.of(e) for e in sliding])
-    return tuple(side_by_side(partial(_jumped, problem), _best(begun, PLACES)))
+    rough = side_by_side(partial(_hung, few), [HangingResonator.of(e) for e in sliding])
+    return tuple(side_by_side(partial(jumped, problem, ways=WAYS), _best(rough, PLACES)))
 
 
-def _begun(few: Problem, effect: HangingResonator) -> Fit:
+def _hung(few: Problem, effect: HangingResonator) -> Fit:
     """The best of a link's starts, roughly."""
     rough = few.misfit(effect, COARSE)
     usual = rough.mean[: rough.split[1]]
-    begun = [approached(rough, [np.concatenate([usual, s])], BEGUN) for s in effect.starts()]
-    return _best([approached(rough, [f.x], FOLLOWED) for f in _best(begun, KEPT)], 1)[0]
+    return begun(rough, [np.concatenate([usual, psi]) for psi in effect.starts()])
 
 
-def _jumped(problem: Problem, rough: Fit) -> Fit:
-    """Where a frequency that is the wrong one jumps to another, then with all that is free."""
+def begun(rough: Misfit, starts: Sequence[np.ndarray]) -> Fit:
+    """The best of many starts, roughly."""
+    tried = [approached(rough, [x], BEGUN) for x in starts]
+    return _best([approached(rough, [f.x], FOLLOWED) for f in _best(tried, KEPT)], 1)[0]
+
+
+def jumped(problem: Problem, rough: Fit, ways: Sequence[str], jumps: int = JUMPS) -> Fit:
+    """Where a frequency that is the wrong one jumps to another, then with all that is free.
+
+    `ways` names those that may, up to so many times.
+    """
     effect, misfit = rough.effect, rough.misfit
     assert isinstance(effect, HangingResonator)
     of = f" of {effect.name} at {effect.at}"
-    there = [misfit.names.index(name + of) for name in WAYS]
+    there = [misfit.names.index(name + of) for name in ways]
     kept = [rough]
-    for _ in range(JUMPS):
+    for _ in range(jumps):
         x, before = kept[0].x, kept[0]
         starts = [_with(x, i, f) for i in there for f in effect.log_frequencies]
         kept = _best([*kept, *(approached(misfit, [one], FOLLOWED) for one in starts)], CLOSER)
