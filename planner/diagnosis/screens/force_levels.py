@@ -178,16 +178,19 @@ def _named(
 def _surely_at(look: _Compared, weighed: Sequence[WeighedLaw]) -> str:
     """The joint that surely is not linear, of whatever shape its law is; "" where none is.
 
-    That whose own stiffness for every hit leaves least or, where hits tell no stiffness, whose law.
+    That whose own stiffness for every hit leaves least. Or that whose law leaves less than all
+    others' and than stiffnesses do: strongly bent laws are nothing like a stiffness, which changes
+    while a hit rings.
     """
-    if placed(look.found):
-        ports = system_of(look.misses.plain).ports
-        return ports[int(np.argmin(look.found.chi2.sum(axis=0)))]
+    found = look.found
+    if placed(found):
+        return system_of(look.misses.plain).ports[int(np.argmin(found.chi2.sum(axis=0)))]
     if not look.rattles or not weighed:
         return ""
     first = max(weighed, key=lambda w: w.explained)
-    others = max((w.explained for w in weighed if w.at != first.at), default=0.0)
-    return first.at if 1 - first.explained < PLACED * (1 - max(others, 0.0)) else ""
+    others = (w.explained for w in weighed if w.at != first.at)
+    next_best = max(0.0, equivalent_share(found), *others)
+    return first.at if 1 - first.explained < PLACED * (1 - next_best) else ""
 
 
 def _weighed(
