@@ -36,7 +36,7 @@ from planner.diagnosis.linear.rounds import (
     one_round,
     settled,
 )
-from planner.diagnosis.linear.second_resonators import second_resonators
+from planner.diagnosis.linear.second_resonators import next_door, second_resonators
 from planner.diagnosis.linear.stated_values import strayed
 from planner.diagnosis.linear.suspects import resonant, suspects
 from planner.diagnosis.linear.three_axis_resonators import hung, three_axis_resonators
@@ -92,11 +92,7 @@ def search(
     found = _moved(problem, found, effects)
     if not bent:
         found = exchanged(problem, found, effects)
-    if min(f.per_value for f in found.finalists) > AT_NOISE:
-        near = settled(problem, three_axis_resonators(problem, found.finalists))
-        found = Found((*found.finalists, *near), found.left)
-        near = settled(problem, second_resonators(problem, found.finalists))
-        found = Found((*found.finalists, *near), found.left)
+    found = _hanging(problem, found, effects)
     if not bent:
         found = _composed(problem, found, effects, tell)
     found = _lessened(problem, _rigid(problem, found, effects))
@@ -161,11 +157,31 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
     It misses the noise then, or bends inertias.
     """
-    best = min(found.finalists, key=lambda f: f.per_value)
-    if best.per_value <= AT_NOISE and not inertias_bent(best):
+    if not _lacks(found, bent=True):
         return found
+    best = min(found.finalists, key=lambda f: f.per_value)
     near = best_of(elsewhere(problem, best, effects), MOVED)
     return Found((*found.finalists, *settled(problem, near)), found.left)
+
+
+def _hanging(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
+    """Adds fits with resonators on three springs, while the best has not enough."""
+    if _lacks(found):
+        near = settled(problem, three_axis_resonators(problem, found.finalists))
+        found = Found((*found.finalists, *near), found.left)
+    if _lacks(found, bent=True):
+        near = settled(problem, next_door(problem, found.finalists, effects))
+        found = Found((*found.finalists, *near), found.left)
+    if _lacks(found):
+        near = settled(problem, second_resonators(problem, found.finalists))
+        found = Found((*found.finalists, *near), found.left)
+    return found
+
+
+def _lacks(found: Found, *, bent: bool = False) -> bool:
+    """Whether the best misses the noise, or with `bent` moves inertias far to reach it."""
+    best = min(found.finalists, key=lambda f: f.per_value)
+    return best.per_value > AT_NOISE or (bent and inertias_bent(best))
 
 
 def exchanged(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:

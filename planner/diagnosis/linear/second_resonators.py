@@ -1,12 +1,14 @@
-"""Something else that hangs on a link beside what is known to hang there."""
+"""What hangs on a link, asked at the links beside it, and of two things on the same one."""
 
 from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 
-from planner.diagnosis.effects.hanging_resonator import WAYS, HangingResonator
-from planner.diagnosis.effects.two_hanging_resonators import SECOND, TwoHangingResonators
+from planner.diagnosis.effects.effect import Effect
+from planner.diagnosis.effects.hanging_resonator import HangingResonator
+from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.effects.two_hanging_resonators import TwoHangingResonators
 from planner.diagnosis.linear.fit import Fit, points
 from planner.diagnosis.linear.problem import COARSE, Problem
 from planner.diagnosis.linear.three_axis_resonators import FEW, begun, jumped
@@ -17,27 +19,53 @@ PLACES = 2  # links at which a second one is looked for
 JUMPS = 5  # of frequencies, at most
 
 
+def next_door(
+    problem: Problem, finalists: Sequence[Fit], effects: Sequence[Effect]
+) -> tuple[Fit, ...]:
+    """Fits with what hangs in the closest one at the links before and after instead.
+
+    There it looks nearly the same; springs begin where they are known to be by now.
+    """
+    sliding = [e for e in effects if isinstance(e, LocalResonator)]
+    links, known = [e.at for e in sliding], list(_hanging(finalists).values())
+    if not known or (at := known[0][1].at) not in links:
+        return ()
+    beside = [i for i in (links.index(at) - 1, links.index(at) + 1) if 0 <= i < len(links)]
+    one = [(known[0][0], HangingResonator.of(sliding[i])) for i in beside]
+    return tuple(side_by_side(partial(_anew, problem), one))
+
+
 def second_resonators(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
     """Fits with two at one link: at the links at which the closest fits have one.
 
     Of one fit too, in which another link's may stand for the second one here.
     """
+    there = list(_hanging(finalists).values())[:PLACES]
+    two = [(found, TwoHangingResonators.of(part)) for found, part in there]
+    return tuple(side_by_side(partial(_anew, problem), two))
+
+
+def _hanging(finalists: Sequence[Fit]) -> dict[str, tuple[Fit, HangingResonator]]:
+    """By link what hangs there alone, in the closest fit that has it, the closest of all first."""
     there: dict[str, tuple[Fit, HangingResonator]] = {}
     for found in sorted(finalists, key=lambda f: f.per_value):
         for part in found.effect.parts():
             if isinstance(part, HangingResonator) and not isinstance(part, TwoHangingResonators):
                 there.setdefault(part.at, (found, part))
-    return tuple(side_by_side(partial(_joined, problem), list(there.values())[:PLACES]))
+    return there
 
 
-def _joined(problem: Problem, one: tuple[Fit, HangingResonator]) -> Fit:
-    found, part = one
-    effect = TwoHangingResonators.of(part)
+def _anew(problem: Problem, one: tuple[Fit, HangingResonator]) -> Fit:
+    """An effect from a fit's springs, and what it knows of the effect's first one."""
+    found, effect = one
     few = problem.at(farthest_first(problem.q)[:FEW].tolist())
     rough = few.misfit(effect, COARSE)
-    known, (a, b) = points(rough, found)[0], rough.split
-    known[a:b] = rough.mean[a:b]  # inertias were bent to make up for what is looked for
-    own = len(known) - len(part.quantities)
-    starts = [np.concatenate([known[:own], psi]) for psi in part.starts()]
-    ways = [*WAYS, *(SECOND + name for name in WAYS)]  # what one alone told was perhaps of both
-    return jumped(problem, begun(rough, starts), ways, JUMPS)
+    x, (a, b) = points(rough, found)[0], rough.split
+    x[a:b] = rough.mean[a:b]  # inertias were bent to make up for what is looked for
+    starts = effect.starts()
+    if isinstance(effect, TwoHangingResonators):
+        half = len(effect.first.quantities)
+        starts[:, :half] = x[b : b + half]
+    # What one alone told was perhaps of both.
+    ways = [q.name for q in effect.quantities if "frequency" in q.name]
+    return jumped(problem, begun(rough, [np.concatenate([x[:b], s]) for s in starts]), ways, JUMPS)
