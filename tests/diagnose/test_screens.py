@@ -1,6 +1,7 @@
 """Screens on hits whose cause is known because the planner's own simulation made them."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.dataset.dataset import Dataset
+from planner.dataset.visits import Visit
 from planner.diagnosis.effects.drift import Drift
 from planner.diagnosis.effects.effect import Effect, Quantity
 from planner.diagnosis.effects.sensor_chain import SensorChain
@@ -19,7 +21,9 @@ from planner.diagnosis.linear.problem import Grade
 from planner.diagnosis.screens import artefacts, drift, force_levels
 from planner.diagnosis.screens import screen as screens
 from planner.diagnosis.screens.exponential_window import screen_window
+from planner.diagnosis.thresholds import CLEAR
 from planner.dynamics.simulation import Simulation
+from planner.recording.records import Hit
 from planner.robot.robot import Robot
 from tests.support.known_robots import KR210
 from tests.support.synthetic_hits import RATE_HZ, recorded
@@ -114,6 +118,45 @@ def test_a_blanked_force_tells_nothing_of_windows(plain):
         return {"force_n": force}
 
     assert screen_window(disturbed(plain, blanked)) is None
+
+
+def ringing(fade: float, before: float = 0.0) -> Dataset:
+    """Hits whose accelerations ring, noisily, under a window; the robot may ring `before` too."""
+    rng, t = np.random.default_rng(7), np.arange(2048) / RATE_HZ
+    force = np.where(np.arange(2048) < 4, 200.0, 0.0)
+    force, since = np.roll(force, 100), np.maximum(t - 100 / RATE_HZ, 0.0)
+    visits = []
+    for number in range(3):
+        hits = []
+        for axis in ("+x", "-y", "+z"):
+            rings = np.exp(-3 * since) * np.sin(2 * np.pi * 12 * since)
+            early = before * np.exp(-3 * t) * np.sin(2 * np.pi * 90 * t)
+            a = rings + early + 1e-3 * rng.standard_normal((3, 2048))
+            a *= np.exp(-fade * since)
+            noisy = force + 0.1 * rng.standard_normal(2048)
+            hits.append(Hit(Path("x"), axis, RATE_HZ, noisy, a))
+        visits.append(Visit(f"P{number}", np.zeros(6), number / 2, tuple(hits)))
+    return Dataset.of_visits(tuple(visits), (5.0, 60.0))
+
+
+@pytest.mark.parametrize("rate", [0.3, 0.8, 2.0, 4.0])
+def test_window_over_the_accelerations_alone_shows_in_their_noise(rate):
+    found = screen_window(ringing(rate))
+    assert found is not None
+    value, sd, _ = found.parameters["rate"]
+    assert abs(value - rate) < 3 * sd < 0.15 + 0.2 * rate
+    assert found.log_evidence > CLEAR
+    assert "noise of the accelerations" in found.text
+
+
+def test_what_rings_feigns_no_window():
+    assert screen_window(ringing(0.0)) is None
+    struck_early = ringing(0.0, before=0.3)
+    assert screen_window(struck_early) is None
+    one = ringing(0.0)
+    few = replace(one.visits[0], hits=(struck_early.visits[0].hits[0], *one.visits[0].hits[1:]))
+    visits = (few, *one.visits[1:])
+    assert screen_window(Dataset.of_visits(visits, one.band_hz)) is None
 
 
 def test_drift_is_told_from_what_goes_with_the_pose(simulation):
