@@ -8,6 +8,7 @@ import numpy as np
 from planner.diagnosis.effects.effect import Setting
 from planner.diagnosis.effects.hanging_resonator import WAYS, HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.thresholds import ODDS_OF_NOTHING, SECOND_EFFECT
 from planner.dynamics.gradient import Impedance
 from planner.dynamics.simulation import Simulation
 
@@ -33,6 +34,11 @@ class TwoHangingResonators(HangingResonator):
         """The one."""
         own = self.quantities[: len(self.quantities) // 2]
         return HangingResonator(self.at, own, self.low_hz, self.high_hz)
+
+    @property
+    def prior(self) -> float:
+        """That of one, and of a second effect beside it."""
+        return self.first.prior * SECOND_EFFECT / ODDS_OF_NOTHING
 
     def starts(self) -> np.ndarray:
         """Those of the second, the first being at its prior's mean."""

@@ -97,7 +97,9 @@ def starts_by_level(
     Of strongly bent laws single hits tell no stiffness: while they ring it changes too much.
     """
     scale, out = float(system.elasticity.stiffness[system.blocks[port]]), []
-    middle = float(np.log(telling(seen[-1].swing[:, port])))
+    if not (most := telling(seen[-1].swing[:, port])):
+        return []  # no hit swings it
+    middle = float(np.log(most))
     for law in LAWS:
         for sign in (1, -1) if law.signed else (1,):
             moved = x.copy()

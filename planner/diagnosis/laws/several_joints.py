@@ -24,6 +24,7 @@ from planner.inference.least_squares import Damping
 
 FINER, LASTS_S = 2, 0.7  # steps a sample, and how long hits are followed
 LEAST_LEFT = 0.05  # of a spring
+STILL = 1e-12  # rad or m, of a joint that no hit swings
 # Each round takes seconds: few of them, and damping that is raised fast where a step fails.
 ROUNDS, GAIN = 5, 0.03  # of a descent at most, and what a round must gain of the value
 DAMPING = Damping(first=1e-4, least=0.0, most=9.0, lighter=0.1, heavier=30.0)
@@ -42,7 +43,7 @@ def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> LawAt
     """Where the refits of force levels say that the law lies."""
     system = system_of(plain)
     scale = system.elasticity.stiffness[system.blocks]
-    middle = np.log([telling(swings) for swings in refits[-1].swing.T])
+    middle = np.log([max(telling(swings), STILL) for swings in refits[-1].swing.T])
     x = np.mean([level.plain.x for level in refits], axis=0)
     nu = np.zeros((2, len(scale)))
     for j, block in enumerate(system.blocks):

@@ -71,7 +71,7 @@ def held_starts(
     law = next(law for law in LAWS if law.effect == "backlash")
     scale = float(system.elasticity.stiffness[system.blocks[port]])
     middle = telling(found.swing[:, 1, port])
-    if np.max(np.abs(sag)) < WEIGHTLESS * middle:
+    if np.max(np.abs(sag)) <= WEIGHTLESS * middle:
         return []
     slides, ports = system.slides[port : port + 1], np.array([port])
     return [

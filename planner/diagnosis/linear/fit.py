@@ -160,7 +160,7 @@ def from_median(problem: Problem, near: Fit, steps: int = ROUGH_STEPS) -> Fit:
     if steps > ROUGH_STEPS:
         starts.append(_best(coarse, starts).x)
     named = (dict(zip(coarse.names, x, strict=True)) for x in starts)
-    return approached(near.misfit, [_placed(near.misfit, known) for known in named], steps)
+    return approached(near.misfit, [placed(near.misfit, known) for known in named], steps)
 
 
 def _approach(problem: Problem, effect: Effect) -> np.ndarray:
@@ -205,10 +205,10 @@ def carried_on(problem: Problem, fit: Fit, effect: Effect, steps: int = SETTLED[
 def settle(problem: Problem, found: Fit, grade: Grade = FINE, steps: int = SETTLED[1]) -> Fit:
     """The same fit on the lines of a grade, followed until nothing more is to be gained."""
     misfit = problem.misfit(found.effect, grade)
-    return follow(misfit, _placed(misfit, found.named()), steps)
+    return follow(misfit, placed(misfit, found.named()), steps)
 
 
-def _placed(misfit: Misfit, known: Mapping[str, float]) -> np.ndarray:
+def placed(misfit: Misfit, known: Mapping[str, float]) -> np.ndarray:
     """x of what is known by name; all else, as bearings after a rough look, as it may be."""
     return np.array([known.get(n, m) for n, m in zip(misfit.names, misfit.mean, strict=True)])
 

@@ -92,7 +92,7 @@ def search(
     found = _moved(problem, found, effects)
     if not bent:
         found = exchanged(problem, found, effects)
-    found = _hanging(problem, found, effects)
+    found = _hanging(problem, found, () if bent else effects)
     if not bent:
         found = _composed(problem, found, effects, tell)
     found = _lessened(problem, _rigid(problem, found, effects))
@@ -165,14 +165,17 @@ def _moved(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
 
 
 def _hanging(problem: Problem, found: Found, effects: Sequence[Effect]) -> Found:
-    """Adds fits with resonators on three springs, while the best has not enough."""
+    """Adds fits with resonators on three springs, while the best has not enough.
+
+    Without effects to choose from those alone that are known to swing along one direction.
+    """
     if _lacks(found):
         near = settled(problem, three_axis_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
     if _lacks(found, bent=True):
         near = settled(problem, next_door(problem, found.finalists, effects))
         found = Found((*found.finalists, *near), found.left)
-    if _lacks(found):
+    if effects and _lacks(found):
         near = settled(problem, second_resonators(problem, found.finalists))
         found = Found((*found.finalists, *near), found.left)
     return found

@@ -8,8 +8,9 @@ import numpy as np
 from planner.diagnosis.effects.effect import Effect
 from planner.diagnosis.effects.hanging_resonator import HangingResonator
 from planner.diagnosis.effects.local_resonator import LocalResonator
+from planner.diagnosis.effects.places import links
 from planner.diagnosis.effects.two_hanging_resonators import TwoHangingResonators
-from planner.diagnosis.linear.fit import Fit, points
+from planner.diagnosis.linear.fit import Fit, placed
 from planner.diagnosis.linear.problem import COARSE, Problem
 from planner.diagnosis.linear.three_axis_resonators import FEW, begun, jumped
 from planner.identification.held_out import farthest_first
@@ -26,13 +27,17 @@ def next_door(
 
     There it looks nearly the same; springs begin where they are known to be by now.
     """
-    sliding = [e for e in effects if isinstance(e, LocalResonator)]
-    links, known = [e.at for e in sliding], list(_hanging(finalists).values())
-    if not known or (at := known[0][1].at) not in links:
+    order = [link for link, _ in links(problem.simulation)]
+    known = next(iter(_hanging(finalists).values()), None)
+    if known is None:
         return ()
-    beside = [i for i in (links.index(at) - 1, links.index(at) + 1) if 0 <= i < len(links)]
-    one = [(known[0][0], HangingResonator.of(sliding[i])) for i in beside]
-    return tuple(side_by_side(partial(_anew, problem), one))
+    found, part = known
+    there = order.index(part.at)
+    sliding = [e for e in effects if isinstance(e, LocalResonator)]
+    beside = [e for e in sliding if abs(order.index(e.at) - there) == 1]
+    return tuple(
+        side_by_side(partial(_anew, problem), [(found, HangingResonator.of(e)) for e in beside])
+    )
 
 
 def second_resonators(problem: Problem, finalists: Sequence[Fit]) -> tuple[Fit, ...]:
@@ -60,7 +65,7 @@ def _anew(problem: Problem, one: tuple[Fit, HangingResonator]) -> Fit:
     found, effect = one
     few = problem.at(farthest_first(problem.q)[:FEW].tolist())
     rough = few.misfit(effect, COARSE)
-    x, (a, b) = points(rough, found)[0], rough.split
+    x, (a, b) = placed(rough, found.named()), rough.split
     x[a:b] = rough.mean[a:b]  # inertias were bent to make up for what is looked for
     starts = effect.starts()
     if isinstance(effect, TwoHangingResonators):

@@ -46,7 +46,7 @@ def weigh(
 ) -> tuple[WeighedLaw, ...]:
     """Every law at the joints that come into question, fitted in time, most probable first.
 
-    Fits begin where hits by themselves say, and where `seen` refits of force levels do.
+    Fits begin where hits by themselves say, and at all joints where `seen` refits of levels do.
     """
     plain, problem = misses.plain, _problem(recorded, misses)
     left = found.chi2.sum(axis=0)
@@ -55,7 +55,9 @@ def weigh(
     for port in (int(j) for j in order if left[j] < ALSO * left[order[0]]):
         own = own_parameter(plain, int(system.blocks[port]))
         begin += starts(found, system, port, plain.x, own)
-        begin += starts_by_level(seen, system, port, plain.x, own) if seen else []
+    for port in range(len(system.ports) if seen else 0):  # hits by themselves don't say which
+        own = own_parameter(plain, int(system.blocks[port]))
+        begin += starts_by_level(seen, system, port, plain.x, own)
     return _fitted(problem, begin, system, found, tell)
 
 

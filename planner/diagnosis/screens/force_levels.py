@@ -10,7 +10,7 @@ from planner.dataset.level_columns import Column
 from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, equivalent, system_of
 from planner.diagnosis.laws.law_at_joints import Laws
-from planner.diagnosis.laws.level_refits import base, bases, refits
+from planner.diagnosis.laws.level_refits import Refit, base, bases, refits
 from planner.diagnosis.laws.open_misses import OpenMisses
 from planner.diagnosis.linear.fit import Fit
 from planner.diagnosis.linear.problem import Problem, tolerances_of
@@ -39,6 +39,7 @@ from planner.diagnosis.thresholds import (
     UNKNOWN,
 )
 from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
 from planner.progress import Tell, quietly
 
 
@@ -108,6 +109,8 @@ class _Compared:
         So does a gear that its weight holds at one end of its gap, and that some hits lift off:
         repeats differ as levels do then.
         """
+        if not self.found.delta.shape[1]:
+            return False
         unlike_a_spring = equivalent_share(self.found) <= LINEARISED and not placed(self.found)
         return unlike_a_spring and off_the_average(self.found) > self.levels_matter
 
@@ -190,7 +193,8 @@ def _surely_at(look: _Compared, weighed: Sequence[WeighedLaw]) -> str:
     first = max(weighed, key=lambda w: w.explained)
     others = (w.explained for w in weighed if w.at != first.at)
     next_best = max(0.0, equivalent_share(found), *others)
-    return first.at if 1 - first.explained < PLACED * (1 - next_best) else ""
+    clearly = 1 - first.explained < PLACED * (1 - next_best)
+    return first.at if clearly and next_best < LAW_SURELY else ""
 
 
 def _weighed(
@@ -200,15 +204,37 @@ def _weighed(
     misses, found = look.misses, look.found
     system, weighed = system_of(misses.plain), ()
     if equivalent_share(found) > LINEARISED or placed(found) or look.rattles:
-        seen = refits(recorded, look.problem.simulation) if look.rattles else ()
+        seen = _refits(recorded, look) if look.rattles else ()
         weighed = weigh(recorded, misses, system, found, tell, seen)
     if not held or (weighed and weighed[0].explained > LAW_SURELY):
         return weighed
-    first = weigh_held(recorded, misses, system, found, tell, everywhere=look.rattles)[:1]
-    if not first or (weighed and weighed[0].explained > first[0].explained):
-        return weighed
-    same = first[0].candidate.law.effect, first[0].at
-    return (*first, *(w for w in weighed if (w.candidate.law.effect, w.at) != same))
+    there = weigh_held(recorded, misses, system, found, tell, everywhere=look.rattles)
+    if look.rattles:
+        return _best_of_each((*there, *weighed))
+    first = [h for h in there[:1] if not weighed or _rather_held(h, weighed[0])]
+    return _best_of_each((*first, *weighed)) if first else weighed
+
+
+def _rather_held(held: WeighedLaw, free: WeighedLaw) -> bool:
+    """Whether a gear that bears weight explains more; where a law does, of the same joint alone."""
+    enough = free.explained > LAW_EXPLAINS
+    return held.explained > free.explained and (held.at == free.at or not enough)
+
+
+def _best_of_each(laws: Sequence[WeighedLaw]) -> tuple[WeighedLaw, ...]:
+    """Each law of each joint once, where it explains most; first what explains most of all."""
+    best: dict[tuple[str, str], WeighedLaw] = {}
+    for law in sorted(laws, key=lambda w: -w.explained):
+        best.setdefault((law.candidate.law.effect, law.at), law)
+    return tuple(best.values())
+
+
+def _refits(recorded: Dataset, look: _Compared) -> tuple[Refit, ...]:
+    """Of each force level, where each has lines enough for that."""
+    try:
+        return refits(recorded, look.problem.simulation)
+    except InputError:
+        return ()
 
 
 def not_by_misses(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]:
