@@ -11,7 +11,8 @@ from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.misses_again import abstained
 from planner.diagnosis.screens import force_levels
-from planner.diagnosis.screens.force_levels import PROPORTIONAL, disproportion
+from planner.diagnosis.screens.compared_levels import disproportion
+from planner.diagnosis.screens.force_levels import PROPORTIONAL
 from planner.diagnosis.screens.hit_errors import beyond_any_hand, taken_out
 from planner.diagnosis.screens.screen import screen
 from planner.dynamics.gradient import response_turned

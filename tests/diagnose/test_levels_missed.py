@@ -15,7 +15,7 @@ from planner.diagnosis.laws.level_refits import base
 from planner.diagnosis.laws.open_misses import OpenMisses, Pair, Whitening, hit_columns
 from planner.diagnosis.linear.problem import tolerances_of
 from planner.diagnosis.misses_again import abstained
-from planner.diagnosis.screens import drift, force_levels, repeats
+from planner.diagnosis.screens import compared_levels, drift, force_levels, repeats
 from planner.diagnosis.screens import screen as screens
 from planner.diagnosis.screens.screen import screen
 from planner.diagnosis.thresholds import (
@@ -55,7 +55,7 @@ def hardening(tmp_path_factory):
 
 def test_a_linear_robot_is_proportional_though_hits_miss(linear):
     exact = equivalent(linear.recorded, system_of(base(linear.recorded, linear.simulation)))
-    assert force_levels.disproportion(exact) > 3
+    assert compared_levels.disproportion(exact) > 3
     assert force_levels.screen(linear.recorded, linear.simulation) == ()
     by_chance = repeats.chance(linear.recorded, misses_of(linear))
     assert by_chance is not None
@@ -105,7 +105,7 @@ def test_without_repeats_it_is_said_what_would_tell(linear, monkeypatch):
     (slight,) = force_levels.screen(once, linear.simulation, single=True)
     assert slight.slight
     assert slight.wants == ""  # nobody has to hit again for what is too little to matter
-    monkeypatch.setattr(force_levels, "LEVELS_MATTER", 0.0)
+    monkeypatch.setattr(compared_levels, "LEVELS_MATTER", 0.0)
     (found,) = force_levels.screen(once, linear.simulation, single=True)
     assert found.effect == UNKNOWN
     told, (remark,) = abstained((found,))
@@ -132,7 +132,7 @@ def test_what_differs_by_little_and_no_law_describes_is_a_remark(linear, monkeyp
     monkeypatch.setattr(force_levels.repeats, "chance", lambda *_: 0.0)
     # As the averages of two levels of three are: half of what the hardest hits differ by.
     compared = equivalent(changed, system_of(base(changed, linear.simulation)), misses_of(linear))
-    assert force_levels.off_the_average(compared) == pytest.approx(
+    assert compared_levels.off_the_average(compared) == pytest.approx(
         louder / (1 + louder) / 2, rel=0.5
     )
     (found,) = force_levels.screen(changed, linear.simulation, single=True)

@@ -18,7 +18,7 @@ from planner.diagnosis.laws.equivalent_stiffness import equivalent, system_of
 from planner.diagnosis.linear.drift_fit import problem_of
 from planner.diagnosis.linear.fit import fit
 from planner.diagnosis.linear.problem import Grade
-from planner.diagnosis.screens import artefacts, drift, force_levels
+from planner.diagnosis.screens import artefacts, compared_levels, drift
 from planner.diagnosis.screens import screen as screens
 from planner.diagnosis.screens.exponential_window import screen_window
 from planner.diagnosis.thresholds import CLEAR
@@ -237,8 +237,8 @@ def test_equivalent_stiffness_is_that_of_the_joint_that_changed(simulation):
     data = recorded(simulation, q, lambda _, level: softer if level == 0 else np.ones(6))
     system = system_of(fit(problem_of(data, simulation), Effect("")))
     found = equivalent(data, system)
-    assert force_levels.disproportion(found) > 5
-    assert force_levels.equivalent_share(found) > 0.9
+    assert compared_levels.disproportion(found) > 5
+    assert compared_levels.equivalent_share(found) > 0.9
     assert system.ports[int(np.argmin(found.chi2.sum(axis=0)))] == "joint_3"
     weight = found.precision[:, 2]
     delta = np.sum(weight * found.delta[:, 2]) / weight.sum()

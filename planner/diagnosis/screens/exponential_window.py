@@ -8,7 +8,7 @@ at the end of the record is less than before the pulse.
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar, root_scalar
 
 from planner.dataset.dataset import Dataset
 from planner.diagnosis.finding import Finding
@@ -90,7 +90,8 @@ def _fading(hit: Hit) -> tuple[float, float] | None:
         return None
     # Second differences are correlated with their neighbours: they tell a third as much.
     sd = np.sqrt(1.5 / before.shape[1] + 1.5 / end.shape[1]) / float(t.mean())
-    return float(brentq(left, -WINDOW_FASTEST_1_S, WINDOW_FASTEST_1_S)), float(sd)
+    found = root_scalar(left, bracket=(-WINDOW_FASTEST_1_S, WINDOW_FASTEST_1_S))
+    return float(found.root), float(sd)
 
 
 def _alike(steps: np.ndarray) -> float:

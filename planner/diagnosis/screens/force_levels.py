@@ -1,7 +1,7 @@
 """The screen for what depends on the force level: nonlinear joints, and what no joint explains."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,10 +11,15 @@ from planner.diagnosis.finding import Finding
 from planner.diagnosis.laws.equivalent_stiffness import Equivalent, equivalent, system_of
 from planner.diagnosis.laws.law_at_joints import Laws
 from planner.diagnosis.laws.level_refits import Refit, base, bases, refits
-from planner.diagnosis.laws.open_misses import OpenMisses
-from planner.diagnosis.linear.fit import Fit
-from planner.diagnosis.linear.problem import Problem, tolerances_of
 from planner.diagnosis.screens import repeats, several_joints
+from planner.diagnosis.screens.compared_levels import (
+    ComparedLevels,
+    disproportion,
+    equivalent_share,
+    excess,
+    off_the_average,
+    placed,
+)
 from planner.diagnosis.screens.fitted_laws import weigh, weigh_held
 from planner.diagnosis.screens.implausible_springs import strayed
 from planner.diagnosis.screens.tone import screen_tone
@@ -30,7 +35,6 @@ from planner.diagnosis.thresholds import (
     LAW_EXPLAINS,
     LAW_OF_ITS_OWN,
     LAW_SURELY,
-    LEVELS_MATTER,
     LINEARISED,
     ONE_JOINT,
     PLACED,
@@ -58,7 +62,7 @@ def screen(
     tone = screen_tone(recorded)
     if tone is not None:
         return (tone,)
-    looks = (_Compared.by(recorded, *base) for base in bases(recorded, nominal))
+    looks = (ComparedLevels.by(recorded, *base) for base in bases(recorded, nominal))
     first = next(looks)
     if not len(first.found.count) or disproportion(first.found) < PROPORTIONAL:
         return ()
@@ -84,37 +88,6 @@ def screen(
     return findings if by_chance <= BY_CHANCE else ()  # what no law describes may be chance
 
 
-@dataclass(frozen=True, eq=False)
-class _Compared:
-    """Force levels compared by a linear fit, which tells what misses of hits leave open."""
-
-    problem: Problem
-    misses: OpenMisses
-    found: Equivalent
-
-    @classmethod
-    def by(cls, recorded: Dataset, problem: Problem, plain: Fit) -> "_Compared":
-        misses = OpenMisses.told(plain, recorded, tolerances_of(problem.simulation))
-        return cls(problem, misses, equivalent(recorded, system_of(plain), misses))
-
-    @property
-    def levels_matter(self) -> float:
-        """How far FRFs of a level may be off their average, as a share of |H|."""
-        return LEVELS_MATTER * self.problem.simulation.robot.config.diagnose.matters
-
-    @property
-    def rattles(self) -> bool:
-        """Whether hits differ by what matters, and no stiffness of its own for every hit says how.
-
-        So does a gear that its weight holds at one end of its gap, and that some hits lift off:
-        repeats differ as levels do then.
-        """
-        if not self.found.delta.shape[1]:
-            return False
-        unlike_a_spring = equivalent_share(self.found) <= LINEARISED and not placed(self.found)
-        return unlike_a_spring and off_the_average(self.found) > self.levels_matter
-
-
 def _several(
     recorded: Dataset, nominal: Simulation, found: Equivalent, tell: Tell
 ) -> tuple[Finding, ...]:
@@ -132,7 +105,7 @@ def _rank(findings: tuple[Finding, ...]) -> tuple[bool, float]:
 
 def _named(
     recorded: Dataset,
-    look: _Compared,
+    look: ComparedLevels,
     tell: Tell,
     least: float | None = None,
     *,
@@ -178,7 +151,7 @@ def _named(
     return (_unknown(look, how),), False
 
 
-def _surely_at(look: _Compared, weighed: Sequence[WeighedLaw]) -> str:
+def _surely_at(look: ComparedLevels, weighed: Sequence[WeighedLaw]) -> str:
     """The joint that surely is not linear, of whatever shape its law is; "" where none is.
 
     That whose own stiffness for every hit leaves least. Or that whose law leaves less than all
@@ -198,7 +171,7 @@ def _surely_at(look: _Compared, weighed: Sequence[WeighedLaw]) -> str:
 
 
 def _weighed(
-    recorded: Dataset, look: _Compared, tell: Tell, *, held: bool
+    recorded: Dataset, look: ComparedLevels, tell: Tell, *, held: bool
 ) -> tuple[WeighedLaw, ...]:
     """All laws, and with `held`, where none explains all, play of a gear that bears weight."""
     misses, found = look.misses, look.found
@@ -229,7 +202,7 @@ def _best_of_each(laws: Sequence[WeighedLaw]) -> tuple[WeighedLaw, ...]:
     return tuple(best.values())
 
 
-def _refits(recorded: Dataset, look: _Compared) -> tuple[Refit, ...]:
+def _refits(recorded: Dataset, look: ComparedLevels) -> tuple[Refit, ...]:
     """Of each force level, where each has lines enough for that."""
     try:
         return refits(recorded, look.problem.simulation)
@@ -244,14 +217,14 @@ def not_by_misses(recorded: Dataset, nominal: Simulation) -> tuple[Finding, ...]
     nothing.
     """
     recorded = recorded.most_heard
-    first = _Compared.by(recorded, *next(bases(recorded, nominal)))
+    first = ComparedLevels.by(recorded, *next(bases(recorded, nominal)))
     if disproportion(first.found) < PROPORTIONAL:
         return ()
     text = (
         "Hits along one axis of a pose differ by more than any hand's misses explain, and not by "
         "their force alone. Look for play, loose parts, or contact with the surroundings."
     )
-    return (Finding(UNKNOWN, None, _excess(first.found) / 2, {}, text),)
+    return (Finding(UNKNOWN, None, excess(first.found) / 2, {}, text),)
 
 
 def differ(recorded: Dataset, nominal: Simulation) -> bool:
@@ -263,7 +236,7 @@ def differ(recorded: Dataset, nominal: Simulation) -> bool:
     return bool(len(found.count)) and disproportion(found) >= PROPORTIONAL
 
 
-def _unknown(look: _Compared, how: str) -> Finding:
+def _unknown(look: ComparedLevels, how: str) -> Finding:
     off = 100 * off_the_average(look.found)
     slight = off < 100 * look.levels_matter
     text = (
@@ -275,41 +248,7 @@ def _unknown(look: _Compared, how: str) -> Finding:
         if slight
         else "Look for contact with the surroundings, loose parts or clearance."
     )
-    return Finding(UNKNOWN, None, _excess(look.found) / 2, {}, text, slight=slight)
-
-
-def off_the_average(found: Equivalent) -> float:
-    """How far FRFs of a force level are off their average over levels, as a share of |H|, rms.
-
-    By half of what they differ by from the strongest level, beyond noise and misses of hits; at the
-    visit where that is most: contact and loose parts need not be everywhere.
-    """
-    here = found.visit == np.unique(found.visit)[:, None]
-    excess = np.maximum(here @ (found.before - found.count), 0.0)
-    return float(np.sqrt(np.max(excess / np.maximum(here @ found.power, 1e-300)))) / 2
-
-
-def equivalent_share(found: Equivalent) -> float:
-    """Share of the levels' differences that a stiffness of its own a hit explains, best joint."""
-    left = float(found.chi2.sum(axis=0).min() - found.count.sum())
-    return 1 - max(left, 0.0) / max(_excess(found), 1e-9)
-
-
-def placed(found: Equivalent) -> bool:
-    """Whether a stiffness of its own a hit explains clearly more at one joint than at any other."""
-    if not found.delta.shape[1]:
-        return False
-    first, *others = np.sort(found.chi2.sum(axis=0))
-    return bool(first < PLACED * min(float(found.before.sum()), *others))
-
-
-def disproportion(found: Equivalent) -> float:
-    """χ² per value of the differences between force levels, 1 if the structure is linear."""
-    return float(found.before.sum() / max(found.count.sum(), 1))
-
-
-def _excess(found: Equivalent) -> float:
-    return float(found.before.sum() - found.count.sum())
+    return Finding(UNKNOWN, None, excess(look.found) / 2, {}, text, slight=slight)
 
 
 def _hardest(recorded: Dataset) -> Column:
