@@ -4,7 +4,7 @@ Of joints that are not linear, springs that follow the force level: what each do
 grows tells, joint by joint, about where a law's numbers lie.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -103,7 +103,7 @@ def starts_by_level(
     for law in LAWS:
         for sign in (1, -1) if law.signed else (1,):
             moved = x.copy()
-            moved[own], share, angle = begin(seen, law, sign, scale, port, middle)
+            moved[own], share, angle = begin(seen, law, sign, scale, port, middle, telling)
             nu = np.array([[sign * np.exp(share) if law.signed else share], [angle]])
             out.append(
                 LawAtJoints(
@@ -115,14 +115,21 @@ def starts_by_level(
 
 
 def begin(
-    seen: Sequence[Refit], law: Law, sign: int, scale: float, joint: int, middle: float
+    seen: Sequence[Refit],
+    law: Law,
+    sign: int,
+    scale: float,
+    joint: int,
+    middle: float,
+    swing_of: Callable[[np.ndarray], float] = np.median,
 ) -> tuple[float, float, float]:
     """ln of the joint's linear stiffness, ln share of k and ln a / e^middle that refits tell.
 
-    `scale` in N·m/rad and `middle` (ln rad) are about where the stiffness and a lie.
+    `scale` in N·m/rad and `middle` (ln rad) are about where the stiffness and a lie; `swing_of`
+    says by which of its hits' swings a level is told.
     """
     told = np.log([level.stiffness[joint] for level in seen])
-    swings = np.array([telling(level.swing[:, joint]) for level in seen])
+    swings = np.array([swing_of(level.swing[:, joint]) for level in seen])
     most = np.log(MOST_LACKING if law.effect == "backlash" or sign < 0 else MOST_SHARE)
 
     sd = [LINEAR_SD, LAW_LOG_SHARE_SD, LAW_ANGLE_LOG_SD]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from planner.dataset.dataset import Dataset
-from planner.diagnosis.laws.equivalent_stiffness import system_of, telling
+from planner.diagnosis.laws.equivalent_stiffness import system_of
 from planner.diagnosis.laws.fit_in_time import LawProblem, descended, misfits
 from planner.diagnosis.laws.law_at_joints import LawAtJoints, LawMisfit
 from planner.diagnosis.laws.level_data import (
@@ -43,7 +43,7 @@ def beginning(refits: Sequence[Refit], law: Law, sign: int, plain: Fit) -> LawAt
     """Where the refits of force levels say that the law lies."""
     system = system_of(plain)
     scale = system.elasticity.stiffness[system.blocks]
-    middle = np.log([max(telling(swings), STILL) for swings in refits[-1].swing.T])
+    middle = np.log(np.maximum(np.median(refits[-1].swing, axis=0), STILL))
     x = np.mean([level.plain.x for level in refits], axis=0)
     nu = np.zeros((2, len(scale)))
     for j, block in enumerate(system.blocks):

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System, telling
+from planner.diagnosis.laws.equivalent_stiffness import Equivalent, System
 from planner.diagnosis.laws.law_at_joints import LawAtJoints
 from planner.diagnosis.laws.torque_laws import LAWS, Law
 
@@ -16,10 +16,10 @@ ASIDE = (-4, 0, 4, 8)  # steps of the grid to the neighbours: fading hits look l
 # Share of the weight that a gear bears. This and the next two: chosen, looking at two cases.
 BORNE = (0.02, 0.06, 0.2, 0.6)
 SLACK = (0.5, 0.98)  # of their stiffness, that they lack in the gap
-# Of such joints, times the swing that tells: a; and the sag of those that turn
+# Of such joints, times the median swing at the highest level: a; and the sag of those that turn
 # about an upright axis.
 GAPS, WEIGHTLESS = (0.03, 0.15, 0.6), 1e-3
-GRID = np.geomspace(0.01, 4.0, 28)  # a, times the swing that tells
+GRID = np.geomspace(0.01, 4.0, 28)  # a, times the median swing at the highest level
 
 
 def faded(law: Law, swing: np.ndarray, a: float) -> np.ndarray:
@@ -34,7 +34,7 @@ def starts(
 ) -> list[LawAtJoints]:
     """Every law (and sign of k): the best of a grid of a, and its neighbours."""
     scale = float(system.elasticity.stiffness[system.blocks[port]])
-    middle = telling(found.swing[:, 1, port])
+    middle = float(np.median(found.swing[:, 1, port]))
     out = []
     for law in LAWS:
         tried = [_at(found, law, port, scale, float(a)) for a in GRID * middle]
@@ -70,7 +70,7 @@ def held_starts(
     """
     law = next(law for law in LAWS if law.effect == "backlash")
     scale = float(system.elasticity.stiffness[system.blocks[port]])
-    middle = telling(found.swing[:, 1, port])
+    middle = float(np.median(found.swing[:, 1, port]))
     if np.max(np.abs(sag)) <= WEIGHTLESS * middle:
         return []
     slides, ports = system.slides[port : port + 1], np.array([port])
