@@ -8,10 +8,11 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording import plausible
-from planner.recording.entries import check_size, columns_of
+from planner.recording.entries import check_size, level_of
 from planner.recording.hdf5 import read_hdf5
+from planner.recording.level_records import records_of
+from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
-from planner.recording.named_columns import to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
@@ -25,10 +26,10 @@ def read_mat(path: Path) -> tuple[Record, ...]:
     entries = read_mat5(path) if is_version_5(path) else _older(path)
     if entries is None:
         return read_hdf5(path)
-    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
+    visible = {name: v for name, v in entries.items() if name and not name.startswith("__")}
     if {"yspec", "npts", "freq", "tfun"} <= set(visible):
         return (_logged_spectra(path, visible),)
-    return to_records(path, columns_of(path, visible))
+    return records_of(path, level_of(visible))
 
 
 def _older(path: Path) -> dict[str, object] | None:
@@ -104,6 +105,7 @@ READERS: dict[str, Callable[[Path], tuple[Record, ...]]] = {
     ".h5": read_hdf5,
     ".hdf5": read_hdf5,
     ".tdms": read_tdms,
+    ".lvm": read_lvm,
     ".csv": read_text,
     ".tsv": read_text,
     ".txt": _read_txt,
@@ -144,8 +146,6 @@ def _read(path: Path, version: tuple[int, ...]) -> tuple[Record, ...]:
 
 def hit_count(path: Path) -> int:
     """How many hits a file holds; 1 where it cannot be read, or holds FRFs."""
-    if READERS.get(path.suffix.lower()) not in (read_uff, _read_txt):
-        return 1  # named columns: a hit a file
     try:
         records = read(path)
     except InputError:

@@ -1,0 +1,160 @@
+"""Levels of a file to records: the parts that are a hit, or FRFs, each by themselves.
+
+Nothing in such files says which group is a hit, which a list of settings. So all is tried as one
+record; where that is no whole hit, group by group, then what has one length; what is whole counts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from planner.errors import InputError
+from planner.recording.column_names import frequency_unit, time_unit, unit_text
+from planner.recording.entries import Level
+from planner.recording.level_columns import Found, found_in, named_from
+from planner.recording.named_columns import to_records
+from planner.recording.records import FrfRecord, Record, TimeRecord
+from planner.recording.sampling import LEAST_SAMPLES
+from planner.recording.units import lookup, lookup_ratio
+
+MOST_NAMED = 8  # arrays that a sentence names
+LOOKED_FOR = (
+    "of a hit time_s or sampling_rate_hz, force_n and acceleration_x_m_s2, … are looked for, of "
+    "FRFs frequency_hz and receptance_xx, mobility_xx or accelerance_xx, …"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Whole:
+    record: Record
+    columns: tuple[Found, ...]
+
+
+def records_of(path: Path, root: Level) -> tuple[Record, ...]:
+    """Records of a file. Raises InputError saying what it holds and what that lacks."""
+    found = found_in(path, root)
+    columns = tuple(f for f in found if not f.lacks)
+    others = tuple(f for f in found if f.lacks and max(f.values.shape) >= LEAST_SAMPLES)
+    wholes = _wholes(path, columns)
+    if wholes:
+        used = {id(column) for whole in wholes for column in whole.columns}
+        left = [c for c in columns if id(c) not in used and len(c.values) >= LEAST_SAMPLES]
+        remark = f"Left out, as no part of a hit: {_listed([*left, *others], False)}."
+        remarks = (remark,) if left or others else ()
+        return tuple(replace(w.record, remarks=w.record.remarks + remarks) for w in wholes)
+    if others or not any(_known(column) for column in columns):
+        raise InputError(f"{path} holds {_held(found, root)}: {LOOKED_FOR}; name columns so.")
+    return _as_it_is(path, columns)
+
+
+def _as_it_is(path: Path, columns: tuple[Found, ...]) -> tuple[Record, ...]:
+    """What is no whole hit: responses alone, or what is to be refused in words."""
+    try:
+        return to_records(path, named_from(path, columns, False))
+    except InputError:
+        try:
+            return to_records(path, named_from(path, columns, True))
+        except InputError:
+            pass
+        raise
+
+
+def _wholes(path: Path, columns: tuple[Found, ...]) -> list[_Whole]:
+    whole = _whole(path, columns)
+    if whole:
+        return [whole]
+    for parts in (_groups(columns), _lengths(columns)):
+        each = [(part, _wholes(path, part)) for part in parts]
+        _no_hit_is_lost(path, each)
+        if wholes := [whole for _, some in each for whole in some]:
+            return wholes
+    return []
+
+
+def _whole(path: Path, columns: tuple[Found, ...]) -> _Whole | None:
+    """The record of some columns by either of their names; None where it is no whole hit."""
+    for by_place in (False, True):
+        try:
+            (record,) = to_records(path, named_from(path, columns, by_place))
+        except InputError:
+            continue
+        if isinstance(record, FrfRecord) or _is_hit(record):
+            return _Whole(record, columns)
+    return None
+
+
+def _is_hit(record: TimeRecord) -> bool:
+    """One force, and accelerations that can be told apart."""
+    forces = [c for c in record.channels if c.quantity == "force"]
+    felt = [(c.node, abs(c.direction)) for c in record.channels if c.quantity == "acceleration"]
+    return len(forces) == 1 and bool(felt) and len(set(felt)) == len(felt)
+
+
+def _groups(columns: tuple[Found, ...]) -> list[tuple[Found, ...]]:
+    """Columns group by group, where they first differ; each with those that belong to no group."""
+    paths = [column.path for column in columns]
+    depth = 0
+    while paths and all(len(p) > depth + 1 for p in paths) and len({p[depth] for p in paths}) == 1:
+        depth += 1
+    grouped: dict[str, list[Found]] = {}
+    common = []
+    for column in columns:
+        if len(column.path) > depth + 1:
+            grouped.setdefault(column.path[depth], []).append(column)
+        else:
+            common.append(column)
+    if len(grouped) < 2 - bool(common):
+        return []
+    if len(grouped) == 1:
+        return [tuple(part) for part in grouped.values()]
+    return [(*common, *part) for part in grouped.values()]
+
+
+def _lengths(columns: tuple[Found, ...]) -> list[tuple[Found, ...]]:
+    """Columns of each length, where they have several."""
+    by_length: dict[int, list[Found]] = {}
+    for column in columns:
+        by_length.setdefault(len(column.values), []).append(column)
+    return [tuple(part) for part in by_length.values()] if len(by_length) > 1 else []
+
+
+def _no_hit_is_lost(path: Path, each: Sequence[tuple[tuple[Found, ...], list[_Whole]]]) -> None:
+    """Raise InputError where a part has the columns of whole hits and is none."""
+    alike = {frozenset(c.title or c.last for c in part) for part, wholes in each if wholes}
+    for part, wholes in each:
+        if not wholes and frozenset(c.title or c.last for c in part) in alike:
+            to_records(path, named_from(path, part, False))
+            raise InputError(
+                f"{path}: {part[-1].place} and what stands with it is no whole hit as the others "
+                f"are; correct or leave it out."
+            )
+
+
+def _known(column: Found) -> bool:
+    """Whether unit or name say what a column holds."""
+    name, unit = column.title or column.last, column.unit
+    axis = time_unit(name, unit) or frequency_unit(name, unit)
+    said = unit or unit_text(name)
+    return bool(axis or lookup(said) or lookup_ratio(said))
+
+
+def _held(found: Sequence[Found], root: Level) -> str:
+    unread = _unread(root)
+    tables = f"{', '.join(unread[:MOST_NAMED])} (objects or tables, which only MATLAB can read)"
+    return ", ".join([_listed(found, True)] * bool(found) + [tables] * bool(unread)) or "nothing"
+
+
+def _unread(level: Level) -> list[str]:
+    inner = [n for part in level.parts.values() if isinstance(part, Level) for n in _unread(part)]
+    return [*level.unread, *inner]
+
+
+def _listed(found: Sequence[Found], lacking: bool) -> str:
+    """Arrays with their shapes, and what each lacks."""
+    texts = []
+    for one in found[:MOST_NAMED]:
+        shape = " × ".join(map(str, one.values.shape))
+        lacks = one.lacks or ("" if _known(one) else "a known name or unit")
+        texts.append(f"{one.place} ({shape}{f', lacks {lacks}' if lacks and lacking else ''})")
+    more = len(found) - len(texts)
+    return ", ".join(texts) + (f" and {more} more" if more else "")

@@ -1,0 +1,212 @@
+"""LabVIEW measurement files (.lvm): headers and segments of text, one or many x columns.
+
+Layout: "Specification for the LabVIEW Measurement File (.lvm)", National Instruments. Read here
+because the reader on PyPI takes files with special blocks, or whose header stands twice, for
+something else, and evaluates what stands in the cells.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.recording.entries import MOST_ENTRIES, Level, level_of
+from planner.recording.level_records import records_of
+from planner.recording.records import Record
+from planner.recording.sampling import UNEVEN, sampling_rate
+from planner.recording.text_tables import MAX_BYTES, decoded, read_text
+
+FIRST_LINE = "LabVIEW Measurement"
+END, SPECIAL, END_SPECIAL = "***End_of_Header***", "***Start_Special***", "***End_Special***"
+ABSCISSA, COMMENT = "X_Value", "Comment"
+
+
+@dataclass
+class _Segment:
+    """A block of rows, what its header says cell by cell, and the names of its columns."""
+
+    stated: dict[str, list[str]]
+    names: list[str]
+    rows: list[list[str]]
+    first_row: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """One column of numbers (n,); `start_s` from `date`, `step` in s (of spectra in Hz)."""
+
+    name: str
+    unit: str
+    values: np.ndarray
+    start: float
+    step: float
+    date: np.datetime64 | None
+    of_spectrum: bool
+
+
+def read_lvm(path: Path) -> tuple[Record, ...]:
+    """Each segment is a record; those that go on where the last ended are one. Spectra are refused.
+
+    Raises InputError saying what is wrong, and where.
+    """
+    text = decoded(path, MAX_BYTES)
+    if not text.startswith(FIRST_LINE):
+        return read_text(path)  # as LabVIEW's "no header" writes it: a table
+    parts: list[list[_Channel]] = []
+    for segment in _segments(text):
+        channels = list(_channels(path, segment))
+        if parts and _goes_on(parts[-1], channels):
+            parts[-1] = [_joined(a, b) for a, b in zip(parts[-1], channels, strict=True)]
+        elif channels:
+            parts.append(channels)
+    if not parts:
+        raise InputError(f"{path} holds headers and no data; export it again.")
+    return records_of(path, level_of({f"segment {k}": _level(p) for k, p in enumerate(parts, 1)}))
+
+
+def _segments(text: str) -> Iterator[_Segment]:
+    """Segments in order. A row of numbers after an empty line begins another of the same header."""
+    separator, special = "\t", False
+    block: dict[str, list[str]] = {}
+    current: _Segment | None = None
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("Separator") and len(line) > len("Separator"):
+            separator = line[len("Separator")]
+        cells = [cell.strip() for cell in line.split(separator)]
+        first = cells[0]
+        if special or first == SPECIAL:
+            special = first != END_SPECIAL
+        elif current and any(cells) and _is_row(first):
+            current.rows.append(cells)
+        elif current and current.rows:  # it ends with an empty line, or where a header begins
+            yield current
+            current = None if any(cells) else _Segment(block, current.names, [], number + 1)
+            block = {first: cells} if any(cells) else block
+        elif first == ABSCISSA:
+            current = _Segment(block, cells, [], number + 1)
+        elif first == END and "Channels" not in block:
+            block = {}  # of the file, not of its channels
+        elif any(cells):
+            block = block if current is None else {}
+            block[first], current = cells, None
+    if current:
+        yield current
+
+
+def _is_row(first: str) -> bool:
+    """Whether a row is of numbers: its first cell is one, or empty as without x columns."""
+    return bool(re.match(r"[-+.,\d]|nan|inf|$", first, re.IGNORECASE))
+
+
+def _channels(path: Path, segment: _Segment) -> Iterator[_Channel]:
+    """Columns with their steps and starts; an x column belongs to those on its right."""
+    x = np.zeros(0)
+    for column, name in enumerate(segment.names[:MOST_ENTRIES] if segment.rows else []):
+        if name == COMMENT or (not name and not _cell(segment, "Samples", column)):
+            continue
+        values = _numbers(path, segment, column)
+        if name == ABSCISSA:
+            x = values
+        elif values.size:
+            yield _channel(path, segment, column, values, x)
+
+
+def _channel(
+    path: Path, segment: _Segment, column: int, values: np.ndarray, x: np.ndarray
+) -> _Channel:
+    stated = {
+        tag: _cell(segment, tag, column)
+        for tag in ("X0", "Delta_X", "Y_Unit_Label", "X_Unit_Label", "X_Dimension", "Date", "Time")
+    }
+    start, step = (_number(path, tag, stated[tag] or "0") for tag in ("X0", "Delta_X"))
+    if len(x) >= len(values):  # its times have more digits than its step
+        start = float(x[0])
+        step = 1 / sampling_rate(path, x[: len(values)] - start)
+    of_spectrum = stated["X_Dimension"] == "Frequency" or stated["X_Unit_Label"] in ("Hz", "hertz")
+    # Seconds since 1904 are a date themselves.
+    date = _date(stated["Date"], stated["Time"]) if abs(start) < 1e9 else None
+    unit = stated["Y_Unit_Label"]
+    return _Channel(segment.names[column], unit, values, start, step, date, of_spectrum)
+
+
+def _cell(segment: _Segment, tag: str, column: int) -> str:
+    """What a header states of the channel in a column."""
+    cells = segment.stated.get(tag, [])
+    return cells[column] if 0 < column < len(cells) else ""
+
+
+def _numbers(path: Path, segment: _Segment, column: int) -> np.ndarray:
+    """The numbers of a column; one that ends before others is empty from there."""
+    texts = [row[column].replace(",", ".") if column < len(row) else "" for row in segment.rows]
+    while texts and not texts[-1]:
+        texts.pop()
+    try:
+        return np.array(texts, dtype=float)
+    except ValueError:
+        pass
+    for row, text in enumerate(texts):
+        try:
+            float(text)
+        except ValueError:
+            raise InputError(
+                f"{path}, row {segment.first_row + row}: {segment.names[column]} is "
+                f"{text[:20] or 'empty'}, no number; the file is cut off or mixed, export it again."
+            ) from None
+    return np.zeros(0)
+
+
+def _number(path: Path, tag: str, text: str) -> float:
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        raise InputError(f"{path}: {tag} {text[:20]} is no number; export it again.") from None
+
+
+def _date(date: str, time: str) -> np.datetime64 | None:
+    day, clock = date.replace("/", "-"), time.replace(",", ".")[:18]  # to ns
+    try:
+        return np.datetime64(f"{day}T{clock}", "ns")
+    except ValueError:
+        return None
+
+
+def _goes_on(before: list[_Channel], after: list[_Channel]) -> bool:
+    """Whether each channel begins where it ended in the last segment."""
+    return len(before) == len(after) and all(
+        (a.name, a.unit, a.of_spectrum) == (b.name, b.unit, False)
+        and abs(_after(a, b) / a.step - len(a.values)) < max(0.5, UNEVEN * len(a.values))
+        for a, b in zip(before, after, strict=True)
+        if a.step > 0
+    )
+
+
+def _after(a: _Channel, b: _Channel) -> float:
+    """How long after `a` `b` begins, in s."""
+    apart = 0.0
+    if a.date is not None and b.date is not None:
+        apart = float((b.date - a.date) / np.timedelta64(1, "ns") * 1e-9)
+    return b.start - a.start + apart
+
+
+def _joined(a: _Channel, b: _Channel) -> _Channel:
+    return replace(a, values=np.concatenate([a.values, b.values]))
+
+
+def _level(channels: list[_Channel]) -> Level:
+    parts = {}
+    for number, channel in enumerate(channels, 1):
+        stated = {
+            "unit": channel.unit,
+            "t0": channel.start,
+            "dt": channel.step,
+            "start_time": channel.date,
+            "x_unit": "Hz" if channel.of_spectrum else "s",
+        }
+        same = [c.name for c in channels].count(channel.name) > 1
+        name = f"{channel.name} ({number})" if same or not channel.name else channel.name
+        known = {key: value for key, value in stated.items() if value is not None}
+        parts[name] = level_of({"": channel.values}, known)
+    return Level({}, parts)
