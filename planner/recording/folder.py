@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
+from planner.recording.column_names import hit_direction
 from planner.recording.joints import JointUnits
-from planner.recording.named_columns import hit_direction
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
+from planner.recording.text_tables import decoded
 
 TABLE = "recordings.csv"
 MAX_BYTES = 32 * 1024 * 1024
@@ -118,7 +119,7 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
 
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Header and rows with their line numbers."""
-    text = _text(path)
+    text = decoded(path, MAX_BYTES)
     first = text.split("\n", 1)[0]
     delimiter = next((d for d in (",", ";", "\t") if d in first), ",")
     try:
@@ -143,23 +144,6 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
                 f"correct the row."
             )
     return header, numbered[1:]
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; check the path.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); check the file.") from None
-    if b"\x00" in data:
-        raise InputError(f"{path} is binary, not a CSV table; check which file it is.")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not UTF-8 text; save the table as CSV in UTF-8.") from None
 
 
 def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[str, ...]:
@@ -190,7 +174,7 @@ def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
 
 def _number(path: Path, number: int, column: str, cell: str) -> float:
     try:
-        value = float(cell)
+        value = float(cell.replace(",", "."))  # decimals of half the world's spreadsheets
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or abs(value) > 1e5:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import AxisNotStatedError, InputError
+from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
-from planner.recording.named_columns import hit_direction
 from planner.recording.points import SENSOR, StatedPoints
 from planner.recording.records import AXES, Channel, FrfRecord, Hit, Record, TimeRecord
 

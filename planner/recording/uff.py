@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
-from planner.recording.named_columns import sampling_rate
 from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
+from planner.recording.sampling import sampling_rate
 from planner.recording.units import lookup
 
 # UFF 58, record 8 and 9: specific data types.
