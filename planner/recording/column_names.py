@@ -10,43 +10,46 @@ _SUFFIXES = {"n": "N", "m_s2": "m/s^2", "m_s": "m/s", "m": "m", "s": "s", "hz": 
 _DIRECTION = re.compile(
     r"(?:^|[_\s.:])(?:a|acc|accel|acceleration)?[_\s]?([+-]?)([xyz])(?:$|[_\s(\[/,])", re.IGNORECASE
 )
-TIMES = ("time", "t", "zeit", "temps", "tempo", "tiempo", "t_s")
+TIMES = ("time", "t", "zeit", "temps", "tempo", "tiempo")
 FREQUENCIES = ("frequency", "freq", "frequenz", "fréquence", "frecuencia", "frequenza")
 
 
 def unit_text(name: str) -> str:
     """The unit that a name ends with: "Force (N)", "Acc X [g]", "t/s", "Force, N", "force_n"."""
-    plain = _without_number(name)
-    if plain.endswith((")", "]")):
-        return plain[_opened(plain) + 1 : -1].strip()
-    if "," in plain:
-        return plain[plain.rfind(",") + 1 :].strip()
-    for at in (i for i, sign in enumerate(plain) if sign == "/" and i):
-        if lookup(plain[at + 1 :]) or lookup_ratio(plain[at + 1 :]):
-            return plain[at + 1 :].strip()
-    for suffix in sorted(_SUFFIXES, key=len, reverse=True):
-        if plain.lower().endswith(f"_{suffix}"):
-            return _SUFFIXES[suffix]
-    return ""
-
-
-def _opened(name: str) -> int:
-    """Where the bracket opens that ends a name."""
-    depth = 0
-    for at in range(len(name) - 1, -1, -1):
-        depth += (name[at] in ")]") - (name[at] in "([")
-        if depth <= 0:
-            return at
-    return -1
+    return _parted(name)[1]
 
 
 def bare(name: str) -> str:
     """A name without its unit, lower case."""
-    plain, unit = _without_number(name), unit_text(name)
-    at = plain.rfind(unit) if unit else -1
-    if at > 0 and plain[at - 1] in "([/, _":
-        plain = plain[: at - 1]
-    return plain.lower().strip(" ,([/\t")
+    return _parted(name)[0].lower().strip(" ,_\t")
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """A name and its unit, "" where it has none."""
+    plain = _without_number(name)
+    if plain.endswith((")", "]")):
+        at = _opened(plain)
+        return plain[: max(at, 0)].rstrip("/ "), plain[at + 1 : -1].strip()
+    if "," in plain:
+        first, _, last = plain.rpartition(",")
+        return first, last.strip()
+    for at in (i for i, sign in enumerate(plain) if sign == "/" and i):
+        if lookup(plain[at + 1 :]) or lookup_ratio(plain[at + 1 :]):
+            return plain[:at], plain[at + 1 :].strip()
+    for suffix in sorted(_SUFFIXES, key=len, reverse=True):
+        if plain.lower().endswith(f"_{suffix}"):
+            return plain[: -len(suffix) - 1], _SUFFIXES[suffix]
+    return plain, ""
+
+
+def _opened(name: str) -> int:
+    """Where the bracket opens that ends a name; -1 where none does."""
+    depth = 0
+    for at in range(len(name) - 1, -1, -1):
+        depth += (name[at] in ")]") - (name[at] in "([")
+        if depth == 0:
+            return at
+    return -1
 
 
 def _without_number(name: str) -> str:

@@ -14,18 +14,17 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.column_names import direction_in, hit_direction, time_unit, unit_text
+from planner.recording.column_names import bare, direction_in, hit_direction, time_unit, unit_text
 from planner.recording.records import Channel, Record, TimeRecord
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
 from planner.recording.units import lookup
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
-# Keys of attributes, letters alone, that state a rate in Hz or a step in s.
-_RATES = ("samplingratehz", "samplingrate", "samplingfrequency", "samplingfrequencyhz",
-          "samplerate", "sampleratehz", "samplefrequency", "fs", "fshz", "abtastrate",
-          "abtastfrequenz")  # fmt: skip
-_STEPS = ("dt", "dts", "deltat", "timestep", "timesteps", "timeincrement", "samplinginterval",
-          "sampleinterval", "wfincrement", "abtastintervall")  # fmt: skip
+# Keys of attributes, letters alone and without a unit, that state a rate in Hz or a step in s.
+_RATES = ("samplingrate", "samplingfrequency", "samplerate", "samplefrequency", "fs",
+          "abtastrate", "abtastfrequenz")  # fmt: skip
+_STEPS = ("dt", "deltat", "timestep", "timeincrement", "samplinginterval", "sampleinterval",
+          "wfincrement", "abtastintervall")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -117,7 +116,8 @@ def _time(path: Path, named: Named) -> TimeRecord:
     channels = [_channel(name, v, named) for name, v in named.columns.items() if name not in times]
     if not channels:
         raise InputError(f"{path} holds times and nothing else; export force and accelerations.")
-    common, remarks = aligned(path, channels, start_s, rate_hz)
+    begin = [start_s.get(channel.name, 0.0) for channel in channels]
+    common, remarks = aligned(path, channels, begin, rate_hz)
     return TimeRecord(path, rate_hz, common, (*named.remarks, *remarks), named.simulated)
 
 
@@ -125,9 +125,9 @@ def _stated_rates(path: Path, named: Named) -> dict[str, float]:
     """Rates in Hz that attributes state, by their names."""
     found = {}
     for key, text in named.attributes.items():
-        if _letters(key) in _RATES:
+        if _letters(bare(key)) in _RATES:
             found[key] = _positive(path, key, str(text), "frequency")
-        elif _letters(key) in _STEPS:
+        elif _letters(bare(key)) in _STEPS:
             found[key] = 1 / _positive(path, key, str(text), "time")
     return found
 

@@ -1,6 +1,6 @@
 """When channels were sampled: rates from times, and channels that do not begin together."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     step = float(middle @ time_s / (middle @ middle))
     off = np.abs(time_s - np.mean(time_s) - step * middle)
     digits = 4 * np.finfo(np.float32).eps * max(abs(time_s[0]), abs(time_s[-1]))
-    if np.any(off > np.maximum(max(UNEVEN * step, digits), 1.2 * rounding(time_s))):
+    if np.max(off) > max(UNEVEN * step, digits, 1.2 * rounding(time_s)):
         steps = np.abs(np.diff(time_s) - step)
         row = int(np.argmax(steps)) + 2
         raise InputError(
@@ -38,14 +38,14 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     return 1 / step
 
 
-def rounding(values: np.ndarray) -> np.ndarray:
-    """By how much each of `values` (n,) may have been rounded, as they were written.
+def rounding(values: np.ndarray) -> float:
+    """By how much `values` (n,) may have been rounded at most, as they were written.
 
     To decimals (0.001 of 1.234, 2.5) or to significant digits (1e-4 of 10.9995 beside 9.00049).
     """
     magnitude = np.floor(np.log10(np.maximum(np.abs(values), 1e-300)))
-    decimals = _first_whole(values, np.zeros(len(values)))
-    return np.maximum(decimals, _first_whole(values, magnitude)) / 2
+    places = _first_whole(values, np.zeros(len(values))), _first_whole(values, magnitude)
+    return float(np.max(places)) / 2
 
 
 def _first_whole(values: np.ndarray, magnitude: np.ndarray) -> np.ndarray:
@@ -59,37 +59,36 @@ def _first_whole(values: np.ndarray, magnitude: np.ndarray) -> np.ndarray:
 
 
 def aligned(
-    path: Path, channels: Sequence[Channel], start_s: Mapping[str, float], rate_hz: float
+    path: Path, channels: Sequence[Channel], start_s: Sequence[float], rate_hz: float
 ) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
     """Channels over the time that all of them have, and what was left out, in words.
 
-    `start_s` says when a channel begins, by name. Raises InputError where channels without a start
-    differ in length, and where they have no time in common.
+    `start_s` (one a channel) says when each begins. Raises InputError where channels that begin
+    together differ in length, and where they have no time in common.
     """
-    names = [channel.name for channel in channels]
-    begin = np.array([start_s.get(name, 0.0) for name in names])
+    begin = np.asarray(start_s, dtype=float)
     lengths = np.array([len(channel.samples) for channel in channels])
     late = np.max(begin) - begin
-    if not np.any(late > 0.01 / rate_hz):
-        if len(set(lengths)) > 1 and not start_s:
-            raise InputError(f"{path} has columns of several lengths; export them together.")
-        late = np.zeros_like(late)
+    if np.all(late < 0.01 / rate_hz):
+        if len(set(lengths)) > 1:
+            raise InputError(
+                f"{path} has channels of {len(set(lengths))} lengths; export them together."
+            )
+        return tuple(channels), ()
     skip = np.round(late * rate_hz).astype(int)
     count = int(np.min(lengths - skip))
-    first, last = names[int(np.argmin(begin))], names[int(np.argmax(begin))]
-    apart = f"{path}: {first} and {last} begin {np.max(late):.3g} s apart"
+    first, last = (channels[int(at(begin))].name for at in (np.argmin, np.argmax))
+    apart = f"{first} and {last} begin {np.max(late):.3g} s apart"
     if count < LEAST_SAMPLES:
-        raise InputError(f"{apart} and have no time in common; export what was sampled together.")
-    cut = tuple(
+        raise InputError(f"{path}: {apart} and have no time in common; export them together.")
+    remarks = []
+    if np.any(skip):
+        remarks.append(f"{apart}: the {count / rate_hz:.4g} s that all channels have are used.")
+    rest = float(np.max(np.abs(late * rate_hz - skip)))
+    if rest > 0.05:
+        remarks.append(f"{first} and {last} are {rest / rate_hz:.2g} s apart, less than a sample.")
+    cut = (
         replace(channel, samples=channel.samples[at : at + count])
         for channel, at in zip(channels, skip, strict=True)
     )
-    remarks = []
-    if np.any(skip):
-        remarks.append(
-            f"{apart}: what all channels have in common, {count / rate_hz:.4g} s, is used."
-        )
-    rest = float(np.max(np.abs(late * rate_hz - skip), initial=0.0))
-    if rest > 0.05:
-        remarks.append(f"{first} and {last} were sampled {rest / rate_hz:.2g} s apart for good.")
-    return cut, tuple(remarks)
+    return tuple(cut), tuple(remarks)
