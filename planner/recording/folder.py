@@ -62,7 +62,8 @@ def read_recordings(
         row = _recording_row(path, inside, number, cells, columns)
         row = _with_points(path, row, cells, points)
         stated = row.stated
-        key = row.pose, row.hit, stated.hit_point, stated.response_points, row.repeat or 0
+        points_hit = stated.hit_point, stated.response_points
+        key = row.pose, row.hit, row.response, *points_hit, row.repeat or 0
         if row.repeat is not None and key in seen:
             raise InputError(
                 f"{path}, row {number}: pose {row.pose}, hit {row.hit}, repeat {row.repeat} is "
@@ -189,14 +190,11 @@ def _recording_row(
     path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[str]
 ) -> PoseRow:
     angles = tuple(_number(path, number, name, cells[name]) for name in columns)
-    hit = cells["hit"].strip().lower()
-    if not hit_direction(hit):
-        frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
-        raise InputError(
-            f'{path}, row {number}: hit is "{cells["hit"].strip()}"; give a signed axis of the '
-            f"{frame} frame such as +x."
-        )
-    hit = hit if hit[0] in "+-" else f"+{hit}"
+    frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
+    hit = _signed_axis(path, number, "hit", cells["hit"], frame)
+    response = None
+    if cells.get("response", "").strip():
+        response = _signed_axis(path, number, "response", cells["response"], "sensor")
     repeat = None
     if cells.get("repeat", "").strip():
         value = _number(path, number, "repeat", cells["repeat"])
@@ -210,7 +208,18 @@ def _recording_row(
         hit,
         repeat,
         _file(path, folder, number, cells["file"].strip()),
+        response=response,
     )
+
+
+def _signed_axis(path: Path, number: int, column: str, cell: str, frame: str) -> str:
+    axis = cell.strip().lower()
+    if not hit_direction(axis):
+        raise InputError(
+            f'{path}, row {number}: {column} is "{cell.strip()}"; give a signed axis of the '
+            f"{frame} frame such as +x."
+        )
+    return axis if axis[0] in "+-" else f"+{axis}"
 
 
 def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointNames) -> PoseRow:
