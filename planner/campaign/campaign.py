@@ -71,9 +71,11 @@ class Campaign(CampaignReads):
         paths: tuple[Path, ...],
         pose: str | None = None,
         progress: Callable[[str], None] | None = None,
+        from_names: bool = False,
     ) -> "tuple[ImportReport, ...]":
         """Import hits, one report per pose, in recording order.
 
+        With `from_names` the names of files say where their FRFs were felt and hit.
         Files that the engineer refused are imported only where `paths` names them themselves.
         Hits far from what the model is sure of are held until `confirm`, `move` or `refuse_held`.
         Raises InputError, before anything is stored, if it is not clear what or where they are.
@@ -89,6 +91,8 @@ class Campaign(CampaignReads):
             deliveries = sort_paths(
                 paths, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
+            if from_names:
+                deliveries = tuple(delivery.placed_by_names() for delivery in deliveries)
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in paths if path.is_file())
             reports = []

@@ -1,6 +1,6 @@
 """What the user names on the command line, sorted into poses with their files."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.dataset.screened_files import Source
@@ -20,6 +20,10 @@ class Delivery:
     joints_deg: tuple[float, ...] | None
     sources: tuple[Source, ...]
     row: str = ""  # "file, row n" for messages
+
+    def placed_by_names(self) -> "Delivery":
+        """Files whose names say where their FRFs were felt and hit."""
+        return replace(self, sources=tuple(replace(s, from_name=True) for s in self.sources))
 
 
 def sort_paths(

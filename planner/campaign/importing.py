@@ -189,6 +189,8 @@ def measure_files(
             hit_point=source.stated.hit_point,
             response_points=source.stated.response_points,
             part=source.part,
+            response=source.response,
+            from_name=source.from_name,
         )
         for verdict, (source, digest, suffix) in zip(
             measured.verdicts[len(old) :], fresh, strict=True

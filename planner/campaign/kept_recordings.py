@@ -60,8 +60,9 @@ class KeptRecordings:
         said = hit.hit_point or hit.response_points or self.names != PointNames()
         stated = StatedPoints(hit.hit_point, hit.response_points, names=self.names)
         return Source(
-            path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints(), hit.part
-        )
+            path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints(), hit.part,
+            hit.response, hit.from_name,
+        )  # fmt: skip
 
     def look_through(self, measurements: Iterable[Measurement], found: Store) -> None:
         """InputError where one of the accepted recordings is not what was imported.

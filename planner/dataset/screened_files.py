@@ -12,7 +12,9 @@ from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 class Source:
     """One file and what the table of recordings says about it (None: nothing).
 
-    `part` is which of the file's hits it is, from 1; 0: all that the file holds.
+    `part` is which of the file's hits it is, from 1; 0: all that the file holds. `response` is the
+    signed axis of an FRF's response; `from_name`: what FRFs do not say of their places, the file's
+    name does.
     """
 
     path: Path
@@ -21,22 +23,27 @@ class Source:
     repeat: int | None = None
     stated: StatedPoints = field(default_factory=StatedPoints)
     part: int = 0
+    response: str | None = None
+    from_name: bool = False
 
     @classmethod
     def of(cls, row: PoseRow) -> "Source":
         """The file that a row of the table names."""
         assert row.file is not None
-        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated)
+        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated, response=row.response)
 
     def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
         """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
+        from planner.recording.file_names import placed_by_name
         from planner.recording.hits import hits_from, located
         from planner.recording.read import read
 
         records: tuple[Record, ...] = read(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
-            return (), tuple(located(record, self.stated) for record in frfs)
+            named = (placed_by_name(r, self.name) for r in frfs) if self.from_name else frfs
+            at = self.stated, self.hit, self.response
+            return (), tuple(located(record, *at) for record in named)
         return hits_from(self._meant(records), self.hit, self.stated), ()
 
     def _meant(self, records: tuple[Record, ...]) -> tuple[Record, ...]:

@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
+from planner.recording.column_names import hit_direction
 from planner.recording.joints import JointUnits
-from planner.recording.named_columns import hit_direction
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
+from planner.recording.text_tables import decoded
 
 TABLE = "recordings.csv"
 MAX_BYTES = 32 * 1024 * 1024
@@ -61,7 +62,8 @@ def read_recordings(
         row = _recording_row(path, inside, number, cells, columns)
         row = _with_points(path, row, cells, points)
         stated = row.stated
-        key = row.pose, row.hit, stated.hit_point, stated.response_points, row.repeat or 0
+        points_hit = stated.hit_point, stated.response_points
+        key = row.pose, row.hit, row.response, *points_hit, row.repeat or 0
         if row.repeat is not None and key in seen:
             raise InputError(
                 f"{path}, row {number}: pose {row.pose}, hit {row.hit}, repeat {row.repeat} is "
@@ -118,7 +120,7 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
 
 def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """Header and rows with their line numbers."""
-    text = _text(path)
+    text = decoded(path, MAX_BYTES)
     first = text.split("\n", 1)[0]
     delimiter = next((d for d in (",", ";", "\t") if d in first), ",")
     try:
@@ -143,23 +145,6 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
                 f"correct the row."
             )
     return header, numbered[1:]
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; check the path.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); check the file.") from None
-    if b"\x00" in data:
-        raise InputError(f"{path} is binary, not a CSV table; check which file it is.")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not UTF-8 text; save the table as CSV in UTF-8.") from None
 
 
 def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[str, ...]:
@@ -190,7 +175,7 @@ def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
 
 def _number(path: Path, number: int, column: str, cell: str) -> float:
     try:
-        value = float(cell)
+        value = float(cell.replace(",", "."))  # decimals of half the world's spreadsheets
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or abs(value) > 1e5:
@@ -205,14 +190,11 @@ def _recording_row(
     path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[str]
 ) -> PoseRow:
     angles = tuple(_number(path, number, name, cells[name]) for name in columns)
-    hit = cells["hit"].strip().lower()
-    if not hit_direction(hit):
-        frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
-        raise InputError(
-            f'{path}, row {number}: hit is "{cells["hit"].strip()}"; give a signed axis of the '
-            f"{frame} frame such as +x."
-        )
-    hit = hit if hit[0] in "+-" else f"+{hit}"
+    frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
+    hit = _signed_axis(path, number, "hit", cells["hit"], frame)
+    response = None
+    if cells.get("response", "").strip():
+        response = _signed_axis(path, number, "response", cells["response"], "sensor")
     repeat = None
     if cells.get("repeat", "").strip():
         value = _number(path, number, "repeat", cells["repeat"])
@@ -226,7 +208,18 @@ def _recording_row(
         hit,
         repeat,
         _file(path, folder, number, cells["file"].strip()),
+        response=response,
     )
+
+
+def _signed_axis(path: Path, number: int, column: str, cell: str, frame: str) -> str:
+    axis = cell.strip().lower()
+    if not hit_direction(axis):
+        raise InputError(
+            f'{path}, row {number}: {column} is "{cell.strip()}"; give a signed axis of the '
+            f"{frame} frame such as +x."
+        )
+    return axis if axis[0] in "+-" else f"+{axis}"
 
 
 def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointNames) -> PoseRow:

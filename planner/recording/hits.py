@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import AxisNotStatedError, InputError
+from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
-from planner.recording.named_columns import hit_direction
 from planner.recording.points import SENSOR, StatedPoints
 from planner.recording.records import AXES, Channel, FrfRecord, Hit, Record, TimeRecord
 
@@ -27,8 +27,22 @@ def hits_from(
     return tuple(_hit(record, axis, stated or StatedPoints()) for record in times)
 
 
-def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
-    """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
+def located(
+    record: FrfRecord,
+    stated: StatedPoints,
+    hit: str | None = None,
+    response: str | None = None,
+) -> FrfRecord:
+    """The record with its nodes by the names of the points, and axes that it does not state.
+
+    `hit` and `response` are signed axes, as the table of recordings has them. Raises InputError as
+    `hits_from`, and where file and table name different axes.
+    """
+    record = replace(
+        record,
+        reference_direction=_completed(record, record.reference_direction, hit, "hit"),
+        response_direction=_completed(record, record.response_direction, response, "response"),
+    )
     count, source = len(record.values), record.source
     response = [
         _axis_there(source, stated, *at)
@@ -36,6 +50,20 @@ def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
     ]
     reference = [stated.hit_at(source, node) for node in record.reference_node or [""] * count]
     return replace(record, response_node=tuple(response), reference_node=tuple(reference))
+
+
+def _completed(
+    record: FrfRecord, own: tuple[int, ...], axis: str | None, what: str
+) -> tuple[int, ...]:
+    """Directions of FRFs, unknown ones (0) as the table says."""
+    said = hit_direction(axis) if axis else 0
+    other = next((d for d in own if d and said and abs(d) != abs(said)), None)
+    if other is not None and (what == "hit" or len(own) == 1):
+        raise InputError(
+            f"{record.source} says that its {what} is along {_name(other)}, the table says "
+            f"{axis}; correct the one that is wrong."
+        )
+    return tuple(direction or said for direction in own)
 
 
 def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:

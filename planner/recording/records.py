@@ -171,6 +171,7 @@ class PoseRow:
     repeat: int | None = None
     file: Path | None = None
     peak_force_n: float | None = None
+    response: str | None = None  # signed axis of an FRF's response, where the table says it
     stated: StatedPoints = field(default_factory=StatedPoints)
 
 
