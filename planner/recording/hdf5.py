@@ -79,6 +79,7 @@ class _Reader:
         self._path = path
         self._left = MOST_ENTRIES
         self._bytes = 0
+        self._seen: set[int] = set()
 
     def group(self, group: "h5py.Group", depth: int = 0) -> Level:
         """A group with what is in it; an array of structs is a list of them."""
@@ -91,6 +92,10 @@ class _Reader:
             if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue  # MATLAB's own, and links to what is read elsewhere
             item = group[name]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in self._seen:  # by another name
+                continue
+            self._seen.add(address)
             if isinstance(item, h5py.Group):
                 entries[name] = self._struct(item, depth + 1)
             elif isinstance(item, h5py.Dataset):

@@ -8,11 +8,12 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording import stated
-from planner.recording.column_names import time_unit
+from planner.recording.column_names import time_unit, unit_text
 from planner.recording.entries import Level, text_of
 from planner.recording.frf_columns import holds_frfs
 from planner.recording.named_columns import Named
 from planner.recording.sampling import UNEVEN, sampling_rate
+from planner.recording.units import lookup
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +58,27 @@ def _found(
             yield from _found(file, part, at, here)
         else:
             own = {k: v for alone, of in here if alone for k, v in of.items()}
+            own |= _of_one(name, here[-1][1])
+            if len(path) and not (unit_text(name) or time_unit(name, "")):
+                own = {**_units(here[-1][1]), **own}  # of all in the group
             shared = {k: v for alone, of in here if not alone for k, v in of.items()}
             yield from _columns(at, part, own, shared)
+
+
+def _units(attributes: Mapping[str, object]) -> dict[str, object]:
+    unit = stated.unit_of(attributes)
+    return {"unit": unit} if lookup(unit) else {}
+
+
+def _of_one(name: str, beside: Mapping[str, object]) -> dict[str, object]:
+    """Of what is stated beside arrays that which names one: "Channel_1_Unit" of Channel_1_Data."""
+    stems = [stem for stem in (name.rpartition("_")[0], name) if stem]
+    return {
+        key[len(stem) + 1 :]: value
+        for stem in stems
+        for key, value in beside.items()
+        if key.startswith((f"{stem}_", f"{stem}."))
+    }
 
 
 def _columns(

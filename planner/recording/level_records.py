@@ -11,13 +11,15 @@ from pathlib import Path
 from planner.errors import InputError
 from planner.recording.column_names import frequency_unit, time_unit, unit_text
 from planner.recording.entries import Level
+from planner.recording.frf_columns import holds_frfs
 from planner.recording.level_columns import Found, found_in, named_from
-from planner.recording.named_columns import to_records
+from planner.recording.named_columns import Named, to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.sampling import LEAST_SAMPLES
 from planner.recording.units import lookup, lookup_ratio
 
 MOST_NAMED = 8  # arrays that a sentence names
+OF_HITS = ("force", "acceleration", "velocity", "displacement")
 LOOKED_FOR = (
     "of a hit time_s or sampling_rate_hz, force_n and acceleration_x_m_s2, … are looked for, of "
     "FRFs frequency_hz and receptance_xx, mobility_xx or accelerance_xx, …"
@@ -63,11 +65,14 @@ def _wholes(path: Path, columns: tuple[Found, ...]) -> list[_Whole]:
     whole = _whole(path, columns)
     if whole:
         return [whole]
-    for parts in (_groups(columns), _lengths(columns)):
-        each = [(part, _wholes(path, part)) for part in parts]
-        _no_hit_is_lost(path, each)
-        if wholes := [whole for _, some in each for whole in some]:
-            return wholes
+    each = [(part, _wholes(path, part)) for part in _groups(columns)]
+    _no_hit_is_lost(path, each)
+    if wholes := [whole for _, some in each for whole in some]:
+        return wholes
+    for part in _lengths(columns):
+        whole = _whole(path, part)
+        if whole and not any(_belongs(c) for c in columns if len(c.values) != len(part[0].values)):
+            return [whole]
     return []
 
 
@@ -118,6 +123,13 @@ def _lengths(columns: tuple[Found, ...]) -> list[tuple[Found, ...]]:
     return [tuple(part) for part in by_length.values()] if len(by_length) > 1 else []
 
 
+def _belongs(column: Found) -> bool:
+    """Whether a column would be of a hit, or an FRF, had it the length of the others."""
+    name = column.title or column.last
+    unit = lookup(column.unit or unit_text(name))
+    return bool(unit and unit.quantity in OF_HITS) or holds_frfs(Named({name: column.values}))
+
+
 def _no_hit_is_lost(path: Path, each: Sequence[tuple[tuple[Found, ...], list[_Whole]]]) -> None:
     """Raise InputError where a part has the columns of whole hits and is none."""
     alike = {frozenset(c.title or c.last for c in part) for part, wholes in each if wholes}
@@ -141,7 +153,10 @@ def _known(column: Found) -> bool:
 def _held(found: Sequence[Found], root: Level) -> str:
     unread = _unread(root)
     tables = f"{', '.join(unread[:MOST_NAMED])} (objects or tables, which only MATLAB can read)"
-    return ", ".join([_listed(found, True)] * bool(found) + [tables] * bool(unread)) or "nothing"
+    return (
+        ", ".join([_listed(found, True)] * bool(found) + [tables] * bool(unread))
+        or "no arrays of numbers"
+    )
 
 
 def _unread(level: Level) -> list[str]:

@@ -7,7 +7,7 @@ something else, and evaluates what stands in the cells.
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +30,8 @@ class _Segment:
 
     stated: dict[str, list[str]]
     names: list[str]
-    rows: list[list[str]]
     first_row: int
+    rows: list[list[str]] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,10 +83,10 @@ def _segments(text: str) -> Iterator[_Segment]:
             current.rows.append(cells)
         elif current and current.rows:  # it ends with an empty line, or where a header begins
             yield current
-            current = None if any(cells) else _Segment(block, current.names, [], number + 1)
+            current = None if any(cells) else _Segment(block, current.names, number + 1)
             block = {first: cells} if any(cells) else block
         elif first == ABSCISSA:
-            current = _Segment(block, cells, [], number + 1)
+            current = _Segment(block, cells, number + 1)
         elif first == END and "Channels" not in block:
             block = {}  # of the file, not of its channels
         elif any(cells):
@@ -102,34 +102,46 @@ def _is_row(first: str) -> bool:
 
 
 def _channels(path: Path, segment: _Segment) -> Iterator[_Channel]:
-    """Columns with their steps and starts; an x column belongs to those on its right."""
-    x = np.zeros(0)
-    for column, name in enumerate(segment.names[:MOST_ENTRIES] if segment.rows else []):
-        if name == COMMENT or (not name and not _cell(segment, "Samples", column)):
+    """Columns with their steps and starts."""
+    columns = {
+        column: _numbers(path, segment, column)
+        for column, name in enumerate(segment.names[:MOST_ENTRIES] if segment.rows else [])
+        if name != COMMENT and (name or _cell(segment, "Samples", column))
+    }
+    times = [column for column in columns if segment.names[column] == ABSCISSA]
+    for column, values in columns.items():
+        at = max((t for t in times if t < column), default=-1)
+        if column in times or not values.size:
             continue
-        values = _numbers(path, segment, column)
-        if name == ABSCISSA:
-            x = values
-        elif values.size:
-            yield _channel(path, segment, column, values, x)
+        # An x column is that of the longest channel on its right.
+        own = [
+            c for c in columns if c > at and c not in times and not any(at < t < c for t in times)
+        ]
+        owner = max(own, key=lambda c: columns[c].size)
+        yield _channel(path, segment, column, values, owner, columns.get(at, np.zeros(0)))
 
 
 def _channel(
-    path: Path, segment: _Segment, column: int, values: np.ndarray, x: np.ndarray
+    path: Path, segment: _Segment, column: int, values: np.ndarray, owner: int, x: np.ndarray
 ) -> _Channel:
-    stated = {
-        tag: _cell(segment, tag, column)
-        for tag in ("X0", "Delta_X", "Y_Unit_Label", "X_Unit_Label", "X_Dimension", "Date", "Time")
-    }
-    start, step = (_number(path, tag, stated[tag] or "0") for tag in ("X0", "Delta_X"))
-    if len(x) >= len(values):  # its times have more digits than its step
-        start = float(x[0])
-        step = 1 / sampling_rate(path, x[: len(values)] - start)
-    of_spectrum = stated["X_Dimension"] == "Frequency" or stated["X_Unit_Label"] in ("Hz", "hertz")
+    def stated(tag: str, at: int = column) -> str:
+        return _cell(segment, tag, at)
+
+    count = stated("Samples")
+    if count.isdecimal() and int(count) > len(values):
+        raise InputError(
+            f"{path} states {count} samples of {segment.names[column]} and holds {len(values)}; "
+            f"the file is cut off, export it again."
+        )
+    start, step = (_number(path, tag, stated(tag)) for tag in ("X0", "Delta_X"))
+    if x.size:  # times have more digits than steps
+        start += float(x[0]) - _number(path, "X0", stated("X0", owner))
+        step = 1 / sampling_rate(path, x - x[0])
+    of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")
     # Seconds since 1904 are a date themselves.
-    date = _date(stated["Date"], stated["Time"]) if abs(start) < 1e9 else None
-    unit = stated["Y_Unit_Label"]
-    return _Channel(segment.names[column], unit, values, start, step, date, of_spectrum)
+    date = _date(stated("Date"), stated("Time")) if abs(start) < 1e9 else None
+    name, unit = segment.names[column], stated("Y_Unit_Label")
+    return _Channel(name, unit, values, start, step, date, of_spectrum)
 
 
 def _cell(segment: _Segment, tag: str, column: int) -> str:
@@ -160,7 +172,7 @@ def _numbers(path: Path, segment: _Segment, column: int) -> np.ndarray:
 
 def _number(path: Path, tag: str, text: str) -> float:
     try:
-        return float(text.replace(",", "."))
+        return float((text or "0").replace(",", "."))
     except ValueError:
         raise InputError(f"{path}: {tag} {text[:20]} is no number; export it again.") from None
 

@@ -27,7 +27,8 @@ def read_mat(path: Path) -> tuple[Record, ...]:
     if entries is None:
         return read_hdf5(path)
     visible = {name: v for name, v in entries.items() if name and not name.startswith("__")}
-    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
+    arrays = {name for name, value in visible.items() if isinstance(value, np.ndarray)}
+    if {"yspec", "npts", "freq", "tfun"} <= arrays:
         return (_logged_spectra(path, visible),)
     return records_of(path, level_of(visible))
 
