@@ -17,7 +17,8 @@ LEAST_SAMPLES = 8
 def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     """Rate in Hz of sampling times (n,) in s; InputError if they are not evenly spaced.
 
-    Times are even if none is farther from a straight line than it may be rounded.
+    Times are even if none is farther from the straight line fitted to them than rounding, of it
+    and of the line, explains.
     """
     count = len(time_s)
     if count < LEAST_SAMPLES:
@@ -29,7 +30,7 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     step = float(middle @ time_s / (middle @ middle))
     off = np.abs(time_s - np.mean(time_s) - step * middle)
     digits = 4 * np.finfo(np.float32).eps * max(abs(time_s[0]), abs(time_s[-1]))
-    if np.max(off) > max(UNEVEN * step, digits, 1.2 * rounding(time_s)):
+    if np.max(off) > max(UNEVEN * step, digits, 2 * rounding(time_s)):
         steps = np.abs(np.diff(time_s) - step)
         row = int(np.argmax(steps)) + 2
         raise InputError(
