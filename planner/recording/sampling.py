@@ -30,7 +30,7 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     step = float(middle @ time_s / (middle @ middle))
     off = np.abs(time_s - np.mean(time_s) - step * middle)
     digits = 4 * np.finfo(np.float32).eps * max(abs(time_s[0]), abs(time_s[-1]))
-    if np.max(off) > max(UNEVEN * step, digits, 2 * rounding(time_s)):
+    if np.max(off) > max(UNEVEN * step, digits, 3 * rounding(time_s)):
         steps = np.abs(np.diff(time_s) - step)
         row = int(np.argmax(steps)) + 2
         raise InputError(
@@ -44,7 +44,8 @@ def rounding(values: np.ndarray) -> float:
 
     To decimals (0.001 of 1.234, 2.5) or to significant digits (1e-4 of 10.9995 beside 9.00049).
     """
-    magnitude = np.floor(np.log10(np.maximum(np.abs(values), 1e-300)))
+    size = np.abs(values)
+    magnitude = np.floor(np.log10(np.maximum(size, max(1e-9 * np.max(size), 1e-300))))
     places = _first_whole(values, np.zeros(len(values))), _first_whole(values, magnitude)
     return float(np.max(places)) / 2
 
