@@ -45,8 +45,9 @@ def rounding(values: np.ndarray) -> float:
     To decimals (0.001 of 1.234, 2.5) or to significant digits (1e-4 of 10.9995 beside 9.00049).
     """
     size = np.abs(values)
-    magnitude = np.floor(np.log10(np.maximum(size, max(1e-9 * np.max(size), 1e-300))))
-    places = _first_whole(values, np.zeros(len(values))), _first_whole(values, magnitude)
+    written = values[size > 1e-12 * np.max(size)]  # a zero that arithmetic missed is a zero
+    magnitude = np.floor(np.log10(np.abs(written)))
+    places = _first_whole(written, np.zeros(len(written))), _first_whole(written, magnitude)
     return float(np.max(places)) / 2
 
 
