@@ -28,9 +28,9 @@ _SI = {"accelerance": "m/s^2/N", "mobility": "m/s/N", "receptance": "m/N", "unkn
 _WORDS = {
     "im": r"im|imag|imaginary|imaginär|imaginärteil|imaginaire",
     "re": r"re|real|realteil|réel|réelle|reell",
-    "phase": r"phase|phas|phi|angle|winkel",
+    "phase": r"phase|phas|phi|angle|arg|winkel",
     "coherence": r"coherence|coh|cohérence|kohärenz|coherencia",
-    "magnitude": r"magnitude|mag|amplitude|ampl|amp|betrag|abs|modulus|module",
+    "magnitude": r"magnitude|mag|amplitude|ampl|amp|betrag|abs|modulus|module|\|[^|]*\|",
 }
 _PARTS = {part: re.compile(rf"(?<![^\W_])({words})(?![^\W_])") for part, words in _WORDS.items()}
 _KINDS = {"accelerance": "accelerance|inertance", "mobility": "mobility",

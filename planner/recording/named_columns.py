@@ -102,8 +102,10 @@ def _time(path: Path, named: Named) -> TimeRecord:
             first = float(np.real(named.columns[current][0])) * times[current].factor
             start_s.setdefault(name, first)
     if not rates:
+        names = ", ".join(list(named.columns)[:6])
         raise InputError(
-            f"{path} has neither a column time_s nor a sampling_rate_hz; export one of them."
+            f"{path} has neither a column time_s nor a sampling_rate_hz, nor FRFs over a column "
+            f"frequency_hz; it has {names}: export one of them, with its name."
         )
     rate_hz = rates[min(rates, key=lambda name: name not in times)]
     for name, rate in rates.items():

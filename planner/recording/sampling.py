@@ -17,7 +17,8 @@ LEAST_SAMPLES = 8
 def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     """Rate in Hz of sampling times (n,) in s; InputError if they are not evenly spaced.
 
-    Times are even if none is farther from a straight line than it may be rounded.
+    Times are even if none is farther from the straight line fitted to them than rounding, of it
+    and of the line, explains.
     """
     count = len(time_s)
     if count < LEAST_SAMPLES:
@@ -29,7 +30,7 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     step = float(middle @ time_s / (middle @ middle))
     off = np.abs(time_s - np.mean(time_s) - step * middle)
     digits = 4 * np.finfo(np.float32).eps * max(abs(time_s[0]), abs(time_s[-1]))
-    if np.max(off) > max(UNEVEN * step, digits, 1.2 * rounding(time_s)):
+    if np.max(off) > max(UNEVEN * step, digits, 3 * rounding(time_s)):
         steps = np.abs(np.diff(time_s) - step)
         row = int(np.argmax(steps)) + 2
         raise InputError(
@@ -43,8 +44,10 @@ def rounding(values: np.ndarray) -> float:
 
     To decimals (0.001 of 1.234, 2.5) or to significant digits (1e-4 of 10.9995 beside 9.00049).
     """
-    magnitude = np.floor(np.log10(np.maximum(np.abs(values), 1e-300)))
-    places = _first_whole(values, np.zeros(len(values))), _first_whole(values, magnitude)
+    size = np.abs(values)
+    written = values[size > 1e-12 * np.max(size)]  # a zero that arithmetic missed is a zero
+    magnitude = np.floor(np.log10(np.abs(written)))
+    places = _first_whole(written, np.zeros(len(written))), _first_whole(written, magnitude)
     return float(np.max(places)) / 2
 
 

@@ -153,7 +153,10 @@ def _header(
     rows = [_header_cells(line, form, width) for line in lines]
     full = [i for i, row in enumerate(rows) if row and all(row) and not _numeric(row[1:])]
     labelled = [i for i in full if rows[i][0].lower() in LABELS]
-    likely = labelled or [i for i in full if width > 2 or not _is_pair(rows[i])]
+    likely = labelled or [
+        i for i in full
+        if (width > 2 or not _is_pair(rows[i])) and not all(map(_is_unit, rows[i]))
+    ]  # fmt: skip
     attributes: dict[str, str] = {}
     for line, row in zip(lines, rows, strict=True):
         for key, value in _pairs(line[:MOST_HEADER_TEXT], row):
@@ -187,9 +190,11 @@ def _numeric(cells: Sequence[str]) -> bool:
 
 def _says_something(name: str) -> bool:
     """Whether a name is one of a column: an axis, or something with its unit."""
-    axis = time_unit(name, "") or frequency_unit(name, "")
-    unit = unit_text(name)
-    return bool(axis or lookup(unit) or lookup_ratio(unit))
+    return bool(time_unit(name, "") or frequency_unit(name, "")) or _is_unit(unit_text(name))
+
+
+def _is_unit(cell: str) -> bool:
+    return bool(lookup(cell) or lookup_ratio(cell))
 
 
 def _units(row: Sequence[str], names: Sequence[str]) -> list[str] | None:
@@ -198,7 +203,7 @@ def _units(row: Sequence[str], names: Sequence[str]) -> list[str] | None:
         return None
     if row[0].lower() in ("unit", "units"):
         return ["", *row[1:]]
-    known = [bool(lookup(cell) or lookup_ratio(cell)) for cell in row if cell]
+    known = [_is_unit(cell) for cell in row if cell]
     if all(known) or (all(row) and any(known)):
         return [*row]
     plain = all(row) and not _numeric(row[1:]) and len(set(row)) <= len(set(names))
