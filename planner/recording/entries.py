@@ -15,7 +15,7 @@ DEEPEST = 32  # levels
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class EntryTree:
     """A group of a file, a struct, an array with what is stated of it.
 
     `attributes` are texts, single numbers, dates and lists of texts; `parts` further levels and
@@ -24,23 +24,23 @@ class Level:
     """
 
     attributes: Mapping[str, object] = field(default_factory=dict)
-    parts: Mapping[str, "Level | np.ndarray"] = field(default_factory=dict)
+    parts: Mapping[str, "EntryTree | np.ndarray"] = field(default_factory=dict)
     unread: tuple[str, ...] = ()  # what is there and cannot be read, in words
 
 
-def level_of(
+def tree_of(
     entries: Mapping[str, object], attributes: Mapping[str, object] | None = None
-) -> Level:
+) -> EntryTree:
     """A level from nested dicts (structs), lists (cells, arrays of structs), arrays and texts."""
     stated = dict(attributes_of(attributes or {}))
-    parts: dict[str, Level | np.ndarray] = {}
+    parts: dict[str, EntryTree | np.ndarray] = {}
     unread = []
     for name, value in entries.items():
         while isinstance(value, list):
             value = _of_list(name, value)
         if isinstance(value, Mapping):
-            value = level_of(value)
-        if isinstance(value, Level):
+            value = tree_of(value)
+        if isinstance(value, EntryTree):
             parts[name] = value
         elif value is None:
             unread.append(name)
@@ -48,7 +48,7 @@ def level_of(
             stated[name] = found
         elif isinstance(value, np.ndarray) and value.size > 1 and value.dtype.kind in "fiubc":
             parts[name] = np.squeeze(value)
-    return Level(stated, parts, tuple(unread))
+    return EntryTree(stated, parts, tuple(unread))
 
 
 def attributes_of(entries: Mapping[str, object]) -> Iterator[tuple[str, object]]:
@@ -105,7 +105,7 @@ def _of_list(name: str, values: list[object]) -> object:
     arrays = [np.squeeze(v) for v in values if isinstance(v, np.ndarray) and np.size(v) > 1]
     alike = len({a.shape for a in arrays}) == 1 and arrays[0].ndim == 1 and len(arrays) > 1
     if alike and len(arrays) + len(texts) == len(values):
-        return Level({"names": texts} if texts else {}, {"": np.column_stack(arrays)})
+        return EntryTree({"names": texts} if texts else {}, {"": np.column_stack(arrays)})
     return {f"{name} {number}": value for number, value in enumerate(values, 1)}
 
 

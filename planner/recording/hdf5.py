@@ -10,11 +10,11 @@ from planner.errors import InputError
 from planner.recording.entries import (
     DEEPEST,
     MOST_ENTRIES,
-    Level,
+    EntryTree,
     check_size,
-    level_of,
+    tree_of,
 )
-from planner.recording.level_records import records_of
+from planner.recording.entry_records import records_of
 from planner.recording.records import Record
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class _Reader:
         self._bytes = 0
         self._seen: set[int] = set()
 
-    def group(self, group: "h5py.Group", depth: int = 0) -> Level:
+    def group(self, group: "h5py.Group", depth: int = 0) -> EntryTree:
         """A group with what is in it; an array of structs is a list of them."""
         import h5py
 
@@ -100,7 +100,7 @@ class _Reader:
                 entries[name] = self._struct(item, depth + 1)
             elif isinstance(item, h5py.Dataset):
                 entries[name] = self._dataset(item, depth + 1)
-        return level_of(entries, _attributes(group))
+        return tree_of(entries, _attributes(group))
 
     def _struct(self, group: "h5py.Group", depth: int) -> object:
         """A group, or one struct after another where its fields are lists of references."""
@@ -147,11 +147,11 @@ class _Reader:
         if isinstance(values, np.ndarray) and values.dtype.names == ("real", "imag"):
             values = values["real"] + 1j * values["imag"]
         if isinstance(values, np.ndarray) and values.dtype.names:
-            return level_of({n: values[n] for n in values.dtype.names}, _attributes(dataset))
+            return tree_of({n: values[n] for n in values.dtype.names}, _attributes(dataset))
         if kind:
             return np.asarray(values).T
         stated = _attributes(dataset)
-        return level_of({"": values}, stated) if stated and np.size(values) > 1 else values
+        return tree_of({"": values}, stated) if stated and np.size(values) > 1 else values
 
 
 def _is_list(dataset: "h5py.Dataset") -> bool:

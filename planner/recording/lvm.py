@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import MOST_ENTRIES, Level, level_of
-from planner.recording.level_records import records_of
+from planner.recording.entries import MOST_ENTRIES, EntryTree, tree_of
+from planner.recording.entry_records import records_of
 from planner.recording.records import Record
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.text_tables import MAX_BYTES, decoded, read_text
@@ -64,7 +64,7 @@ def read_lvm(path: Path) -> tuple[Record, ...]:
             parts.append(channels)
     if not parts:
         raise InputError(f"{path} holds headers and no data; export it again.")
-    return records_of(path, level_of({f"segment {k}": _level(p) for k, p in enumerate(parts, 1)}))
+    return records_of(path, tree_of({f"segment {k}": _tree(p) for k, p in enumerate(parts, 1)}))
 
 
 def _segments(text: str) -> Iterator[_Segment]:
@@ -207,7 +207,7 @@ def _joined(a: _Channel, b: _Channel) -> _Channel:
     return replace(a, values=np.concatenate([a.values, b.values]))
 
 
-def _level(channels: list[_Channel]) -> Level:
+def _tree(channels: list[_Channel]) -> EntryTree:
     parts = {}
     for number, channel in enumerate(channels, 1):
         stated = {
@@ -220,5 +220,5 @@ def _level(channels: list[_Channel]) -> Level:
         same = [c.name for c in channels].count(channel.name) > 1
         name = f"{channel.name} ({number})" if same or not channel.name else channel.name
         known = {key: value for key, value in stated.items() if value is not None}
-        parts[name] = level_of({"": channel.values}, known)
-    return Level({}, parts)
+        parts[name] = tree_of({"": channel.values}, known)
+    return EntryTree({}, parts)

@@ -8,9 +8,9 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.recording import plausible
-from planner.recording.entries import check_size, level_of
+from planner.recording.entries import check_size, tree_of
+from planner.recording.entry_records import records_of
 from planner.recording.hdf5 import read_hdf5
-from planner.recording.level_records import records_of
 from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
 from planner.recording.records import FrfRecord, Record, TimeRecord
@@ -30,7 +30,7 @@ def read_mat(path: Path) -> tuple[Record, ...]:
     arrays = {name for name, value in visible.items() if isinstance(value, np.ndarray)}
     if {"yspec", "npts", "freq", "tfun"} <= arrays:
         return (_logged_spectra(path, visible),)
-    return records_of(path, level_of(visible))
+    return records_of(path, tree_of(visible))
 
 
 def _older(path: Path) -> dict[str, object] | None:

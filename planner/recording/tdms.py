@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import Level, check_size, level_of
-from planner.recording.level_records import records_of
+from planner.recording.entries import EntryTree, check_size, tree_of
+from planner.recording.entry_records import records_of
 from planner.recording.records import Record
 
 if TYPE_CHECKING:
@@ -36,31 +36,31 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
     return records_of(path, root)
 
 
-def _root(path: Path) -> Level:
+def _root(path: Path) -> EntryTree:
     from nptdms import TdmsFile
 
     with TdmsFile.open(path, raw_timestamps=True) as file:
         groups = file.groups()
         check_size(path, sum(8 * len(c) for group in groups for c in group.channels()))
         found = {
-            group.name: level_of(
+            group.name: tree_of(
                 {channel.name: _channel(channel) for channel in group.channels()},
                 _stated(group.properties),
             )
             for group in groups
         }
-        return level_of(found, _stated(file.properties))
+        return tree_of(found, _stated(file.properties))
 
 
-def _channel(channel: "nptdms.TdmsChannel") -> Level:
+def _channel(channel: "nptdms.TdmsChannel") -> EntryTree:
     """A channel's numbers with its properties; dates are times in s. What is neither is empty."""
     values = channel[:]
     if isinstance(values, np.ndarray) and values.dtype.names and values.size:
         seconds = (values["seconds"] - values["seconds"][0]).astype(float)
-        return Level({"unit": "s"}, {"": seconds + values["second_fractions"] / 2.0**64})
+        return EntryTree({"unit": "s"}, {"": seconds + values["second_fractions"] / 2.0**64})
     if np.asarray(values).dtype.kind not in "fiubc":
-        return Level()
-    return level_of({"": np.asarray(values)}, _stated(channel.properties))
+        return EntryTree()
+    return tree_of({"": np.asarray(values)}, _stated(channel.properties))
 
 
 def _stated(properties: Mapping[str, Any]) -> dict[str, object]:

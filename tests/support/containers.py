@@ -196,6 +196,17 @@ def _h5_table(group: h5py.Group, hit: Hit) -> None:
     group["table"] = rows
 
 
+def late_h5(path: Path, hit: Hit, by: int, said: Callable[[float], object]) -> None:
+    """Accelerations begin `by` samples after the force, as the attribute start_time says."""
+    with h5py.File(path, "w") as file:
+        for k, (name, unit, values) in enumerate(zip(NAMES, UNITS, signals(hit), strict=True)):
+            skip = by if k else 0
+            file[name] = values[skip:]
+            stated = {"unit": unit, "fs": f"{hit.sampling_rate_hz} Hz",
+                      "start_time": said(skip / hit.sampling_rate_hz)}  # fmt: skip
+            file[name].attrs.update(stated)
+
+
 def tdms(path: Path, hits: Sequence[Hit], extra: Sequence[Any] = (), **late: Any) -> None:
     """Waveforms; `late` are samples by which a channel began later, and how that is said."""
     from nptdms import ChannelObject, RootObject, TdmsWriter

@@ -9,15 +9,17 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording import stated
 from planner.recording.column_names import time_unit, unit_text
-from planner.recording.entries import Level, text_of
+from planner.recording.entries import EntryTree, text_of
 from planner.recording.frf_columns import holds_frfs
 from planner.recording.named_columns import Named
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.units import lookup
 
+Stated = Mapping[str, object]
+
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class EntryColumn:
     """An array of a file: a column, or one that lacks names (`lacks` says so).
 
     `own` is stated of it alone, `shared` of several; `title` is its name in a list beside it.
@@ -25,8 +27,8 @@ class Found:
 
     path: tuple[str, ...]
     values: np.ndarray  # (n,) unless it lacks something
-    own: Mapping[str, object]
-    shared: Mapping[str, object]
+    own: Stated
+    shared: Stated
     title: str = ""
     unit: str = ""
     lacks: str = ""
@@ -42,19 +44,22 @@ class Found:
         return "/".join(self.path) or "data"
 
 
-def found_in(file: Path, root: Level) -> tuple[Found, ...]:
+def found_in(file: Path, root: EntryTree) -> tuple[EntryColumn, ...]:
     """Every array of a file. Raises InputError where a channel's own times are uneven."""
     return tuple(_found(file, root, (), []))
 
 
 def _found(
-    file: Path, level: Level, path: tuple[str, ...], above: list[tuple[bool, Mapping[str, object]]]
-) -> Iterator[Found]:
-    level = _with_own_times(file, level)
-    here = [*above, (_arrays(level) == 1, {**level.attributes, **_beside(level)})]
-    for name, part in level.parts.items():
+    file: Path,
+    tree: EntryTree,
+    path: tuple[str, ...],
+    above: list[tuple[bool, Stated]],
+) -> Iterator[EntryColumn]:
+    tree = _with_own_times(file, tree)
+    here = [*above, (_arrays(tree) == 1, {**tree.attributes, **_beside(tree)})]
+    for name, part in tree.parts.items():
         at = (*path, name) if name else path
-        if isinstance(part, Level):
+        if isinstance(part, EntryTree):
             yield from _found(file, part, at, here)
         else:
             own = {k: v for alone, of in here if alone for k, v in of.items()}
@@ -65,12 +70,12 @@ def _found(
             yield from _columns(at, part, own, shared)
 
 
-def _units(attributes: Mapping[str, object]) -> dict[str, object]:
+def _units(attributes: Stated) -> dict[str, object]:
     unit = stated.unit_of(attributes)
     return {"unit": unit} if lookup(unit) else {}
 
 
-def _of_one(name: str, beside: Mapping[str, object]) -> dict[str, object]:
+def _of_one(name: str, beside: Stated) -> dict[str, object]:
     """Of what is stated beside arrays that which names one: "Channel_1_Unit" of Channel_1_Data."""
     stems = [stem for stem in (name.rpartition("_")[0], name) if stem]
     return {
@@ -83,9 +88,9 @@ def _of_one(name: str, beside: Mapping[str, object]) -> dict[str, object]:
 
 def _columns(
     at: tuple[str, ...], values: np.ndarray, own: dict[str, object], shared: dict[str, object]
-) -> Iterator[Found]:
+) -> Iterator[EntryColumn]:
     if values.ndim == 1:
-        yield Found(at, values, own, shared, unit=stated.unit_of(own))
+        yield EntryColumn(at, values, own, shared, unit=stated.unit_of(own))
         return
     for count, turned in ((values.shape[1], values), (values.shape[0], values.T)):
         for beside in (own, shared):
@@ -93,44 +98,44 @@ def _columns(
                 each = (stated.units_of(of, count) for of in (own, shared))
                 units = next((u for u in each if u[0]), ("",) * count)
                 for title, unit, column in zip(titles, units, turned.T, strict=True):
-                    yield Found(at, column, own, shared, title, unit)
+                    yield EntryColumn(at, column, own, shared, title, unit)
                 return
-    lacks = f"{min(values.shape)} names beside it" if values.ndim == 2 else "columns"
-    yield Found(at, values, own, shared, lacks=lacks)
+    lacks = f"{min(values.shape)} names beside it" if values.ndim == 2 else "one column an FRF"
+    yield EntryColumn(at, values, own, shared, lacks=lacks)
 
 
-def _arrays(level: Level) -> int:
-    return sum(_arrays(p) if isinstance(p, Level) else 1 for p in level.parts.values())
+def _arrays(tree: EntryTree) -> int:
+    return sum(_arrays(p) if isinstance(p, EntryTree) else 1 for p in tree.parts.values())
 
 
-def _beside(level: Level) -> dict[str, object]:
+def _beside(tree: EntryTree) -> dict[str, object]:
     """Attributes of the parts that hold no array: they tell of those beside them."""
     found: dict[str, object] = {}
-    for name, part in level.parts.items():
-        if isinstance(part, Level) and not _arrays(part):
+    for name, part in tree.parts.items():
+        if isinstance(part, EntryTree) and not _arrays(part):
             inner = {**part.attributes, **_beside(part)}
             found |= {f"{name}.{key}": value for key, value in inner.items()}
     return found
 
 
-def _with_own_times(file: Path, level: Level) -> Level:
-    """The level with one array where its two are a channel and the times of its samples."""
-    parts = {n: p for n, p in level.parts.items() if not isinstance(p, Level) or _arrays(p)}
+def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
+    """A group with one array where its two are a channel and the times of its samples."""
+    parts = {n: p for n, p in tree.parts.items() if not isinstance(p, EntryTree) or _arrays(p)}
     flat = {n: p for n, p in parts.items() if isinstance(p, np.ndarray) and p.ndim == 1}
     times = [n for n in flat if time_unit(n, "")]
     if len(parts) != 2 or len(flat) != 2 or len(times) != 1:
-        return level
+        return tree
     (name,) = times
     unit = time_unit(name, "")
     time_s = flat[name] * (unit.factor if unit else 1.0)
     if len({len(a) for a in flat.values()}) != 1 or not np.isrealobj(time_s):
-        return level
+        return tree
     axis = {"dt": 1 / sampling_rate(file, time_s), "t0": float(time_s[0])}
-    rest = {n: p for n, p in level.parts.items() if n != name}
-    return Level({**level.attributes, **axis}, rest, level.unread)
+    rest = {n: p for n, p in tree.parts.items() if n != name}
+    return EntryTree({**tree.attributes, **axis}, rest, tree.unread)
 
 
-def named_from(file: Path, columns: Sequence[Found], by_place: bool) -> Named:
+def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Named:
     """Columns with their names: those stated of them, or (`by_place`) the last part of their place.
 
     Raises InputError where two have the same, or rates differ, or units are stated twice.
@@ -149,6 +154,8 @@ def named_from(file: Path, columns: Sequence[Found], by_place: bool) -> Named:
             )
     held = {n: c.values for n, c in zip(names, columns, strict=True)}
     starts, first = _starts(file, axes)
+    if len({len(c.values) for c in columns}) > 1 and len(starts) < len(columns):
+        starts = {}  # what states no start cannot be laid beside the others
     if step := _common_step(file, {n: a.step for n, a in axes.items() if a.step}):
         if any(axis.quantity == "frequency" for axis in axes.values()):
             lines = np.arange(max(len(values) for values in held.values())) * step + first
@@ -186,7 +193,7 @@ def _starts(file: Path, axes: Mapping[str, stated.Axis]) -> tuple[dict[str, floa
     return {n: start - first for n, start in known.items()}, first
 
 
-def _names(file: Path, columns: Sequence[Found], by_place: bool) -> list[str]:
+def _names(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> list[str]:
     """A name for each, by which they differ."""
     names = [c.title or (not by_place and stated.name_of(c.own)) or c.last for c in columns]
     same = _grouped(names, columns)
@@ -203,8 +210,8 @@ def _names(file: Path, columns: Sequence[Found], by_place: bool) -> list[str]:
     return distinct
 
 
-def _grouped(names: Sequence[str], columns: Sequence[Found]) -> dict[str, list[Found]]:
-    found: dict[str, list[Found]] = {}
+def _grouped(names: Sequence[str], columns: Sequence[EntryColumn]) -> dict[str, list[EntryColumn]]:
+    found: dict[str, list[EntryColumn]] = {}
     for name, column in zip(names, columns, strict=True):
         found.setdefault(name, []).append(column)
     return found
@@ -230,7 +237,7 @@ def _common_step(file: Path, steps: Mapping[str, float]) -> float | None:
     return next(iter(steps.values()), None)
 
 
-def _attributes(columns: Sequence[Found]) -> dict[str, str]:
+def _attributes(columns: Sequence[EntryColumn]) -> dict[str, str]:
     """What is stated of all columns, or of some and contradicted of none."""
     found: dict[str, str] = {}
     contradicted = set()

@@ -10,9 +10,9 @@ from pathlib import Path
 
 from planner.errors import InputError
 from planner.recording.column_names import frequency_unit, time_unit, unit_text
-from planner.recording.entries import Level
+from planner.recording.entries import EntryTree
+from planner.recording.entry_columns import EntryColumn, found_in, named_from
 from planner.recording.frf_columns import holds_frfs
-from planner.recording.level_columns import Found, found_in, named_from
 from planner.recording.named_columns import Named, to_records
 from planner.recording.records import FrfRecord, Record, TimeRecord
 from planner.recording.sampling import LEAST_SAMPLES
@@ -25,14 +25,16 @@ LOOKED_FOR = (
     "FRFs frequency_hz and receptance_xx, mobility_xx or accelerance_xx, …"
 )
 
+Columns = tuple[EntryColumn, ...]
+
 
 @dataclass(frozen=True, eq=False)
 class _Whole:
     record: Record
-    columns: tuple[Found, ...]
+    columns: Columns
 
 
-def records_of(path: Path, root: Level) -> tuple[Record, ...]:
+def records_of(path: Path, root: EntryTree) -> tuple[Record, ...]:
     """Records of a file. Raises InputError saying what it holds and what that lacks."""
     found = found_in(path, root)
     columns = tuple(f for f in found if not f.lacks)
@@ -49,7 +51,7 @@ def records_of(path: Path, root: Level) -> tuple[Record, ...]:
     return _as_it_is(path, columns)
 
 
-def _as_it_is(path: Path, columns: tuple[Found, ...]) -> tuple[Record, ...]:
+def _as_it_is(path: Path, columns: Columns) -> tuple[Record, ...]:
     """What is no whole hit: responses alone, or what is to be refused in words."""
     try:
         return to_records(path, named_from(path, columns, False))
@@ -61,7 +63,7 @@ def _as_it_is(path: Path, columns: tuple[Found, ...]) -> tuple[Record, ...]:
         raise
 
 
-def _wholes(path: Path, columns: tuple[Found, ...]) -> list[_Whole]:
+def _wholes(path: Path, columns: Columns) -> list[_Whole]:
     whole = _whole(path, columns)
     if whole:
         return [whole]
@@ -76,7 +78,7 @@ def _wholes(path: Path, columns: tuple[Found, ...]) -> list[_Whole]:
     return []
 
 
-def _whole(path: Path, columns: tuple[Found, ...]) -> _Whole | None:
+def _whole(path: Path, columns: Columns) -> _Whole | None:
     """The record of some columns by either of their names; None where it is no whole hit."""
     for by_place in (False, True):
         try:
@@ -95,13 +97,13 @@ def _is_hit(record: TimeRecord) -> bool:
     return len(forces) == 1 and bool(felt) and len(set(felt)) == len(felt)
 
 
-def _groups(columns: tuple[Found, ...]) -> list[tuple[Found, ...]]:
+def _groups(columns: Columns) -> list[Columns]:
     """Columns group by group, where they first differ; each with those that belong to no group."""
     paths = [column.path for column in columns]
     depth = 0
     while paths and all(len(p) > depth + 1 for p in paths) and len({p[depth] for p in paths}) == 1:
         depth += 1
-    grouped: dict[str, list[Found]] = {}
+    grouped: dict[str, list[EntryColumn]] = {}
     common = []
     for column in columns:
         if len(column.path) > depth + 1:
@@ -115,22 +117,22 @@ def _groups(columns: tuple[Found, ...]) -> list[tuple[Found, ...]]:
     return [(*common, *part) for part in grouped.values()]
 
 
-def _lengths(columns: tuple[Found, ...]) -> list[tuple[Found, ...]]:
+def _lengths(columns: Columns) -> list[Columns]:
     """Columns of each length, where they have several."""
-    by_length: dict[int, list[Found]] = {}
+    by_length: dict[int, list[EntryColumn]] = {}
     for column in columns:
         by_length.setdefault(len(column.values), []).append(column)
     return [tuple(part) for part in by_length.values()] if len(by_length) > 1 else []
 
 
-def _belongs(column: Found) -> bool:
+def _belongs(column: EntryColumn) -> bool:
     """Whether a column would be of a hit, or an FRF, had it the length of the others."""
     name = column.title or column.last
     unit = lookup(column.unit or unit_text(name))
     return bool(unit and unit.quantity in OF_HITS) or holds_frfs(Named({name: column.values}))
 
 
-def _no_hit_is_lost(path: Path, each: Sequence[tuple[tuple[Found, ...], list[_Whole]]]) -> None:
+def _no_hit_is_lost(path: Path, each: Sequence[tuple[Columns, list[_Whole]]]) -> None:
     """Raise InputError where a part has the columns of whole hits and is none."""
     alike = {frozenset(c.title or c.last for c in part) for part, wholes in each if wholes}
     for part, wholes in each:
@@ -142,7 +144,7 @@ def _no_hit_is_lost(path: Path, each: Sequence[tuple[tuple[Found, ...], list[_Wh
             )
 
 
-def _known(column: Found) -> bool:
+def _known(column: EntryColumn) -> bool:
     """Whether unit or name say what a column holds."""
     name, unit = column.title or column.last, column.unit
     axis = time_unit(name, unit) or frequency_unit(name, unit)
@@ -150,7 +152,7 @@ def _known(column: Found) -> bool:
     return bool(axis or lookup(said) or lookup_ratio(said))
 
 
-def _held(found: Sequence[Found], root: Level) -> str:
+def _held(found: Sequence[EntryColumn], root: EntryTree) -> str:
     unread = _unread(root)
     tables = f"{', '.join(unread[:MOST_NAMED])} (objects or tables, which only MATLAB can read)"
     return (
@@ -159,12 +161,14 @@ def _held(found: Sequence[Found], root: Level) -> str:
     )
 
 
-def _unread(level: Level) -> list[str]:
-    inner = [n for part in level.parts.values() if isinstance(part, Level) for n in _unread(part)]
-    return [*level.unread, *inner]
+def _unread(tree: EntryTree) -> list[str]:
+    inner = [
+        n for part in tree.parts.values() if isinstance(part, EntryTree) for n in _unread(part)
+    ]
+    return [*tree.unread, *inner]
 
 
-def _listed(found: Sequence[Found], lacking: bool) -> str:
+def _listed(found: Sequence[EntryColumn], lacking: bool) -> str:
     """Arrays with their shapes, and what each lacks."""
     texts = []
     for one in found[:MOST_NAMED]:
