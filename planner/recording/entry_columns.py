@@ -1,4 +1,4 @@
-"""Levels of a file to its columns, each with what is stated of it, and to named columns."""
+"""Entries of a file to its columns, each with what is stated of it, and to named columns."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from planner.recording import stated
 from planner.recording.column_names import time_unit, unit_text
 from planner.recording.entries import EntryTree, text_of
 from planner.recording.frf_columns import holds_frfs
-from planner.recording.named_columns import Named
+from planner.recording.named_columns import Named, check_finite
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.units import lookup
 
@@ -55,6 +55,7 @@ def _found(
     path: tuple[str, ...],
     above: list[tuple[bool, Stated]],
 ) -> Iterator[EntryColumn]:
+    """Arrays below a group; `above`: what groups state, and whether of one array alone."""
     tree = _with_own_times(file, tree)
     here = [*above, (_arrays(tree) == 1, {**tree.attributes, **_beside(tree)})]
     for name, part in tree.parts.items():
@@ -64,13 +65,14 @@ def _found(
         else:
             own = {k: v for alone, of in here if alone for k, v in of.items()}
             own |= _of_one(name, here[-1][1])
-            if len(path) and not (unit_text(name) or time_unit(name, "")):
-                own = {**_units(here[-1][1]), **own}  # of all in the group
+            if path and not (unit_text(name) or time_unit(name, "")):
+                own = {**_unit_of_all(here[-1][1]), **own}
             shared = {k: v for alone, of in here if not alone for k, v in of.items()}
             yield from _columns(at, part, own, shared)
 
 
-def _units(attributes: Stated) -> dict[str, object]:
+def _unit_of_all(attributes: Stated) -> dict[str, object]:
+    """The unit that a group states of all that is in it."""
     unit = stated.unit_of(attributes)
     return {"unit": unit} if lookup(unit) else {}
 
@@ -130,6 +132,7 @@ def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
     time_s = flat[name] * (unit.factor if unit else 1.0)
     if len({len(a) for a in flat.values()}) != 1 or not np.isrealobj(time_s):
         return tree
+    check_finite(file, name, time_s)
     axis = {"dt": 1 / sampling_rate(file, time_s), "t0": float(time_s[0])}
     rest = {n: p for n, p in tree.parts.items() if n != name}
     return EntryTree({**tree.attributes, **axis}, rest, tree.unread)

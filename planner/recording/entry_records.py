@@ -1,4 +1,4 @@
-"""Levels of a file to records: the parts that are a hit, or FRFs, each by themselves.
+"""Entries of a file to records: the parts that are a hit, or FRFs, each by themselves.
 
 Nothing in such files says which group is a hit, which a list of settings. So all is tried as one
 record; where that is no whole hit, group by group, then what has one length; what is whole counts.
@@ -155,17 +155,13 @@ def _known(column: EntryColumn) -> bool:
 def _held(found: Sequence[EntryColumn], root: EntryTree) -> str:
     unread = _unread(root)
     tables = f"{', '.join(unread[:MOST_NAMED])} (objects or tables, which only MATLAB can read)"
-    return (
-        ", ".join([_listed(found, True)] * bool(found) + [tables] * bool(unread))
-        or "no arrays of numbers"
-    )
+    texts = [_listed(found, True)] * bool(found) + [tables] * bool(unread)
+    return ", ".join(texts) or "no arrays of numbers"
 
 
 def _unread(tree: EntryTree) -> list[str]:
-    inner = [
-        n for part in tree.parts.values() if isinstance(part, EntryTree) for n in _unread(part)
-    ]
-    return [*tree.unread, *inner]
+    trees = (part for part in tree.parts.values() if isinstance(part, EntryTree))
+    return [*tree.unread, *(name for part in trees for name in _unread(part))]
 
 
 def _listed(found: Sequence[EntryColumn], lacking: bool) -> str:

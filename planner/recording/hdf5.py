@@ -2,18 +2,12 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import (
-    DEEPEST,
-    MOST_ENTRIES,
-    EntryTree,
-    check_size,
-    tree_of,
-)
+from planner.recording.entries import DEEPEST, MOST_ENTRIES, EntryTree, check_size, tree_of
 from planner.recording.entry_records import records_of
 from planner.recording.records import Record
 
@@ -143,11 +137,12 @@ class _Reader:
             return self._elements(dataset, depth) if kind == "cell" else None
         if kind == "char":
             return _text(dataset[()])
-        values = dataset[()]
-        if isinstance(values, np.ndarray) and values.dtype.names == ("real", "imag"):
-            values = values["real"] + 1j * values["imag"]
-        if isinstance(values, np.ndarray) and values.dtype.names:
-            return tree_of({n: values[n] for n in values.dtype.names}, _attributes(dataset))
+        values: Any = dataset[()]
+        fields = dataset.dtype.names or ()
+        if fields == ("real", "imag"):
+            values, fields = values["real"] + 1j * values["imag"], ()
+        if fields:
+            return tree_of({name: values[name] for name in fields}, _attributes(dataset))
         if kind:
             return np.asarray(values).T
         stated = _attributes(dataset)

@@ -167,6 +167,8 @@ def _in_the_file(source: Path) -> str:
         return 'write it as its first line, such as "# hit: +x"'
     if kind in ("uff", "unv", "uf58"):
         return "state it in the file (ref_dir)"
+    if kind == "lvm":
+        return "write it into its header, as a line of hit, a tab and +x"
     return 'state it in the file (attribute hit, such as "+x")'
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.recording.entries import MOST_ENTRIES, EntryTree, tree_of
 from planner.recording.entry_records import records_of
+from planner.recording.named_columns import check_finite
 from planner.recording.records import Record
 from planner.recording.sampling import UNEVEN, sampling_rate
 from planner.recording.text_tables import MAX_BYTES, decoded, read_text
@@ -26,8 +27,9 @@ ABSCISSA, COMMENT = "X_Value", "Comment"
 
 @dataclass
 class _Segment:
-    """A block of rows, what its header says cell by cell, and the names of its columns."""
+    """A block of rows, what its header says of each column, and the columns' names."""
 
+    head: dict[str, str]  # what the file's header says
     stated: dict[str, list[str]]
     names: list[str]
     first_row: int
@@ -56,7 +58,9 @@ def read_lvm(path: Path) -> tuple[Record, ...]:
     if not text.startswith(FIRST_LINE):
         return read_text(path)  # as LabVIEW's "no header" writes it: a table
     parts: list[list[_Channel]] = []
+    head: dict[str, str] = {}
     for segment in _segments(text):
+        head = segment.head
         channels = list(_channels(path, segment))
         if parts and _goes_on(parts[-1], channels):
             parts[-1] = [_joined(a, b) for a, b in zip(parts[-1], channels, strict=True)]
@@ -64,12 +68,14 @@ def read_lvm(path: Path) -> tuple[Record, ...]:
             parts.append(channels)
     if not parts:
         raise InputError(f"{path} holds headers and no data; export it again.")
-    return records_of(path, tree_of({f"segment {k}": _tree(p) for k, p in enumerate(parts, 1)}))
+    trees = {f"segment {number}": _tree(part) for number, part in enumerate(parts, 1)}
+    return records_of(path, tree_of(trees, head))
 
 
 def _segments(text: str) -> Iterator[_Segment]:
     """Segments in order. A row of numbers after an empty line begins another of the same header."""
     separator, special = "\t", False
+    head: dict[str, str] = {}
     block: dict[str, list[str]] = {}
     current: _Segment | None = None
     for number, line in enumerate(text.splitlines(), 1):
@@ -83,12 +89,12 @@ def _segments(text: str) -> Iterator[_Segment]:
             current.rows.append(cells)
         elif current and current.rows:  # it ends with an empty line, or where a header begins
             yield current
-            current = None if any(cells) else _Segment(block, current.names, number + 1)
+            current = None if any(cells) else _Segment(head, block, current.names, number + 1)
             block = {first: cells} if any(cells) else block
         elif first == ABSCISSA:
-            current = _Segment(block, cells, number + 1)
-        elif first == END and "Channels" not in block:
-            block = {}  # of the file, not of its channels
+            current = _Segment(head, block, cells, number + 1)
+        elif first == END and "Channels" not in block:  # of the file, not of its channels
+            head, block = {tag: found[1] for tag, found in block.items() if len(found) > 1}, {}
         elif any(cells):
             block = block if current is None else {}
             block[first], current = cells, None
@@ -135,6 +141,7 @@ def _channel(
         )
     start, step = (_number(path, tag, stated(tag)) for tag in ("X0", "Delta_X"))
     if x.size:  # times have more digits than steps
+        check_finite(path, ABSCISSA, x)
         start += float(x[0]) - _number(path, "X0", stated("X0", owner))
         step = 1 / sampling_rate(path, x - x[0])
     of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")

@@ -148,7 +148,7 @@ def _text(inner: _Inner, shape: tuple[int, ...]) -> object:
         codec += "-le" if inner.order == "<" else "-be"
     text = bytes(characters).decode(codec or "latin-1")
     rows = shape[0]
-    if rows < 2 or len(shape) > 2 or rows * shape[1] != len(text):
+    if rows < 2 or math.prod(shape) != len(text):
         return text
     return tuple(text[row::rows].strip() for row in range(rows))
 

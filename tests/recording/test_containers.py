@@ -165,10 +165,11 @@ def test_what_is_not_understood_is_said(tmp_path, what):
 
 def test_segments_that_go_on_are_one_record(tmp_path):
     parts = [part(HITS[0], slice(256)), part(HITS[0], slice(256, None))]
-    text = lvm(parts).replace("08:01:30.25", "08:00:30.75")
+    text = lvm(parts).replace("08:01:30.25", "08:00:30.75").replace("X_Col", "hit\t-y\nX_Col")
     (tmp_path / "on.lvm").write_text(text)
-    (hit,) = hits_from(read(tmp_path / "on.lvm"), "+x")
+    (hit,) = hits_from(read(tmp_path / "on.lvm"))
     same(hit, HITS[0])
+    assert hit.axis == "-y"
     (tmp_path / "on.lvm").write_text(text.replace("08:00:30.75", "08:00:31.75"))
     assert hit_count(tmp_path / "on.lvm") == 2
 

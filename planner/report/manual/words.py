@@ -77,6 +77,10 @@ FORMATS = (
     ("CSV, MAT, HDF5, TDMS", "columns or arrays named time_s, force_n, acceleration_x_m_s2, …; for "
      "FRFs frequency_hz, accelerance_xx, …; the hit as attribute hit = +x, in a CSV as its first "
      "line: # hit: +x; or else in recordings.csv"),
+    ("MAT, HDF5, TDMS, LVM", "as programs write them: structs, cell arrays and groups, also one a "
+     "hit; a matrix with a list of names beside it; unit, rate (fs, dt, wf_increment, …) and start "
+     "(t0, wf_start_time, …) of each channel; LabVIEW's .lvm with one or many x columns. Channels "
+     "that begin apart are laid over each other; what is no signal is left out"),
 )  # fmt: skip
 
 NUMBERS = (
