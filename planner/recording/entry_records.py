@@ -24,6 +24,7 @@ LOOKED_FOR = (
     "of a hit time_s or sampling_rate_hz, force_n and acceleration_x_m_s2, … are looked for, of "
     "FRFs frequency_hz and receptance_xx, mobility_xx or accelerance_xx, …"
 )
+UNREAD = "a table, string array or object of MATLAB's own: save table2struct or cellstr of it"
 
 Columns = tuple[EntryColumn, ...]
 
@@ -154,7 +155,7 @@ def _known(column: EntryColumn) -> bool:
 
 def _held(found: Sequence[EntryColumn], root: EntryTree) -> str:
     unread = _unread(root)
-    tables = f"{', '.join(unread[:MOST_NAMED])} (objects or tables, which only MATLAB can read)"
+    tables = f"{', '.join(unread[:MOST_NAMED])} ({UNREAD})"
     texts = [_listed(found, True)] * bool(found) + [tables] * bool(unread)
     return ", ".join(texts) or "no arrays of numbers"
 

@@ -14,6 +14,13 @@ from planner.recording.records import Record
 if TYPE_CHECKING:
     import h5py
 
+NUMBERS = {
+    "double",
+    "single",
+    "logical",
+    *(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)),
+}
+
 
 def read_hdf5(path: Path) -> tuple[Record, ...]:
     """HDF5 files: groups, datasets and their attributes; structs and cells of MATLAB's v7.3.
@@ -144,7 +151,7 @@ class _Reader:
         if fields:
             return tree_of({name: values[name] for name in fields}, _attributes(dataset))
         if kind:
-            return np.asarray(values).T
+            return np.asarray(values).T if kind in NUMBERS else None
         stated = _attributes(dataset)
         return tree_of({"": values}, stated) if stated and np.size(values) > 1 else values
 

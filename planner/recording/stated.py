@@ -17,14 +17,14 @@ from planner.recording.units import lookup
 Attributes = Mapping[str, object]
 # Keys, letters and digits alone, as measuring programs write them.
 _NAMES = {"name", "channelname", "signalname", "label", "title", "names", "channelnames", "labels",
-          "channels", "columns", "signals", "varnames"}  # fmt: skip
+          "channels", "columns", "signals", "varnames", "nichannelname"}  # fmt: skip
 _UNITS = {"unit", "units", "unitstring", "unitlabel", "yunit", "yunits", "yunitlabel",
           "niunitdescription", "engineeringunits", "engunits", "quantitylabel",
           "unitsymbol"}  # fmt: skip
 _RATES = {"fs", "fshz", "samplerate", "sampleratehz", "samplingrate", "samplingratehz",
           "samplefrequency", "samplingfrequency", "samplingfrequencyhz", "fsample",
           "rate"}  # fmt: skip
-_STEPS = {"dt", "dts", "ts", "deltat", "deltax", "timestep", "increment", "xincrement", "xinc",
+_STEPS = {"dt", "dts", "deltat", "deltax", "timestep", "increment", "xincrement", "xinc",
           "wfincrement", "timeincrement", "samplinginterval", "sampleinterval", "samplingperiod",
           "sampleperiod"}  # fmt: skip
 _STARTS = {"start", "starts", "starttime", "startvalue", "startoffset", "t0", "tstart", "x0",
