@@ -6,7 +6,8 @@ TUTORIAL = (
     (
         "Begin with files that run.",
         "planner new --example cell7-robot",
-        "Three files with comments: robot/robot.toml, robot/robot.urdf and campaign.toml. Replace "
+        "Files with comments: robot/robot.toml, robot/robot.urdf and campaign.toml; cut.toml and "
+        "tool.toml are for planner stability and couple. Replace "
         "the URDF by your robot's (makers publish them, ROS packages hold many), keep two links on "
         "fixed joints: where the hammer hits and where the accelerometer sits. A link that moves "
         "needs an <inertial>; boxes or cylinders as <collision> are enough.",
