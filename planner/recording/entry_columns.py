@@ -13,7 +13,7 @@ from planner.recording.entries import EntryTree, text_of
 from planner.recording.frf_columns import holds_frfs
 from planner.recording.named_columns import Named, check_finite
 from planner.recording.sampling import UNEVEN, sampling_rate
-from planner.recording.units import lookup
+from planner.recording.units import Unit, lookup
 
 Stated = Mapping[str, object]
 
@@ -121,21 +121,37 @@ def _beside(tree: EntryTree) -> dict[str, object]:
 
 
 def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
-    """A group with one array where its two are a channel and the times of its samples."""
-    parts = {n: p for n, p in tree.parts.items() if not isinstance(p, EntryTree) or _arrays(p)}
-    flat = {n: p for n, p in parts.items() if isinstance(p, np.ndarray) and p.ndim == 1}
-    times = [n for n in flat if time_unit(n, "")]
-    if len(parts) != 2 or len(flat) != 2 or len(times) != 1:
+    """A group with one array where its two are a channel and what its samples stand at."""
+    holding = {n: p for n, p in tree.parts.items() if not isinstance(p, EntryTree) or _arrays(p)}
+    arrays = {n: only for n, p in holding.items() if (only := _only(p))}
+    axes = {n: unit for n, (_, said) in arrays.items() if (unit := _axis_unit(n, said))}
+    if len(holding) != 2 or len(arrays) != 2 or len(axes) != 1:
         return tree
-    (name,) = times
-    unit = time_unit(name, "")
-    time_s = flat[name] * (unit.factor if unit else 1.0)
-    if len({len(a) for a in flat.values()}) != 1 or not np.isrealobj(time_s):
+    ((name, unit),) = axes.items()
+    at = arrays[name][0] * unit.factor
+    if len({array.shape for array, _ in arrays.values()}) > 1 or not np.isrealobj(at):
         return tree
-    check_finite(file, name, time_s)
-    axis = {"dt": 1 / sampling_rate(file, time_s), "t0": float(time_s[0])}
+    check_finite(file, name, at)
+    axis = {"dt": 1 / sampling_rate(file, at), "t0": float(at[0]), "x_unit": unit.si}
     rest = {n: p for n, p in tree.parts.items() if n != name}
     return EntryTree({**tree.attributes, **axis}, rest, tree.unread)
+
+
+def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
+    """The one column that a part holds and what is stated of it; None where it holds others."""
+    if not isinstance(part, EntryTree):
+        return (part, {}) if part.ndim == 1 else None
+    inner = [p for p in part.parts.values() if not isinstance(p, EntryTree) or _arrays(p)]
+    found = _only(inner[0]) if len(inner) == 1 else None
+    return (found[0], {**part.attributes, **_beside(part), **found[1]}) if found else None
+
+
+def _axis_unit(name: str, said: Stated) -> Unit | None:
+    """The unit of what samples stand at, where a part is named so."""
+    unit = lookup(stated.unit_of(said))
+    if unit and unit.quantity in ("time", "frequency") and stated.is_abscissa(name):
+        return unit
+    return time_unit(name, stated.unit_of(said))
 
 
 def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Named:

@@ -160,8 +160,13 @@ def _of_keys(attributes: Attributes, keys: set[str]) -> Iterator[tuple[str, obje
             yield key, value
 
 
+def is_abscissa(name: str) -> bool:
+    """Whether a group or array of this name is what the samples of a channel stand at."""
+    return _ABSCISSA.fullmatch(name.lower()) is not None
+
+
 def _on_abscissa(key: str) -> bool:
-    return any(_ABSCISSA.fullmatch(level) for level in key.lower().split(".")[:-1])
+    return any(is_abscissa(level) for level in key.split(".")[:-1])
 
 
 def _forms(key: str) -> tuple[str, ...]:

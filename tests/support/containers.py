@@ -87,6 +87,16 @@ def _scope(hit: Hit) -> dict[str, Any]:
     return {"trace": structs(each), "hit": hit.axis}
 
 
+def _program_times(hit: Hit) -> dict[str, Any]:
+    """Each signal with its times as numbers."""
+    made: dict[str, Any] = {"hit": hit.axis}
+    for number, (name, unit, v) in enumerate(zip(NAMES, UNITS, signals(hit), strict=True)):
+        x = {"values": 1e3 * times(hit), "quantity": {"label": "ms"}}
+        y = {"values": v, "quantity": {"label": unit}}
+        made[f"S{number}"] = {"x_values": x, "y_values": y, "function_record": {"name": name}}
+    return made
+
+
 def _array_of_hits(path: Path, hits: Sequence[Hit]) -> None:
     each = [{"hit": h.axis, "force_n": h.force_n, "a": np.column_stack(h.acceleration_m_s2),
              "a_names": cells(["a_x_m_s2", "a_y_m_s2", "a_z_m_s2"])} for h in hits]  # fmt: skip
@@ -176,6 +186,13 @@ def _h5_each(unit_key: str, **axis: float) -> Callable[[h5py.Group, Hit], None]:
                 dataset.attrs[key] = value
 
     return write
+
+
+def _h5_scope(group: h5py.Group, hit: Hit) -> None:
+    """Each channel a group of its times and values."""
+    for name, unit, values in zip(NAMES, UNITS, signals(hit), strict=True):
+        group[f"{name}/Time"], group[f"{name}/Value"] = times(hit), values
+        group[f"{name}/Time"].attrs["unit"], group[f"{name}/Value"].attrs["unit"] = "s", unit
 
 
 def _h5_matrix(group: h5py.Group, hit: Hit) -> None:
@@ -291,6 +308,8 @@ ONE_HIT: dict[str, tuple[str, Writer]] = {
     "MAT: signals of a measuring program": ("c.mat", mat(_program, do_compression=True)),
     "MAT: one signal of many columns": ("d.mat", mat(_program_matrix)),
     "MAT: channels with times of their own": ("e.mat", mat(_scope)),
+    "MAT: signals with times of their own": ("t.mat", mat(_program_times)),
+    "HDF5: a group a channel": ("u.h5", lambda p, h: h5(p, h[:1], _h5_scope)),
     "MAT: a cell array of columns": ("f.mat", mat(_cell_columns)),
     "MAT: a cell array as a table": ("g.mat", mat(_cell_table)),
     "MAT: names in a matrix of characters": ("h.mat", mat(_char_names)),
