@@ -11,7 +11,8 @@ from planner.errors import InputError
 from planner.recording.hits import hits_from
 from planner.recording.read import hit_count, read
 from planner.recording.records import FrfRecord
-from tests.support.containers import MANY_HITS, ONE_HIT, late_h5, lvm, lvm_file, tdms
+from tests.support.containers import MANY_HITS, ONE_HIT, late_h5, lvm_file, tdms
+from tests.support.lvm_files import lvm
 from tests.support.simulated_hits import make_hit
 
 
@@ -37,8 +38,9 @@ def same(found, made, skip=0, digits=1e-6, rate=1e-4):
 def test_a_hit_is_read_from_any_container(tmp_path, what):
     name, write = ONE_HIT[what]
     write(tmp_path / name, HITS)
-    (hit,) = hits_from(read(tmp_path / name), "+x")
+    (hit,) = hits_from(read(tmp_path / name))
     same(hit, HITS[0])
+    assert hit.axis == HITS[0].axis
     assert hit_count(tmp_path / name) == 1
     assert not hit.remarks
 
@@ -47,7 +49,7 @@ def test_a_hit_is_read_from_any_container(tmp_path, what):
 def test_each_group_that_is_a_hit_is_one(tmp_path, what):
     name, write = MANY_HITS[what]
     write(tmp_path / name, HITS)
-    found = hits_from(read(tmp_path / name), "+x")
+    found = hits_from(read(tmp_path / name))
     assert len(found) == hit_count(tmp_path / name) == len(HITS)
     for hit, made in zip(found, HITS, strict=True):
         same(hit, made)
@@ -165,7 +167,7 @@ def test_what_is_not_understood_is_said(tmp_path, what):
 
 def test_segments_that_go_on_are_one_record(tmp_path):
     parts = [part(HITS[0], slice(256)), part(HITS[0], slice(256, None))]
-    text = lvm(parts).replace("08:01:30.25", "08:00:30.75").replace("X_Col", "hit\t-y\nX_Col")
+    text = lvm(parts).replace("08:01:30.25", "08:00:30.75").replace("hit\t+x", "hit\t-y")
     (tmp_path / "on.lvm").write_text(text)
     (hit,) = hits_from(read(tmp_path / "on.lvm"))
     same(hit, HITS[0])
