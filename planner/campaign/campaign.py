@@ -245,11 +245,11 @@ class Campaign(CampaignReads):
             )  # fmt: skip
         started = time.perf_counter()
         old = self.recordings.sources(known) if known else ()
-        hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
+        hits, measured = measure_files(old, kept.fresh, self.cell.config.modes)
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         modes = new_modes = from_modal(measured.modal)
         if old:  # among earlier hits, wrong ones would not stand out
-            alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
+            alone = measure_files((), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
         asked = contradiction(pose, measured, len(old))
         asked = asked or question(before, state, pose, joints_deg, new_modes)

@@ -1,18 +1,22 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 
 from planner.errors import AxisNotStatedError, PlannerError
 from planner.recording.points import StatedPoints
 from planner.recording.records import FrfRecord, Hit, PoseRow, Record
+from planner.words import counted
 
 
 @dataclass(frozen=True)
 class Source:
     """One file and what the table of recordings says about it (None: nothing).
 
-    `part` is which of the file's hits it is, from 1; 0: all that the file holds.
+    `part` is which of the file's hits it is, from 1; 0: all that the file holds. `at_s` is when,
+    in a record of several hits.
     """
 
     path: Path
@@ -21,6 +25,7 @@ class Source:
     repeat: int | None = None
     stated: StatedPoints = field(default_factory=StatedPoints)
     part: int = 0
+    at_s: float | None = None
 
     @classmethod
     def of(cls, row: PoseRow) -> "Source":
@@ -31,9 +36,9 @@ class Source:
     def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
         """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
         from planner.recording.hits import hits_from, located
-        from planner.recording.read import read
+        from planner.recording.read import read_hits
 
-        records: tuple[Record, ...] = read(self.path)
+        records: tuple[Record, ...] = read_hits(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
             return (), tuple(located(record, self.stated) for record in frfs)
@@ -46,12 +51,29 @@ class Source:
         times = [record for record in records if not isinstance(record, FrfRecord)]
         return tuple(times[self.part - 1 : self.part])
 
-    def parts(self, count: int) -> "tuple[Source, ...]":
-        """Each of the file's hits by itself, where there are several."""
-        if count < 2:
-            return (self,)
-        named = [(k, f"{self.name} (hit {k})") for k in range(1, count + 1)]
-        return tuple(replace(self, name=name, part=k) for k, name in named)
+    @property
+    def whole_name(self) -> str:
+        """The file's name, without which of its hits is meant."""
+        return self.name.rpartition(" (hit ")[0] if self.part else self.name
+
+    def parts(self) -> "tuple[Source, ...]":
+        """Each of the file's hits by itself, where there are several; the file must be readable."""
+        from planner.recording.read import hits_in
+
+        return tuple(
+            replace(self, name=f"{self.name} ({_which(k, at_s)})", part=k, at_s=at_s)
+            for k, at_s in enumerate(hits_in(self.path), 1)
+        ) or (self,)
+
+
+def in_parts(sources: tuple[Source, ...]) -> tuple[Source, ...]:
+    """Sources of which each is a single hit; exported FRFs and what cannot be read as they are."""
+    return tuple(part for source in sources for part in source.parts())
+
+
+def _which(number: int, at_s: float | None) -> str:
+    """A hit of a file in words."""
+    return f"hit {number}" if at_s is None else f"hit {number} at {at_s:.2f} s"
 
 
 @dataclass(frozen=True)
@@ -79,6 +101,18 @@ class ScreenedFiles:
     hits: tuple[tuple[Hit, ...], ...]
     agreeing: tuple[Hit, ...]
     records: tuple[FrfRecord, ...]
+
+
+def told_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
+    """How many hits of each file are good, where it holds several, and remarks on the good ones."""
+    told = []
+    for name, group in groupby(verdicts, key=lambda verdict: verdict.source.whole_name):
+        own = list(group)
+        good = sum(verdict.accepted for verdict in own)
+        if any(v.source.at_s is not None for v in own) or (own[0].source.part and good < len(own)):
+            told.append(f"{counted(len(own), 'hit')} in {name}: {good} good.")
+        told += [f"{v.source.name}: {text}" for v in own if v.accepted for text in v.remarks]
+    return tuple(told)
 
 
 def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> ScreenedFiles:

@@ -80,6 +80,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
         simulated=record.simulated,
         hit_point=stated.hit_at(source, force.node),
         responses=tuple(order),
+        faults=record.faults,
     )
 
 
@@ -139,6 +140,8 @@ def _in_the_file(source: Path) -> str:
         return 'write it as its first line, such as "# hit: +x"'
     if kind in ("uff", "unv", "uf58"):
         return "state it in the file (ref_dir)"
+    if kind == "wav":
+        return 'state it in channels.csv (column hit, such as "+x")'
     return 'state it in the file (attribute hit, such as "+x")'
 
 

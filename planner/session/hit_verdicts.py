@@ -8,7 +8,7 @@ from planner.dataset.screened_files import FileVerdict, Source, not_averaged, re
 from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
-from planner.recording.read import hit_count
+from planner.recording.read import version
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling_rates import sampled_otherwise
@@ -170,13 +170,13 @@ class Verdicts:
 
     def _hits_of(self, path: Path) -> list[tuple[FileVerdict, tuple[Hit, ...]]]:
         """The verdict on each hit in a file by itself, and what of it is usable."""
-        stat, row = path.stat(), self.table.row(path)
-        key = path, stat.st_size, stat.st_mtime_ns, str(row)
+        row = self.table.row(path)
+        key = path, version(path), str(row)
         if key not in self._read:
             source = Source(path, path.name, stated=self._stated)
             if row is not None:
                 source = replace(Source.of(row), path=path, name=path.name)
-            judged = [read_one(one, self._band) for one in source.parts(hit_count(path))]
+            judged = [read_one(one, self._band) for one in source.parts()]
             self._read[key] = [(verdict, hits) for verdict, hits, _ in judged]
         return self._read[key]
 

@@ -1,0 +1,148 @@
+"""What an instrument wrote where it had measured nothing: records filled up, samples lost.
+
+A channel that stands still did so by its resolution, or because nothing was measured. By its
+resolution it rests for longer and longer while it moves by less and less; it does not move by
+several of its own steps, sample after sample, and then never again.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from planner.recording.channel_faults import step
+from planner.recording.pulse import find_pulse
+from planner.recording.records import Channel, Fault, TimeRecord
+
+# How a channel moves is judged by so many of its changes, at least so few. It moves where these
+# cover more than STEPS of its resolution, and rests unlike before beyond LONGER times their longest
+# rest. Chosen: of noise of half a step nine rests in ten million are longer.
+CHANGES, LEAST_CHANGES, STEPS, LONGER = 32, 8, 4.0, 4
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """A channel's last value: from which sample on, and whether it moved until then."""
+
+    start: int
+    sudden: bool
+
+    @classmethod
+    def of(cls, samples: np.ndarray) -> "_Rest":
+        """Of a channel (n,) that is not constant."""
+        start = int(np.flatnonzero(samples != samples[-1])[-1]) + 1
+        before = samples[:start]
+        changes = np.flatnonzero(np.diff(before))[-CHANGES:]
+        if len(changes) < LEAST_CHANGES:
+            return cls(start, False)
+        longer = len(samples) - start > LONGER * int(np.max(np.diff(changes)))
+        moves = longer and np.ptp(before[changes[0] :]) > STEPS * step(before)
+        return cls(start, bool(moves))
+
+
+def without_filling(record: TimeRecord) -> TimeRecord:
+    """The record without samples at its ends that were filled in; as it is where none were.
+
+    Filled in is where all accelerations (where there are none: all channels but forces) repeat one
+    value though they moved until then, or, before the pulse, from then on.
+    """
+    end = _filled([c.samples for c in _judged(record)])
+    record = _cut(record, 0, end, "last")
+    begin = _filled([c.samples[: _quiet(record)][::-1] for c in _judged(record)])
+    return _cut(record, begin, 0, "first")
+
+
+def standing_still(record: TimeRecord) -> tuple[Fault, ...]:
+    """Faults of a hit's record: one channel that ends before the others, samples lost inside."""
+    channels = _judged(record)
+    moving = [c for c in channels if np.any(c.samples != c.samples[0])]
+    rests = [_Rest.of(c.samples) for c in moving]
+    rate = record.sampling_rate_hz
+    return (
+        *(
+            Fault(
+                "dead",
+                f"{c.name} repeats one value for the last {(len(c.samples) - r.start) / rate:.2g} "
+                f"s, while other channels move on; check its cable.",
+            )
+            for c, r in zip(moving, rests, strict=True)
+            if r.sudden
+        ),
+        *_lost(record, np.array([c.samples for c in moving])),
+    )
+
+
+def _judged(record: TimeRecord) -> list[Channel]:
+    """Accelerations; of a record without, all channels but forces."""
+    found = [c for c in record.channels if c.quantity == "acceleration"]
+    return found or [c for c in record.channels if c.quantity != "force"]
+
+
+def _quiet(record: TimeRecord) -> int:
+    """How many samples lie before the pulse."""
+    forces = [c for c in record.channels if c.quantity == "force"]
+    return find_pulse(forces[0].samples).quiet if len(forces) == 1 else 0
+
+
+def _filled(channels: list[np.ndarray]) -> int:
+    """How many samples at the end of channels (n,) were filled in."""
+    rests = [_Rest.of(samples) for samples in channels if np.any(samples != samples[:1])]
+    sudden = [rest.start for rest in rests if rest.sudden]
+    # The first of equal samples may be the last that was measured, or not.
+    if not sudden or max(rest.start for rest in rests) > max(sudden):
+        return 0
+    return len(channels[0]) - min(sudden)
+
+
+def _cut(record: TimeRecord, first: int, last: int, which: str) -> TimeRecord:
+    """The record without so many samples at its ends."""
+    if not first and not last:
+        return record
+    end = len(record.channels[0].samples) - last
+    seconds = (first or last) / record.sampling_rate_hz
+    text = (
+        f"The {which} {seconds:.3g} s repeat one value, while the structure moves: they were "
+        f"filled in and are left out."
+    )
+    channels = (replace(c, samples=c.samples[first:end].copy()) for c in record.channels)
+    faults = (*record.faults, Fault("filled", text, refuse=False))
+    return replace(record, channels=tuple(channels), faults=faults)
+
+
+def _lost(record: TimeRecord, samples: np.ndarray) -> tuple[Fault, ...]:
+    """Where all of (c, n) stand still amid their movement and then jump, after the pulse."""
+    quiet = _quiet(record)
+    after = samples[:, quiet:]
+    changes = np.flatnonzero(np.any(np.diff(after, axis=1), axis=0))
+    if len(changes) <= 2 * LEAST_CHANGES:
+        return ()
+    rests = np.diff(changes)
+    padded = np.pad(rests, CHANGES)
+    usual = np.max(sliding_window_view(padded, CHANGES), axis=1)
+    around = np.maximum(usual[: len(rests)], usual[CHANGES + 1 :])
+    inner = slice(LEAST_CHANGES, len(rests) - LEAST_CHANGES)
+    candidates = np.flatnonzero(rests[inner] > LONGER * around[inner]) + LEAST_CHANGES
+    steps = [step(x) for x in after] if candidates.size else []
+    for k in candidates.tolist():
+        low, high = changes[max(0, k - CHANGES)], changes[min(len(rests), k + 1 + CHANGES)]
+        begin, end = int(changes[k]) + 1, int(changes[k + 1])
+        both = zip(after, steps, strict=True)
+        if any(_jumps(x, own, (low, begin, end, high)) for x, own in both):
+            rate = record.sampling_rate_hz
+            return (
+                Fault(
+                    "lost_samples",
+                    f"{(quiet + begin) / rate:.3g} s into the record all accelerations stand still "
+                    f"for {(end - begin) / rate:.2g} s and then jump: samples were lost; hit "
+                    f"again.",
+                ),
+            )
+    return ()
+
+
+def _jumps(x: np.ndarray, own: float, at: tuple[int, int, int, int]) -> bool:
+    """Whether a channel (n,) moves before and after a rest, and jumps in between."""
+    low, begin, end, high = at
+    moves = np.ptp(x[low:begin]), np.ptp(x[end + 1 : high + 1])
+    jump = max(abs(x[end + 1] - x[end]), abs(x[begin] - x[begin - 1]))
+    return bool(min(jump, *moves) > STEPS * own)
