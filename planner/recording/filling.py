@@ -14,18 +14,23 @@ from planner.recording.channel_faults import step
 from planner.recording.pulse import find_pulse
 from planner.recording.records import Channel, Fault, TimeRecord
 
-# How a channel moves is judged by so many of its changes, at least so few. It moves where these
-# cover more than STEPS of its resolution, and rests unlike before beyond LONGER times their longest
-# rest. Chosen: of noise of half a step nine rests in ten million are longer.
-CHANGES, LEAST_CHANGES, STEPS, LONGER = 32, 8, 4.0, 4
+# How a channel moves is judged by so many of its changes: where it fades below its resolution, the
+# last ones cover two or three of its steps. It moves where they cover more than STEPS, and rests
+# unlike before beyond LONGER times their longest rest. One channel alone has to be surer: SURELY
+# steps. SKEW: samples by which channels may end one before the other; fewer are not worth a word.
+# All chosen.
+CHANGES, STEPS, SURELY, LONGER, SKEW = 8, 4.0, 12.0, 4, 16
 
 
 @dataclass(frozen=True)
 class _Rest:
-    """A channel's last value: from which sample on, and whether it moved until then."""
+    """A channel's last value: from which sample on, and by how many steps it moved until then.
+
+    No steps where it may rest by its resolution.
+    """
 
     start: int
-    sudden: bool
+    steps: float
 
     @classmethod
     def of(cls, samples: np.ndarray) -> "_Rest":
@@ -33,11 +38,11 @@ class _Rest:
         start = int(np.flatnonzero(samples != samples[-1])[-1]) + 1
         before = samples[:start]
         changes = np.flatnonzero(np.diff(before))[-CHANGES:]
-        if len(changes) < LEAST_CHANGES:
-            return cls(start, False)
-        longer = len(samples) - start > LONGER * int(np.max(np.diff(changes)))
-        moves = longer and np.ptp(before[changes[0] :]) > STEPS * step(before)
-        return cls(start, bool(moves))
+        if len(changes) < CHANGES:
+            return cls(start, 0.0)
+        if len(samples) - start <= max(SKEW, LONGER * int(np.max(np.diff(changes)))):
+            return cls(start, 0.0)
+        return cls(start, float(np.ptp(before[changes[0] :]) / step(before)))
 
 
 def without_filling(record: TimeRecord) -> TimeRecord:
@@ -66,7 +71,7 @@ def standing_still(record: TimeRecord) -> tuple[Fault, ...]:
                 f"s, while other channels move on; check its cable.",
             )
             for c, r in zip(moving, rests, strict=True)
-            if r.sudden
+            if r.steps > SURELY
         ),
         *_lost(record, np.array([c.samples for c in moving])),
     )
@@ -87,9 +92,9 @@ def _quiet(record: TimeRecord) -> int:
 def _filled(channels: list[np.ndarray]) -> int:
     """How many samples at the end of channels (n,) were filled in."""
     rests = [_Rest.of(samples) for samples in channels if np.any(samples != samples[:1])]
-    sudden = [rest.start for rest in rests if rest.sudden]
+    sudden = [rest.start for rest in rests if rest.steps > STEPS]
     # The first of equal samples may be the last that was measured, or not.
-    if not sudden or max(rest.start for rest in rests) > max(sudden):
+    if not sudden or max(rest.start for rest in rests) > max(sudden) + SKEW:
         return 0
     return len(channels[0]) - min(sudden)
 
@@ -114,20 +119,19 @@ def _lost(record: TimeRecord, samples: np.ndarray) -> tuple[Fault, ...]:
     quiet = _quiet(record)
     after = samples[:, quiet:]
     changes = np.flatnonzero(np.any(np.diff(after, axis=1), axis=0))
-    if len(changes) <= 2 * LEAST_CHANGES:
+    if len(changes) <= 2 * CHANGES:
         return ()
     rests = np.diff(changes)
     padded = np.pad(rests, CHANGES)
     usual = np.max(sliding_window_view(padded, CHANGES), axis=1)
     around = np.maximum(usual[: len(rests)], usual[CHANGES + 1 :])
-    inner = slice(LEAST_CHANGES, len(rests) - LEAST_CHANGES)
-    candidates = np.flatnonzero(rests[inner] > LONGER * around[inner]) + LEAST_CHANGES
+    inner = slice(CHANGES, len(rests) - CHANGES)
+    candidates = np.flatnonzero(rests[inner] > LONGER * around[inner]) + CHANGES
     steps = [step(x) for x in after] if candidates.size else []
     for k in candidates.tolist():
-        low, high = changes[max(0, k - CHANGES)], changes[min(len(rests), k + 1 + CHANGES)]
         begin, end = int(changes[k]) + 1, int(changes[k + 1])
         both = zip(after, steps, strict=True)
-        if any(_jumps(x, own, (low, begin, end, high)) for x, own in both):
+        if any(_jumps(x, own, begin, end) for x, own in both):
             rate = record.sampling_rate_hz
             return (
                 Fault(
@@ -140,9 +144,9 @@ def _lost(record: TimeRecord, samples: np.ndarray) -> tuple[Fault, ...]:
     return ()
 
 
-def _jumps(x: np.ndarray, own: float, at: tuple[int, int, int, int]) -> bool:
-    """Whether a channel (n,) moves before and after a rest, and jumps in between."""
-    low, begin, end, high = at
-    moves = np.ptp(x[low:begin]), np.ptp(x[end + 1 : high + 1])
+def _jumps(x: np.ndarray, own: float, begin: int, end: int) -> bool:
+    """Whether a channel (n,) moves for as long before and after a rest, and jumps in between."""
+    low = max(0, begin - (end - begin))
+    moves = np.ptp(x[low:begin]), np.ptp(x[end + 1 : 2 * end + 1 - begin])
     jump = max(abs(x[end + 1] - x[end]), abs(x[begin] - x[begin - 1]))
     return bool(min(jump, *moves) > STEPS * own)
