@@ -233,6 +233,7 @@ class Campaign(CampaignReads):
         from planner.campaign.log_conversion import from_homogeneity, from_modal
         from planner.campaign.question import question
         from planner.campaign.revisits import suspected
+        from planner.dataset.screened_files import hits_of_files
 
         before, state, pose = self.model, self.state, delivery.pose
         known = state.hit_at(pose)
@@ -283,6 +284,7 @@ class Campaign(CampaignReads):
             model=model,
             refit_seconds=time.perf_counter() - started,
             remarks=(
+                *hits_of_files(measured.verdicts[len(old) :]),
                 *measured.remarks,
                 *told,
                 *taken_after_all(state, kept.fresh),

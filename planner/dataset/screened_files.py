@@ -61,7 +61,7 @@ class Source:
         from planner.recording.read import hits_in
 
         return tuple(
-            replace(self, name=f"{self.name} ({_which(k, at_s)})", part=k, at_s=at_s)
+            replace(self, name=f"{self.name} (hit {k}{when(at_s)})", part=k, at_s=at_s)
             for k, at_s in enumerate(hits_in(self.path), 1)
         ) or (self,)
 
@@ -71,14 +71,17 @@ def in_parts(sources: tuple[Source, ...]) -> tuple[Source, ...]:
     return tuple(part for source in sources for part in source.parts())
 
 
-def _which(number: int, at_s: float | None) -> str:
-    """A hit of a file in words."""
-    return f"hit {number}" if at_s is None else f"hit {number} at {at_s:.2f} s"
+def when(at_s: float | None) -> str:
+    """When in its record a hit was, to follow its name; nothing where it has one of its own."""
+    return "" if at_s is None else f" at {at_s:.2f} s"
 
 
 @dataclass(frozen=True)
 class FileVerdict:
-    """What became of one file: accepted, or refused for a stated reason."""
+    """What became of one file: accepted, or refused for a stated reason.
+
+    `refused_hits` are, of an accepted file of several hits, names and reasons of those refused.
+    """
 
     source: Source
     accepted: bool
@@ -87,6 +90,12 @@ class FileVerdict:
     simulated: bool = False
     remarks: tuple[str, ...] = ()
     axis_missing: bool = False  # good but for that nothing says along which axis it was made
+    refused_hits: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def refused(self) -> tuple[tuple[str, str], ...]:
+        """Name and reason of all that was refused."""
+        return self.refused_hits if self.accepted else ((self.source.name, self.reason),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,16 +112,21 @@ class ScreenedFiles:
     records: tuple[FrfRecord, ...]
 
 
-def told_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
-    """How many hits of each file are good, where it holds several, and remarks on the good ones."""
+def hits_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
+    """How many hits of a file are good, where a record was cut into hits or not all are."""
     told = []
     for name, group in groupby(verdicts, key=lambda verdict: verdict.source.whole_name):
         own = list(group)
         good = sum(verdict.accepted for verdict in own)
         if any(v.source.at_s is not None for v in own) or (own[0].source.part and good < len(own)):
             told.append(f"{counted(len(own), 'hit')} in {name}: {good} good.")
-        told += [f"{v.source.name}: {text}" for v in own if v.accepted for text in v.remarks]
     return tuple(told)
+
+
+def told_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
+    """The same, and the remarks on what is good."""
+    remarks = (f"{v.source.name}: {text}" for v in verdicts if v.accepted for text in v.remarks)
+    return (*hits_of_files(verdicts), *remarks)
 
 
 def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> ScreenedFiles:
@@ -178,24 +192,21 @@ def read_one(
     judged = [
         (hit, (*told, *screen(hit, limits), *driving_point(hit, band_hz))) for hit, told in heard
     ]
-    remarks = [f.text for _, faults in judged for f in faults if not f.refuse]
+    told = tuple(f.text for _, faults in judged for f in faults if not f.refuse)
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
-    refused = [
-        " ".join(f.text for f in faults if f.refuse)
-        for _, faults in judged
-        if any(f.refuse for f in faults)
-    ]
-    if len(refused) == len(judged):
-        return (
-            FileVerdict(source, False, " ".join(refused), axis, simulated, tuple(remarks)),
-            (),
-            [],
-        )
-    remarks += [f"One of {len(judged)} hits in {source.name} is refused: {t}" for t in refused]
-    good = [hit for hit, faults in judged if not any(f.refuse for f in faults)]
+    reasons = [" ".join(f.text for f in faults if f.refuse) for _, faults in judged]
+    if all(reasons):
+        return FileVerdict(source, False, " ".join(reasons), axis, simulated, told), (), []
+    good = [hit for (hit, _), reason in zip(judged, reasons, strict=True) if not reason]
     hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
-    remarks = tuple(remarks)
-    return FileVerdict(source, True, "", axis, simulated, remarks), hits, []
+    refused = _refused_hits(source, reasons) if any(reasons) else ()
+    return FileVerdict(source, True, "", axis, simulated, told, False, refused), hits, []
+
+
+def _refused_hits(source: Source, reasons: list[str]) -> tuple[tuple[str, str], ...]:
+    """Names of a file's hits that have a reason, and the reasons."""
+    names = (part.name for part in source.parts())
+    return tuple(one for one in zip(names, reasons, strict=True) if one[1])
 
 
 def renamed(text: str, sources: tuple[Source, ...]) -> str:
@@ -216,9 +227,14 @@ def _agreeing(
     faults = screen_repeats(tuple(hit for _, hit in every), band_hz)
     for (number, hit), found in zip(every, faults, strict=True):
         refusing = [fault for fault in found if fault.refuse]
-        if refusing:
-            text = " ".join(fault.text for fault in refusing)
-            verdicts[number] = replace(verdicts[number], accepted=False, reason=text)
-        else:
+        if not refusing:
             kept.append(hit)
+            continue
+        text, verdict = " ".join(fault.text for fault in refusing), verdicts[number]
+        if len(hits[number]) > 1:
+            verdicts[number] = replace(
+                verdict, refused_hits=(*verdict.refused_hits, (verdict.source.name, text))
+            )
+        else:
+            verdicts[number] = replace(verdict, accepted=False, reason=text)
     return tuple(kept)

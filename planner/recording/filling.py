@@ -73,7 +73,7 @@ def standing_still(record: TimeRecord) -> tuple[Fault, ...]:
             for c, r in zip(moving, rests, strict=True)
             if r.steps > SURELY
         ),
-        *_lost(record, np.array([c.samples for c in moving])),
+        *(_lost(record, np.array([c.samples for c in moving])) if moving else ()),
     )
 
 

@@ -19,7 +19,7 @@ from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
-from planner.recording.folder import files_in
+from planner.recording.folder import CHANNELS, files_in
 from planner.recording.read import READERS
 from planner.recording.records import FrfRecord
 from planner.report.answer import Answer, RefusedFile
@@ -189,7 +189,7 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
         if path.is_dir():
             found += files_in(path, READERS)
         elif path.is_file():
-            found.append(path)
+            found += [path] if path.name != CHANNELS else []
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
     return tuple(Source(path, str(path)) for path in found)

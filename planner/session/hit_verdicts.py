@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one
+from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one, when
 from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
@@ -38,11 +38,12 @@ class HitVerdict:
     hits: tuple[Hit, ...] = ()
     number: int = 0
     weak: bool = False
+    at_s: float | None = None
 
     @property
     def name(self) -> str:
         """As other verdicts speak of it."""
-        return f"hit {self.number} ({self.path.name})"
+        return f"hit {self.number} ({self.path.name}{when(self.at_s)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,8 @@ class Verdicts:
         kind = "repeat" if verdict.reason else "good"
         kind = "unstated" if verdict.axis_missing else kind
         text = verdict.reason or " ".join(verdict.remarks)
-        return HitVerdict(path, verdict.axis or "", kind, text, own, number)
+        at_s = verdict.source.at_s
+        return HitVerdict(path, verdict.axis or "", kind, text, own, number, False, at_s)
 
     def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
         """With which do not go with the others, and what a vote among three and more says."""
