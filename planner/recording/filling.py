@@ -1,48 +1,13 @@
-"""What an instrument wrote where it had measured nothing: records filled up, samples lost.
+"""What an instrument wrote where it had measured nothing: records filled up, samples lost."""
 
-A channel that stands still did so by its resolution, or because nothing was measured. By its
-resolution it rests for longer and longer while it moves by less and less; it does not move by
-several of its own steps, sample after sample, and then never again.
-"""
-
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from planner.recording.channel_faults import step
+from planner.recording.channel_faults import CHANGES, LONGER, SKEW, STEPS, Rest, step
 from planner.recording.pulse import find_pulse
 from planner.recording.records import Channel, Fault, TimeRecord
-
-# How a channel moves is judged by so many of its changes: where it fades below its resolution, the
-# last ones cover two or three of its steps. It moves where they cover more than STEPS, and rests
-# unlike before beyond LONGER times their longest rest. One channel alone has to be surer: SURELY
-# steps. SKEW: samples by which channels may end one before the other; fewer are not worth a word.
-# All chosen.
-CHANGES, STEPS, SURELY, LONGER, SKEW = 8, 4.0, 12.0, 4, 16
-
-
-@dataclass(frozen=True)
-class _Rest:
-    """A channel's last value: from which sample on, and by how many steps it moved until then.
-
-    No steps where it may rest by its resolution.
-    """
-
-    start: int
-    steps: float
-
-    @classmethod
-    def of(cls, samples: np.ndarray) -> "_Rest":
-        """Of a channel (n,) that is not constant."""
-        start = int(np.flatnonzero(samples != samples[-1])[-1]) + 1
-        before = samples[:start]
-        changes = np.flatnonzero(np.diff(before))[-CHANGES:]
-        if len(changes) < CHANGES:
-            return cls(start, 0.0)
-        if len(samples) - start <= max(SKEW, LONGER * int(np.max(np.diff(changes)))):
-            return cls(start, 0.0)
-        return cls(start, float(np.ptp(before[changes[0] :]) / step(before)))
 
 
 def without_filling(record: TimeRecord) -> TimeRecord:
@@ -55,26 +20,6 @@ def without_filling(record: TimeRecord) -> TimeRecord:
     record = _cut(record, 0, end, "last")
     begin = _filled([c.samples[: _quiet(record)][::-1] for c in _judged(record)])
     return _cut(record, begin, 0, "first")
-
-
-def standing_still(record: TimeRecord) -> tuple[Fault, ...]:
-    """Faults of a hit's record: one channel that ends before the others, samples lost inside."""
-    channels = _judged(record)
-    moving = [c for c in channels if np.any(c.samples != c.samples[0])]
-    rests = [_Rest.of(c.samples) for c in moving]
-    rate = record.sampling_rate_hz
-    return (
-        *(
-            Fault(
-                "dead",
-                f"{c.name} repeats one value for the last {(len(c.samples) - r.start) / rate:.2g} "
-                f"s, while other channels move on; check its cable.",
-            )
-            for c, r in zip(moving, rests, strict=True)
-            if r.steps > SURELY
-        ),
-        *(_lost(record, np.array([c.samples for c in moving])) if moving else ()),
-    )
 
 
 def _judged(record: TimeRecord) -> list[Channel]:
@@ -91,7 +36,7 @@ def _quiet(record: TimeRecord) -> int:
 
 def _filled(channels: list[np.ndarray]) -> int:
     """How many samples at the end of channels (n,) were filled in."""
-    rests = [_Rest.of(samples) for samples in channels if np.any(samples != samples[:1])]
+    rests = [Rest.of(samples) for samples in channels if np.any(samples != samples[:1])]
     sudden = [rest.start for rest in rests if rest.steps > STEPS]
     # The first of equal samples may be the last that was measured, or not.
     if not sudden or max(rest.start for rest in rests) > max(sudden) + SKEW:
@@ -114,10 +59,13 @@ def _cut(record: TimeRecord, first: int, last: int, which: str) -> TimeRecord:
     return replace(record, channels=tuple(channels), faults=faults)
 
 
-def _lost(record: TimeRecord, samples: np.ndarray) -> tuple[Fault, ...]:
-    """Where all of (c, n) stand still amid their movement and then jump, after the pulse."""
+def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:
+    """Where all accelerations stand still amid their movement and then jump, after the pulse."""
+    moving = [c.samples for c in _judged(record) if np.any(c.samples != c.samples[0])]
+    if not moving:
+        return ()
     quiet = _quiet(record)
-    after = samples[:, quiet:]
+    after = np.array(moving)[:, quiet:]
     changes = np.flatnonzero(np.any(np.diff(after, axis=1), axis=0))
     if len(changes) <= 2 * CHANGES:
         return ()

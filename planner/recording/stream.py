@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from planner.recording.filling import standing_still
+from planner.recording.filling import lost_samples
 from planner.recording.pulse import NORMAL_MAD, RISING_SAMPLES
 from planner.recording.records import Fault, TimeRecord
 from planner.recording.screening import ANSWER_S, SILENCE, ScreeningLimits
@@ -38,7 +38,7 @@ def cut_into_hits(record: TimeRecord) -> tuple[TimeRecord, ...]:
     forces = [c for c in record.channels if c.quantity == "force"]
     pulses = _pulses(forces[0].samples, record.sampling_rate_hz) if len(forces) == 1 else []
     if len(pulses) < 2:
-        found = standing_still(record)
+        found = lost_samples(record)
         return (replace(record, faults=(*record.faults, *found)) if found else record,)
     struck = _parts(pulses, len(forces[0].samples))
     both = zip(struck, _restless(record, struck), strict=True)
@@ -88,7 +88,7 @@ def _part(record: TimeRecord, one: _Struck, struck: list[_Struck], restless: flo
     kept = slice(one.begin, one.stop)
     channels = tuple(replace(c, samples=c.samples[kept].copy()) for c in record.channels)
     part = replace(record, channels=channels, at_s=one.first / rate, faults=())
-    told = [*(record.faults if last else ()), *standing_still(part)]
+    told = [*(record.faults if last else ()), *lost_samples(part)]
     if one.cut_off:
         usual = min(s.stop - s.first for s in struck if not s.cut_off)
         ends = "the record ends" if last else "the next hit follows"
