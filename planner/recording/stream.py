@@ -10,7 +10,8 @@ from planner.recording.records import Fault, TimeRecord
 from planner.recording.screening import ANSWER_S, SILENCE, ScreeningLimits
 
 APART_S = 0.5  # no hand hits again so soon on purpose: pulses closer than this are one hit
-PRETRIGGER = 0.1  # share of the shortest pause between two hits that is kept before each
+# Kept before each hit: a share of the usual pause between two, at most another one of its own.
+PRETRIGGER, MOST_PRETRIGGER = 0.1, 0.5
 SHORT = 0.5  # share of the usual length below which a hit is cut off
 # Movement left from the hit before, as a share of the answer, that is worth saying; it stands out
 # of the noise where its power is more than so many times the quietest.
@@ -73,8 +74,10 @@ def _groups(samples: np.ndarray, apart: float) -> list[tuple[int, int]]:
 def _parts(pulses: list[tuple[int, int]], samples: int) -> list[_Struck]:
     """What is kept of each hit of a record of so many samples."""
     first, end = np.array(pulses).T
-    before = int(PRETRIGGER * np.min(first[1:] - end[:-1]))
-    length = np.append(first[1:] - before, samples) - first
+    pause = first[1:] - end[:-1]
+    usual = PRETRIGGER * np.median(pause)
+    before = np.append(usual, np.minimum(usual, MOST_PRETRIGGER * pause)).astype(int)
+    length = np.append(first[1:] - before[1:], samples) - first
     short = length < SHORT * np.median(length)
     stop = first + np.where(short, length, np.min(length[~short]))
     begin = np.maximum(first - before, 0)

@@ -9,7 +9,6 @@ import io
 import math
 import struct
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from planner.recording.named_columns import Named, to_records
 from planner.recording.records import Record
 
 WAV = ".wav"
-CHUNK = b"chan"  # of a kept copy: its rows of channels.csv
+CHUNK = b"plnr"  # of a kept copy: its rows of channels.csv
 COLUMNS = ("channel", "name", "unit", "full_scale")
 OPTIONAL = ("hit", "hit_point")
 EXAMPLE = '"channel,name,unit,full_scale", "1,force,N,2200" and "2,acceleration x,m/s^2,98.1"'
@@ -82,8 +81,7 @@ def self_contained(path: Path, data: bytes) -> bytes:
 
     Raises InputError where the table is missing or wrong.
     """
-    chunks = list(_chunks(data))
-    if any(name == CHUNK for name, _ in chunks) or not _whole(data):
+    if CHUNK in _chunks(data) or not _whole(data):
         return data
     rows = io.StringIO(newline="")
     writer = csv.writer(rows, lineterminator="\n")
@@ -92,25 +90,32 @@ def self_contained(path: Path, data: bytes) -> bytes:
         writer.writerow([getattr(one, key) for key in (*COLUMNS, *OPTIONAL)])
     text = rows.getvalue().encode()
     text += b"\n" * (len(text) % 2)
+    data = _stated(data)
     data = data + bytes(len(data) % 2) + CHUNK + struct.pack("<I", len(text)) + text
     return data[:4] + struct.pack("<I", len(data) - 8) + data[8:]
 
 
-def _chunks(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Name and content of each chunk."""
-    at = 12
-    while data[:4] == b"RIFF" and at + 8 <= len(data):
+def _stated(data: bytes) -> bytes:
+    """The bytes of a file as far as it says that it goes."""
+    return data[: 8 + struct.unpack("<I", data[4:8])[0]] if len(data) > 8 else data
+
+
+def _chunks(data: bytes) -> dict[bytes, slice]:
+    """Where the content of each chunk is, as it is stated."""
+    found, at = {}, 12
+    while data[:4] == b"RIFF" and at + 8 <= len(_stated(data)):
         size = struct.unpack("<I", data[at + 4 : at + 8])[0]
-        yield data[at : at + 4], data[at + 8 : at + 8 + size]
+        found[data[at : at + 4]] = slice(at + 8, at + 8 + size)
         at += 8 + size + size % 2
+    return found
 
 
 def _whole(data: bytes) -> bool:
-    """Whether the last chunk ends where the file does."""
-    chunks = [(name, len(body)) for name, body in _chunks(data)]
-    taken = 12 + sum(8 + size + size % 2 for _, size in chunks)
-    stated = struct.unpack("<I", data[4:8])[0] if len(data) > 8 else -1
-    return bool(chunks) and len(data) in (taken, taken - 1) and stated in (taken - 8, taken - 9)
+    """Whether all chunks are there as long as they are stated to be."""
+    ends = [part.stop for part in _chunks(data).values()]
+    stated = len(_stated(data))
+    whole = len(data) > 8 and stated == 8 + struct.unpack("<I", data[4:8])[0]
+    return bool(ends) and whole and stated - 1 <= max(ends) <= stated
 
 
 def _samples(path: Path, data: bytes) -> tuple[int, np.ndarray]:
@@ -118,6 +123,8 @@ def _samples(path: Path, data: bytes) -> tuple[int, np.ndarray]:
     from scipy.io import wavfile
 
     how = "export WAV of 16, 24 or 32 bits or of floating-point numbers again"
+    if data[:4] != b"RIFF":
+        raise InputError(f"{path} is no WAV file (it does not begin with RIFF); {how}.")
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
@@ -139,9 +146,9 @@ def _samples(path: Path, data: bytes) -> tuple[int, np.ndarray]:
 def _scales(path: Path, data: bytes) -> list[Scaled]:
     """What the table says of a file's channels; in a kept copy it is in the file."""
     table = scales_beside(path)
-    own = next((body for name, body in _chunks(data) if name == CHUNK), None)
+    own = _chunks(data).get(CHUNK)
     if own is not None:
-        header, rows = table_of(path, own.decode("utf-8", "replace"))
+        header, rows = table_of(path, data[own].decode("utf-8", "replace"))
     elif table.is_file():
         header, rows = read_table(table)
     else:
@@ -149,6 +156,7 @@ def _scales(path: Path, data: bytes) -> list[Scaled]:
             f"{path} says nothing of scale and units: write them into {table}, such as the lines "
             f"{EXAMPLE}: full_scale is what the largest sample stands for, in that unit."
         )
+    header = [name.lower() for name in header]
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise InputError(f"{table} has no column {missing[0]}; its lines are such as {EXAMPLE}.")

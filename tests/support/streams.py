@@ -12,7 +12,7 @@ import scipy.io
 from nptdms import ChannelObject, RootObject, TdmsWriter
 from scipy import signal
 
-RATE_HZ, FINER = 1024, 16
+RATE_HZ, FINER = 1024, 8
 MODES = (12.0, 0.03), (23.0, 0.025), (41.0, 0.02)  # Hz, damping ratio
 SHAPES = np.array([[0.94, 0.31, 0.16], [0.27, 0.89, 0.36], [0.17, -0.34, 0.93]])
 NAMES = ("force_n", *(f"acceleration_{axis}_m_s2" for axis in "xyz"))
@@ -30,7 +30,7 @@ def stream(
 ) -> np.ndarray:
     """Force and accelerations (4, n) at RATE_HZ, with noise and an anti-alias filter's ringing.
 
-    Masses are 1/mode of a shape's square at 100 kg; the response is stepped finely in time.
+    The modes have 100 kg each; their response is stepped finely in time.
     """
     rng = np.random.default_rng(seed)
     fine = RATE_HZ * FINER
@@ -40,8 +40,9 @@ def stream(
     response = np.zeros((3, t.size))
     for (hz, ratio), shape in zip(MODES, SHAPES, strict=True):
         w = 2 * np.pi * hz
-        system = signal.lti([1.0, 0.0, 0.0], [1.0, 2 * ratio * w, w**2])
-        answer = signal.lsim(system, pushed, t)[1]
+        system = [1.0, 0.0, 0.0], [1.0, 2 * ratio * w, w**2]
+        ((b,), a, _) = signal.cont2discrete(system, 1 / fine, "foh")
+        answer = signal.lfilter(b, a, pushed)
         response += np.outer(shape * shape["xyz".index(axis[1])] / 100.0, answer)
     sos = signal.butter(6, 0.4 * RATE_HZ, fs=fine, output="sos")
     both = np.asarray(signal.sosfilt(sos, np.vstack([force, response])))[:, ::FINER]
@@ -102,17 +103,19 @@ def write_uff(path: Path, samples: np.ndarray, axis: str) -> None:
             file.write_sets(one, "add")
 
 
-def write_wav(path: Path, samples: np.ndarray, axis: str, bits: int = 24) -> None:
+def write_wav(
+    path: Path, samples: np.ndarray, axis: str, bits: int = 24, rate_hz: int = RATE_HZ
+) -> None:
     """PCM of 16, 24 or 32 bits or, of 0 bits, floating-point numbers; the table gets its rows."""
     write_scales(path, axis)
     shares = samples.T / np.array(SCALES)
     if bits == 0:
-        return scipy.io.wavfile.write(path, RATE_HZ, shares.astype(np.float32))
+        return scipy.io.wavfile.write(path, rate_hz, shares.astype(np.float32))
     whole = np.round(shares * 2 ** (bits - 1)).astype(np.int32)
     if bits != 24:
-        return scipy.io.wavfile.write(path, RATE_HZ, whole.astype(f"int{bits}"))
+        return scipy.io.wavfile.write(path, rate_hz, whole.astype(f"int{bits}"))
     data = np.ascontiguousarray(whole, "<i4").view(np.uint8).reshape(-1, 4)[:, :3].tobytes()
-    form = struct.pack("<HHIIHH", 1, 4, RATE_HZ, RATE_HZ * 12, 12, 24)
+    form = struct.pack("<HHIIHH", 1, 4, rate_hz, rate_hz * 12, 12, 24)
     body = b"WAVEfmt " + struct.pack("<I", 16) + form + b"data" + struct.pack("<I", len(data))
     path.write_bytes(b"RIFF" + struct.pack("<I", len(body) + len(data)) + body + data)
 
