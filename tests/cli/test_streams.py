@@ -11,7 +11,7 @@ from planner.recording.hits import hits_from
 from planner.recording.read import hits_in, read, read_hits
 from tests.support import streams
 from tests.support.outside import call, make_cell, record
-from tests.support.streams import CLEAN, MIXED, MODES, WRITERS, stream
+from tests.support.streams import CLEAN, MIXED, MODES, WRITERS, joined, stream
 
 made = lru_cache(stream)
 AXES = "+x", "-y", "+z"
@@ -49,18 +49,6 @@ def test_a_record_of_a_single_hit_stays_as_it_was(tmp_path):
     assert cut.faults == ()
     np.testing.assert_array_equal(cut.force_n, samples[0])
     np.testing.assert_array_equal(cut.acceleration_m_s2, samples[1:])
-
-
-def joined(folder: Path, axis: str) -> np.ndarray:
-    """The hits of a folder along an axis, one after the other; they have died out by their end."""
-    found = [hits_from(read(f))[0] for f in sorted((folder / "data").glob(f"*_{axis}_*.uff"))]
-    rng = np.random.default_rng(0)
-    each = [np.vstack([hit.force_n, hit.acceleration_m_s2]) for hit in found]
-    parts = []
-    for one in each:
-        rest = rng.permutation(one[:, -64:].T).T  # quiet until the next
-        parts += [one, np.tile(rest, 4)]
-    return np.hstack(parts)
 
 
 @pytest.fixture

@@ -12,6 +12,9 @@ import scipy.io
 from nptdms import ChannelObject, RootObject, TdmsWriter
 from scipy import signal
 
+from planner.recording.hits import hits_from
+from planner.recording.read import read
+
 RATE_HZ, FINER = 1024, 8
 MODES = (12.0, 0.03), (23.0, 0.025), (41.0, 0.02)  # Hz, damping ratio
 SHAPES = np.array([[0.94, 0.31, 0.16], [0.27, 0.89, 0.36], [0.17, -0.34, 0.93]])
@@ -47,6 +50,16 @@ def stream(
     sos = signal.butter(6, 0.4 * RATE_HZ, fs=fine, output="sos")
     both = np.asarray(signal.sosfilt(sos, np.vstack([force, response])))[:, ::FINER]
     return both + np.array([[0.3], [4e-3], [4e-3], [4e-3]]) * rng.standard_normal(both.shape)
+
+
+def joined(folder: Path, axis: str) -> np.ndarray:
+    """The hits of a recordings folder along an axis ("px") after each other, almost at rest between."""
+    rng, parts = np.random.default_rng(0), []
+    for file in sorted((folder / "data").glob(f"*_{axis}_*.uff")):
+        (hit,) = hits_from(read(file))
+        one = np.vstack([hit.force_n, hit.acceleration_m_s2])
+        parts += [one, np.tile(rng.permutation(one[:, -64:].T).T, 4)]
+    return np.hstack(parts)
 
 
 def _table(samples: np.ndarray) -> dict[str, np.ndarray]:
