@@ -1,5 +1,6 @@
 """A recorder that ran on while one hit again and again: its record cut into hits by the pulses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,22 +13,25 @@ from planner.recording.screening import ANSWER_S, SILENCE, ScreeningLimits
 APART_S = 0.5  # no hand hits again so soon on purpose: pulses closer than this are one hit
 # Kept before each hit: a share of the usual pause between two, at most another one of its own.
 PRETRIGGER, MOST_PRETRIGGER = 0.1, 0.5
-SHORT = 0.5  # share of the usual length below which a hit is cut off
-# Movement left from the hit before, as a share of the answer, that is worth saying; it stands out
-# of the noise where its power is more than so many times the quietest.
+SHORT = 0.5  # share of the usual length below which a hit that still rings at its end is cut off
+# Movement before or at the end of a hit, as a share of the answer to it, that is worth saying; it
+# stands out of the noise where its power is more than so many times the quietest.
 RESTLESS, OUT_OF_NOISE = 0.02, 2.0
-LEAST_QUIET = 2 * RISING_SAMPLES  # samples before a hit from which its rest is judged
+LEAST_QUIET = 2 * RISING_SAMPLES  # samples by which rest is judged
 
 
 @dataclass(frozen=True)
 class _Struck:
-    """Samples of a hit in a stream: of its pulses, and of the part that is kept of it."""
+    """Samples of a hit in a stream: of its pulse, and of the part that is kept of it.
 
-    first: int  # of its pulses
-    end: int
-    begin: int  # of what is kept
+    `restless` is the movement before it as a share of the answer to it.
+    """
+
+    first: int
+    begin: int
     stop: int
     cut_off: bool
+    restless: float
 
 
 def cut_into_hits(record: TimeRecord) -> tuple[TimeRecord, ...]:
@@ -41,9 +45,8 @@ def cut_into_hits(record: TimeRecord) -> tuple[TimeRecord, ...]:
     if len(pulses) < 2:
         found = lost_samples(record)
         return (replace(record, faults=(*record.faults, *found)) if found else record,)
-    struck = _parts(pulses, len(forces[0].samples))
-    both = zip(struck, _restless(record, struck), strict=True)
-    return tuple(_part(record, one, struck, share) for one, share in both)
+    struck = _struck(record, pulses)
+    return tuple(_part(record, one, struck) for one in struck)
 
 
 def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
@@ -71,21 +74,48 @@ def _groups(samples: np.ndarray, apart: float) -> list[tuple[int, int]]:
     return [(int(one[0]), int(one[-1]) + 1) for one in each]
 
 
-def _parts(pulses: list[tuple[int, int]], samples: int) -> list[_Struck]:
-    """What is kept of each hit of a record of so many samples."""
+def _struck(record: TimeRecord, pulses: list[tuple[int, int]]) -> list[_Struck]:
+    """What is kept of each hit of a record, and how far it was from rest."""
+    samples = len(record.channels[0].samples)
     first, end = np.array(pulses).T
     pause = first[1:] - end[:-1]
     usual = PRETRIGGER * np.median(pause)
     before = np.append(usual, np.minimum(usual, MOST_PRETRIGGER * pause)).astype(int)
-    length = np.append(first[1:] - before[1:], samples) - first
-    short = length < SHORT * np.median(length)
-    stop = first + np.where(short, length, np.min(length[~short]))
     begin = np.maximum(first - before, 0)
-    each = zip(*(a.tolist() for a in (first, end, begin, stop, short)), strict=True)
-    return [_Struck(*one) for one in each]
+    stop = np.append(begin[1:], samples)
+    last = max(samples - int(usual), (int(first[-1]) + samples) // 2)
+    quiet = [*zip(begin, first - RISING_SAMPLES, strict=True), (last, samples)]
+    moved, answer = _movement(record, quiet, first)
+    restless = np.sqrt(np.nan_to_num(moved[:-1]) / answer)
+    ringing = np.sqrt(np.nan_to_num(moved[1:], nan=np.inf) / answer)
+    length = stop - first
+    cut_off = (length < SHORT * np.median(length)) & (ringing > RESTLESS)
+    stop = np.where(cut_off, stop, first + np.min(length[~cut_off]))
+    each = (a.tolist() for a in (first, begin, stop, cut_off, restless))
+    return [_Struck(*one) for one in zip(*each, strict=True)]
 
 
-def _part(record: TimeRecord, one: _Struck, struck: list[_Struck], restless: float) -> TimeRecord:
+def _movement(
+    record: TimeRecord, quiet: Sequence[tuple[int, int]], first: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Power of the accelerations (n + 1,) in parts of the record that should be quiet, without
+    the noise, NaN where they are too short; and of the answers (n,) to the n hits.
+    """
+    a = np.array([c.samples for c in record.channels if c.quantity == "acceleration"])
+    judged = [k for k, (start, stop) in enumerate(quiet) if stop - start >= LEAST_QUIET]
+    moved, answer = np.full(len(quiet), np.nan), np.full(len(first), SILENCE**2)
+    if not a.size or not judged:
+        return moved, answer
+    long = round(ANSWER_S * record.sampling_rate_hz)
+    answer += [float(np.sum(np.var(a[:, at : at + long], axis=1))) for at in first]
+    power = np.array([np.var(a[:, slice(*quiet[k])], axis=1) for k in judged])
+    noise = np.min(power, axis=0)
+    clear = np.sum(power, axis=1) > OUT_OF_NOISE * np.sum(noise)
+    moved[judged] = np.where(clear, np.sum(power - noise, axis=1), 0.0)
+    return moved, answer
+
+
+def _part(record: TimeRecord, one: _Struck, struck: list[_Struck]) -> TimeRecord:
     """One hit of a record."""
     rate, last = record.sampling_rate_hz, one is struck[-1]
     kept = slice(one.begin, one.stop)
@@ -102,31 +132,13 @@ def _part(record: TimeRecord, one: _Struck, struck: list[_Struck], restless: flo
                 f"have {usual / rate:.2g} s; wait as long after each.",
             )
         )
-    if restless > RESTLESS:
+    if one.restless > RESTLESS:
         told.append(
             Fault(
                 "not_at_rest",
-                f"The structure was not at rest: it still moved by {100 * restless:.0f} % of its "
-                f"answer to this hit; wait longer before the next.",
-                refuse=restless > 1 / ScreeningLimits().least_response_snr,
+                f"The structure was not at rest: before this hit it moved by "
+                f"{100 * one.restless:.0f} % of its answer; wait longer between hits.",
+                refuse=one.restless > 1 / ScreeningLimits().least_response_snr,
             )
         )
     return replace(part, faults=tuple(told))
-
-
-def _restless(record: TimeRecord, struck: list[_Struck]) -> list[float]:
-    """Of each hit, the movement before it as a share of the answer to it; 0 where it is noise."""
-    samples = np.array([c.samples for c in record.channels if c.quantity == "acceleration"])
-    known = [s for s in struck if s.first - s.begin > LEAST_QUIET]
-    if not samples.size or not known:
-        return [0.0] * len(struck)
-    answer = round(ANSWER_S * record.sampling_rate_hz)
-    before = [np.var(samples[:, s.begin : s.first - RISING_SAMPLES], axis=1) for s in known]
-    after = [np.var(samples[:, s.first : s.first + answer], axis=1) for s in known]
-    quietest = np.min(before, axis=0)
-    shares = {}
-    for one, rest, own in zip(known, before, after, strict=True):
-        over = float(np.sum(rest - quietest))
-        clear = np.sum(rest) > OUT_OF_NOISE * np.sum(quietest)
-        shares[one] = float(np.sqrt(over / max(float(np.sum(own)), SILENCE**2))) if clear else 0.0
-    return [shares.get(one, 0.0) for one in struck]

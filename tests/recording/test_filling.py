@@ -124,6 +124,16 @@ def test_hits_that_follow_too_soon_are_told():
     assert len({len(hit.channels[0].samples) for k, hit in enumerate(hits) if k not in (1, 2)}) == 1
 
 
+def test_what_the_last_hits_lack_costs_the_others_nothing():
+    samples = stream([(t, 700.0) for t in (1.0, 5.0, 9.0)], 11.5)  # the last has died out
+    whole = cut_into_hits(record(samples))
+    assert [hit.faults for hit in whole] == [(), (), ()]
+    for left in (1.0, 0.3, 0.02):
+        hits = cut_into_hits(record(samples[:, : round((9.0 + left) * RATE_HZ)]))
+        assert [[f.kind for f in hit.faults] for hit in hits] == [[], [], ["cut_off"]]
+        assert len(hits[0].channels[0].samples) > 3.5 * RATE_HZ
+
+
 def test_soft_hits_beside_hard_ones_are_hits_of_their_own():
     peaks = (900.0, 150.0, 25.0, 800.0)  # each at least 12 % of a harder one's
     hits = cut_into_hits(record(stream([(1.0 + 3 * k, p) for k, p in enumerate(peaks)], 13.0)))

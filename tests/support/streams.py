@@ -53,7 +53,7 @@ def stream(
 
 
 def joined(folder: Path, axis: str) -> np.ndarray:
-    """The hits of a recordings folder along an axis ("px") after each other, almost at rest between."""
+    """The hits of a folder along an axis ("px") after each other, almost at rest in between."""
     rng, parts = np.random.default_rng(0), []
     for file in sorted((folder / "data").glob(f"*_{axis}_*.uff")):
         (hit,) = hits_from(read(file))
