@@ -109,7 +109,7 @@ def keep_files(
                 f"{source.path} was imported before as a recording of pose {owner[digest]}; "
                 f"it cannot belong to {delivery.pose} too."
             )
-        if digest in owner or digest in seen:
+        if digest in owner or (digest in seen and not source.part):
             already.append(source.name)
         elif reason := _reason_against(delivery.pose, digest, source.path in named, state):
             left_out.append(_left(source, digest, reason))

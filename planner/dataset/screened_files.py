@@ -60,6 +60,8 @@ class Source:
         """Each of the file's hits by itself, where there are several; the file must be readable."""
         from planner.recording.read import hits_in
 
+        if self.part:
+            return (self,)
         return tuple(
             replace(self, name=f"{self.name} (hit {k}{when(at_s)})", part=k, at_s=at_s)
             for k, at_s in enumerate(hits_in(self.path), 1)
