@@ -56,7 +56,8 @@ def _cut(record: TimeRecord, first: int, last: int, which: str) -> TimeRecord:
     )
     channels = (replace(c, samples=c.samples[first:end].copy()) for c in record.channels)
     faults = (*record.faults, Fault("filled", text, refuse=False))
-    return replace(record, channels=tuple(channels), faults=faults)
+    remarks = (*record.remarks, text)
+    return replace(record, channels=tuple(channels), remarks=remarks, faults=faults)
 
 
 def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:
@@ -85,7 +86,7 @@ def lost_samples(record: TimeRecord) -> tuple[Fault, ...]:
                 Fault(
                     "lost_samples",
                     f"{(quiet + begin) / rate:.3g} s into the record all accelerations stand still "
-                    f"for {(end - begin) / rate:.2g} s and then jump: samples were lost; hit "
+                    f"for {(end - begin) / rate:.2g} s and then jump: samples were lost; record "
                     f"again.",
                 ),
             )

@@ -10,7 +10,8 @@ from planner.recording.pulse import NORMAL_MAD, RISING_SAMPLES
 from planner.recording.records import Fault, TimeRecord
 from planner.recording.screening import ANSWER_S, SILENCE, ScreeningLimits
 
-APART_S = 0.5  # no hand hits again so soon on purpose: pulses closer than this are one hit
+# No hand hits again so soon on purpose, and fewer samples tell nothing: such pulses are one hit.
+APART_S, APART_SAMPLES = 0.5, 64
 # Kept before each hit: a share of the usual pause between two, at most another one of its own.
 PRETRIGGER, MOST_PRETRIGGER = 0.1, 0.5
 SHORT = 0.5  # share of the usual length below which a hit that still rings at its end is cut off
@@ -59,8 +60,9 @@ def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
     size = np.abs(force_n - np.median(force_n))
     floor = limits.least_snr * NORMAL_MAD * float(np.median(size))
     least, found = limits.second_peak * float(np.max(size)), []
+    apart = max(APART_S * rate_hz, APART_SAMPLES)
     while True:
-        groups = _groups(np.flatnonzero(size > max(least, floor)), APART_S * rate_hz)
+        groups = _groups(np.flatnonzero(size > max(least, floor)), apart)
         if len(groups) <= max(1, len(found)):
             return found or groups
         found = groups
