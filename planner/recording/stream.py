@@ -122,7 +122,7 @@ def _part(record: TimeRecord, one: _Struck, struck: list[_Struck]) -> TimeRecord
     rate, last = record.sampling_rate_hz, one is struck[-1]
     kept = slice(one.begin, one.stop)
     channels = tuple(replace(c, samples=c.samples[kept].copy()) for c in record.channels)
-    part = replace(record, channels=channels, at_s=one.first / rate, faults=())
+    part = replace(record, channels=channels, at_s=float(one.first / rate), faults=())
     told = [*(record.faults if last else ()), *lost_samples(part)]
     if one.cut_off:
         usual = min(s.stop - s.first for s in struck if not s.cut_off)

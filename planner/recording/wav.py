@@ -130,7 +130,7 @@ def _samples(path: Path, data: bytes) -> tuple[int, np.ndarray]:
             warnings.simplefilter("always")
             rate_hz, found = wavfile.read(io.BytesIO(data))
     except Exception as error:  # the library raises whatever the junk makes it raise
-        said = str(error) or type(error).__name__
+        said = str(error) if isinstance(error, ValueError) else type(error).__name__
         raise InputError(f"{path} is no readable WAV file ({said}); {how}.") from None
     if not _whole(data) or any("EOF" in str(w.message) for w in warned):
         raise InputError(f"{path} is cut off; {how}.")
