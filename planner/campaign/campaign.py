@@ -237,6 +237,7 @@ class Campaign(CampaignReads):
         from planner.campaign.log_conversion import from_homogeneity, from_modal
         from planner.campaign.question import question
         from planner.campaign.revisits import suspected
+        from planner.dataset.screened_files import hits_of_files
 
         before, state, pose = self.model, self.state, delivery.pose
         known = state.hit_at(pose)
@@ -249,11 +250,11 @@ class Campaign(CampaignReads):
             )  # fmt: skip
         started = time.perf_counter()
         old = self.recordings.sources(known) if known else ()
-        hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
+        hits, measured = measure_files(old, kept.fresh, self.cell.config.modes)
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         modes = new_modes = from_modal(measured.modal)
         if old:  # among earlier hits, wrong ones would not stand out
-            alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
+            alone = measure_files((), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
         asked = contradiction(pose, measured, len(old))
         asked = asked or question(before, state, pose, joints_deg, new_modes)
@@ -287,6 +288,7 @@ class Campaign(CampaignReads):
             model=model,
             refit_seconds=time.perf_counter() - started,
             remarks=(
+                *hits_of_files(measured.verdicts[len(old) :]),
                 *measured.remarks,
                 *told,
                 *taken_after_all(state, kept.fresh),

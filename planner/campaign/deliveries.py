@@ -5,7 +5,7 @@ from pathlib import Path
 
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import TABLE, files_in, read_recordings
+from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import READERS
@@ -50,7 +50,7 @@ def sort_paths(
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
-            bare.append(path)
+            bare += [path] if path.name != CHANNELS else []
         else:
             raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
     if bare:

@@ -119,7 +119,7 @@ class KeptRecordings:
 
 def frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:
     """What an FRF depends on."""
-    return (*(hit.sha256 for hit in hits), table.band_hz, table.window_rate_1_s)
+    return (*((hit.sha256, hit.part) for hit in hits), table.band_hz, table.window_rate_1_s)
 
 
 def _marks(folder: Path) -> dict[str, tuple[int, int, int, int]]:

@@ -1,4 +1,4 @@
-"""recordings.csv and predict.csv."""
+"""Tables beside recordings: recordings.csv, predict.csv, and how all such tables are read."""
 
 import csv
 import io
@@ -15,6 +15,8 @@ from planner.recording.records import PoseRow, RecordingsFolder
 from planner.recording.text_tables import decoded
 
 TABLE = "recordings.csv"
+CHANNELS = "channels.csv"  # scales and units of WAV files
+TABLES = (TABLE, CHANNELS)
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ROWS = 200_000
 ANGLE, SLIDE = "_deg", "_mm"
@@ -27,7 +29,7 @@ def several_poses(paths: list[Path]) -> bool:
 
 def joint_columns(folder: Path) -> JointUnits:
     """The joints as the table's columns `…_deg` and `…_mm` name them, where no robot is named."""
-    header, _ = _table(folder / TABLE)
+    header, _ = read_table(folder / TABLE)
     columns = [name for name in header if name.endswith((ANGLE, SLIDE))]
     names = tuple(name.removesuffix(ANGLE).removesuffix(SLIDE) for name in columns)
     return JointUnits(names, tuple(name.endswith(SLIDE) for name in columns))
@@ -47,7 +49,7 @@ def read_recordings(
     """
     points = points or PointNames()
     path = folder / TABLE
-    header, lines = _table(path)
+    header, lines = read_table(path)
     units = JointUnits.of(joints)
     told = not bare or any(name.endswith((ANGLE, SLIDE)) for name in header)
     columns = _joint_columns(path, header, units) if told else ()
@@ -79,7 +81,7 @@ def read_recordings(
 
 def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow, ...]:
     """Poses at which a prediction is wanted. Raises InputError naming file, row and remedy."""
-    header, lines = _table(path)
+    header, lines = read_table(path)
     columns = _joint_columns(path, header, JointUnits.of(joints))
     if "pose" not in header:
         raise InputError(f"{path} has no column pose; add one that names each row.")
@@ -110,7 +112,8 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
     found = sorted(p for p in folder.rglob("*") if p.is_file())
     found = [
         path for path in found
-        if path.name != TABLE and not any(part[0] == "." for part in path.relative_to(folder).parts)
+        if path.name not in TABLES
+        and not any(part[0] == "." for part in path.relative_to(folder).parts)
         and (path.parent == folder or path.suffix.lower() in suffixes)
     ]  # fmt: skip
     if not found:
@@ -118,9 +121,13 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
     return found
 
 
-def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and rows with their line numbers."""
-    text = decoded(path, MAX_BYTES)
+def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header and rows of a table with their line numbers. Raises InputError for what is wrong."""
+    return table_of(path, decoded(path, MAX_BYTES))
+
+
+def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The same of a text; `path` is what messages name."""
     first = text.split("\n", 1)[0]
     delimiter = next((d for d in (",", ";", "\t") if d in first), ",")
     try:

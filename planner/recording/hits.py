@@ -108,6 +108,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
         simulated=record.simulated,
         hit_point=stated.hit_at(source, force.node),
         responses=tuple(order),
+        faults=record.faults,
     )
 
 
@@ -169,6 +170,8 @@ def _in_the_file(source: Path) -> str:
         return "state it in the file (ref_dir)"
     if kind == "lvm":
         return "write it into its header, as a line of hit, a tab and +x"
+    if kind == "wav":
+        return 'state it in channels.csv (column hit, such as "+x")'
     return 'state it in the file (attribute hit, such as "+x")'
 
 

@@ -17,14 +17,10 @@ from planner.errors import InputError
 from planner.recording.column_names import bare, direction_in, hit_direction, time_unit, unit_text
 from planner.recording.records import Channel, Record, TimeRecord
 from planner.recording.sampling import UNEVEN, aligned, sampling_rate
+from planner.recording.stated import RATES, STEPS
 from planner.recording.units import lookup
 
 _AT = re.compile(r"acceleration_(.+)_[xyz]$")
-# Keys of attributes, letters alone and without a unit, that state a rate in Hz or a step in s.
-_RATES = ("samplingrate", "samplingfrequency", "samplerate", "samplefrequency", "fs",
-          "abtastrate", "abtastfrequenz")  # fmt: skip
-_STEPS = ("dt", "deltat", "timestep", "timeincrement", "samplinginterval", "sampleinterval",
-          "wfincrement", "abtastintervall")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -127,9 +123,9 @@ def _stated_rates(path: Path, named: Named) -> dict[str, float]:
     """Rates in Hz that attributes state, by their names."""
     found = {}
     for key, text in named.attributes.items():
-        if _letters(bare(key)) in _RATES:
+        if _letters(bare(key)) in RATES:
             found[key] = _positive(path, key, str(text), "frequency")
-        elif _letters(bare(key)) in _STEPS:
+        elif _letters(bare(key)) in STEPS:
             found[key] = 1 / _positive(path, key, str(text), "time")
     return found
 

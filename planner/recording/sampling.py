@@ -12,6 +12,7 @@ from planner.recording.records import Channel
 UNEVEN = 1e-3  # share of a step by which sampling times may scatter beside their rounding
 MOST_DIGITS = 15
 LEAST_SAMPLES = 8
+SLOWEST_S = 1e6  # between two samples
 
 
 def sampling_rate(path: Path, time_s: np.ndarray) -> float:
@@ -24,7 +25,7 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
     if count < LEAST_SAMPLES:
         raise InputError(f"{path} holds {count} samples; a hit has hundreds: export again.")
     step = (time_s[-1] - time_s[0]) / (count - 1)
-    if not step > 0:
+    if not 0 < step < SLOWEST_S:
         raise InputError(f"{path}: the time column does not increase; check the columns.")
     middle = np.arange(count) - (count - 1) / 2
     step = float(middle @ time_s / (middle @ middle))

@@ -21,12 +21,12 @@ _NAMES = {"name", "channelname", "signalname", "label", "title", "names", "chann
 _UNITS = {"unit", "units", "unitstring", "unitlabel", "yunit", "yunits", "yunitlabel",
           "niunitdescription", "engineeringunits", "engunits", "quantitylabel",
           "unitsymbol"}  # fmt: skip
-_RATES = {"fs", "fshz", "samplerate", "sampleratehz", "samplingrate", "samplingratehz",
-          "samplefrequency", "samplingfrequency", "samplingfrequencyhz", "fsample",
-          "rate"}  # fmt: skip
-_STEPS = {"dt", "dts", "deltat", "deltax", "timestep", "increment", "xincrement", "xinc",
+RATES = {"fs", "fshz", "samplerate", "sampleratehz", "samplingrate", "samplingratehz",
+          "samplefrequency", "samplingfrequency", "samplingfrequencyhz", "fsample", "rate",
+          "abtastrate", "abtastfrequenz"}  # fmt: skip
+STEPS = {"dt", "dts", "deltat", "deltax", "timestep", "increment", "xincrement", "xinc",
           "wfincrement", "timeincrement", "samplinginterval", "sampleinterval", "samplingperiod",
-          "sampleperiod"}  # fmt: skip
+          "sampleperiod", "abtastintervall"}  # fmt: skip
 _STARTS = {"start", "starts", "starttime", "startvalue", "startoffset", "t0", "tstart", "x0",
            "xstart", "timestart", "wfstarttime", "wfstartoffset"}  # fmt: skip
 _ABSCISSA = re.compile(r"x|x.?(values?|axis|data)|abscissa|time.?(axis|base)")
@@ -92,8 +92,8 @@ def rescaled(attributes: Attributes) -> str:
 
 def axis_of(path: Path, attributes: Attributes) -> Axis:
     """What samples stand at. Raises InputError where it is stated twice and differently."""
-    steps = [n for _, v in _of_keys(attributes, _STEPS) if (n := _number(v)) is not None and n]
-    rates = [n for _, v in _of_keys(attributes, _RATES) if (n := _number(v)) is not None and n]
+    steps = [n for _, v in _of_keys(attributes, STEPS) if (n := _number(v)) is not None and n]
+    rates = [n for _, v in _of_keys(attributes, RATES) if (n := _number(v)) is not None and n]
     quantity, factor = _abscissa(attributes)
     found = [1 / rate for rate in rates] + [step * factor for step in steps]
     for step in found[1:]:
@@ -107,7 +107,7 @@ def axis_of(path: Path, attributes: Attributes) -> Axis:
 
 def is_axis(key: str) -> bool:
     """Whether an attribute is of one channel's axis, unit or name, and of no record."""
-    known = _STEPS | _RATES | _STARTS | _UNITS | _NAMES | _X_UNITS
+    known = STEPS | RATES | _STARTS | _UNITS | _NAMES | _X_UNITS
     return any(form in known for form in _forms(key))
 
 

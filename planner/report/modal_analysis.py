@@ -12,14 +12,14 @@ from rich.console import Group
 from planner.campaign.events import Amplitude
 from planner.campaign.log_conversion import from_homogeneity
 from planner.dataset.measure import measure
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.errors import InputError, PlannerError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
-from planner.recording.folder import files_in
+from planner.recording.folder import CHANNELS, files_in
 from planner.recording.read import READERS
 from planner.recording.records import FrfRecord
 from planner.report.answer import Answer, RefusedFile
@@ -160,7 +160,7 @@ def modal_report(
     if unlabelled is not None:
         return _by_transfer(unlabelled, band_hz, quantity, pictures)
     band = band_hz or DEFAULT_BAND_HZ
-    measured = measure(sources, band, estimator, window_rate_1_s)
+    measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
     refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
     if measured.modal is None:
         reasons = [file.reason for file in refused] or list(measured.remarks)
@@ -175,7 +175,7 @@ def modal_report(
         accepted=accepted,
         hits=measured.frf.hits,
         usable_band_hz=measured.frf.usable_band_hz,
-        remarks=measured.remarks,
+        remarks=(*told_of_files(measured.verdicts), *measured.remarks),
         amplitude=from_homogeneity(measured.homogeneity),
         simulated=simulated,
         **_draw(pictures, measured.frf, found, measured.modal, accepted, simulated),
@@ -189,7 +189,7 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
         if path.is_dir():
             found += files_in(path, READERS)
         elif path.is_file():
-            found.append(path)
+            found += [path] if path.name != CHANNELS else []
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
     return tuple(Source(path, str(path)) for path in found)
