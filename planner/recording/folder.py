@@ -19,9 +19,15 @@ MAX_ROWS = 200_000
 ANGLE, SLIDE = "_deg", "_mm"
 
 
-def several_poses(paths: list[Path]) -> bool:
-    """Whether a single folder with recordings.csv is named."""
-    return len(paths) == 1 and (paths[0] / TABLE).is_file()
+def several_poses(paths: list[Path], least: int = 2) -> bool:
+    """Whether a single folder is named whose recordings.csv lists that many poses at least."""
+    if len(paths) != 1 or not (paths[0] / TABLE).is_file():
+        return False
+    header, rows = _table(paths[0] / TABLE)
+    if "pose" not in header:
+        return True  # said where the table is read in earnest
+    at = header.index("pose")
+    return len({cells[at].strip() for _, cells in rows}) >= least
 
 
 def joint_columns(folder: Path) -> JointUnits:

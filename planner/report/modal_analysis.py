@@ -13,15 +13,14 @@ from planner.campaign.events import Amplitude
 from planner.campaign.log_conversion import from_homogeneity
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source
-from planner.errors import InputError, PlannerError, RefusedError
+from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
-from planner.recording.folder import files_in
+from planner.recording.folder import TABLE, files_in, joint_columns, read_recordings
 from planner.recording.read import READERS
-from planner.recording.records import FrfRecord
 from planner.report.answer import Answer, RefusedFile
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
@@ -144,21 +143,16 @@ def modal_report(
     force: str | None = None,
     estimator: str = "h1",
     pictures: Pictures = NO_PICTURES,
-    quantity: str | None = None,
     window_rate_1_s: float = 0.0,
 ) -> ModalReport:
     """Analyse files, or folders of files, of one pose.
 
-    `force` names the force channel of a long record whose channels are not labelled, `quantity`
-    what unlabelled FRFs are. Raises RefusedError if no file could be used.
+    `force` names the force channel of a long record whose channels are not labelled. Raises
+    RefusedError if no file could be used.
     """
-    check_options(band_hz, estimator, quantity, window_rate_1_s)
     sources = sources_of(paths)
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)
-    unlabelled = _unlabelled(sources)
-    if unlabelled is not None:
-        return _by_transfer(unlabelled, band_hz, quantity, pictures)
     band = band_hz or DEFAULT_BAND_HZ
     measured = measure(sources, band, estimator, window_rate_1_s)
     refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
@@ -184,15 +178,18 @@ def modal_report(
 
 def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
     """All recordings that files and folders hold; InputError for what does not exist."""
-    found: list[Path] = []
+    found: list[Source] = []
     for path in paths:
-        if path.is_dir():
-            found += files_in(path, READERS)
+        if (path / TABLE).is_file():
+            table = read_recordings(path, joint_columns(path), bare=True)
+            found += [Source.of(row) for row in table.rows]
+        elif path.is_dir():
+            found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():
-            found.append(path)
+            found.append(Source(path, str(path)))
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
-    return tuple(Source(path, str(path)) for path in found)
+    return tuple(found)
 
 
 def _draw(
@@ -239,43 +236,3 @@ def _by_channel(
     accepted, simulated = (sources[0].name,), records[0].simulated
     plots = _draw(pictures, None, found, modal, accepted, simulated)
     return ModalReport.of(modal, accepted=accepted, simulated=simulated, **plots)
-
-
-def _unlabelled(sources: tuple[Source, ...]) -> FrfRecord | None:
-    """The FRFs of a single file that states no directions."""
-    from planner.recording.read import read
-
-    if len(sources) != 1:
-        return None
-    try:
-        records = read(sources[0].path)
-    except PlannerError:
-        return None  # said again, with the file's name, where it is read in earnest
-    frfs = [r for r in records if isinstance(r, FrfRecord) and not any(r.response_direction)]
-    return frfs[0] if frfs else None
-
-
-def _by_transfer(
-    record: FrfRecord,
-    band_hz: tuple[float, float] | None,
-    quantity: str | None,
-    pictures: Pictures,
-) -> ModalReport:
-    """FRFs without directions: poles and unscaled shapes."""
-    from planner.modal.transfer_functions import modes_from_transfer_functions
-
-    modal = modes_from_transfer_functions(record, quantity, band_hz)
-    plots = NOT_DRAWN
-    if pictures.wanted:
-        from planner.report.modal_plots import cmif_figure, mac_figure
-
-        name = record.source.name[-LONGEST_NAME:]
-        figures = {
-            "cmif": cmif_figure(record.frequency_hz, record.values, modal, f"CMIF · {name}"),
-            "mac": mac_figure(modal, f"AutoMAC · {name}"),
-        }
-        plots = pictures.write(figures, name)
-    accepted = (str(record.source),)
-    return ModalReport.of(
-        modal, fit_error=None, accepted=accepted, simulated=record.simulated, **plots
-    )

@@ -25,7 +25,7 @@ from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import joint_columns, read_recordings
 from planner.recording.records import PoseRow, RecordingsFolder
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
-from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode, check_options
+from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode
 from planner.report.plot_files import Pictures
 from planner.report.sensor_masses import WithoutSensors, without_sensors
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
@@ -144,7 +144,6 @@ def survey(
     band_hz: tuple[float, float] | None,
     robot_toml: Path | None,
     estimator: str,
-    quantity: str | None,
     window_rate_1_s: float,
     progress: Callable[[str], None],
 ) -> SurveyReport:
@@ -152,7 +151,6 @@ def survey(
 
     Raises RefusedError where no pose gives a mode.
     """
-    check_options(band_hz, estimator, quantity, window_rate_1_s)
     band = band_hz or DEFAULT_BAND_HZ
     table = _table(folder, robot_toml)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
