@@ -62,8 +62,10 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s
     data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True)
-    orders, found = _diagram(matrix, chosen)
-    start = np.array([line.pole for line in stable(found)]) + rate
+    # A record cut off while it rings leaves ripples, which polynomials take for poles.
+    smooth = matrix.ended or matrix
+    orders, found = _diagram(smooth, chosen)
+    start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
     start = _with_one_above(start, f[chosen][-1])

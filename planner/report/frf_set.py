@@ -27,7 +27,7 @@ class FrfSet:
 
     `band_hz` is where modes are looked for, None: wherever there are lines. Not `placed` are those
     that state neither where nor along which directions they were measured. Rate and tail as in
-    `Frf`.
+    `Frf`; `ended` are FRFs of hits under a window by which decays are over, of that rate.
     """
 
     records: tuple[FrfRecord, ...]
@@ -38,12 +38,17 @@ class FrfSet:
     placed: bool
     exponential_rate_1_s: float = 0.0
     tail_s: float = np.inf
+    ended: FrfRecord | None = None
+    ended_rate_1_s: float = 0.0
 
     def matrix(self, quantity: str | None) -> FrfMatrix:
         """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
         found = matrix_of(self.records, quantity)
-        rate = self.exponential_rate_1_s
-        return replace(found, exponential_rate_1_s=rate, tail_s=self.tail_s)
+        rate, ended = self.exponential_rate_1_s, None
+        if self.ended is not None:
+            ended = matrix_of((self.ended,))
+            ended = replace(ended, exponential_rate_1_s=self.ended_rate_1_s)
+        return replace(found, exponential_rate_1_s=rate, tail_s=self.tail_s, ended=ended)
 
 
 def frf_set(
@@ -135,15 +140,15 @@ def _struck(
     )
     band = band_hz or _band(parts)
     measured = MeasuredPose(parts, band, estimator, window_rate_1_s, store=user_store())
-    verdicts, frf = measured.verdicts, measured.whole
+    verdicts, frf, ended = measured.verdicts, measured.whole, measured.ended_frf
     refused = tuple(RefusedFile(v.source.name, v.reason) for v in verdicts if not v.accepted)
-    if frf is None:
+    if frf is None or ended is None:
         reasons = [file.reason for file in refused] or list(measured.averaged.remarks)
         raise RefusedError(f"No modes could be identified: {reasons[0]}")
     used = [v for v in verdicts if v.accepted]
-    record = exported(frf, used[0].source.path, any(v.simulated for v in used))
+    path, simulated = used[0].source.path, any(v.simulated for v in used)
     return FrfSet(
-        (record,),
+        (exported(frf, path, simulated),),
         tuple(source.path for source in sources),
         tuple(v.source.name for v in used),
         refused,
@@ -151,6 +156,8 @@ def _struck(
         True,
         frf.exponential_rate_1_s,
         frf.tail_s,
+        exported(ended, path, simulated),
+        ended.exponential_rate_1_s,
     )
 
 

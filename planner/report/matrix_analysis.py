@@ -17,6 +17,7 @@ from planner.report.frf_set import FrfSet
 from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.words import counted
 
 
 @dataclass(frozen=True)
@@ -88,8 +89,9 @@ class MatrixReport(Answer):
         """The modes as a table."""
         low, high = self.band_hz
         made = table(
-            f"Modes between {low:g} and {high:g} Hz from {self.frfs} FRFs, {len(self.dofs)} degrees"
-            f" of freedom (fit error {100 * self.fit_error:.1f} %)",
+            f"Modes between {low:g} and {high:g} Hz from {counted(self.frfs, 'FRF')}, "
+            f"{counted(len(self.dofs), 'degree of freedom', 'degrees of freedom')} "
+            f"(fit error {100 * self.fit_error:.1f} %)",
             *("mode", "frequency (Hz)", "damping (%)", "MPC", "MPD (°)", "modal mass (kg)"),
             *("largest at", "physical (%)"),
         )

@@ -30,6 +30,7 @@ from planner.report.plot_files import Pictures
 from planner.report.sensor_masses import WithoutSensors, without_sensors
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 from planner.robot.robot import Robot
+from planner.words import counted
 
 ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
@@ -126,7 +127,7 @@ class SurveyReport(Answer):
         labels = sorted({mode.label for pose in self.poses for mode in pose.modes if mode.label})
         low, high = self.band_hz
         made = table(
-            f"Modes of {len(self.poses)} poses between {low:g} and {high:g} Hz",
+            f"Modes of {counted(len(self.poses), 'pose')} between {low:g} and {high:g} Hz",
             *("pose", *(f"mode {label} (Hz)" for label in labels), "without label (Hz)"),
         )
         for pose in self.poses:
