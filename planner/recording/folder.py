@@ -240,7 +240,7 @@ def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointN
     hit_point = cells.get("hit_point", "").strip()
     responses = tuple(cells.get("response_points", "").split())
     for column, name in (("hit_point", hit_point), *(("response_points", n) for n in responses)):
-        if name and name not in points.known:
+        if name and not points.anywhere and name not in points.known:
             raise InputError(
                 f'{path}, row {row.row}: {column} names "{name}", which is none of robot.toml\'s '
                 f"points ({', '.join(points.known)}); correct it, or add a [[point]]."

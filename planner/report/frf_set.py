@@ -67,7 +67,9 @@ def frf_set(
     records = [record for _, own in held for record in own]
     if records and isinstance(records[0], TimeRecord):
         times = [record for record in records if isinstance(record, TimeRecord)]
-        return None if _one_sensor(times) else _struck(sources, band_hz, estimator, window_rate_1_s)
+        if _one_sensor(times) and not any(s.stated.hit_point for s in sources):
+            return None
+        return _struck(sources, band_hz, estimator, window_rate_1_s)
     given, used = [], []
     for source, own in held:
         frfs = [record for record in own if isinstance(record, FrfRecord)]

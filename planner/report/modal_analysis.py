@@ -1,7 +1,7 @@
 """Answer of `modes` for the recordings of one pose, which belong to no campaign."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
 from planner.recording.folder import TABLE, files_in, joint_columns, read_recordings
+from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS
 from planner.report.answer import Answer, RefusedFile
 from planner.report.plot_files import Pictures
@@ -181,8 +182,8 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
     found: list[Source] = []
     for path in paths:
         if (path / TABLE).is_file():
-            table = read_recordings(path, joint_columns(path), bare=True)
-            found += [Source.of(row) for row in table.rows]
+            table = read_recordings(path, joint_columns(path), ANYWHERE, bare=True)
+            found += [_of_no_robot(Source.of(row)) for row in table.rows]
         elif path.is_dir():
             found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():
@@ -190,6 +191,11 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
     return tuple(found)
+
+
+def _of_no_robot(source: Source) -> Source:
+    """Without names of points, but those that the table says."""
+    return replace(source, stated=replace(source.stated, names=PointNames()))
 
 
 def _draw(

@@ -171,9 +171,11 @@ def survey(
             q = table.joints.internal(rows[0].joints_deg)
             visited.append(_visited(name, q, measured))
     if not any(found):
+        reasons = [file.reason for file in refused] + [
+            told for one in every for told in one.remarks
+        ]
         raise RefusedError(
-            f"{folder}: no pose gives a mode between {band[0]:g} and "
-            f"{band[1]:g} Hz; see `planner modes` of one pose's files."
+            f"{folder}: no pose gives a mode between {band[0]:g} and {band[1]:g} Hz: {reasons[0]}"
         )
     first = {row.pose: row for row in reversed(table.rows)}
     q = table.joints.internal([first[name].joints_deg for name in names])

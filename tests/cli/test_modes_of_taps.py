@@ -1,6 +1,7 @@
 """`planner modes` of time histories of any points: one sensor, a roving hammer, a roving sensor."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -67,15 +68,25 @@ def named_columns(folder, rng):
     return [folder]
 
 
+def table(folder, rng):
+    """Points that recordings.csv alone tells."""
+    rows = ["pose,hit,hit_point,response_points,repeat,file"]
+    for k in NODES:
+        write_csv(folder / f"{k}.csv", tap(PLATE, k, (0,), rng), "acceleration_z_m_s2")
+        rows.append(f"P1,+z,{PLATE.nodes[k]},{PLATE.nodes[0]},1,{k}.csv")
+    (folder / "recordings.csv").write_text("\n".join(rows) + "\n")
+    return [folder]
+
+
 @pytest.mark.parametrize(
-    "write", [roving_hammer, roving_sensor, one_file, repeats, named_columns]
+    "write", [roving_hammer, roving_sensor, one_file, repeats, named_columns, table]
 )
 def test_hits_of_any_points(write, tmp_path, capsys):
     paths = write(tmp_path, np.random.default_rng(4))
     code, answer, err = modes(capsys, *paths, "--band-hz", *BAND)
     assert (code, err) == (0, "")
     assert len(answer["dofs"]) == len(NODES)
-    assert answer["simulated"] == (write is not named_columns)
+    assert answer["simulated"] == (write not in (named_columns, table))
     assert answer["refused"] == []
     agree(answer)
 
@@ -136,7 +147,16 @@ def test_pictures_and_files_of_taps(tmp_path, capsys):
     options = "--plot", tmp_path / "plots", "--export", tmp_path / "out", "--band-hz", *BAND
     code, answer, err = modes(capsys, *paths, *options)
     assert (code, err) == (0, "")
-    assert all(open(path, "rb").read(4) == b"\x89PNG" for path in answer["plots"])
+    assert all(Path(path).read_bytes().startswith(b"\x89PNG") for path in answer["plots"])
     code, again, _ = modes(capsys, tmp_path / "out" / "frfs.uff", "--band-hz", *BAND)
     assert code == 0
     assert again["dofs"] == answer["dofs"]
+
+
+def test_a_record_sampled_too_slowly_for_the_band_names_both(tmp_path, capsys):
+    one = tap(PLATE, 0, (0,), np.random.default_rng(2))
+    path = write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
+    code, _, err = modes(capsys, path, "--band-hz", 600, 900)
+    assert code == 3
+    assert "its FRFs end at 460.8 Hz, before the end of the band of 600 to 900 Hz" in err
+    assert "--band-hz" in err
