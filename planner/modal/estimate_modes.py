@@ -59,7 +59,7 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
     chosen = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
     chosen &= np.all(np.isfinite(h), axis=(0, 1))
     if columns.size == 0 or np.count_nonzero(chosen) < 8 or not np.any(h[..., chosen]):
-        raise too_few_lines(np.count_nonzero(chosen), frf.frequency_hz, band_hz)
+        raise too_few_lines(chosen, frf.frequency_hz, band_hz)
     variance = frf.variance[:, columns][..., chosen]
     known = np.all(np.isfinite(variance) & (variance > 0))
     force = frf.force_share

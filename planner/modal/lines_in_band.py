@@ -6,9 +6,9 @@ from planner.errors import RefusedError
 
 
 def too_few_lines(
-    count: int, frequency_hz: np.ndarray, band_hz: tuple[float, float]
+    usable: np.ndarray, frequency_hz: np.ndarray, band_hz: tuple[float, float]
 ) -> RefusedError:
-    """The refusal of FRFs at lines (F,), so many of which can be used in the band."""
+    """The refusal of FRFs at lines (F,), of which those that are `usable` (F,) are too few."""
     first, last = float(frequency_hz[0]), float(frequency_hz[-1])
     band = f"{band_hz[0]:g} to {band_hz[1]:g} Hz"
     if last < band_hz[0]:
@@ -17,7 +17,7 @@ def too_few_lines(
         off = f"The FRFs begin at {first:g} Hz, above the band of {band}"
     else:
         return RefusedError(
-            f"Only {count} usable frequency lines lie in the band of {band}, of FRFs between "
+            f"Only {np.count_nonzero(usable)} usable frequency lines lie in the band of {band}, of FRFs between "
             f"{first:g} and {last:g} Hz: give another band with --band-hz, record longer or hit "
             f"with a harder tip."
         )

@@ -57,7 +57,7 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
     if np.count_nonzero(chosen) < LEAST_LINES:
-        raise too_few_lines(np.count_nonzero(chosen), f, band_hz)
+        raise too_few_lines(chosen, f, band_hz)
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
     rate = matrix.exponential_rate_1_s

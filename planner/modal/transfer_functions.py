@@ -50,8 +50,8 @@ def modes_from_transfer_functions(
     response = convert(frequency, record.values[:, keep], stated, "accelerance")[:, None, :]
     step = frequency[1] - frequency[0]
     band = band_hz or (8 * float(step), float(frequency[-1]) / 1.2)
-    inside = np.count_nonzero((frequency >= band[0]) & (frequency <= band[1]))
-    if inside < LEAST_IN_BAND:
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    if np.count_nonzero(inside) < LEAST_IN_BAND:
         raise too_few_lines(inside, frequency, band)
     modes = [m for part in _parts(band, step) for m in _part(frequency, response, part)]
     if not modes:

@@ -51,9 +51,10 @@ def _fonts_with(characters: Iterable[int]) -> list[str]:
     from matplotlib.font_manager import fontManager, get_font
 
     left, found = set(characters), []
-    if left:
-        fonts = [font for font in fontManager.ttflist if not font.name.startswith(LAST_RESORT)]
-        having = {font.name: left & get_font(font.fname).get_charmap().keys() for font in fonts}
+    if not left:
+        return found
+    fonts = [font for font in fontManager.ttflist if not font.name.startswith(LAST_RESORT)]
+    having = {font.name: left & get_font(font.fname).get_charmap().keys() for font in fonts}
     while left:
         best = max(having, key=lambda name: len(having[name] & left))
         if not having[best] & left:
