@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, refusals, respond
+from planner.cli.answer import AsJson, FromNames, refusals, respond
 from planner.errors import InputError
 
 
@@ -50,6 +50,7 @@ def modes(
     operating: Annotated[
         bool, typer.Option("--operating", help="Responses alone, no force: unscaled modes.")
     ] = False,
+    from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
     """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
@@ -58,22 +59,25 @@ def modes(
     """
     from planner.cli.progress import reporting
     from planner.recording.folder import several_poses
+    from planner.report.frf_set import frf_set
     from planner.report.matrix_analysis import matrix_report
-    from planner.report.modal_analysis import modal_report
+    from planner.report.modal_analysis import check_options, modal_report, sources_of
     from planner.report.plot_files import Pictures
+    from planner.report.unlabelled_analysis import unlabelled_report
 
+    check_options(band_hz, estimator, quantity, window_rate_1_s)
     pictures = Pictures(plot, format_, rrd)
     for_points = [
         name
         for name, given in (("--real", real), ("--export", export), ("--operating", operating))
         if given
     ]
-    if several_poses(paths):
+    if several_poses(paths, least=1 if robot else 2):
         from planner.report.survey import survey
 
         if for_points:
             raise InputError(f"{paths[0]} holds several poses; leave {for_points[0]} out.")
-        given = paths[0], band_hz, robot, estimator, quantity, window_rate_1_s
+        given = paths[0], band_hz, robot, estimator, window_rate_1_s
         with reporting("identifying", quiet=as_json) as progress:
             answer = survey(*given, progress).with_pictures(pictures, paths[0].name)
         return respond(answer, as_json, refusals(answer.refused))
@@ -81,13 +85,17 @@ def modes(
         from planner.report.operating_analysis import operating_report
 
         return respond(operating_report(paths, band_hz, pictures), as_json)
-    matrix = None if force else matrix_report(paths, band_hz, quantity, pictures, real, export)
-    if matrix is None and for_points:
+    sources = sources_of(paths, from_names)
+    given = None if force else frf_set(sources, band_hz, estimator, window_rate_1_s)
+    if given is not None and given.placed:
+        answer = matrix_report(given, quantity, pictures, real, export)
+    elif for_points:
+        what = "FRFs without directions" if given else "hits of one pose"
         raise InputError(
-            f"{paths[0]} holds hits of one pose, and {for_points[0]} is for FRFs of any points; "
-            f"leave it out."
+            f"{paths[0]} holds {what}, and {for_points[0]} is for FRFs of any points; leave it out."
         )
-    answer = matrix or modal_report(
-        paths, band_hz, force, estimator, pictures, quantity, window_rate_1_s
-    )
+    elif given is not None:
+        answer = unlabelled_report(given, quantity, pictures)
+    else:
+        answer = modal_report(sources, band_hz, force, estimator, pictures, window_rate_1_s)
     return respond(answer, as_json, refusals(answer.refused))

@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import groupby
 from pathlib import Path
+from typing import TypeVar
 
 from planner.errors import AxisNotStatedError, PlannerError
 from planner.recording.points import StatedPoints
 from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 from planner.words import counted
+
+RecordT = TypeVar("RecordT", bound=Record)
 
 
 @dataclass(frozen=True)
@@ -38,17 +41,24 @@ class Source:
 
     def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
         """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
-        from planner.recording.file_names import placed_by_name
         from planner.recording.hits import hits_from, located
         from planner.recording.read import read_hits
 
         records: tuple[Record, ...] = read_hits(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
-            named = (placed_by_name(r, self.name) for r in frfs) if self.from_name else frfs
-            at = self.stated, self.hit, self.response
-            return (), tuple(located(record, *at) for record in named)
+            return (), tuple(located(self.placed(record), self.stated) for record in frfs)
         return hits_from(self._meant(records), self.hit, self.stated), ()
+
+    def placed(self, record: RecordT) -> RecordT:
+        """FRFs with the places that they do not state themselves; time histories as they are."""
+        from planner.recording.file_names import placed_by_name
+        from planner.recording.hits import with_axes
+
+        if not isinstance(record, FrfRecord):
+            return record
+        named = placed_by_name(record, self.name) if self.from_name else record
+        return with_axes(named, self.hit, self.response)
 
     def _meant(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
         """Of a file's records those that are meant."""

@@ -1,16 +1,19 @@
 """FRFs of files with their places: what is checked before any of them is used."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
-from planner.errors import PlannerError
+from planner.errors import PlannerError, RefusedError
 from planner.frf.quantities import convert
 from planner.recording.records import FrfRecord
 
 # Relative, of one line in two files: headers state the spacing to five digits or so.
 SAME_LINE = 1e-4
+# What a record states of each of its FRFs.
+OF_EACH = "response_direction", "reference_direction", "response_node", "reference_node"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +78,29 @@ def common_lines(records: Sequence[FrfRecord], refusal: type[PlannerError]) -> n
                 f"{record.source} has other frequency lines than {first.source}; export one grid."
             )
     return lines
+
+
+def joined(records: Sequence[FrfRecord]) -> FrfRecord:
+    """FRFs of several files as if of the first. Raises RefusedError where they do not go together.
+
+    For files that state no directions: what differs are rows.
+    """
+    first = records[0]
+    common_lines(records, RefusedError)
+    other = next((r for r in records if (r.quantity, r.unit) != (first.quantity, first.unit)), None)
+    if other is not None:
+        raise RefusedError(
+            f"{other.source} holds FRFs of kind {other.quantity}, {first.source} of kind "
+            f"{first.quantity}; name files of one kind."
+        )
+    return replace(
+        first,
+        values=np.concatenate([record.values for record in records]),
+        coherence=np.concatenate([record.coherence for record in records]),
+        remarks=tuple(dict.fromkeys(told for record in records for told in record.remarks)),
+        simulated=any(record.simulated for record in records),
+        **{name: tuple(chain(*(getattr(r, name) for r in records))) for name in OF_EACH},
+    )
 
 
 def _places(record: FrfRecord) -> list[tuple[str, int, str, int]]:

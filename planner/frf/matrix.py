@@ -18,8 +18,8 @@ class FrfMatrix:
 
     `accelerance[o, i]` is the response at `responses[o]` to a force at `references[i]`, both along
     positive axes: what was measured along negative ones is turned. In m/s²/N where `scaled`.
-    `coherence` is NaN where the files state none. `turned` are the degrees of freedom that were
-    measured against their axis, `files` where FRFs come from.
+    `coherence` is NaN where the files state none. `exponential_rate_1_s` and `tail_s` as in `Frf`;
+    `ended` are the same FRFs under a window by which decays are over, None where there is none.
     """
 
     frequency_hz: np.ndarray  # (F,) increasing, > 0
@@ -30,6 +30,9 @@ class FrfMatrix:
     scaled: bool
     remarks: tuple[str, ...] = ()
     simulated: bool = False
+    exponential_rate_1_s: float = 0.0
+    tail_s: float = np.inf
+    ended: "FrfMatrix | None" = None
 
     @property
     def measured(self) -> np.ndarray:

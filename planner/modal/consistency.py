@@ -21,7 +21,7 @@ from planner.modal.exchanged import (
 )
 from planner.modal.matrix_poles import MatrixPoles
 from planner.modal.matrix_sides import Sides
-from planner.modal.odd_entries import odd_entries, place
+from planner.modal.odd_entries import odd_entries
 from planner.modal.row_places import turned_rows
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry
@@ -121,7 +121,7 @@ def _turned_rows(sides: Sides, geometry: Geometry | None) -> tuple[Dof, ...]:
 def _turned_row(dof: Dof, hit: bool) -> str:
     done = "hit" if hit else "felt"
     return (
-        f"The sign at {place(dof)} is turned where it was {done}: in all modes it moves against the"
+        f"The sign {dof.at} is turned where it was {done}: in all modes it moves against the"
         f" points around it. The sign of all FRFs {done} there was "
         "inverted before the analysis."
     )
@@ -186,7 +186,7 @@ def _turned(
         others = [r for r in reciprocity if dof in (r.first, r.second) and r.ratio < 0]
         more = f" and {len(others)} × H_ij = −H_ji" if others else ""
         sentences.append(
-            f"The sign of the channel at {place(dof)} is turned: its driving point has Im H < 0 "
+            f"The sign of the channel {dof.at} is turned: its driving point has Im H < 0 "
             f"at resonances{more}. The sign of all FRFs with this reference was inverted before "
             "the analysis."
         )
@@ -198,6 +198,6 @@ def _remarks(reciprocity: tuple[Reciprocity, ...]) -> tuple[str, ...]:
     if worst is None or worst.difference < RECIPROCAL:
         return ()
     return (
-        f"Between {place(worst.first)} and {place(worst.second)} H_ij and H_ji differ by "
+        f"Between hits {worst.first.at} and {worst.second.at} H_ij and H_ji differ by "
         f"{100 * worst.difference:.0f} % (ratio {worst.ratio:.2f}).",
     )

@@ -5,6 +5,7 @@ import numpy as np
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
 from planner.modal.fit_data import Data
+from planner.modal.lines_in_band import too_few_lines
 from planner.modal.modes import LEAST_PROBABILITY, ModalModel, Mode
 from planner.modal.pole_identification import MAX_ORDER, Identified, PoleIdentification, identify
 from planner.modal.residues import rank_one
@@ -58,10 +59,7 @@ def _select(frf: Frf, band_hz: tuple[float, float]) -> Data:
     chosen = (frf.frequency_hz >= low) & (frf.frequency_hz <= high)
     chosen &= np.all(np.isfinite(h), axis=(0, 1))
     if columns.size == 0 or np.count_nonzero(chosen) < 8 or not np.any(h[..., chosen]):
-        raise RefusedError(
-            f"Only {np.count_nonzero(chosen)} usable frequency lines lie between {low:g} and"
-            f" {high:g} Hz: record longer or hit with a harder tip."
-        )
+        raise too_few_lines(chosen, frf.frequency_hz, band_hz)
     variance = frf.variance[:, columns][..., chosen]
     known = np.all(np.isfinite(variance) & (variance > 0))
     force = frf.force_share

@@ -48,10 +48,12 @@ class Exchange:
                 "the points around them in the modes, swapped they move with them. Check the "
                 "labels."
             )
+        pair = f"Nodes {a.node} and {b.node} ({a.direction})"
+        if a.direction != b.direction:
+            pair = f"The channels {a.at} and {b.at}"
         return (
-            f"Nodes {a.node} and {b.node} ({a.direction}) are probably swapped: as labelled, "
-            f"hitting and listening there differ by {100 * self.stated:.0f} %, swapped by "
-            f"{100 * self.exchanged:.0f} %. Check the labels."
+            f"{pair} are probably swapped: as labelled, hitting and listening there differ by "
+            f"{100 * self.stated:.0f} %, swapped by {100 * self.exchanged:.0f} %. Check the labels."
         )
 
 

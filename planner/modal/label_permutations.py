@@ -94,7 +94,7 @@ def _guide_crossings(guided: np.ndarray, tree: Tree, x: np.ndarray) -> list[np.n
         for b in range(k - 1):
             if set(before[: b + 1]) != set(after[: b + 1]):
                 out[b].append((x[above] + x[i]) / 2)
-    return [np.array(places).reshape(-1, x.shape[1]) for places in out]
+    return [np.array(places).reshape(len(places), x.shape[1]) for places in out]
 
 
 def _swapped(before: Row, after: Row, b: int) -> float:

@@ -19,10 +19,9 @@ from planner.modal.shape_measures import (
     real_normal_modes,
 )
 from planner.recording.dof import Dof
+from planner.recording.excited_band import FIRST_LINE
 from planner.recording.geometry import Geometry
 
-# A band that the user does not state begins at this line: the first ones hold offsets and drift.
-FIRST_LINE = 3
 LEFT_OUT = 1e8  # times its variance: of a residue that does not fit the others
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.errors import RefusedError
 from planner.frf.matrix import FrfMatrix
 from planner.modal.fit_data import Data
+from planner.modal.lines_in_band import too_few_lines
 from planner.modal.matrix_selection import established, first_variance, judged
 from planner.modal.plscf import PoleSet, plscf, row_errors
 from planner.modal.pole_identification import ladder
@@ -57,15 +57,15 @@ def identify_matrix(matrix: FrfMatrix, band_hz: tuple[float, float]) -> MatrixPo
     f = matrix.frequency_hz
     chosen = (f >= band_hz[0] / (1 + MARGIN)) & (f <= band_hz[1] * (1 + MARGIN))
     if np.count_nonzero(chosen) < LEAST_LINES:
-        raise RefusedError(
-            f"Only {np.count_nonzero(chosen)} frequency lines lie between {band_hz[0]:g} and"
-            f" {band_hz[1]:g} Hz: widen the band or record longer."
-        )
+        raise too_few_lines(chosen, f, band_hz)
     rows, columns = np.nonzero(matrix.measured)
     response = matrix.accelerance[rows, columns][:, None, chosen]
-    data = Data(f[chosen], response, None, pooled=True, near=True)
-    orders, found = _diagram(matrix, chosen)
-    start = np.array([line.pole for line in stable(found)])
+    rate = matrix.exponential_rate_1_s
+    data = Data(f[chosen], response, None, rate, tail_s=matrix.tail_s, pooled=True, near=True)
+    # A record cut off while it rings leaves ripples, which polynomials take for poles.
+    smooth = matrix.ended or matrix
+    orders, found = _diagram(smooth, chosen)
+    start = np.array([line.pole for line in stable(found)]) + smooth.exponential_rate_1_s
     if not start.size:
         return None
     start = _with_one_above(start, f[chosen][-1])

@@ -10,11 +10,13 @@ import numpy as np
 
 from planner.modal.fit_data import Data
 from planner.modal.mode_selection import PoleFit, scales
-from planner.modal.refine import Refined, refine
+from planner.modal.refine import evaluate
 
-CUT = 0.12  # of the band's span, taken away above, then below
+# Of the band's span, taken away above, then below; at most half of what lies beside a mode there,
+# so that it is judged by lines that hold it.
+CUT = 0.12
 LEAST_LINES = 32
-MAX_ITERATIONS = 8  # the start is next to the answer
+HELD = 1e-10  # of the information on the best held pole: below, rounding rules
 
 
 def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
@@ -25,41 +27,53 @@ def inflation(data: Data, fitted: PoleFit, shared: np.ndarray) -> np.ndarray:
     """
     refined, scale = fitted.refined, scales(data, fitted)
     m = refined.poles.size
-    common = np.diag(shared).reshape(2, m).T
-    own = _variance(refined) * scale[:, None]
-    extra = np.zeros((m, 2))
-    for part in _parts(data):
-        other = _fit(data, fitted, part)
-        apart = other.poles - refined.poles
-        square = np.stack([apart.real**2, apart.imag**2], axis=1)
-        by_chance = np.maximum(_variance(other) * scale[:, None] - own, 0.0)
-        extra = np.maximum(extra, square - by_chance - common)
-    # One factor a mode: real and imaginary parts suffer from the same cause.
-    return 1 + np.max(np.maximum(extra, 0.0) / np.maximum(own, 1e-300), axis=1)
+    own, common = _pairs(refined.pole_covariance) * scale[:, None], _pairs(shared)
+    factor = np.ones(m)
+    for part, judged in _parts(data, refined.poles).items():
+        moved, covariance = _step(data, fitted, slice(*part))
+        k = np.array(judged)
+        variance = np.maximum(_pairs(covariance) * scale[:, None], own)[k]
+        by_chance = variance - own[k] + common[k]
+        # An error of the model, too, moves a pole the farther the less the lines hold it. Real and
+        # imaginary parts suffer from the same cause: one factor a mode.
+        beyond = np.maximum(moved.reshape(2, m).T[k] ** 2 - by_chance, 0.0) / variance
+        factor[k] = np.maximum(factor[k], 1 + np.max(beyond, axis=1))
+    return factor
 
 
-def _parts(data: Data) -> list[slice]:
+def _parts(data: Data, poles: np.ndarray) -> dict[tuple[int, int], list[int]]:
+    """Ranges of lines, first and end, and the poles that each judges."""
     frequency = data.frequency_hz
-    step = CUT * (frequency[-1] - frequency[0])
-    below = int(np.searchsorted(frequency, frequency[0] + step))
-    above = int(np.searchsorted(frequency, frequency[-1] - step))
-    parts = [slice(0, above), slice(below, frequency.size)]
-    return [p for p in parts if p.stop - p.start >= LEAST_LINES]
+    low, high = frequency[[0, -1]]
+    cut = CUT * (high - low)
+    found: dict[tuple[int, int], list[int]] = {}
+    for k, hz in enumerate(np.abs(poles) / (2 * np.pi)):
+        if not low < hz < high:
+            continue
+        below = int(np.searchsorted(frequency, low + min(cut, (hz - low) / 2)))
+        above = int(np.searchsorted(frequency, high - min(cut, (high - hz) / 2)))
+        for part in ((0, above), (below, frequency.size)):
+            if part[1] - part[0] >= LEAST_LINES:
+                found.setdefault(part, []).append(k)
+    return found
 
 
-def _fit(data: Data, fitted: PoleFit, part: slice) -> Refined:
-    return refine(
-        data.lines.part(part),
-        data.response[..., part],
-        fitted.variance[..., part],
-        fitted.refined.poles,
-        data.allowed,
-        max_iterations=MAX_ITERATIONS,
-    )
+def _step(data: Data, fitted: PoleFit, part: slice) -> tuple[np.ndarray, np.ndarray]:
+    """How the poles move (2m,) when part of the lines is fitted, and their covariance (2m, 2m).
+
+    Linearised where all lines have them: poles that a part does not hold would stray in a fit, to
+    where their variance is that of another place.
+    """
+    refined = fitted.refined
+    weight = 2 / fitted.variance[..., part].reshape(data.entries, -1)
+    response = data.response[..., part].reshape(data.entries, -1)
+    point = evaluate(data.lines.part(part), response, weight, refined.poles)
+    unit = np.sqrt(np.maximum(np.diag(refined.pole_covariance), 1e-300))
+    turned = np.outer(unit, unit)
+    covariance = np.linalg.pinv(point.normal * turned, rcond=HELD, hermitian=True) * turned
+    return -covariance @ point.gradient, covariance
 
 
-def _variance(refined: Refined) -> np.ndarray:
+def _pairs(covariance: np.ndarray) -> np.ndarray:
     """(m, 2) variances of the real and imaginary parts of the poles."""
-    m = refined.poles.size
-    diagonal = np.maximum(np.diag(refined.pole_covariance), 0.0)
-    return np.stack([diagonal[:m], diagonal[m:]], axis=1)
+    return np.maximum(np.diag(covariance), 0.0).reshape(2, -1).T

@@ -5,7 +5,6 @@ from itertools import combinations
 import numpy as np
 
 from planner.modal.matrix_sides import Sides
-from planner.recording.dof import Dof
 
 # An entry fits where its residues differ from what the rest of its row asks for by less than this,
 # over all modes; what turned it round differs by more than the second as stated.
@@ -63,11 +62,6 @@ def _expected(sides: Sides) -> np.ndarray | None:
 
 
 def _named(sides: Sides, row: int, column: int) -> str:
-    one, other = place(sides.rows[row]), place(sides.columns[column])
+    one, other = sides.rows[row].at, sides.columns[column].at
     felt, hit = (other, one) if sides.hit else (one, other)
-    return f"felt at {felt} and hit at {hit}"
-
-
-def place(dof: Dof) -> str:
-    """A degree of freedom in a sentence."""
-    return f"node {dof.node}, {dof.direction}"
+    return f"felt {felt} and hit {hit}"

@@ -9,7 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.modal.residues import Lines, Residues, synthesize, unpack
+from planner.modal.residues import (
+    Lines,
+    Residues,
+    basis,
+    basis_slope,
+    stack,
+    synthesize,
+    unpack,
+)
 
 RIDGE = 1e-13  # of the residues' normal matrix: keeps poles that coincide apart from rounding
 AT_ONCE = 30_000  # values of one column for all poles and sets of a block, to stay in the cache
@@ -105,6 +113,9 @@ def _columns(data: SetData, poles: np.ndarray) -> tuple[np.ndarray, int]:
     (k, m), lines = poles.shape, data.lines.x.size
     rest = data.lines.rest * data.root
     linear = 2 * m + 2 * len(rest)
+    if np.isfinite(data.lines.tail_s):
+        parts = [basis(data.lines, poles), basis_slope(data.lines, poles)]
+        return stack(np.concatenate(parts, axis=-2) * data.root), linear
     both = np.empty((k, linear + 2 * m, 2 * lines))
     both[:, 2 * m : linear, :lines] = np.concatenate([rest.real, -rest.imag])
     both[:, 2 * m : linear, lines:] = np.concatenate([rest.imag, rest.real])

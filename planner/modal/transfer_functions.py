@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.errors import InputError, RefusedError
 from planner.frf.quantities import DERIVATIVE, convert
+from planner.modal.lines_in_band import too_few_lines
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.plscf import plscf
 from planner.modal.pole_identification import ladder
@@ -21,6 +22,7 @@ MAX_ORDER = 40
 # Each part of the band spans an octave and is fitted with half an octave more on either side.
 SPAN, OVERLAP = 2.0, 2.0**0.5
 LEAST_LINES = 64  # of a part
+LEAST_IN_BAND = 8
 # A line of the diagram that is a mode: part of the range of orders that it spans, share of them
 # that have it, scatter in bandwidths over the upper ones, damping, and part of the response at
 # its frequency.
@@ -48,6 +50,9 @@ def modes_from_transfer_functions(
     response = convert(frequency, record.values[:, keep], stated, "accelerance")[:, None, :]
     step = frequency[1] - frequency[0]
     band = band_hz or (8 * float(step), float(frequency[-1]) / 1.2)
+    inside = (frequency >= band[0]) & (frequency <= band[1])
+    if np.count_nonzero(inside) < LEAST_IN_BAND:
+        raise too_few_lines(inside, frequency, band)
     modes = [m for part in _parts(band, step) for m in _part(frequency, response, part)]
     if not modes:
         raise RefusedError(
@@ -55,8 +60,8 @@ def modes_from_transfer_functions(
             f"the band or record longer."
         )
     remarks = (
-        f"Of {response.shape[0]} FRFs without labels: shapes follow their order in the file and "
-        f"are not scaled; standard deviations are the scatter over model orders.",
+        f"Of {response.shape[0]} FRFs without labels: shapes follow the order of the files and are "
+        f"not scaled; standard deviations are the scatter over model orders.",
     )
     return ModalModel(tuple(modes), band, float("nan"), MAX_ORDER, (*record.remarks, *remarks))
 

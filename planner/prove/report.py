@@ -12,6 +12,7 @@ from planner.prove.run import Proof, told, unseal
 from planner.prove.score import Scored, score
 from planner.prove.summary import summary
 from planner.report.answer import Answer, plain
+from planner.report.frf_plots import png
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ def write(proof: Proof, scored: Sequence[Scored]) -> ProofReport:
     text = json.dumps(whole, indent=1)
     (proof.folder / "report.json").write_text(text, encoding="utf-8")
     for name, draw in PICTURES.items():
-        draw(scored).savefig(proof.folder / f"{name}.png", dpi=110)
+        (proof.folder / f"{name}.png").write_bytes(png(draw(scored), dpi=110))
     (proof.folder / "report.md").write_text(_markdown(proof, scored, figures), encoding="utf-8")
     return answer
 

@@ -55,5 +55,12 @@ class Dof:
         """Whether it is a rotation about an axis."""
         return self.direction.removeprefix("-").startswith("r")
 
+    @property
+    def at(self) -> str:
+        """In a sentence: "at node 4, x", "along x" where the node has no name."""
+        if self.node in ("", "0"):
+            return f"along {self.direction}"
+        return f"at node {self.node}, {self.direction}"
+
     def __str__(self) -> str:
-        return f"{self.node}:{self.direction}"
+        return self.direction if self.node in ("", "0") else f"{self.node}:{self.direction}"

@@ -22,9 +22,15 @@ MAX_ROWS = 200_000
 ANGLE, SLIDE = "_deg", "_mm"
 
 
-def several_poses(paths: list[Path]) -> bool:
-    """Whether a single folder with recordings.csv is named."""
-    return len(paths) == 1 and (paths[0] / TABLE).is_file()
+def several_poses(paths: list[Path], least: int = 2) -> bool:
+    """Whether a single folder is named whose recordings.csv lists that many poses at least."""
+    if len(paths) != 1 or not (paths[0] / TABLE).is_file():
+        return False
+    header, rows = read_table(paths[0] / TABLE)
+    if "pose" not in header:
+        return True  # said where the table is read in earnest
+    at = header.index("pose")
+    return len({cells[at].strip() for _, cells in rows}) >= least
 
 
 def joint_columns(folder: Path) -> JointUnits:
@@ -234,7 +240,7 @@ def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointN
     hit_point = cells.get("hit_point", "").strip()
     responses = tuple(cells.get("response_points", "").split())
     for column, name in (("hit_point", hit_point), *(("response_points", n) for n in responses)):
-        if name and name not in points.known:
+        if name and not points.anywhere and name not in points.known:
             raise InputError(
                 f'{path}, row {row.row}: {column} names "{name}", which is none of robot.toml\'s '
                 f"points ({', '.join(points.known)}); correct it, or add a [[point]]."

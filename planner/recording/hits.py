@@ -9,7 +9,7 @@ import numpy as np
 from planner.errors import AxisNotStatedError, InputError
 from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
-from planner.recording.points import SENSOR, StatedPoints
+from planner.recording.points import SENSOR, UNTOLD, StatedPoints
 from planner.recording.records import AXES, Channel, FrfRecord, Hit, Record, TimeRecord
 
 
@@ -27,22 +27,20 @@ def hits_from(
     return tuple(_hit(record, axis, stated or StatedPoints()) for record in times)
 
 
-def located(
-    record: FrfRecord,
-    stated: StatedPoints,
-    hit: str | None = None,
-    response: str | None = None,
-) -> FrfRecord:
-    """The record with its nodes by the names of the points, and axes that it does not state.
+def with_axes(record: FrfRecord, hit: str | None, response: str | None) -> FrfRecord:
+    """FRFs with axes that they do not state: signed axes as the table of recordings has them.
 
-    `hit` and `response` are signed axes, as the table of recordings has them. Raises InputError as
-    `hits_from`, and where file and table name different axes.
+    Raises InputError where file and table name different axes.
     """
-    record = replace(
+    return replace(
         record,
         reference_direction=_completed(record, record.reference_direction, hit, "hit"),
         response_direction=_completed(record, record.response_direction, response, "response"),
     )
+
+
+def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
+    """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
     count, source = len(record.values), record.source
     response = [
         _axis_there(source, stated, *at)
@@ -96,7 +94,11 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
                 f"{source}: the unit of {channel.name} is not known; label it N or m/s^2."
             )
     order = sorted(responses, key=lambda dof: _rank(dof, responses))
-    samples = np.array([responses[d].samples * np.sign(responses[d].direction) for d in order])
+    signs = [-1.0 if responses[d].direction < 0 else 1.0 for d in order]
+    samples = np.array([responses[d].samples * s for d, s in zip(order, signs, strict=True)])
+    told, hit_point = _hit_direction(force, axis), stated.hit_at(source, force.node)
+    if stated.names.anywhere and not any(told):
+        axis, hit_point = AXES[0], hit_point + UNTOLD
     name = _axis(record, force, axis, remarks)
     return Hit(
         source,
@@ -106,7 +108,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
         samples,
         remarks=tuple(remarks),
         simulated=record.simulated,
-        hit_point=stated.hit_at(source, force.node),
+        hit_point=hit_point,
         responses=tuple(order),
         faults=record.faults,
     )
@@ -116,6 +118,8 @@ def _responses(
     record: TimeRecord, accelerations: Sequence[Channel], stated: StatedPoints
 ) -> dict[Dof, Channel]:
     """Accelerations by point and axis; of the tool's sensor, where it stands alone, all three."""
+    if stated.names.anywhere:
+        return _anywhere(record, accelerations, stated)
     found: dict[Dof, Channel] = {}
     whole = bool(accelerations)
     for channel in accelerations:
@@ -135,17 +139,51 @@ def _responses(
     return found
 
 
+def _anywhere(
+    record: TimeRecord, accelerations: Sequence[Channel], stated: StatedPoints
+) -> dict[Dof, Channel]:
+    """The same of points that belong to no robot, any number of them.
+
+    A channel without a direction is a point by itself, as if it had an axis x only.
+    """
+    found: dict[Dof, Channel] = {}
+    for channel in accelerations:
+        node = stated.response_at(record.source, channel.node)
+        along = abs(channel.direction)
+        if not along:
+            node = (channel.name if node == SENSOR else node) + UNTOLD
+        dof = Dof(node, AXES[along - 1 if along else 0]) if along <= len(AXES) else None
+        if dof is None or dof in found:
+            fault = "has its place and direction twice" if dof else "is a rotation"
+            raise InputError(
+                f"{record.source}: {channel.name} {fault}; state node and direction of each "
+                f"acceleration, or leave it out."
+            )
+        found[dof] = channel
+    if not found:
+        raise InputError(
+            f"{record.source} holds {describe(record)}: a hit needs an acceleration; export force "
+            f"and accelerations together."
+        )
+    return found
+
+
 def _rank(dof: Dof, responses: dict[Dof, Channel]) -> tuple[int, int]:
     """Places in order of the file, x, y, z at each."""
     places = list(dict.fromkeys(own.node for own in responses))
     return places.index(dof.node), dof.number
 
 
+def _hit_direction(force: Channel, axis: str | None) -> tuple[int, int]:
+    """As the file and as the table of recordings says it; 0 where it does not."""
+    own = force.direction if 1 <= abs(force.direction) <= 3 else 0
+    return own, hit_direction(axis) if axis else 0
+
+
 def _axis(record: TimeRecord, force: Channel, axis: str | None, remarks: list[str]) -> str:
-    source, stated = record.source, hit_direction(axis) if axis else 0
+    source, (own, stated) = record.source, _hit_direction(force, axis)
     if axis and not stated:
         raise InputError(f'{source}: hit "{axis}" is no signed axis such as +x; correct it.')
-    own = force.direction if 1 <= abs(force.direction) <= 3 else 0
     if not own and not stated:
         raise AxisNotStatedError(
             f"{source} does not say along which axis it was hit; {_in_the_file(source)}, or list "

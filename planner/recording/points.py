@@ -11,6 +11,7 @@ from planner.errors import InputError
 
 TCP, SENSOR = "tcp", "sensor"
 AXES = "xyz"
+UNTOLD = " (direction not stated)"  # ends the name of a point that a file gives no direction at
 
 
 @dataclass(frozen=True)
@@ -70,13 +71,15 @@ class PointNames:
 
     `axes` are those that a point's sensor has ("xyz", "x"), by name; `nodes` names points by the
     digits of node numbers. `hits` and `sensors` name points that are where the tool is hit and
-    where its sensor sits: they are these.
+    where its sensor sits: they are these. With `anywhere` recordings are of no robot: every node
+    that a file states is a point, and its sensor has whichever axes.
     """
 
     axes: dict[str, str] = field(default_factory=dict)
     nodes: dict[str, str] = field(default_factory=dict)
     hits: tuple[str, ...] = (TCP,)
     sensors: tuple[str, ...] = (SENSOR,)
+    anywhere: bool = False
 
     @property
     def known(self) -> tuple[str, ...]:
@@ -102,11 +105,14 @@ class PointNames:
         Files of a robot without points, or whose points have no nodes, may state any name or node:
         they say nothing. Raises KeyError where it is no point's.
         """
-        if node in self.known:
+        if node in self.known or (self.anywhere and node not in ("", "0")):
             return node
         if node in ("", "0") or not (self.nodes if node.isdigit() else self.axes):
             return None
         return self.nodes[node]
+
+
+ANYWHERE = PointNames(anywhere=True)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from planner.recording.dof import Dof
 from planner.recording.joints import JointUnits
-from planner.recording.points import SENSOR, TCP, Layout, StatedPoints
+from planner.recording.points import SENSOR, TCP, UNTOLD, Layout, StatedPoints
 from planner.recording.pulse import Pulse, find_pulse
 
 AXES = ("x", "y", "z")
@@ -150,6 +150,8 @@ class Hit:
     def label(self, row: int) -> str:
         """A response in words: "x", of another sensor than the tool's "elbow x"."""
         dof = self.responses[row]
+        if dof.node.endswith(UNTOLD):
+            return dof.node
         return dof.direction if dof.node == SENSOR else f"{dof.node} {dof.direction}"
 
     @property

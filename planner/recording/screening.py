@@ -162,8 +162,10 @@ def _soft(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
         return [
             Fault(
                 "too_slow",
-                f"Sampled at {hit.sampling_rate_hz:g} Hz, the record cannot reach {high:g} Hz; "
-                f"sample at {2.56 * high:.0f} Hz or faster.",
+                f"Sampled at {hit.sampling_rate_hz:g} Hz, its FRFs end at "
+                f"{0.45 * hit.sampling_rate_hz:.4g} Hz, before the end of the band of {low:g} to "
+                f"{high:g} Hz; sample at {2.56 * high:.0f} Hz or faster, or give another band "
+                f"(--band-hz).",
             )
         ]
     inside = spectrum[(frequency >= low) & (frequency <= high)]

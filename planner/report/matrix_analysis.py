@@ -8,17 +8,16 @@ from typing import Any
 from rich.console import Group
 from rich.text import Text
 
-from planner.errors import PlannerError
-from planner.frf.matrix import FrfMatrix, matrix_of
+from planner.frf.matrix import FrfMatrix
 from planner.modal.matrix_modes import MatrixMode, MatrixModes, modes_of_matrix, with_normal_modes
 from planner.recording.dof import Dof
 from planner.recording.geometry import Geometry, read_geometry
-from planner.recording.read import read
-from planner.recording.records import FrfRecord, Record
 from planner.report.answer import Answer, RefusedFile
-from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN, check_options, sources_of
+from planner.report.frf_set import FrfSet
+from planner.report.modal_analysis import LONGEST_NAME, NOT_DRAWN
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table, with_sd
+from planner.words import counted
 
 
 @dataclass(frozen=True)
@@ -90,8 +89,9 @@ class MatrixReport(Answer):
         """The modes as a table."""
         low, high = self.band_hz
         made = table(
-            f"Modes between {low:g} and {high:g} Hz from {self.frfs} FRFs, {len(self.dofs)} degrees"
-            f" of freedom (fit error {100 * self.fit_error:.1f} %)",
+            f"Modes between {low:g} and {high:g} Hz from {counted(self.frfs, 'FRF')}, "
+            f"{counted(len(self.dofs), 'degree of freedom', 'degrees of freedom')} "
+            f"(fit error {100 * self.fit_error:.1f} %)",
             *("mode", "frequency (Hz)", "damping (%)", "MPC", "MPD (°)", "modal mass (kg)"),
             *("largest at", "physical (%)"),
         )
@@ -110,36 +110,27 @@ class MatrixReport(Answer):
             f"{mode.mpc:.3f}",
             f"{mode.mpd_deg:.1f}",
             f"{mode.modal_mass_kg:.3g}" if mode.scaled else "not scaled",
-            f"{node} {direction}",
+            f"{node} {direction}".strip(),
             f"{100 * mode.probability:.0f}",
         )
 
 
 def matrix_report(
-    paths: Sequence[Path],
-    band_hz: tuple[float, float] | None,
+    given: FrfSet,
     quantity: str | None,
     pictures: Pictures,
     real: bool = False,
     files_to: Path | None = None,
-) -> MatrixReport | None:
-    """Analyse files of FRFs between any points; None where they are no such matrix.
+) -> MatrixReport:
+    """Analyse FRFs between any points.
 
-    They are then hits of one pose, or all three responses of one point, and read elsewhere. With
-    `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder for
-    universal files and tables.
+    With `real` the shapes are the real normal modes behind the complex ones; `files_to` is a folder
+    for universal files and tables. Raises InputError or RefusedError in one sentence.
     """
-    files = [source.path for source in sources_of(paths)]
-    if not any(isinstance(record, FrfRecord) for record in _first(files)):
-        return None
-    held, refused = _read(files)
-    frfs = [record for records in held.values() for record in records]
-    if not frfs or not _is_matrix(frfs):
-        return None
-    check_options(band_hz, quantity=quantity)
-    matrix = matrix_of(frfs, quantity)
-    geometry = read_geometry(tuple(files))
-    found = modes_of_matrix(matrix, band_hz, geometry)
+    files = given.files
+    matrix = given.matrix(quantity)
+    geometry = read_geometry(files)
+    found = modes_of_matrix(matrix, given.band_hz, geometry)
     if real:
         found = with_normal_modes(found)
     return MatrixReport(
@@ -150,8 +141,8 @@ def matrix_report(
         band_hz=found.band_hz,
         fit_error=found.found.fit_error,
         order=found.found.order,
-        refused=refused,
-        accepted=tuple(str(path) for path in held),
+        refused=given.refused,
+        accepted=given.accepted,
         remarks=found.remarks,
         simulated=matrix.simulated,
         exports=_export(matrix, found, geometry, real, files_to),
@@ -206,56 +197,3 @@ def _draw(
         moving = animate(found, geometry, pictures.folder.absolute(), mark)
         drawn["plots"] = [*drawn["plots"], *map(str, moving)]
     return drawn
-
-
-def _first(files: Sequence[Path]) -> tuple[Record, ...]:
-    """Records of the first file that can be read."""
-    for path in files:
-        try:
-            return read(path)
-        except PlannerError:
-            continue
-    return ()
-
-
-def _read(
-    files: Sequence[Path],
-) -> tuple[dict[Path, tuple[FrfRecord, ...]], tuple[RefusedFile, ...]]:
-    """FRFs of every file that holds some, and why others are refused; geometry alone is none."""
-    held, refused = {}, []
-    for path in files:
-        try:
-            records = read(path)
-        except PlannerError as error:
-            if read_geometry((path,)) is None:
-                refused.append(RefusedFile(str(path), str(error)))
-            continue
-        frfs = tuple(record for record in records if isinstance(record, FrfRecord))
-        held[path] = frfs
-        if not frfs:
-            del held[path]
-            why = f"{path} holds time histories, other files FRFs; name one kind only."
-            refused.append(RefusedFile(str(path), why))
-    return held, tuple(refused)
-
-
-def _is_matrix(frfs: Sequence[FrfRecord]) -> bool:
-    """Whether FRFs are between named points, and not all three responses of one point."""
-    if not all(record.response_node for record in frfs):
-        return False
-    pairs = {
-        (*felt, *hit)
-        for r in frfs
-        for felt, hit in zip(
-            zip(r.response_node, map(abs, r.response_direction), strict=True),
-            zip(r.reference_node, map(abs, r.reference_direction), strict=True),
-            strict=True,
-        )
-    }
-    if len({(felt, hit) for felt, _, hit, _ in pairs}) > 1:
-        return True
-    if not any(direction for _, direction, _, _ in pairs):
-        return False  # nothing is stated
-    hits = {hit for *_, hit in pairs}
-    felt = {hit: {d for _, d, _, other in pairs if other == hit} for hit in hits}
-    return not any({1, 2, 3} <= directions for directions in felt.values())

@@ -1,7 +1,7 @@
 """Answer of `modes` for the recordings of one pose, which belong to no campaign."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,15 +13,15 @@ from planner.campaign.events import Amplitude
 from planner.campaign.log_conversion import from_homogeneity
 from planner.dataset.measure import measure
 from planner.dataset.screened_files import Source, in_parts, told_of_files
-from planner.errors import InputError, PlannerError, RefusedError
+from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
-from planner.recording.folder import CHANNELS, files_in
+from planner.recording.folder import CHANNELS, TABLE, files_in, joint_columns, read_recordings
+from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS
-from planner.recording.records import FrfRecord
 from planner.report.answer import Answer, RefusedFile
 from planner.report.plot_files import Pictures
 from planner.report.text import SIMULATED, drawn, remarks, table, with_sd
@@ -139,26 +139,20 @@ def check_options(
 
 
 def modal_report(
-    paths: Sequence[Path],
+    sources: tuple[Source, ...],
     band_hz: tuple[float, float] | None = None,
     force: str | None = None,
     estimator: str = "h1",
     pictures: Pictures = NO_PICTURES,
-    quantity: str | None = None,
     window_rate_1_s: float = 0.0,
 ) -> ModalReport:
-    """Analyse files, or folders of files, of one pose.
+    """Analyse files of one pose.
 
-    `force` names the force channel of a long record whose channels are not labelled, `quantity`
-    what unlabelled FRFs are. Raises RefusedError if no file could be used.
+    `force` names the force channel of a long record whose channels are not labelled. Raises
+    RefusedError if no file could be used.
     """
-    check_options(band_hz, estimator, quantity, window_rate_1_s)
-    sources = sources_of(paths)
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)
-    unlabelled = _unlabelled(sources)
-    if unlabelled is not None:
-        return _by_transfer(unlabelled, band_hz, quantity, pictures)
     band = band_hz or DEFAULT_BAND_HZ
     measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
     refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
@@ -182,17 +176,28 @@ def modal_report(
     )
 
 
-def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
-    """All recordings that files and folders hold; InputError for what does not exist."""
-    found: list[Path] = []
+def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source, ...]:
+    """All recordings that files and folders hold; InputError for what does not exist.
+
+    With `from_names` FRFs have what they do not state of their places from the files' names.
+    """
+    found: list[Source] = []
     for path in paths:
-        if path.is_dir():
-            found += files_in(path, READERS)
+        if (path / TABLE).is_file():
+            table = read_recordings(path, joint_columns(path), ANYWHERE, bare=True)
+            found += [_of_no_robot(Source.of(row)) for row in table.rows]
+        elif path.is_dir():
+            found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():
-            found += [path] if path.name != CHANNELS else []
+            found += [Source(path, str(path))] if path.name != CHANNELS else []
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
-    return tuple(Source(path, str(path)) for path in found)
+    return tuple(replace(source, from_name=from_names) for source in found)
+
+
+def _of_no_robot(source: Source) -> Source:
+    """Without names of points, but those that the table says."""
+    return replace(source, stated=replace(source.stated, names=PointNames()))
 
 
 def _draw(
@@ -239,43 +244,3 @@ def _by_channel(
     accepted, simulated = (sources[0].name,), records[0].simulated
     plots = _draw(pictures, None, found, modal, accepted, simulated)
     return ModalReport.of(modal, accepted=accepted, simulated=simulated, **plots)
-
-
-def _unlabelled(sources: tuple[Source, ...]) -> FrfRecord | None:
-    """The FRFs of a single file that states no directions."""
-    from planner.recording.read import read
-
-    if len(sources) != 1:
-        return None
-    try:
-        records = read(sources[0].path)
-    except PlannerError:
-        return None  # said again, with the file's name, where it is read in earnest
-    frfs = [r for r in records if isinstance(r, FrfRecord) and not any(r.response_direction)]
-    return frfs[0] if frfs else None
-
-
-def _by_transfer(
-    record: FrfRecord,
-    band_hz: tuple[float, float] | None,
-    quantity: str | None,
-    pictures: Pictures,
-) -> ModalReport:
-    """FRFs without directions: poles and unscaled shapes."""
-    from planner.modal.transfer_functions import modes_from_transfer_functions
-
-    modal = modes_from_transfer_functions(record, quantity, band_hz)
-    plots = NOT_DRAWN
-    if pictures.wanted:
-        from planner.report.modal_plots import cmif_figure, mac_figure
-
-        name = record.source.name[-LONGEST_NAME:]
-        figures = {
-            "cmif": cmif_figure(record.frequency_hz, record.values, modal, f"CMIF · {name}"),
-            "mac": mac_figure(modal, f"AutoMAC · {name}"),
-        }
-        plots = pictures.write(figures, name)
-    accepted = (str(record.source),)
-    return ModalReport.of(
-        modal, fit_error=None, accepted=accepted, simulated=record.simulated, **plots
-    )

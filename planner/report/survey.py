@@ -25,11 +25,12 @@ from planner.modal.tracking import Guide, Tracks, track
 from planner.recording.folder import joint_columns, read_recordings
 from planner.recording.records import PoseRow, RecordingsFolder
 from planner.report.answer import NOT_IN_JSON, Answer, RefusedFile
-from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode, check_options
+from planner.report.modal_analysis import DEFAULT_BAND_HZ, IdentifiedMode
 from planner.report.plot_files import Pictures
 from planner.report.sensor_masses import WithoutSensors, without_sensors
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
 from planner.robot.robot import Robot
+from planner.words import counted
 
 ABOVE = 2  # labels of the simulation above the modes of the pose that has most
 SURE = 0.9  # probability of a label below which the text marks it as doubtful
@@ -126,7 +127,7 @@ class SurveyReport(Answer):
         labels = sorted({mode.label for pose in self.poses for mode in pose.modes if mode.label})
         low, high = self.band_hz
         made = table(
-            f"Modes of {len(self.poses)} poses between {low:g} and {high:g} Hz",
+            f"Modes of {counted(len(self.poses), 'pose')} between {low:g} and {high:g} Hz",
             *("pose", *(f"mode {label} (Hz)" for label in labels), "without label (Hz)"),
         )
         for pose in self.poses:
@@ -144,7 +145,6 @@ def survey(
     band_hz: tuple[float, float] | None,
     robot_toml: Path | None,
     estimator: str,
-    quantity: str | None,
     window_rate_1_s: float,
     progress: Callable[[str], None],
 ) -> SurveyReport:
@@ -152,7 +152,6 @@ def survey(
 
     Raises RefusedError where no pose gives a mode.
     """
-    check_options(band_hz, estimator, quantity, window_rate_1_s)
     band = band_hz or DEFAULT_BAND_HZ
     table = _table(folder, robot_toml)
     names = tuple(dict.fromkeys(row.pose for row in table.rows))
@@ -172,9 +171,11 @@ def survey(
             q = table.joints.internal(rows[0].joints_deg)
             visited.append(_visited(name, q, measured))
     if not any(found):
+        reasons = [file.reason for file in refused] + [
+            told for one in every for told in one.remarks
+        ]
         raise RefusedError(
-            f"{folder}: no pose gives a mode between {band[0]:g} and "
-            f"{band[1]:g} Hz; see `planner modes` of one pose's files."
+            f"{folder}: no pose gives a mode between {band[0]:g} and {band[1]:g} Hz: {reasons[0]}"
         )
     first = {row.pose: row for row in reversed(table.rows)}
     q = table.joints.internal([first[name].joints_deg for name in names])

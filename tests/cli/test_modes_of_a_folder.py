@@ -55,6 +55,47 @@ def test_a_robot_with_other_joints_is_refused(folder, tmp_path):
     assert "Traceback" not in run.stderr
 
 
+def some_of(folder, target, rows):
+    """A copy of a folder with some rows of its table, by `rows(cells)` (None: left out)."""
+    shutil.copytree(folder, target)
+    header, *lines = (folder / "recordings.csv").read_text().splitlines()
+    kept = [row for line in lines if (row := rows(line.split(",")))]
+    text = "\n".join([header, *(",".join(row) for row in kept)])
+    (target / "recordings.csv").write_text(text + "\n", encoding="utf-8")
+    return target
+
+
+def test_a_folder_of_one_pose_is_that_pose(folder, tmp_path):
+    one = some_of(folder, tmp_path / "one", lambda row: row if row[0] == "A21" else None)
+    answer = planner_json("modes", str(one))
+    files = planner_json("modes", *(str(p) for p in sorted(one.glob("data/A21*"))))
+    assert answer["modes"] == files["modes"]
+    assert answer.keys() == files.keys()
+    toml = str(shipped("kr240_plane") / "robot" / "robot.toml")
+    labelled = planner_json("modes", str(one), "--robot", toml)
+    assert [pose["pose"] for pose in labelled["poses"]] == ["A21"]
+    found = [mode["frequency_hz"] for mode in labelled["modes"]]
+    assert found == pytest.approx([mode["frequency_hz"] for mode in answer["modes"]], rel=1e-3)
+
+
+@pytest.mark.parametrize("robot", [True, False])
+def test_poses_named_twice_in_scripts_that_fonts_lack(folder, tmp_path, robot):
+    """The robot stood still between two poses; their names draw no warning."""
+    first = (folder / "recordings.csv").read_text().splitlines()[1].split(",")
+    names = {"A21": "\u59ff\u52bf", "A22": "\U00012000 2"}
+
+    def still(row):
+        return [names[row[0]], *first[1:7], *row[7:]] if row[0] in names else None
+
+    two = some_of(folder, tmp_path / "two", still)
+    toml = str(shipped("kr240_plane") / "robot" / "robot.toml")
+    options = ["--robot", toml] if robot else []
+    run = planner("modes", two, "--plot", tmp_path / "plots", *options)
+    assert run.returncode == 0
+    assert run.stderr == ""
+    assert (tmp_path / "plots" / "campbell.png").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize("option", [("--real",), ("--export", "files"), ("--operating",)])
 def test_what_is_for_other_points_is_refused_for_hits_at_the_tool(folder, option):
     code, _, told = call("modes", folder, *option)

@@ -5,9 +5,12 @@ import subprocess
 import sys
 
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
 from rerun.chunk import RrdReader
 
 from planner.cli.run import run
+from planner.report.picture_files import rendered
 from tests.support.outside import make_cell, record
 
 NAMES = ["stabilisation", "frf", "coherence", "mac"]
@@ -112,3 +115,14 @@ def test_matplotlib_and_rerun_are_only_imported_for_pictures(hits):
             [sys.executable, "-c", program, *arguments], capture_output=True, text=True, timeout=60
         )
         assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("form", ["png", "svg"])
+def test_characters_that_a_font_lacks_are_drawn_by_another(form):
+    """Without a warning (they are errors here), also where no font has them."""
+    figure = Figure()
+    lacking = figure.text(0.1, 0.5, "\u0416 \U00012000", fontfamily="cmr10")
+    assert rendered(figure, format=form)
+    first, *others = lacking.get_fontfamily()
+    assert first == "cmr10"
+    assert any(0x416 in get_font(findfont(name)).get_charmap() for name in others)

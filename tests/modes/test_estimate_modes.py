@@ -143,6 +143,21 @@ def test_scatter_between_lines_unlike_the_stated_variance_enlarges_the_sd():
     assert any("enlarged" in remark for remark in boasting.remarks)
 
 
+def test_sds_do_not_hang_on_the_band():
+    """Lines cut off to check the model may be all that hold a mode near the band's edge."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        system = random_system(rng, 5, (8.0, 60.0), damping=(0.01, 0.04))
+        h, variance = noisy(exact_frf(system, LINES), 0.003, rng)
+        first, last = system.frequency_hz[[0, -1]]
+        lows, highs = first * rng.uniform(0.5, 0.9, 8), last * rng.uniform(1.1, 1.25, 8)
+        bands = zip(lows, highs, strict=True)
+        models = [estimate_modes(as_frf(LINES, h, variance), band) for band in bands]
+        lowest = [m.modes[int(np.argmin(np.abs(frequencies(m) - first)))] for m in models]
+        sds = [mode.frequency_sd_hz for mode in lowest]
+        assert np.max(sds) < 2 * np.min(sds)
+
+
 def test_probability_is_high_for_modes_with_support():
     rng = np.random.default_rng(6)
     system = random_system(rng, 4, damping=(0.01, 0.03))

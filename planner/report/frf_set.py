@@ -1,0 +1,204 @@
+"""FRFs of any points: exported by an analyser, or estimated here from hits of any points."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.dataset.measure import MeasuredPose
+from planner.dataset.screened_files import Source, in_parts
+from planner.dataset.store import user_store
+from planner.errors import PlannerError, RefusedError
+from planner.frf.between_points import exported
+from planner.frf.matrix import FrfMatrix, matrix_of
+from planner.recording.excited_band import excited_band
+from planner.recording.geometry import read_geometry
+from planner.recording.points import ANYWHERE
+from planner.recording.read import read
+from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
+from planner.report.answer import RefusedFile
+from planner.report.modal_analysis import DEFAULT_BAND_HZ
+
+
+@dataclass(frozen=True, eq=False)
+class FrfSet:
+    """FRFs, and what became of the files that they are from.
+
+    `band_hz` is where modes are looked for, None: wherever there are lines. Not `placed` are those
+    that state neither where nor along which directions they were measured. Rate and tail as in
+    `Frf`; `ended` are FRFs of hits under a window by which decays are over, of that rate.
+    """
+
+    records: tuple[FrfRecord, ...]
+    files: tuple[Path, ...]
+    accepted: tuple[str, ...]
+    refused: tuple[RefusedFile, ...]
+    band_hz: tuple[float, float] | None
+    placed: bool
+    exponential_rate_1_s: float = 0.0
+    tail_s: float = np.inf
+    ended: FrfRecord | None = None
+    ended_rate_1_s: float = 0.0
+
+    def matrix(self, quantity: str | None) -> FrfMatrix:
+        """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
+        found = matrix_of(self.records, quantity)
+        rate, ended = self.exponential_rate_1_s, None
+        if self.ended is not None:
+            ended = matrix_of((self.ended,))
+            ended = replace(ended, exponential_rate_1_s=self.ended_rate_1_s)
+        return replace(found, exponential_rate_1_s=rate, tail_s=self.tail_s, ended=ended)
+
+
+def frf_set(
+    sources: Sequence[Source],
+    band_hz: tuple[float, float] | None,
+    estimator: str = "h1",
+    window_rate_1_s: float = 0.0,
+) -> FrfSet | None:
+    """The FRFs of files; None where they are of one point with all its three responses.
+
+    That is a pose, be it hits or FRFs, and read elsewhere. The first file that can be read says
+    which of both is meant. Raises RefusedError where no hit can be used.
+    """
+    held, refused = _read(sources)
+    records = [record for _, own in held for record in own]
+    if records and isinstance(records[0], TimeRecord):
+        times = [record for record in records if isinstance(record, TimeRecord)]
+        if _one_sensor(times) and not any(s.stated.hit_point for s in sources):
+            return None
+        return _struck(sources, band_hz, estimator, window_rate_1_s)
+    given, used = [], []
+    for source, own in held:
+        frfs = [record for record in own if isinstance(record, FrfRecord)]
+        given += frfs
+        if frfs:
+            used.append(source.name)
+        else:
+            why = f"{source.name} holds time histories, other files FRFs; name one kind only."
+            refused.append(RefusedFile(source.name, why))
+    if not given or _of_one_point(given):
+        return None
+    return FrfSet(
+        tuple(given),
+        tuple(source.path for source in sources),
+        tuple(used),
+        tuple(refused),
+        band_hz,
+        _placed(given),
+        window_rate_1_s,
+    )
+
+
+def _read(
+    sources: Sequence[Source],
+) -> tuple[list[tuple[Source, tuple[Record, ...]]], list[RefusedFile]]:
+    """Records of every file, and why others are refused; geometry alone is no reason."""
+    held, refused = [], []
+    for source in sources:
+        try:
+            own = read(source.path)
+            held.append((source, tuple(map(source.placed, own))))
+        except PlannerError as error:
+            if read_geometry((source.path,)) is None:
+                refused.append(RefusedFile(source.name, str(error)))
+    return held, refused
+
+
+def _one_sensor(times: Sequence[TimeRecord]) -> bool:
+    """Whether hits are those of a pose: at one point, heard along x, y and z by one sensor.
+
+    So it is, too, where nothing is a hit, and where single files lack a direction: what is wrong
+    with them is said where poses are read.
+    """
+    places, whole = set(), False
+    for record in times:
+        force = [_node(c.node) for c in record.channels if c.quantity == "force"]
+        heard = [c for c in record.channels if c.quantity == "acceleration"]
+        if len(force) == 1 and heard:
+            places.add((force[0], frozenset(_node(c.node) for c in heard)))
+            whole = whole or sorted(abs(c.direction) for c in heard) == [1, 2, 3]
+    return not places or (len(places) == 1 and whole)
+
+
+def _node(name: str) -> str:
+    return "" if name == "0" else name
+
+
+def _struck(
+    sources: Sequence[Source],
+    band_hz: tuple[float, float] | None,
+    estimator: str,
+    window_rate_1_s: float,
+) -> FrfSet:
+    """FRFs of hits, screened and averaged as those of a pose are."""
+    named = (replace(s, stated=replace(s.stated, names=ANYWHERE)) for s in sources)
+    parts = in_parts(tuple(s for s in named if read_geometry((s.path,)) is None))
+    band = band_hz or _band(parts)
+    measured = MeasuredPose(parts, band, estimator, window_rate_1_s, store=user_store())
+    verdicts, frf, ended = measured.verdicts, measured.whole, measured.ended_frf
+    refused = tuple(RefusedFile(v.source.name, v.reason) for v in verdicts if not v.accepted)
+    if frf is None or ended is None:
+        reasons = [file.reason for file in refused] or list(measured.averaged.remarks)
+        raise RefusedError(f"No modes could be identified: {reasons[0]}")
+    used = [v for v in verdicts if v.accepted]
+    path, simulated = used[0].source.path, any(v.simulated for v in used)
+    return FrfSet(
+        (exported(frf, path, simulated),),
+        tuple(source.path for source in sources),
+        tuple(v.source.name for v in used),
+        refused,
+        band,
+        True,
+        frf.exponential_rate_1_s,
+        frf.tail_s,
+        exported(ended, path, simulated),
+        ended.exponential_rate_1_s,
+    )
+
+
+def _band(parts: Sequence[Source]) -> tuple[float, float]:
+    """Which the hits excite."""
+    hits: list[Hit] = []
+    for part in parts:
+        try:
+            hits += part.read()[0]
+        except PlannerError:
+            continue  # said again, where it is read in earnest
+    return excited_band(hits) if hits else DEFAULT_BAND_HZ
+
+
+def _placed(frfs: Sequence[FrfRecord]) -> bool:
+    pairs = _pairs(frfs)
+    return len({(felt, hit) for felt, _, hit, _ in pairs}) > 1 or any(d for _, d, *_ in pairs)
+
+
+def _of_one_point(frfs: Sequence[FrfRecord]) -> bool:
+    """Whether FRFs are all three responses of one point, or of a format without points."""
+    pairs = _pairs(frfs)
+    if not all(record.response_node for record in frfs):
+        return any(along for _, along, *_ in pairs)
+    if len({(felt, hit) for felt, _, hit, _ in pairs}) > 1:
+        return False
+    hits = {hit for *_, hit in pairs}
+    felt = {hit: {d for _, d, _, other in pairs if other == hit} for hit in hits}
+    return any({1, 2, 3} <= directions for directions in felt.values())
+
+
+def _pairs(frfs: Sequence[FrfRecord]) -> set[tuple[str, int, str, int]]:
+    """Node and direction, without its sign, of every response and of its hit."""
+    found = set()
+    for record in frfs:
+        none = ("",) * len(record.values)
+        found |= {
+            (felt, abs(along), hit, abs(struck))
+            for felt, along, hit, struck in zip(
+                record.response_node or none,
+                record.response_direction,
+                record.reference_node or none,
+                record.reference_direction,
+                strict=True,
+            )
+        }
+    return found

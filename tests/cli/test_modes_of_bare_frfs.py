@@ -1,0 +1,94 @@
+"""`planner modes` of FRFs that state little, and of bands in which they have no lines."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from planner.cli.run import run
+from tests.support.structures import plate
+
+BAND = (25.0, 120.0)
+PLATE = plate(3, 3)
+NODES = range(len(PLATE.nodes))
+
+
+def modes(capsys, *arguments):
+    code = run(["modes", *(str(a) for a in arguments), "--json"])
+    captured = capsys.readouterr()
+    return code, json.loads(captured.out) if captured.out else None, captured.err
+
+
+def exact_frfs(folder, names, axis=0, turned=False):
+    """Exact FRFs of the plate's first points as named columns, one file each; none has a node."""
+    hz, files = np.arange(1, 601) * 0.25, []
+    for k, name in enumerate(names):
+        h = PLATE.accelerance(hz, [k], [axis])[0, 0] * (-1 if turned else 1)
+        files.append(folder / f"{k}.csv")
+        table = np.column_stack([hz, h.real, h.imag])
+        head = f"frequency_hz,{name}_re,{name}_im"
+        np.savetxt(files[-1], table, delimiter=",", header=head, comments="", fmt="%.9g")
+    return files
+
+
+def test_a_turned_channel_of_a_nameless_point(tmp_path, capsys):
+    (path,) = exact_frfs(tmp_path, ["accelerance_xx"], turned=True)
+    code, answer, _ = modes(capsys, path, "--band-hz", *BAND)
+    assert (code, answer["dofs"], len(answer["modes"])) == (0, [["", "x"]], 3)
+    assert "The sign of the channel along x is turned" in " ".join(answer["remarks"])
+    assert "node" not in " ".join(answer["remarks"])
+
+
+def logged(path, rows, hz):
+    """FRFs of rows as a logger saves them that knows no directions."""
+    h = np.zeros((len(rows), hz.size), complex)
+    h[:, 1:] = PLATE.accelerance(hz[1:], rows, [0])[:, 0]
+    samples = 2 * (hz.size - 1)
+    savemat(path, {"yspec": h.T, "npts": samples, "freq": hz[1] * samples, "tfun": 1})
+    return path
+
+
+def test_unlabelled_frfs_of_several_files_are_rows_of_one_analysis(tmp_path, capsys):
+    hz = np.arange(513) * 0.25
+    whole = logged(tmp_path / "whole.mat", list(NODES), hz)
+    parts = [logged(tmp_path / f"{k}.mat", [2 * k, 2 * k + 1], hz) for k in range(4)]
+    options = "--quantity", "accelerance", "--band-hz", *BAND
+    code, answer, err = modes(capsys, *parts, logged(tmp_path / "last.mat", [8], hz), *options)
+    assert (code, err) == (0, "")
+    assert len(answer["accepted"]) == 5
+    assert [len(mode["shape"]) for mode in answer["modes"]] == 3 * [len(NODES)]
+    assert answer["modes"] == modes(capsys, whole, *options)[1]["modes"]
+    other = logged(tmp_path / "other.mat", [0], hz * 1.5)
+    code, _, err = modes(capsys, *parts, other, *options)
+    assert code in (2, 3)
+    assert "other.mat has other frequency lines" in err
+
+
+@pytest.mark.parametrize(
+    ("band", "told"),
+    [((200, 400), "The FRFs end at 150 Hz, below the band of 200 to 400 Hz"),
+     ((0.01, 0.2), "The FRFs begin at 0.25 Hz, above the band of 0.01 to 0.2 Hz")],
+)  # fmt: skip
+@pytest.mark.parametrize("kind", ["matrix", "pose", "folder", "unlabelled"])
+def test_bands_that_frfs_do_not_hold_are_named(kind, band, told, tmp_path, capsys):
+    if kind == "unlabelled":
+        paths = [logged(tmp_path / "a.mat", [0, 1], np.arange(601) * 0.25)]
+    else:
+        names = [f"accelerance_{axis}x" for axis in ("xy" if kind == "matrix" else "xyz")]
+        paths = exact_frfs(tmp_path, names)
+    if kind == "folder":
+        joined = np.column_stack([np.loadtxt(p, delimiter=",", skiprows=1)[:, 1:] for p in paths])
+        lines = np.loadtxt(paths[0], delimiter=",", skiprows=1)[:, :1]
+        head = ",".join(["frequency_hz", *(f"{n}_{part}" for n in names for part in ("re", "im"))])
+        for pose in ("P1", "P2"):
+            np.savetxt(tmp_path / f"{pose}.csv", np.hstack([lines, joined]), delimiter=",",
+                       header=head, comments="")  # fmt: skip
+        rows = "pose,hit,repeat,file\nP1,+x,1,P1.csv\nP2,+x,1,P2.csv\n"
+        (tmp_path / "recordings.csv").write_text(rows)
+        paths = [tmp_path]
+    code, _, err = modes(capsys, *paths, "--quantity", "accelerance", "--band-hz", *band)
+    assert code == 3
+    assert told in err
+    assert "--band-hz" in err
+    assert len(err.strip().splitlines()) == 1

@@ -1,0 +1,162 @@
+"""`planner modes` of time histories of any points: one sensor, a roving hammer, a roving sensor."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.cli.run import run
+from planner.modal.mac import mac
+from tests.support.struck_structures import unit_mass_shapes
+from tests.support.structures import plate
+from tests.support.taps import tap, write_csv, write_uff
+
+BAND = (25.0, 120.0)
+PLATE = plate(3, 3)
+NODES = range(len(PLATE.nodes))
+
+
+def modes(capsys, *arguments):
+    code = run(["modes", *(str(a) for a in arguments), "--json"])
+    captured = capsys.readouterr()
+    return code, json.loads(captured.out) if captured.out else None, captured.err
+
+
+def agree(answer, scale=0.03, shapes=True):
+    """Frequency and damping within 4 sds and 0.2 %, shapes by node, scaled where so."""
+    poles, true = unit_mass_shapes(PLATE)
+    inside = (np.abs(poles) > 2 * np.pi * BAND[0]) & (np.abs(poles) < 2 * np.pi * BAND[1])
+    found = [m for m in answer["modes"] if BAND[0] < m["frequency_hz"] < BAND[1]]
+    assert len(found) == np.count_nonzero(inside) == 3
+    for mode, pole, own in zip(found, poles[inside], true[:, inside].T, strict=True):
+        hz, ratio = abs(pole) / (2 * np.pi), -pole.real / abs(pole)
+        assert abs(mode["frequency_hz"] - hz) < min(4 * mode["frequency_sd_hz"], 2e-3 * hz)
+        assert abs(mode["damping_ratio"] - ratio) < min(4 * mode["damping_sd"], 0.1 * ratio)
+        if not shapes:
+            continue
+        rows = [PLATE.nodes.index(int(str(node).lstrip("n"))) for node, _ in answer["dofs"]]
+        shape = np.array([complex(*value) for value in mode["shape"]])
+        assert mac(shape, own[rows]) > 0.99
+        assert mode["scaled"] == (scale is not None)
+        if scale is not None:
+            assert np.linalg.norm(shape) == pytest.approx(np.linalg.norm(own[rows]), rel=scale)
+
+
+def roving_hammer(folder, rng):
+    return [write_uff(folder / f"{k}.uff", [tap(PLATE, k, (0,), rng)]) for k in NODES]
+
+
+def roving_sensor(folder, rng):
+    return [write_uff(folder / f"{k}.uff", [tap(PLATE, 0, (k,), rng)], turned=True) for k in NODES]
+
+
+def one_file(folder, rng):
+    return [write_uff(folder / "all.uff", [tap(PLATE, k, (0,), rng) for k in NODES])]
+
+
+def repeats(folder, rng):
+    every = [tap(PLATE, k, (0, 4), rng) for k in NODES for _ in range(2)]
+    return [write_uff(folder / f"{i}.uff", [one]) for i, one in enumerate(every)]
+
+
+def named_columns(folder, rng):
+    told = "hit: +z", "hit_point: n{}"
+    for k in NODES:
+        own = [text.format(PLATE.nodes[k]) for text in told]
+        write_csv(folder / f"{k}.csv", tap(PLATE, k, (0, 5), rng), "acceleration_{}_z_m_s2", *own)
+    return [folder]
+
+
+def table(folder, rng):
+    """Points that recordings.csv alone tells."""
+    rows = ["pose,hit,hit_point,response_points,repeat,file"]
+    for k in NODES:
+        write_csv(folder / f"{k}.csv", tap(PLATE, k, (0,), rng), "acceleration_z_m_s2")
+        rows.append(f"P1,+z,{PLATE.nodes[k]},{PLATE.nodes[0]},1,{k}.csv")
+    (folder / "recordings.csv").write_text("\n".join(rows) + "\n")
+    return [folder]
+
+
+@pytest.mark.parametrize(
+    "write", [roving_hammer, roving_sensor, one_file, repeats, named_columns, table]
+)
+def test_hits_of_any_points(write, tmp_path, capsys):
+    paths = write(tmp_path, np.random.default_rng(4))
+    code, answer, err = modes(capsys, *paths, "--band-hz", *BAND)
+    assert (code, err) == (0, "")
+    assert len(answer["dofs"]) == len(NODES)
+    assert answer["simulated"] == (write not in (named_columns, table))
+    assert answer["refused"] == []
+    agree(answer)
+
+
+@pytest.mark.parametrize(
+    ("column", "attributes", "dof", "scaled"),
+    [
+        ("acceleration_z_m_s2", ("hit: +z",), ["", "z"], True),
+        ("acceleration_z_m_s2", ("hit: +x",), ["", "z"], False),
+        ("acceleration_z_m_s2", (), ["", "z"], False),
+        ("acceleration_m_s2", ("hit: +z",), ["acceleration_m_s2", "scalar"], False),
+        ("acceleration_m_s2", (), ["acceleration_m_s2", "scalar"], False),
+    ],
+)
+def test_a_hammer_and_one_sensor(column, attributes, dof, scaled, tmp_path, capsys):
+    """Without a band: where the hit excites; what is not stated is not made up."""
+    path = write_csv(tmp_path / "tap.csv", tap(PLATE, 0, (0,), np.random.default_rng(2)), column,
+                     *attributes)  # fmt: skip
+    code, answer, err = modes(capsys, path)
+    assert (code, err) == (0, "")
+    assert answer["dofs"] == [dof]
+    assert BAND[1] < answer["band_hz"][1] < 512
+    assert {mode["scaled"] for mode in answer["modes"]} == {scaled}
+    agree(answer, shapes=False)
+
+
+def test_an_analysers_window_is_taken_out_of_the_damping(tmp_path, capsys):
+    rng, rate = np.random.default_rng(3), 3.0
+    one = tap(PLATE, 0, (0,), rng)
+    window = np.exp(-rate * np.maximum(0, np.arange(one.force_n.size) / 1024.0 - 0.102))
+    one.acceleration_m_s2[:] *= window
+    one.force_n[:] *= window
+    path = write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
+    code, answer, _ = modes(capsys, path, "--window-rate", rate)
+    assert code == 0
+    agree(answer, shapes=False)
+
+
+def test_faulty_hits_are_refused_and_the_others_used(tmp_path, capsys):
+    rng = np.random.default_rng(6)
+    paths = roving_hammer(tmp_path, rng)
+    double = write_uff(tmp_path / "double.uff", [tap(PLATE, 3, (0,), rng, second=0.6)])
+    run_of = [tap(PLATE, 5, (0,), rng, second=share) for share in (0.0, 0.5)]
+    run_of = write_uff(tmp_path / "run.uff", run_of)
+    code, answer, err = modes(capsys, *paths, double, run_of, "--band-hz", *BAND)
+    assert code == 3
+    assert [one["file"] for one in answer["refused"]] == [str(double), f"{run_of} (hit 2)"]
+    assert all("second pulse" in one["reason"] for one in answer["refused"])
+    agree(answer)
+    code, answer, err = modes(capsys, double)
+    assert (code, answer) == (3, None)
+    assert "second pulse" in err
+    assert len(err.strip().splitlines()) == 1
+
+
+def test_pictures_and_files_of_taps(tmp_path, capsys):
+    paths = roving_hammer(tmp_path, np.random.default_rng(7))
+    options = "--plot", tmp_path / "plots", "--export", tmp_path / "out", "--band-hz", *BAND
+    code, answer, err = modes(capsys, *paths, *options)
+    assert (code, err) == (0, "")
+    assert all(Path(path).read_bytes().startswith(b"\x89PNG") for path in answer["plots"])
+    code, again, _ = modes(capsys, tmp_path / "out" / "frfs.uff", "--band-hz", *BAND)
+    assert code == 0
+    assert again["dofs"] == answer["dofs"]
+
+
+def test_a_record_sampled_too_slowly_for_the_band_names_both(tmp_path, capsys):
+    one = tap(PLATE, 0, (0,), np.random.default_rng(2))
+    path = write_csv(tmp_path / "tap.csv", one, "acceleration_z_m_s2", "hit: +z")
+    code, _, err = modes(capsys, path, "--band-hz", 600, 900)
+    assert code == 3
+    assert "its FRFs end at 460.8 Hz, before the end of the band of 600 to 900 Hz" in err
+    assert "--band-hz" in err

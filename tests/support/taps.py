@@ -1,0 +1,87 @@
+"""Time histories of hits on simulated structures, as files: any points, any number of sensors."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyuff
+
+from tests.support.structures import Structure
+
+RATE_HZ, SAMPLES, LONG = 1024.0, 1024, 16
+PULSE_S, BEFORE_S, PEAK_N = 0.004, 0.1, 200.0
+
+
+@dataclass(frozen=True, eq=False)
+class Tap:
+    """A hit at one degree of freedom (index) of a structure, felt at others: n samples each."""
+
+    structure: Structure
+    hit: int
+    felt: tuple[int, ...]
+    force_n: np.ndarray
+    acceleration_m_s2: np.ndarray  # (r, n)
+
+
+def tap(
+    structure: Structure,
+    hit: int,
+    felt: tuple[int, ...],
+    rng: np.random.Generator,
+    noise: float = 2e-3,
+    second: float = 0.0,
+) -> Tap:
+    """Records of 1 s that end while the structure rings.
+
+    Noise by the responses' rms (5e-4 of the peak on the force); `second`: size of a second pulse
+    30 ms later, relative.
+    """
+    n = SAMPLES * LONG
+    t = np.arange(n) / RATE_HZ
+    pulses = [(BEFORE_S, 1.0), (BEFORE_S + 0.03, second)]
+    force = sum(
+        PEAK_N * size * np.sin(np.pi * np.clip((t - at) / PULSE_S, 0, 1)) ** 2
+        for at, size in pulses
+    )
+    hz = np.fft.rfftfreq(n, 1 / RATE_HZ)
+    h = np.zeros((len(felt), hz.size), complex)
+    h[:, 1:] = structure.accelerance(hz[1:], list(felt), [hit])[:, 0]
+    a = np.fft.irfft(h * np.fft.rfft(force), n, axis=1)[:, :SAMPLES]
+    a = a + noise * np.std(a, axis=1, keepdims=True) * rng.standard_normal(a.shape)
+    return Tap(structure, hit, felt, force[:SAMPLES] + 0.1 * rng.standard_normal(SAMPLES), a)
+
+
+def write_uff(path: Path, taps: list[Tap], turned: bool = False) -> Path:
+    """One hit after the other, labelled as simulated; responses along −z where `turned`."""
+    sets = []
+    for one in taps:
+        nodes = one.structure.nodes
+        ends = [(nodes[one.hit], 3, 13, "N", one.force_n)]
+        sign = -1 if turned else 1
+        heard = zip(one.felt, one.acceleration_m_s2, strict=True)
+        ends += [(nodes[k], 3 * sign, 12, "m/s^2", sign * own) for k, own in heard]
+        sets += [
+            {
+                "type": 58, "binary": 1, "func_type": 1, "id1": "simulated", "rsp_node": node,
+                "rsp_dir": direction, "ref_node": nodes[one.hit], "ref_dir": 3, "data": samples,
+                "x": np.arange(samples.size) / RATE_HZ, "abscissa_spacing": 1,
+                "abscissa_spec_data_type": 17, "ordinate_spec_data_type": kind,
+                "ordinate_axis_units_lab": unit, "orddenom_spec_data_type": 0,
+            }
+            for node, direction, kind, unit, samples in ends
+        ]  # fmt: skip
+    path.unlink(missing_ok=True)
+    pyuff.UFF(str(path)).write_sets(sets, "add")
+    return path
+
+
+def write_csv(path: Path, one: Tap, columns: str, *attributes: str) -> Path:
+    """Named columns, {} where the node goes, below lines of attributes ("hit: +z")."""
+    nodes = [f"n{one.structure.nodes[k]}" for k in one.felt]
+    head = [f"# {text}" for text in attributes]
+    names = ["time_s", "force_n", *(columns.format(node) for node in nodes)]
+    t = np.arange(one.force_n.size) / RATE_HZ
+    table = np.column_stack([t, one.force_n, one.acceleration_m_s2.T])
+    text = "\n".join([*head, ",".join(names)])
+    np.savetxt(path, table, delimiter=",", header=text, comments="", fmt="%.9g")
+    return path
