@@ -64,10 +64,10 @@ def decoded(path: Path, most_bytes: int) -> str:
         raise InputError(f"{path} cannot be read ({error}); export it again.") from None
     if len(data) > most_bytes:
         raise InputError(f"{path} holds more than {most_bytes >> 20} MiB of text; split it.")
+    marked = next((name for bom, name in BOMS.items() if data.startswith(bom)), None)
+    if marked is None and b"\x00" in data[:4096]:
+        raise InputError(f"{path} is binary, not a text table; check its name and format.")
     try:
-        marked = next((name for bom, name in BOMS.items() if data.startswith(bom)), None)
-        if marked is None and b"\x00" in data[:4096]:
-            raise InputError(f"{path} is binary, not a text table; check its name and format.")
         return data.decode(marked or "utf-8")
     except UnicodeDecodeError:
         return data.decode("cp1252" if marked is None else "latin-1", errors="replace")

@@ -122,7 +122,7 @@ def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, str]:
     for one in _alternatives(given):
         if isinstance(one, types.StructType):
             return one.cls, "[{}]"
-        inner = getattr(one, "item_type", getattr(one, "value_type", None))
+        inner: object = getattr(one, "item_type", getattr(one, "value_type", None))
         if isinstance(inner, types.StructType):
             return inner.cls, "[{}.NAME]" if isinstance(one, types.DictType) else "[[{}]]"
     return None, ""
