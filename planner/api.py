@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from planner.campaign.material import Material
 from planner.dataset.dataset import Dataset
 from planner.dataset.measure import measure
+from planner.dataset.screened_files import in_parts
 from planner.design.extra_sensor import extra_sensor
 from planner.design.next_hit import next_hit
 from planner.diagnosis.diagnose import explain
@@ -87,7 +88,7 @@ def analyse(
         paths = [Path(one) for one in given if isinstance(one, Path | str)]
         if len(paths) < len(given):
             raise InputError("Hits and files are mixed; give one kind.")
-        measured = measure(sources_of(paths), band, estimator, window_rate_1_s)
+        measured = measure(in_parts(sources_of(paths)), band, estimator, window_rate_1_s)
         if measured.modal is None:
             reasons = [v.reason for v in measured.verdicts if not v.accepted]
             reason = (reasons or list(measured.remarks))[0]

@@ -71,9 +71,11 @@ class Campaign(CampaignReads):
         paths: tuple[Path, ...],
         pose: str | None = None,
         progress: Callable[[str], None] | None = None,
+        from_names: bool = False,
     ) -> "tuple[ImportReport, ...]":
         """Import hits, one report per pose, in recording order.
 
+        With `from_names` the names of files say where their FRFs were felt and hit.
         Files that the engineer refused are imported only where `paths` names them themselves.
         Hits far from what the model is sure of are held until `confirm`, `move` or `refuse_held`.
         Raises InputError, before anything is stored, if it is not clear what or where they are.
@@ -89,6 +91,8 @@ class Campaign(CampaignReads):
             deliveries = sort_paths(
                 paths, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
+            if from_names:
+                deliveries = tuple(delivery.placed_by_names() for delivery in deliveries)
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
             named = frozenset(path for path in paths if path.is_file())
             reports = []
@@ -233,6 +237,7 @@ class Campaign(CampaignReads):
         from planner.campaign.log_conversion import from_homogeneity, from_modal
         from planner.campaign.question import question
         from planner.campaign.revisits import suspected
+        from planner.dataset.screened_files import hits_of_files
 
         before, state, pose = self.model, self.state, delivery.pose
         known = state.hit_at(pose)
@@ -245,11 +250,11 @@ class Campaign(CampaignReads):
             )  # fmt: skip
         started = time.perf_counter()
         old = self.recordings.sources(known) if known else ()
-        hits, measured = measure_files(self.directory, old, kept.fresh, self.cell.config.modes)
+        hits, measured = measure_files(old, kept.fresh, self.cell.config.modes)
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         modes = new_modes = from_modal(measured.modal)
         if old:  # among earlier hits, wrong ones would not stand out
-            alone = measure_files(self.directory, (), kept.fresh, self.cell.config.modes)[1]
+            alone = measure_files((), kept.fresh, self.cell.config.modes)[1]
             new_modes = from_modal(alone.modal)
         asked = contradiction(pose, measured, len(old))
         asked = asked or question(before, state, pose, joints_deg, new_modes)
@@ -283,6 +288,7 @@ class Campaign(CampaignReads):
             model=model,
             refit_seconds=time.perf_counter() - started,
             remarks=(
+                *hits_of_files(measured.verdicts[len(old) :]),
                 *measured.remarks,
                 *told,
                 *taken_after_all(state, kept.fresh),

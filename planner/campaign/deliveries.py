@@ -1,11 +1,11 @@
 """What the user names on the command line, sorted into poses with their files."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import TABLE, files_in, read_recordings
+from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import READERS
@@ -20,6 +20,10 @@ class Delivery:
     joints_deg: tuple[float, ...] | None
     sources: tuple[Source, ...]
     row: str = ""  # "file, row n" for messages
+
+    def placed_by_names(self) -> "Delivery":
+        """Files whose names say where their FRFs were felt and hit."""
+        return replace(self, sources=tuple(replace(s, from_name=True) for s in self.sources))
 
 
 def sort_paths(
@@ -46,7 +50,7 @@ def sort_paths(
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
-            bare.append(path)
+            bare += [path] if path.name != CHANNELS else []
         else:
             raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
     if bare:

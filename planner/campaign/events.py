@@ -77,6 +77,8 @@ class HitRecord(msgspec.Struct, frozen=True):
     hit_point: str = ""  # as the table of recordings named it, "" where it did not
     response_points: tuple[str, ...] = ()
     part: int = 0
+    response: str | None = None  # signed axis of an FRF's response, as the table named it
+    from_name: bool = False  # FRFs' places are from the file's name
 
 
 class MeasuredMode(msgspec.Struct, frozen=True):

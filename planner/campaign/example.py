@@ -1,4 +1,4 @@
-"""Files of an own robot to begin with: a commented robot.toml, campaign.toml and URDF."""
+"""Files of an own robot to begin with: commented TOML files and a URDF."""
 
 import shutil
 from pathlib import Path

@@ -20,7 +20,6 @@ from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
-from planner.recording.read import hit_count
 
 Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
 
@@ -101,7 +100,7 @@ def keep_files(
     seen: set[str] = set()
     for source in delivery.sources:
         try:
-            digest = store.sha256(store.read_bytes(source.path))
+            digest = store.sha256(store.read_recording(source.path))
         except InputError as error:  # one bad file does not keep the others out
             left_out.append(_left(source, "", str(error)))
             continue
@@ -110,14 +109,15 @@ def keep_files(
                 f"{source.path} was imported before as a recording of pose {owner[digest]}; "
                 f"it cannot belong to {delivery.pose} too."
             )
-        if digest in owner or digest in seen:
+        if digest in owner or (digest in seen and not source.part):
             already.append(source.name)
         elif reason := _reason_against(delivery.pose, digest, source.path in named, state):
             left_out.append(_left(source, digest, reason))
         else:
             seen.add(digest)
             digest, suffix = store.store_recording(directory, source.path)
-            fresh += [(part, digest, suffix) for part in source.parts(hit_count(source.path))]
+            kept = replaced(source, path=store.recording_path(directory, digest, suffix))
+            fresh += [(part, digest, suffix) for part in kept.parts()]
     return KeptFiles(tuple(fresh), tuple(already), tuple(left_out))
 
 
@@ -168,13 +168,10 @@ def taken_after_all(state: CampaignState, fresh: tuple[Kept, ...]) -> tuple[str,
 
 
 def measure_files(
-    directory: Path, old: tuple[Source, ...], fresh: tuple[Kept, ...], table: ModesTable
+    old: tuple[Source, ...], fresh: tuple[Kept, ...], table: ModesTable
 ) -> tuple[tuple[HitRecord, ...], MeasuredPose]:
     """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
-    new = tuple(
-        replaced(s, path=store.recording_path(directory, digest, suffix))
-        for s, digest, suffix in fresh
-    )
+    new = tuple(source for source, _, _ in fresh)
     measured = measure((*old, *new), table.band_hz, window_rate_1_s=table.window_rate_1_s)
     records = tuple(
         HitRecord(
@@ -189,6 +186,8 @@ def measure_files(
             hit_point=source.stated.hit_point,
             response_points=source.stated.response_points,
             part=source.part,
+            response=source.response,
+            from_name=source.from_name,
         )
         for verdict, (source, digest, suffix) in zip(
             measured.verdicts[len(old) :], fresh, strict=True

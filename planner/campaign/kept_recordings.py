@@ -60,8 +60,9 @@ class KeptRecordings:
         said = hit.hit_point or hit.response_points or self.names != PointNames()
         stated = StatedPoints(hit.hit_point, hit.response_points, names=self.names)
         return Source(
-            path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints(), hit.part
-        )
+            path, hit.file, hit.hit, hit.repeat, stated if said else StatedPoints(), hit.part,
+            hit.response, hit.from_name,
+        )  # fmt: skip
 
     def look_through(self, measurements: Iterable[Measurement], found: Store) -> None:
         """InputError where one of the accepted recordings is not what was imported.
@@ -118,7 +119,7 @@ class KeptRecordings:
 
 def frf_key(hits: tuple[HitRecord, ...], table: ModesTable) -> tuple:
     """What an FRF depends on."""
-    return (*(hit.sha256 for hit in hits), table.band_hz, table.window_rate_1_s)
+    return (*((hit.sha256, hit.part) for hit in hits), table.band_hz, table.window_rate_1_s)
 
 
 def _marks(folder: Path) -> dict[str, tuple[int, int, int, int]]:

@@ -29,7 +29,7 @@ def sha256(data: bytes) -> str:
 
 def store_recording(folder: Path, path: Path) -> tuple[str, str]:
     """Keep a recording under its content hash; returns (sha256, suffix). Idempotent."""
-    data = read_bytes(path)
+    data = read_recording(path)
     digest, suffix = sha256(data), "".join(path.suffixes[-2:]).lower()
     suffix = suffix if suffix.endswith(".gz") else path.suffix.lower()
     kept = recording_path(folder, digest, suffix)
@@ -46,14 +46,21 @@ def recording_path(folder: Path, digest: str, suffix: str) -> Path:
     return folder.joinpath(RECORDINGS, f"{digest}{suffix}")
 
 
-def read_bytes(path: Path) -> bytes:
+def read_recording(path: Path) -> bytes:
+    """A recording's bytes with all that reading it takes, or InputError saying why not."""
+    from planner.recording.read import content
+
+    return read_bytes(path, content)
+
+
+def read_bytes(path: Path, read: Callable[[Path], bytes] = Path.read_bytes) -> bytes:
     """A file's bytes, or InputError saying why not."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise InputError(
                 f"{path} is larger than {MAX_FILE_BYTES >> 20} MiB, no single hit is; split it."
             )
-        return path.read_bytes()
+        return read(path)
     except FileNotFoundError:
         raise InputError(f"{path} does not exist; check the path.") from None
     except OSError as error:

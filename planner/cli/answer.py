@@ -11,6 +11,14 @@ if TYPE_CHECKING:
 
 AsJson = Annotated[bool, typer.Option("--json", help="Answer with one JSON document.")]
 
+FromNames = Annotated[
+    bool,
+    typer.Option(
+        "--from-names",
+        help="FRFs' directions or nodes from file names (tap_yx, H3_1) where files lack them.",
+    ),
+]
+
 
 def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:
     """Print the answer and return the exit code."""

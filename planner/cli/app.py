@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from planner.cli.acts import Directory, confirm, skip, undo, withdraw
-from planner.cli.answer import AsJson, refusals, respond, warn
+from planner.cli.answer import AsJson, FromNames, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
 from planner.cli.couple import couple
@@ -101,6 +101,7 @@ def import_(
     directory: Directory,
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Hits, or a folder.")],
     pose: Annotated[str | None, typer.Option(metavar="ID", help="Pose of these hits.")] = None,
+    from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
     """Import hits, refit, and say what changed.
@@ -113,7 +114,7 @@ def import_(
 
     with reporting("importing", quiet=as_json) as progress:
         campaign = Campaign(directory)
-        reports = campaign.import_paths(tuple(paths), pose, progress)
+        reports = campaign.import_paths(tuple(paths), pose, progress, from_names)
     answer = ImportedPoses.of(reports, campaign.state.simulated)
     return respond(answer, as_json, refusals(answer.refused, answer.to_be_answered(directory)))
 

@@ -22,10 +22,12 @@ class WrittenManual(Answer):
 
 
 def schema(
-    file: Annotated[str, typer.Argument(metavar="FILE", help="robot or campaign.")] = "robot",
+    file: Annotated[
+        str, typer.Argument(metavar="FILE", help="robot, campaign, cut or tool.")
+    ] = "robot",
     as_json: AsJson = False,
 ) -> int:
-    """Every entry of robot.toml or campaign.toml, from the types that read them.
+    """Every entry of robot.toml, campaign.toml, cut.toml or tool.toml, as they are read.
 
     --json holds a JSON Schema, which editors complete and check by.
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, refusals, respond
+from planner.cli.answer import AsJson, FromNames, refusals, respond
 from planner.errors import InputError
 
 
@@ -50,6 +50,7 @@ def modes(
     operating: Annotated[
         bool, typer.Option("--operating", help="Responses alone, no force: unscaled modes.")
     ] = False,
+    from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
     """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
@@ -60,7 +61,7 @@ def modes(
     from planner.recording.folder import several_poses
     from planner.report.frf_set import frf_set
     from planner.report.matrix_analysis import matrix_report
-    from planner.report.modal_analysis import check_options, modal_report
+    from planner.report.modal_analysis import check_options, modal_report, sources_of
     from planner.report.plot_files import Pictures
     from planner.report.unlabelled_analysis import unlabelled_report
 
@@ -84,7 +85,8 @@ def modes(
         from planner.report.operating_analysis import operating_report
 
         return respond(operating_report(paths, band_hz, pictures), as_json)
-    given = None if force else frf_set(paths, band_hz, estimator, window_rate_1_s)
+    sources = sources_of(paths, from_names)
+    given = None if force else frf_set(sources, band_hz, estimator, window_rate_1_s)
     if given is not None and given.placed:
         answer = matrix_report(given, quantity, pictures, real, export)
     elif for_points:
@@ -95,5 +97,5 @@ def modes(
     elif given is not None:
         answer = unlabelled_report(given, quantity, pictures)
     else:
-        answer = modal_report(paths, band_hz, force, estimator, pictures, window_rate_1_s)
+        answer = modal_report(sources, band_hz, force, estimator, pictures, window_rate_1_s)
     return respond(answer, as_json, refusals(answer.refused))

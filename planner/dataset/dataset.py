@@ -119,7 +119,7 @@ class Dataset:
             q = np.mean([recording.q for recording in group], axis=0)
             entries.append(PoseEntry(pose, q, measured))
         verdicts = [v for entry in entries for v in entry.measured.verdicts]
-        refused = tuple((v.source.name, v.reason) for v in verdicts if not v.accepted)
+        refused = tuple(one for verdict in verdicts for one in verdict.refused)
         remarks = tuple(
             f"Pose {entry.pose} is left out: {entry.measured.averaged.remarks[0]}"
             for entry in entries

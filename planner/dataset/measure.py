@@ -10,7 +10,7 @@ import numpy as np
 from planner import content_hash
 from planner.dataset.screened_files import FileVerdict, ScreenedFiles, Source, read_files, renamed
 from planner.dataset.store import Store, user_store
-from planner.errors import RefusedError
+from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.modal.homogeneity import Homogeneity, homogeneity
 from planner.modal.modes import ModalModel
@@ -221,11 +221,13 @@ def program() -> str:
 
 def _digest(sources: tuple[Source, ...]) -> str:
     """Of all files' content; a file that cannot be read counts as it is named nowhere else."""
+    from planner.recording.read import content
+
     contents = []
     for source in sources:
         try:
-            contents.append(source.path.read_bytes())
-        except OSError as error:
+            contents.append(content(source.path))
+        except (OSError, InputError) as error:
             contents.append(f"{source.path}: {error}".encode())
     return content_hash.digest(*contents)
 

@@ -1,18 +1,23 @@
 """The files of one pose: read, screened each by itself and beside its repeats, judged."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 
 from planner.errors import AxisNotStatedError, PlannerError
 from planner.recording.points import StatedPoints
 from planner.recording.records import FrfRecord, Hit, PoseRow, Record
+from planner.words import counted
 
 
 @dataclass(frozen=True)
 class Source:
     """One file and what the table of recordings says about it (None: nothing).
 
-    `part` is which of the file's hits it is, from 1; 0: all that the file holds.
+    `part` is which of the file's hits it is, from 1; 0: all that the file holds. `response` is the
+    signed axis of an FRF's response; `from_name`: what FRFs do not say of their places, the file's
+    name does. `at_s` is when, in a record of several hits.
     """
 
     path: Path
@@ -21,22 +26,28 @@ class Source:
     repeat: int | None = None
     stated: StatedPoints = field(default_factory=StatedPoints)
     part: int = 0
+    response: str | None = None
+    from_name: bool = False
+    at_s: float | None = None
 
     @classmethod
     def of(cls, row: PoseRow) -> "Source":
         """The file that a row of the table names."""
         assert row.file is not None
-        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated)
+        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated, response=row.response)
 
     def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
         """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
+        from planner.recording.file_names import placed_by_name
         from planner.recording.hits import hits_from, located
-        from planner.recording.read import read
+        from planner.recording.read import read_hits
 
-        records: tuple[Record, ...] = read(self.path)
+        records: tuple[Record, ...] = read_hits(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
-            return (), tuple(located(record, self.stated) for record in frfs)
+            named = (placed_by_name(r, self.name) for r in frfs) if self.from_name else frfs
+            at = self.stated, self.hit, self.response
+            return (), tuple(located(record, *at) for record in named)
         return hits_from(self._meant(records), self.hit, self.stated), ()
 
     def _meant(self, records: tuple[Record, ...]) -> tuple[Record, ...]:
@@ -46,17 +57,39 @@ class Source:
         times = [record for record in records if not isinstance(record, FrfRecord)]
         return tuple(times[self.part - 1 : self.part])
 
-    def parts(self, count: int) -> "tuple[Source, ...]":
-        """Each of the file's hits by itself, where there are several."""
-        if count < 2:
+    @property
+    def whole_name(self) -> str:
+        """The file's name, without which of its hits is meant."""
+        return self.name.rpartition(" (hit ")[0] if self.part else self.name
+
+    def parts(self) -> "tuple[Source, ...]":
+        """Each of the file's hits by itself, where there are several; the file must be readable."""
+        from planner.recording.read import hits_in
+
+        if self.part:
             return (self,)
-        named = [(k, f"{self.name} (hit {k})") for k in range(1, count + 1)]
-        return tuple(replace(self, name=name, part=k) for k, name in named)
+        return tuple(
+            replace(self, name=f"{self.name} (hit {k}{when(at_s)})", part=k, at_s=at_s)
+            for k, at_s in enumerate(hits_in(self.path), 1)
+        ) or (self,)
+
+
+def in_parts(sources: tuple[Source, ...]) -> tuple[Source, ...]:
+    """Sources of which each is a single hit; exported FRFs and what cannot be read as they are."""
+    return tuple(part for source in sources for part in source.parts())
+
+
+def when(at_s: float | None) -> str:
+    """When in its record a hit was, to follow its name; nothing where it has one of its own."""
+    return "" if at_s is None else f" at {at_s:.2f} s"
 
 
 @dataclass(frozen=True)
 class FileVerdict:
-    """What became of one file: accepted, or refused for a stated reason."""
+    """What became of one file: accepted, or refused for a stated reason.
+
+    `refused_hits` are, of an accepted file of several hits, names and reasons of those refused.
+    """
 
     source: Source
     accepted: bool
@@ -65,6 +98,12 @@ class FileVerdict:
     simulated: bool = False
     remarks: tuple[str, ...] = ()
     axis_missing: bool = False  # good but for that nothing says along which axis it was made
+    refused_hits: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def refused(self) -> tuple[tuple[str, str], ...]:
+        """Name and reason of all that was refused."""
+        return self.refused_hits if self.accepted else ((self.source.name, self.reason),)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +118,23 @@ class ScreenedFiles:
     hits: tuple[tuple[Hit, ...], ...]
     agreeing: tuple[Hit, ...]
     records: tuple[FrfRecord, ...]
+
+
+def hits_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
+    """How many hits of a file are good, where a record was cut into hits or not all are."""
+    told = []
+    for name, group in groupby(verdicts, key=lambda verdict: verdict.source.whole_name):
+        own = list(group)
+        good = sum(verdict.accepted for verdict in own)
+        if any(v.source.at_s is not None for v in own) or (own[0].source.part and good < len(own)):
+            told.append(f"{counted(len(own), 'hit')} in {name}: {good} good.")
+    return tuple(told)
+
+
+def told_of_files(verdicts: Sequence[FileVerdict]) -> tuple[str, ...]:
+    """The same, and the remarks on what is good."""
+    remarks = (f"{v.source.name}: {text}" for v in verdicts if v.accepted for text in v.remarks)
+    return (*hits_of_files(verdicts), *remarks)
 
 
 def read_files(sources: tuple[Source, ...], band_hz: tuple[float, float]) -> ScreenedFiles:
@@ -144,24 +200,21 @@ def read_one(
     judged = [
         (hit, (*told, *screen(hit, limits), *driving_point(hit, band_hz))) for hit, told in heard
     ]
-    remarks = [f.text for _, faults in judged for f in faults if not f.refuse]
+    told = tuple(f.text for _, faults in judged for f in faults if not f.refuse)
     simulated, axis = any(hit.simulated for hit in found), found[0].axis
-    refused = [
-        " ".join(f.text for f in faults if f.refuse)
-        for _, faults in judged
-        if any(f.refuse for f in faults)
-    ]
-    if len(refused) == len(judged):
-        return (
-            FileVerdict(source, False, " ".join(refused), axis, simulated, tuple(remarks)),
-            (),
-            [],
-        )
-    remarks += [f"One of {len(judged)} hits in {source.name} is refused: {t}" for t in refused]
-    good = [hit for hit, faults in judged if not any(f.refuse for f in faults)]
+    reasons = [" ".join(f.text for f in faults if f.refuse) for _, faults in judged]
+    if all(reasons):
+        return FileVerdict(source, False, " ".join(reasons), axis, simulated, told), (), []
+    good = [hit for (hit, _), reason in zip(judged, reasons, strict=True) if not reason]
     hits = tuple(replace(hit, repeat=source.repeat or hit.repeat) for hit in good)
-    remarks = tuple(remarks)
-    return FileVerdict(source, True, "", axis, simulated, remarks), hits, []
+    refused = _refused_hits(source, reasons) if any(reasons) else ()
+    return FileVerdict(source, True, "", axis, simulated, told, False, refused), hits, []
+
+
+def _refused_hits(source: Source, reasons: list[str]) -> tuple[tuple[str, str], ...]:
+    """Names of a file's hits that have a reason, and the reasons."""
+    names = (part.name for part in source.parts())
+    return tuple(one for one in zip(names, reasons, strict=True) if one[1])
 
 
 def renamed(text: str, sources: tuple[Source, ...]) -> str:
@@ -182,9 +235,14 @@ def _agreeing(
     faults = screen_repeats(tuple(hit for _, hit in every), band_hz)
     for (number, hit), found in zip(every, faults, strict=True):
         refusing = [fault for fault in found if fault.refuse]
-        if refusing:
-            text = " ".join(fault.text for fault in refusing)
-            verdicts[number] = replace(verdicts[number], accepted=False, reason=text)
-        else:
+        if not refusing:
             kept.append(hit)
+            continue
+        text, verdict = " ".join(fault.text for fault in refusing), verdicts[number]
+        if len(hits[number]) > 1:
+            verdicts[number] = replace(
+                verdict, refused_hits=(*verdict.refused_hits, (verdict.source.name, text))
+            )
+        else:
+            verdicts[number] = replace(verdict, accepted=False, reason=text)
     return tuple(kept)

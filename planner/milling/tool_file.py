@@ -51,7 +51,10 @@ TO_TIP = (0.0, 0.0, 1.0)  # where a file says nothing: z of the tcp points out o
 
 
 class ContactTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[segment.contact]."""
+    """What holds a segment at its lower end; without it the segment is held rigidly.
+
+    Stiffness and damping are across the axis and in bending; `sd_percent` says how well known.
+    """
 
     stiffness_n_m: float
     stiffness_nm_rad: float
@@ -61,7 +64,7 @@ class ContactTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class MaterialTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[material.NAME]."""
+    """A material by a name of your choice; `loss_factor` is its structural damping."""
 
     youngs_modulus_pa: float
     density_kg_m3: float
@@ -70,7 +73,11 @@ class MaterialTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[[segment]]."""
+    """Segments from the holder to the tip, each a beam of a `material`.
+
+    `end_diameter_m` is towards the tip, `bore_m` along the axis; of `flutes` the segment bends as a
+    rod of 80 % of its diameter, or of `equivalent_diameter_m`; `mass_kg` sits at its end.
+    """
 
     length_m: float
     diameter_m: float
@@ -84,7 +91,10 @@ class SegmentTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class ToolPointTable(msgspec.Struct, forbid_unknown_fields=True):
-    """[[point]]: where a tested tool was hit and measured."""
+    """Where a tested tool was hit and measured: the `node` of the FRFs' file, from its tip.
+
+    `place_sd_m` says how well that is known, `sensor_mass_kg` what sat there.
+    """
 
     node: int | str
     from_tip_m: float
@@ -93,7 +103,11 @@ class ToolPointTable(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class ToolTable(msgspec.Struct, forbid_unknown_fields=True):
-    """A whole tool.toml."""
+    """A tool, segment by segment from the holder to the tip.
+
+    `to_spindle` is the direction from the tip to the spindle, in the axes of the FRFs: what
+    cut.toml calls `axis`. `axis` may state the direction from the holder to the tip instead.
+    """
 
     segment: tuple[SegmentTable, ...]
     material: dict[str, MaterialTable]

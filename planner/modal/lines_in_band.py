@@ -17,8 +17,8 @@ def too_few_lines(
         off = f"The FRFs begin at {first:g} Hz, above the band of {band}"
     else:
         return RefusedError(
-            f"Only {np.count_nonzero(usable)} usable frequency lines lie in the band of {band}, of FRFs between "
-            f"{first:g} and {last:g} Hz: give another band with --band-hz, record longer or hit "
-            f"with a harder tip."
+            f"Only {np.count_nonzero(usable)} usable frequency lines lie in the band of {band}, of "
+            f"FRFs between {first:g} and {last:g} Hz: give another band with --band-hz, "
+            f"record longer or hit with a harder tip."
         )
     return RefusedError(f"{off} in which modes are looked for; give another with --band-hz.")

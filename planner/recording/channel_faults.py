@@ -1,6 +1,7 @@
 """Single channels that cannot be used: dead ones, and such as were overloaded."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,6 +11,38 @@ from planner.recording.records import Fault, Hit
 # lie below the top by a share of NEAR at most. A pulse of NARROW samples above its half is so sharp
 # that two are equal in one of 300 at a step of COARSE of its peak.
 BY_CHANCE, NEAR, NARROW, COARSE = 5e-4, 0.1, 6, 2e-3
+
+# A channel that stands still does so by its resolution, or because nothing was measured. By its
+# resolution it rests for longer and longer while it moves by less and less.
+# How a channel moves is judged by so many of its changes: where it fades below its resolution, the
+# last ones cover two or three of its steps. It moves where they cover more than STEPS, and rests
+# unlike before beyond LONGER times their longest rest. One channel alone has to be surer: SURELY
+# steps. SKEW: samples by which channels may end one before the other; fewer are not worth a word.
+# All chosen.
+CHANGES, STEPS, SURELY, LONGER, SKEW = 8, 4.0, 12.0, 4, 16
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A channel's last value: from which sample on, and by how many steps it moved until then.
+
+    No steps where it may rest by its resolution.
+    """
+
+    start: int
+    steps: float
+
+    @classmethod
+    def of(cls, samples: np.ndarray) -> "Rest":
+        """Of a channel (n,) that is not constant."""
+        start = int(np.flatnonzero(samples != samples[-1])[-1]) + 1
+        before = samples[:start]
+        changes = np.flatnonzero(np.diff(before))[-CHANGES:]
+        if len(changes) < CHANGES:
+            return cls(start, 0.0)
+        if len(samples) - start <= max(SKEW, LONGER * int(np.max(np.diff(changes)))):
+            return cls(start, 0.0)
+        return cls(start, float(np.ptp(before[changes[0] :]) / step(before)))
 
 
 def channel_faults(hit: Hit) -> tuple[Fault, ...]:
@@ -48,6 +81,14 @@ def _of_acceleration(hit: Hit, row: int) -> Fault | None:
     if not np.any(samples - samples[0]):
         return Fault(
             "dead", f"The acceleration along {name} is constant; check the cable of {name}."
+        )
+    rest = Rest.of(samples)
+    if rest.steps > SURELY:
+        seconds = (len(samples) - rest.start) / hit.sampling_rate_hz
+        return Fault(
+            "dead",
+            f"The acceleration along {name} repeats one value for the last {seconds:.2g} s, though "
+            f"it moved until then; check the cable of {name}.",
         )
     return _overload(f"acceleration {name}", "m/s²", samples, pulse=False)
 

@@ -1,4 +1,4 @@
-"""recordings.csv and predict.csv."""
+"""Tables beside recordings: recordings.csv, predict.csv, and how all such tables are read."""
 
 import csv
 import io
@@ -8,12 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from planner.errors import InputError
+from planner.recording.column_names import hit_direction
 from planner.recording.joints import JointUnits
-from planner.recording.named_columns import hit_direction
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.records import PoseRow, RecordingsFolder
+from planner.recording.text_tables import decoded
 
 TABLE = "recordings.csv"
+CHANNELS = "channels.csv"  # scales and units of WAV files
+TABLES = (TABLE, CHANNELS)
 MAX_BYTES = 32 * 1024 * 1024
 MAX_ROWS = 200_000
 ANGLE, SLIDE = "_deg", "_mm"
@@ -23,7 +26,7 @@ def several_poses(paths: list[Path], least: int = 2) -> bool:
     """Whether a single folder is named whose recordings.csv lists that many poses at least."""
     if len(paths) != 1 or not (paths[0] / TABLE).is_file():
         return False
-    header, rows = _table(paths[0] / TABLE)
+    header, rows = read_table(paths[0] / TABLE)
     if "pose" not in header:
         return True  # said where the table is read in earnest
     at = header.index("pose")
@@ -32,7 +35,7 @@ def several_poses(paths: list[Path], least: int = 2) -> bool:
 
 def joint_columns(folder: Path) -> JointUnits:
     """The joints as the table's columns `…_deg` and `…_mm` name them, where no robot is named."""
-    header, _ = _table(folder / TABLE)
+    header, _ = read_table(folder / TABLE)
     columns = [name for name in header if name.endswith((ANGLE, SLIDE))]
     names = tuple(name.removesuffix(ANGLE).removesuffix(SLIDE) for name in columns)
     return JointUnits(names, tuple(name.endswith(SLIDE) for name in columns))
@@ -52,7 +55,7 @@ def read_recordings(
     """
     points = points or PointNames()
     path = folder / TABLE
-    header, lines = _table(path)
+    header, lines = read_table(path)
     units = JointUnits.of(joints)
     told = not bare or any(name.endswith((ANGLE, SLIDE)) for name in header)
     columns = _joint_columns(path, header, units) if told else ()
@@ -67,7 +70,8 @@ def read_recordings(
         row = _recording_row(path, inside, number, cells, columns)
         row = _with_points(path, row, cells, points)
         stated = row.stated
-        key = row.pose, row.hit, stated.hit_point, stated.response_points, row.repeat or 0
+        points_hit = stated.hit_point, stated.response_points
+        key = row.pose, row.hit, row.response, *points_hit, row.repeat or 0
         if row.repeat is not None and key in seen:
             raise InputError(
                 f"{path}, row {number}: pose {row.pose}, hit {row.hit}, repeat {row.repeat} is "
@@ -83,7 +87,7 @@ def read_recordings(
 
 def read_poses(path: Path, joints: JointUnits | Sequence[str]) -> tuple[PoseRow, ...]:
     """Poses at which a prediction is wanted. Raises InputError naming file, row and remedy."""
-    header, lines = _table(path)
+    header, lines = read_table(path)
     columns = _joint_columns(path, header, JointUnits.of(joints))
     if "pose" not in header:
         raise InputError(f"{path} has no column pose; add one that names each row.")
@@ -114,7 +118,8 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
     found = sorted(p for p in folder.rglob("*") if p.is_file())
     found = [
         path for path in found
-        if path.name != TABLE and not any(part[0] == "." for part in path.relative_to(folder).parts)
+        if path.name not in TABLES
+        and not any(part[0] == "." for part in path.relative_to(folder).parts)
         and (path.parent == folder or path.suffix.lower() in suffixes)
     ]  # fmt: skip
     if not found:
@@ -122,9 +127,13 @@ def files_in(folder: Path, suffixes: Collection[str]) -> list[Path]:
     return found
 
 
-def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and rows with their line numbers."""
-    text = _text(path)
+def read_table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Header and rows of a table with their line numbers. Raises InputError for what is wrong."""
+    return table_of(path, decoded(path, MAX_BYTES))
+
+
+def table_of(path: Path, text: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The same of a text; `path` is what messages name."""
     first = text.split("\n", 1)[0]
     delimiter = next((d for d in (",", ";", "\t") if d in first), ",")
     try:
@@ -149,23 +158,6 @@ def _table(path: Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
                 f"correct the row."
             )
     return header, numbered[1:]
-
-
-def _text(path: Path) -> str:
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist; check the path.") from None
-    except OSError as error:
-        raise InputError(f"{path} cannot be read ({error.strerror}); check the file.") from None
-    if b"\x00" in data:
-        raise InputError(f"{path} is binary, not a CSV table; check which file it is.")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"{path} is not UTF-8 text; save the table as CSV in UTF-8.") from None
 
 
 def _joint_columns(path: Path, header: list[str], joints: JointUnits) -> tuple[str, ...]:
@@ -196,7 +188,7 @@ def _pose(path: Path, number: int, cells: dict[str, str]) -> str:
 
 def _number(path: Path, number: int, column: str, cell: str) -> float:
     try:
-        value = float(cell)
+        value = float(cell.replace(",", "."))  # decimals of half the world's spreadsheets
     except ValueError:
         value = math.nan
     if not math.isfinite(value) or abs(value) > 1e5:
@@ -211,14 +203,11 @@ def _recording_row(
     path: Path, folder: Path, number: int, cells: dict[str, str], columns: Sequence[str]
 ) -> PoseRow:
     angles = tuple(_number(path, number, name, cells[name]) for name in columns)
-    hit = cells["hit"].strip().lower()
-    if not hit_direction(hit):
-        frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
-        raise InputError(
-            f'{path}, row {number}: hit is "{cells["hit"].strip()}"; give a signed axis of the '
-            f"{frame} frame such as +x."
-        )
-    hit = hit if hit[0] in "+-" else f"+{hit}"
+    frame = "hit point's" if cells.get("hit_point", "").strip() else "tcp"
+    hit = _signed_axis(path, number, "hit", cells["hit"], frame)
+    response = None
+    if cells.get("response", "").strip():
+        response = _signed_axis(path, number, "response", cells["response"], "sensor")
     repeat = None
     if cells.get("repeat", "").strip():
         value = _number(path, number, "repeat", cells["repeat"])
@@ -232,7 +221,18 @@ def _recording_row(
         hit,
         repeat,
         _file(path, folder, number, cells["file"].strip()),
+        response=response,
     )
+
+
+def _signed_axis(path: Path, number: int, column: str, cell: str, frame: str) -> str:
+    axis = cell.strip().lower()
+    if not hit_direction(axis):
+        raise InputError(
+            f'{path}, row {number}: {column} is "{cell.strip()}"; give a signed axis of the '
+            f"{frame} frame such as +x."
+        )
+    return axis if axis[0] in "+-" else f"+{axis}"
 
 
 def _with_points(path: Path, row: PoseRow, cells: dict[str, str], points: PointNames) -> PoseRow:

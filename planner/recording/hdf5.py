@@ -1,74 +1,67 @@
 """HDF5 files (MATLAB's v7.3 among them): one dataset a channel, nothing taken from elsewhere."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import check_size, columns_of, text_of
-from planner.recording.named_columns import Named, to_records
+from planner.recording.entries import DEEPEST, MOST_ENTRIES, EntryTree, check_size, tree_of
+from planner.recording.entry_records import records_of
 from planner.recording.records import Record
 
 if TYPE_CHECKING:
     import h5py
 
-MOST_OBJECTS = 10_000  # groups and datasets that are looked at
+NUMBERS = {
+    "double",
+    "single",
+    "logical",
+    *(f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)),
+}
 
 
 def read_hdf5(path: Path) -> tuple[Record, ...]:
-    """HDF5 files with one dataset per channel; attributes of the file and its root count too.
+    """HDF5 files: groups, datasets and their attributes; structs and cells of MATLAB's v7.3.
 
-    Raises InputError where two groups hold the same names (each is a hit of its own), and where
-    numbers lie in another file: the copy that a campaign keeps would be without them.
+    Raises InputError where numbers lie in another file: the copy that a campaign keeps would be
+    without them.
     """
     import h5py
 
-    entries: dict[str, object] = {}
-    units: dict[str, str] = {}
     try:
         with h5py.File(path, "r") as file:
-            entries.update(file.attrs.items())
-            for name, dataset in _datasets(path, file).items():
-                entries[name] = dataset[()]
-                if "unit" in dataset.attrs:
-                    units[name] = text_of(dataset.attrs["unit"])
+            _check(path, file)
+            root = _Reader(path).group(file)
     except InputError:
         raise
     except Exception as error:  # the library raises whatever the junk makes it raise
         raise InputError(
             f"{path} is not a readable HDF5 file ({type(error).__name__}); export it again."
         ) from None
-    named = columns_of(path, entries)
-    return to_records(path, Named(named.columns, units, named.attributes))
+    return records_of(path, root)
 
 
-def _datasets(path: Path, file: "h5py.File") -> "dict[str, h5py.Dataset]":
-    """Vectors and single values by the last part of their name, none of them read yet."""
+def _check(path: Path, file: "h5py.File") -> None:
+    """Raise InputError where a file holds too much, or leads to another."""
     import h5py
 
-    found: dict[str, h5py.Dataset] = {}
-    where: dict[str, str] = {}
-    seen, elsewhere, vectors = [0], [], 0
+    seen, size = [0], [0]
+    elsewhere: list[str] = []
 
     def link(name: str, what: object) -> None:
         if isinstance(what, h5py.ExternalLink):
             elsewhere.append(name)
 
-    def visit(name: str, item: object) -> bool | None:
+    def visit(name: str, item: object) -> None:
         seen[0] += 1
-        if seen[0] > MOST_OBJECTS:
-            raise InputError(f"{path} holds more than {MOST_OBJECTS} objects; export a hit a file.")
+        if seen[0] > MOST_ENTRIES:
+            raise InputError(f"{path} holds more than {MOST_ENTRIES} objects; export a hit a file.")
         if isinstance(item, h5py.Dataset):
-            short = name.rsplit("/", maxsplit=1)[-1]
+            size[0] += (item.size or 0) * item.dtype.itemsize
             if item.is_virtual or item.external:
                 elsewhere.append(name)
-            elif short in found:
-                raise InputError(
-                    f"{path} holds {short} twice, as {where[short]} and as {name}; export each "
-                    f"hit into a file of its own."
-                )
-            elif sum(size > 1 for size in item.shape or ()) <= 1:
-                found[short], where[short] = item, name
-        return None
 
     file.visititems_links(link)
     file.visititems(visit)
@@ -77,6 +70,116 @@ def _datasets(path: Path, file: "h5py.File") -> "dict[str, h5py.Dataset]":
             f"{path}: {elsewhere[0]} lies in another file, which would not be kept; export all "
             f"channels into one file."
         )
-    vectors = [d for d in found.values() if d.size]
-    check_size(path, sum(d.size * d.dtype.itemsize for d in vectors))
+    check_size(path, size[0])
+
+
+class _Reader:
+    """Reads a file's objects, not too many of them: references may lead in circles."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._left = MOST_ENTRIES
+        self._bytes = 0
+        self._seen: set[int] = set()
+
+    def group(self, group: "h5py.Group", depth: int = 0) -> EntryTree:
+        """A group with what is in it; an array of structs is a list of them."""
+        import h5py
+
+        if depth > DEEPEST:
+            raise InputError(f"{self._path} is nested too deep; export a hit a file.")
+        entries: dict[str, object] = {}
+        for name in group:
+            if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                continue  # MATLAB's own, and links to what is read elsewhere
+            item = group[name]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in self._seen:  # by another name
+                continue
+            self._seen.add(address)
+            if isinstance(item, h5py.Group):
+                entries[name] = self._struct(item, depth + 1)
+            elif isinstance(item, h5py.Dataset):
+                entries[name] = self._dataset(item, depth + 1)
+        return tree_of(entries, _attributes(group))
+
+    def _struct(self, group: "h5py.Group", depth: int) -> object:
+        """A group, or one struct after another where its fields are lists of references."""
+        import h5py
+
+        items = list(group.values()) if _stated(group, "MATLAB_class") == "struct" else []
+        lists = [i for i in items if isinstance(i, h5py.Dataset) and _is_list(i)]
+        if not items or len(lists) < len(items) or len({i.size for i in lists}) > 1:
+            return self.group(group, depth)
+        each = {name: self._elements(item, depth) for name, item in group.items()}
+        return [dict(zip(each, values, strict=True)) for values in zip(*each.values(), strict=True)]
+
+    def _elements(self, dataset: "h5py.Dataset", depth: int) -> list[object]:
+        import h5py
+
+        if depth > DEEPEST:
+            raise InputError(f"{self._path} is nested too deep; export a hit a file.")
+        found: list[object] = []
+        for reference in np.asarray(dataset[()]).ravel():
+            item = dataset.file[reference] if reference else None
+            if isinstance(item, h5py.Group):
+                found.append(self._struct(item, depth + 1))
+            else:
+                found.append(self._dataset(item, depth + 1) if item is not None else {})
+        return found
+
+    def _dataset(self, dataset: "h5py.Dataset", depth: int) -> object:
+        """Numbers, a text, a list, or a table's columns; with what is stated of them, a level."""
+        import h5py
+
+        self._left -= 1
+        self._bytes += (dataset.size or 0) * dataset.dtype.itemsize
+        if self._left < 0:
+            raise InputError(f"{self._path} holds more than {MOST_ENTRIES} objects.")
+        check_size(self._path, self._bytes)
+        kind = _stated(dataset, "MATLAB_class")
+        if dataset.shape is None or "MATLAB_empty" in dataset.attrs:
+            return {}
+        if kind and dataset.dtype == h5py.ref_dtype:
+            return self._elements(dataset, depth) if kind == "cell" else None
+        if kind == "char":
+            return _text(dataset[()])
+        values: Any = dataset[()]
+        fields = dataset.dtype.names or ()
+        if fields == ("real", "imag"):
+            values, fields = values["real"] + 1j * values["imag"], ()
+        if fields:
+            return tree_of({name: values[name] for name in fields}, _attributes(dataset))
+        if kind:
+            return np.asarray(values).T if kind in NUMBERS else None
+        stated = _attributes(dataset)
+        return tree_of({"": values}, stated) if stated and np.size(values) > 1 else values
+
+
+def _is_list(dataset: "h5py.Dataset") -> bool:
+    import h5py
+
+    return dataset.dtype == h5py.ref_dtype and _stated(dataset, "MATLAB_class") is None
+
+
+def _text(codes: np.ndarray) -> object:
+    """A text as MATLAB stores it, codes of UTF-16 in columns; several rows are a list."""
+    rows = [row.astype("<u2").tobytes().decode("utf-16-le") for row in np.atleast_2d(codes.T)]
+    return rows[0] if len(rows) == 1 else tuple(row.strip() for row in rows)
+
+
+def _stated(item: "h5py.Dataset | h5py.Group", name: str) -> str | None:
+    value = item.attrs.get(name)
+    return value.decode() if isinstance(value, bytes) else None
+
+
+def _attributes(item: "h5py.Dataset | h5py.Group") -> Mapping[str, object]:
+    """What is stated of an object, without MATLAB's own and what cannot be read."""
+    found = {}
+    for name in item.attrs:
+        if not name.startswith(("MATLAB_", "H5PATH")):
+            try:
+                found[name] = item.attrs[name]
+            except (OSError, TypeError):  # of a kind that no attribute of a channel has
+                continue
     return found

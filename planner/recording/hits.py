@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from planner.errors import AxisNotStatedError, InputError
+from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
-from planner.recording.named_columns import hit_direction
 from planner.recording.points import SENSOR, UNTOLD, StatedPoints
 from planner.recording.records import AXES, Channel, FrfRecord, Hit, Record, TimeRecord
 
@@ -27,15 +27,48 @@ def hits_from(
     return tuple(_hit(record, axis, stated or StatedPoints()) for record in times)
 
 
-def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
-    """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
+def located(
+    record: FrfRecord,
+    stated: StatedPoints,
+    hit: str | None = None,
+    response: str | None = None,
+) -> FrfRecord:
+    """The record with its nodes by the names of the points, and axes that it does not state.
+
+    `hit` and `response` are signed axes, as the table of recordings has them. Raises InputError as
+    `hits_from`, and where file and table name different axes.
+    """
+    record = directed(record, hit, response)
     count, source = len(record.values), record.source
-    response = [
+    felt = [
         _axis_there(source, stated, *at)
         for at in zip(record.response_node or [""] * count, record.response_direction, strict=True)
     ]
     reference = [stated.hit_at(source, node) for node in record.reference_node or [""] * count]
-    return replace(record, response_node=tuple(response), reference_node=tuple(reference))
+    return replace(record, response_node=tuple(felt), reference_node=tuple(reference))
+
+
+def directed(record: FrfRecord, hit: str | None, response: str | None) -> FrfRecord:
+    """The record with the axes that it does not state. Raises InputError as `located`."""
+    return replace(
+        record,
+        reference_direction=_completed(record, record.reference_direction, hit, "hit"),
+        response_direction=_completed(record, record.response_direction, response, "response"),
+    )
+
+
+def _completed(
+    record: FrfRecord, own: tuple[int, ...], axis: str | None, what: str
+) -> tuple[int, ...]:
+    """Directions of FRFs, unknown ones (0) as the table says."""
+    said = hit_direction(axis) if axis else 0
+    other = next((d for d in own if d and said and abs(d) != abs(said)), None)
+    if other is not None and (what == "hit" or len(own) == 1):
+        raise InputError(
+            f"{record.source} says that its {what} is along {_name(other)}, the table says "
+            f"{axis}; correct the one that is wrong."
+        )
+    return tuple(direction or said for direction in own)
 
 
 def _axis_there(source: object, stated: StatedPoints, node: str, direction: int) -> str:
@@ -84,6 +117,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
         simulated=record.simulated,
         hit_point=hit_point,
         responses=tuple(order),
+        faults=record.faults,
     )
 
 
@@ -179,6 +213,10 @@ def _in_the_file(source: Path) -> str:
         return 'write it as its first line, such as "# hit: +x"'
     if kind in ("uff", "unv", "uf58"):
         return "state it in the file (ref_dir)"
+    if kind == "lvm":
+        return "write it into its header, as a line of hit, a tab and +x"
+    if kind == "wav":
+        return 'state it in channels.csv (column hit, such as "+x")'
     return 'state it in the file (attribute hit, such as "+x")'
 
 

@@ -1,23 +1,28 @@
 """Reading a recording, whatever its format: one reader per format, chosen by the file's name."""
 
 from collections.abc import Callable
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
 from planner.errors import InputError
 from planner.recording import plausible
-from planner.recording.entries import check_size, columns_of
+from planner.recording.entries import check_size, tree_of
+from planner.recording.entry_records import records_of
+from planner.recording.filling import without_filling
 from planner.recording.hdf5 import read_hdf5
+from planner.recording.lvm import read_lvm
 from planner.recording.mat5 import is_version_5, read_mat5
-from planner.recording.named_columns import to_records
+from planner.recording.read_files import ReadFile, ReadFiles
 from planner.recording.records import FrfRecord, Record, TimeRecord
+from planner.recording.stream import cut_into_hits
 from planner.recording.tdms import read_tdms
 from planner.recording.text_tables import read_text
 from planner.recording.uff import read_uff
+from planner.recording.wav import WAV, read_wav, scales_beside, self_contained
 
 MAX_BYTES = 512 * 1024 * 1024
+REMEMBERED = ReadFiles(256 * 1024 * 1024)  # a file of many hits is read once, not once a hit
 
 
 def read_mat(path: Path) -> tuple[Record, ...]:
@@ -25,10 +30,11 @@ def read_mat(path: Path) -> tuple[Record, ...]:
     entries = read_mat5(path) if is_version_5(path) else _older(path)
     if entries is None:
         return read_hdf5(path)
-    visible = {name: value for name, value in entries.items() if not name.startswith("__")}
-    if {"yspec", "npts", "freq", "tfun"} <= set(visible):
+    visible = {name: v for name, v in entries.items() if name and not name.startswith("__")}
+    arrays = {name for name, value in visible.items() if isinstance(value, np.ndarray)}
+    if {"yspec", "npts", "freq", "tfun"} <= arrays:
         return (_logged_spectra(path, visible),)
-    return to_records(path, columns_of(path, visible))
+    return records_of(path, tree_of(visible))
 
 
 def _older(path: Path) -> dict[str, object] | None:
@@ -104,32 +110,76 @@ READERS: dict[str, Callable[[Path], tuple[Record, ...]]] = {
     ".h5": read_hdf5,
     ".hdf5": read_hdf5,
     ".tdms": read_tdms,
+    ".lvm": read_lvm,
     ".csv": read_text,
     ".tsv": read_text,
     ".txt": _read_txt,
     ".gz": read_text,
+    WAV: read_wav,
 }
 
 
 def read(path: Path) -> tuple[Record, ...]:
     """All records of a file. Raises InputError with one sentence if it cannot be read right."""
+    return _read(path).whole
+
+
+def read_hits(path: Path) -> tuple[Record, ...]:
+    """The same, with time histories of several hits cut into hits."""
+    return _read(path).hits
+
+
+def hits_in(path: Path) -> tuple[float | None, ...]:
+    """Of a file of several hits the time (s) of each in its record, None where each has its own.
+
+    () where the file holds a single hit, or FRFs, or cannot be read.
+    """
+    try:
+        hits = [one for one in read_hits(path) if isinstance(one, TimeRecord)]
+    except InputError:
+        return ()
+    return tuple(hit.at_s for hit in hits) if len(hits) > 1 else ()
+
+
+def version(path: Path) -> tuple[int, ...]:
+    """What changes when a file does, or the table of scales beside it. Raises OSError."""
+    stats = [path.stat()]
+    if path.suffix.lower() == WAV and scales_beside(path).is_file():
+        stats.append(scales_beside(path).stat())
+    each = ((s.st_ino, s.st_size, s.st_mtime_ns, s.st_ctime_ns) for s in stats)
+    return tuple(number for one in each for number in one)
+
+
+def content(path: Path) -> bytes:
+    """A recording's bytes with all that reading it takes, so that it can be kept elsewhere.
+
+    Raises InputError where what it needs is missing or wrong, OSError where it cannot be read.
+    """
+    data = path.read_bytes()
+    return self_contained(path, data) if path.suffix.lower() == WAV else data
+
+
+def _read(path: Path) -> ReadFile:
     if path.suffix.lower() not in READERS:
         raise InputError(
             f"{path} has no known format; recordings are {', '.join(READERS)}: export one of these."
         )
     try:
-        stat = path.stat()
+        size, mark = path.stat().st_size, version(path)
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}); check the path.") from None
-    if stat.st_size == 0:
+    if size == 0:
         raise InputError(f"{path} is empty; export it again.")
-    if stat.st_size > MAX_BYTES:
+    if size > MAX_BYTES:
         raise InputError(f"{path} is larger than {MAX_BYTES >> 20} MiB; split it.")
-    return _read(path, (stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns))
+    found = REMEMBERED.get((path, mark))
+    if found is None:
+        found = _read_anew(path)
+        REMEMBERED.put((path, mark), found)
+    return found
 
 
-@lru_cache(maxsize=1)  # a file of many hits is read once, not once a hit
-def _read(path: Path, version: tuple[int, ...]) -> tuple[Record, ...]:
+def _read_anew(path: Path) -> ReadFile:
     try:
         records = READERS[path.suffix.lower()](path)
     except InputError:
@@ -139,15 +189,6 @@ def _read(path: Path, version: tuple[int, ...]) -> tuple[Record, ...]:
             f"{path} cannot be read as {path.suffix} ({type(error).__name__}); export it again."
         ) from error
     plausible.check(path, records)
-    return records
-
-
-def hit_count(path: Path) -> int:
-    """How many hits a file holds; 1 where it cannot be read, or holds FRFs."""
-    if READERS.get(path.suffix.lower()) not in (read_uff, _read_txt):
-        return 1  # named columns: a hit a file
-    try:
-        records = read(path)
-    except InputError:
-        return 1
-    return max(1, sum(isinstance(record, TimeRecord) for record in records))
+    whole = tuple(without_filling(r) if isinstance(r, TimeRecord) else r for r in records)
+    cut = (cut_into_hits(r) if isinstance(r, TimeRecord) else (r,) for r in whole)
+    return ReadFile(whole, tuple(hit for hits in cut for hit in hits))

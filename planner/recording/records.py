@@ -33,15 +33,30 @@ class Channel:
     node: str = ""
 
 
+@dataclass(frozen=True)
+class Fault:
+    """Why a hit was refused (`refuse` true) or is only remarked upon."""
+
+    kind: str  # "clipped", "double_hit", "too_weak", "too_soft", "wrong_axis", "incoherent", …
+    text: str  # one sentence: what is wrong, with figures, and what to do
+    refuse: bool = True
+
+
 @dataclass(frozen=True, eq=False)
 class TimeRecord:
-    """Simultaneously sampled channels of one file."""
+    """Simultaneously sampled channels of one file.
+
+    `faults` were found before it was known what it holds. `at_s` is, of a hit that was cut out of a
+    longer record, the time of its pulse in that record; None where the record is as it was stored.
+    """
 
     source: Path
     sampling_rate_hz: float
     channels: tuple[Channel, ...]
     remarks: tuple[str, ...] = ()  # what the reader noticed and the user should know
     simulated: bool = False  # the file says that it holds simulated, not measured, data
+    faults: tuple[Fault, ...] = ()
+    at_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +112,7 @@ class Hit:
     responses: tuple[Dof, ...] = OF_TOOL
     taken_out_m_s2: np.ndarray | None = None
     taken_out_sd: float = 0.0
+    faults: tuple[Fault, ...] = ()  # of its record, see `TimeRecord`
 
     @cached_property
     def pulse(self) -> Pulse:
@@ -150,15 +166,6 @@ class Hit:
 
 
 @dataclass(frozen=True)
-class Fault:
-    """Why a hit was refused (`refuse` true) or is only remarked upon."""
-
-    kind: str  # "clipped", "double_hit", "too_weak", "too_soft", "wrong_axis", "incoherent", …
-    text: str  # one sentence: what is wrong, with figures, and what to do
-    refuse: bool = True
-
-
-@dataclass(frozen=True)
 class PoseRow:
     """One row of recordings.csv (`file` is absolute) or of predict.csv (`hit`, `file` None).
 
@@ -173,6 +180,7 @@ class PoseRow:
     repeat: int | None = None
     file: Path | None = None
     peak_force_n: float | None = None
+    response: str | None = None  # signed axis of an FRF's response, where the table says it
     stated: StatedPoints = field(default_factory=StatedPoints)
 
 

@@ -28,8 +28,9 @@ def screen(hit: Hit, limits: ScreeningLimits | None = None) -> tuple[Fault, ...]
     """Faults of one hit by itself; those with `refuse` make it unusable."""
     limits, pulse = limits or ScreeningLimits(), hit.pulse
     if pulse.peak_n < SILENCE or np.max(np.abs(hit.acceleration_m_s2)) < SILENCE:
-        return (Fault("dead", "Force or accelerations are zero throughout; check the cables."),)
-    faults = [*_short(hit, limits), *_weak(hit, limits), *channel_faults(hit)]
+        text = "Force or accelerations are zero throughout; check the cables."
+        return (*hit.faults, Fault("dead", text))
+    faults = [*hit.faults, *_short(hit, limits), *_weak(hit, limits), *channel_faults(hit)]
     if any(f.kind == "too_weak" for f in faults):
         return tuple(faults)
     return (
@@ -66,7 +67,8 @@ def _weak(hit: Hit, limits: ScreeningLimits) -> list[Fault]:
             )
         )
     ratio = _response_snr(hit)
-    if ratio is not None and ratio < limits.least_response_snr:
+    told = any(fault.kind == "not_at_rest" for fault in hit.faults)
+    if ratio is not None and not told and ratio < limits.least_response_snr:
         faults.append(
             Fault(
                 "too_weak",

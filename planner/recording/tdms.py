@@ -1,30 +1,30 @@
-"""TDMS files as LabVIEW writes them: unit_string, wf_increment."""
+"""TDMS files as LabVIEW and DAQ programs write them: unit_string, wf_increment, wf_start_time."""
 
 import logging
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planner.errors import InputError
-from planner.recording.entries import check_size
-from planner.recording.named_columns import Named, to_records
+from planner.recording.entries import EntryTree, check_size, tree_of
+from planner.recording.entry_records import records_of
 from planner.recording.records import Record
 
-SAME_RATE = 1e-6  # relative: steps of one clock, as they are rounded in a file
+if TYPE_CHECKING:
+    import nptdms
 
 
 def read_tdms(path: Path) -> tuple[Record, ...]:
-    """TDMS files; unit and increment as LabVIEW writes them (unit_string, wf_increment).
+    """TDMS files; groups that are a hit each are a record each, texts and settings are left out.
 
-    Raises InputError where two groups hold the same channels (each is a hit of its own), and where
-    channels were not sampled together.
+    Raises InputError where it is damaged, and where channels were not sampled together.
     """
     with _warnings() as warned:
         try:
-            named = _named(path)
+            root = _root(path)
         except InputError:
             raise
         except Exception as error:  # the library raises whatever the junk makes it raise
@@ -33,56 +33,42 @@ def read_tdms(path: Path) -> tuple[Record, ...]:
             ) from None
     if warned:
         raise InputError(f"{path} is cut off ({warned[0]}); export it again.")
-    return to_records(path, named)
+    return records_of(path, root)
 
 
-def _named(path: Path) -> Named:
+def _root(path: Path) -> EntryTree:
     from nptdms import TdmsFile
 
-    columns: dict[str, np.ndarray] = {}
-    units: dict[str, str] = {}
-    where: dict[str, str] = {}
-    with TdmsFile.open(path) as file:
-        attributes = {str(k): str(v) for k, v in file.properties.items()}
+    with TdmsFile.open(path, raw_timestamps=True) as file:
         groups = file.groups()
-        channels = [channel for group in groups for channel in group.channels()]
-        for group in groups:
-            attributes |= {str(k): str(v) for k, v in group.properties.items()}
-        check_size(path, sum(8 * len(channel) for channel in channels))
-        for channel in channels:
-            name = channel.name
-            if name in columns:
-                raise InputError(
-                    f"{path} holds {name} twice, in {where[name]} and in {channel.group_name}; "
-                    f"export each hit into a file of its own."
-                )
-            columns[name] = np.asarray(channel[:], dtype=float)
-            where[name] = channel.group_name
-            if channel.properties.get("unit_string"):
-                units[name] = str(channel.properties["unit_string"])
-    step = _common(path, {c.name: c.properties.get("wf_increment") for c in channels}, SAME_RATE)
-    if step:
-        attributes.setdefault("sampling_rate_hz", repr(1 / step))
-        _common(path, {c.name: c.properties.get("wf_start_offset", 0) for c in channels}, 0, step)
-    return Named(columns, units, attributes)
-
-
-def _common(path: Path, stated: dict[str, Any], relative: float, step: float = 0.0) -> float | None:
-    """What channels state alike, None where none does; InputError where they contradict."""
-    given = {name: float(value) for name, value in stated.items() if value}
-    if step:
-        given = {name: float(value or 0.0) for name, value in stated.items()}
-    if not given:
-        return None
-    (first, value), *others = given.items()
-    for name, other in others:
-        if not abs(other - value) <= relative * abs(value) + step / 2:
-            what = f"begin {abs(other - value):.3g} s apart" if step else "have different rates"
-            raise InputError(
-                f"{path}: channels {first} and {name} {what}; export channels that were sampled "
-                f"together."
+        check_size(path, sum(8 * len(c) for group in groups for c in group.channels()))
+        found = {
+            group.name: tree_of(
+                {channel.name: _channel(channel) for channel in group.channels()},
+                _stated(group.properties),
             )
-    return value
+            for group in groups
+        }
+        return tree_of(found, _stated(file.properties))
+
+
+def _channel(channel: "nptdms.TdmsChannel") -> EntryTree:
+    """A channel's numbers with its properties; dates are times in s. What is neither is empty."""
+    values = channel[:]
+    if isinstance(values, np.ndarray) and values.dtype.names and values.size:
+        seconds = (values["seconds"] - values["seconds"][0]).astype(float)
+        return EntryTree({"unit": "s"}, {"": seconds + values["second_fractions"] / 2.0**64})
+    if np.asarray(values).dtype.kind not in "fiubc":
+        return EntryTree()
+    return tree_of({"": np.asarray(values)}, _stated(channel.properties))
+
+
+def _stated(properties: Mapping[str, Any]) -> dict[str, object]:
+    """Properties with dates as NumPy has them."""
+    return {
+        name: value.as_datetime64("ns") if hasattr(value, "as_datetime64") else value
+        for name, value in properties.items()
+    }
 
 
 @contextmanager

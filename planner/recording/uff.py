@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from planner.errors import ForeignFileError, InputError
-from planner.recording.named_columns import sampling_rate
 from planner.recording.records import Channel, FrfRecord, Record, TimeRecord
-from planner.recording.units import lookup
+from planner.recording.sampling import aligned, sampling_rate
+from planner.recording.units import MOTIONS, Unit, lookup, lookup_ratio
 
 # UFF 58, record 8 and 9: specific data types.
 _QUANTITY = {8: "displacement", 11: "velocity", 12: "acceleration", 13: "force", 9: "force",
@@ -22,7 +22,12 @@ _FUNCTIONS = {0: "general data", 1: "time histories", 2: "auto-spectra", 3: "cro
               4: "FRFs", 5: "transmissibilities", 6: "coherences", 9: "power spectral densities",
               12: "spectra"}  # fmt: skip
 HEAD = 1 << 16  # bytes in which a first dataset begins
-_RATIO = {"acceleration": "accelerance", "velocity": "mobility", "displacement": "receptance"}
+_NONE = ("", "NONE", "NULL")
+# Dataset 164, record 1 and 2: how many of a system's units of length and of force are one of SI's.
+_SYSTEMS = {1: (1.0, 1.0), 2: (3.28084, 0.224809), 3: (1.0, 0.101972), 4: (3.28084, 7.23301),
+            5: (1e3, 1e3), 6: (1e2, 1e2), 7: (39.3701, 0.224809), 8: (1e3, 0.101972),
+            10: (1e3, 1.0)}  # fmt: skip
+LAST_LINE = 6  # values: a last line may be filled up
 
 
 def read_uff(path: Path) -> tuple[Record, ...]:
@@ -61,19 +66,65 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         with warnings.catch_warnings(), redirect_stdout(io.StringIO()):
             warnings.simplefilter("ignore")
             file = pyuff.UFF(str(path))
-            count = len(file.get_set_types())
-            if not count:
+            kinds = [int(kind) for kind in file.get_set_types()]
+            if not kinds:
                 raise ForeignFileError(
                     f"{path} is no universal file (no dataset in it); export again."
                 )
-            sets: list[Any] = [file.read_sets(i) for i in range(count)]
-            return sets
+            if 0 in kinds:  # bytes between two datasets are damaged
+                raise InputError(f"{path} holds a dataset without a number; export it again.")
+            sets: list[Any] = [file.read_sets(i) for i in range(len(kinds))]
+            blocks = file._block_ind  # where datasets begin and end, which nothing public says
     except InputError:
         raise
     except Exception as error:  # the parser raises whatever the junk makes it raise
         raise InputError(
             f"{path} cannot be read as a universal file ({type(error).__name__}); export it again."
         ) from None
+    system = _SYSTEMS[1]
+    for kind, one, (first, end) in zip(kinds, sets, blocks, strict=True):
+        if kind == 164:
+            system = _system(path, one)
+        elif kind == 58:
+            one["system"] = system
+            if one["binary"] and len(one["data"]) != int(one["num_pts"]):
+                _read_mixed(path, one, int(first), int(end))
+            _without_padding(one)
+    return sets
+
+
+def _system(path: Path, s: dict[str, Any]) -> tuple[float, float]:
+    """Units of length and of force that are one of SI's, as a dataset 164 states them."""
+    stated = float(s["length"]), float(s["force"])
+    known = _SYSTEMS.get(int(s["units_code"]), stated)
+    if not all(f > 0 and abs(f / k - 1) < 0.01 for f, k in zip(stated, known, strict=True)):
+        raise InputError(
+            f"{path}: dataset 164 states the system of units {s['units_code']} and factors "
+            f"{stated[0]:g} (length) and {stated[1]:g} (force), which contradict it; correct it."
+        )
+    return stated
+
+
+def _read_mixed(path: Path, s: dict[str, Any], first: int, end: int) -> None:
+    """Values of double precision over an uneven abscissa of single precision (cases 6 and 8)."""
+    with open(path, "rb") as file:
+        file.seek(first)
+        body = b"".join(file.read(end - first + 1).splitlines(keepends=True)[13:])
+    order = "<" if s["byte_ordering"] == 1 else ">"
+    parts = 2 if s["ord_data_type"] in (5, 6) else 1
+    line = np.dtype([("x", f"{order}f4"), ("y", f"{order}f8", (parts,))])
+    count = int(s["num_pts"])
+    if s["abscissa_spacing"] == 0 and 0 <= len(body) - count * line.itemsize <= 2:
+        values = np.frombuffer(body, line, count)
+        s["x"] = values["x"].astype(float)
+        s["data"] = values["y"] @ np.array([1.0, 1j][:parts])
+
+
+def _without_padding(s: dict[str, Any]) -> None:
+    """Leave out what fills up the last line of an ASCII dataset: the count that is stated holds."""
+    count = int(s["num_pts"])
+    if not s["binary"] and 0 < len(s["data"]) - count < LAST_LINE:
+        s["x"], s["data"] = s["x"][:count], s["data"][:count]
 
 
 def _check_numbers(path: Path, sets: list[dict[str, Any]]) -> None:
@@ -97,16 +148,20 @@ def _simulated(sets: list[dict[str, Any]]) -> bool:
     return any("simulated" in text.lower() for text in texts)
 
 
-def _unit(path: Path, s: dict[str, Any]) -> tuple[str, str, float]:
-    """Quantity, SI unit and factor; without a label UFF's default, SI, holds."""
-    stated = _QUANTITY.get(int(s["ordinate_spec_data_type"]))
-    label = str(s["ordinate_axis_units_lab"]).strip()
-    if label.upper() in ("", "NONE", "NULL"):
-        return (stated, _SI[stated], 1.0) if stated else ("unknown", "", 1.0)
+def _unit(path: Path, s: dict[str, Any], axis: str = "ordinate") -> Unit:
+    """Unit of an axis: by its label, without one of the file's system of units, which is SI's."""
+    stated = _QUANTITY.get(int(s[f"{axis}_spec_data_type"]))
+    label = str(s[f"{axis}_axis_units_lab"]).strip()
+    if label.upper() in _NONE:
+        if stated is None:
+            return Unit("unknown", "", 1.0)
+        length, force = s["system"]
+        factor = {"force": 1 / force, "pressure": length**2 / force}.get(stated, 1 / length)
+        return Unit(stated, _SI[stated], factor)
     known = lookup(label)
     if known is None:
-        return stated or "unknown", "", 1.0
-    if stated and known[0] != stated:
+        return Unit(stated or "unknown", "", 1.0)
+    if stated and known.quantity != stated:
         raise InputError(
             f"{path} labels a record of {stated} with the unit {label}; correct the export."
         )
@@ -131,12 +186,9 @@ def _by_hit(sets: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
 
 
 def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
-    grids = {(round(float(s["abscissa_min"]), 9), _rate(path, s), len(s["data"])) for s in sets}
-    rates = {round(g[1], 6) for g in grids}
-    if len(rates) > 1 or len({g[2] for g in grids}) > 1:
-        raise InputError(
-            f"{path} mixes records of different sampling or length; export one hit with one rate."
-        )
+    rates = {round(_rate(path, s), 6) for s in sets}
+    if len(rates) > 1:
+        raise InputError(f"{path} mixes records of different sampling; export one hit, one rate.")
     common = {int(s["ref_dir"]) for s in sets if int(s["ref_dir"])}
     hit_nodes = {int(s["ref_node"]) for s in sets if int(s["ref_dir"]) and int(s["ref_node"])}
     channels, remarks = [], []
@@ -153,8 +205,9 @@ def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:
         name = name if name.upper() != "NONE" else f"{quantity} {direction:+d}"
         samples = np.asarray(s["data"], dtype=float) * factor
         channels.append(Channel(name, quantity, unit, direction, samples, str(node)))
-    rate = next(iter(grids))[1]
-    return TimeRecord(path, rate, tuple(channels), tuple(remarks), _simulated(sets))
+    rate = _rate(path, sets[0])
+    together, cut = aligned(path, channels, [float(s["x"][0]) for s in sets], rate)
+    return TimeRecord(path, rate, together, (*remarks, *cut), _simulated(sets))
 
 
 def _rate(path: Path, s: dict[str, Any]) -> float:
@@ -175,7 +228,7 @@ def _frf_record(
     for s in sets:
         if len(s["x"]) != len(frequency) or not np.allclose(s["x"], frequency):
             raise InputError(f"{path} mixes FRFs over different frequency lines; export one grid.")
-        quantity, unit, factor = _unit_of_ratio(s)
+        quantity, unit, factor = _unit_of_ratio(path, s)
         kinds.add((quantity, unit))
         values.append(np.asarray(s["data"], dtype=complex) * factor)
         match = found.get(_place(s))
@@ -214,21 +267,22 @@ def _nodes(sets: list[dict[str, Any]], end: str) -> tuple[str, ...]:
     if any(number != "0" for number in numbers):
         return tuple(numbers)
     names = [str(s[f"{end}_ent_name"]).strip() for s in sets]
-    return tuple("0" if name.upper() in ("", "NONE", "NULL") else name for name in names)
+    return tuple("0" if name.upper() in _NONE else name for name in names)
 
 
-def _unit_of_ratio(s: dict[str, Any]) -> tuple[str, str, float]:
-    """Kind and unit of an FRF from its numerator and denominator, where both are stated."""
-    top = _QUANTITY.get(int(s["ordinate_spec_data_type"]))
-    bottom = _QUANTITY.get(int(s["orddenom_spec_data_type"]))
-    if top not in _RATIO or bottom != "force":
-        return "unknown", "", 1.0
-    factor = 1.0
-    for key, sign in (("ordinate_axis_units_lab", 1), ("orddenom_axis_units_lab", -1)):
-        label = str(s[key]).strip().split("/N")[0]
-        if label.upper() not in ("", "NONE"):
-            known = lookup(label)
-            if known is None:
-                return _RATIO[top], "", 1.0
-            factor *= known[2] ** sign
-    return _RATIO[top], f"{_SI[top]}/N", factor
+def _unit_of_ratio(path: Path, s: dict[str, Any]) -> Unit:
+    """Kind and unit of an FRF: the ratio that its label states, else numerator and denominator."""
+    ratio = lookup_ratio(str(s["ordinate_axis_units_lab"]))
+    if ratio is None:
+        top, bottom = _unit(path, s), _unit(path, s, "orddenom")
+        if top.quantity not in MOTIONS or bottom.quantity != "force":
+            return Unit("unknown", "", 1.0)
+        unit = f"{top.si}/N" if top.si and bottom.si else ""
+        return Unit(MOTIONS[top.quantity], unit, top.factor / bottom.factor)
+    stated = MOTIONS.get(_QUANTITY.get(int(s["ordinate_spec_data_type"]), ""), ratio.quantity)
+    if stated != ratio.quantity:
+        raise InputError(
+            f"{path} labels {stated} with {str(s['ordinate_axis_units_lab']).strip()}, which is "
+            f"{ratio.quantity}; correct the export."
+        )
+    return ratio

@@ -7,18 +7,20 @@ from pathlib import Path
 import numpy as np
 
 from planner.dataset.measure import MeasuredPose
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError
 from planner.frf.between_points import exported
 from planner.frf.matrix import FrfMatrix, matrix_of
 from planner.recording.excited_band import excited_band
+from planner.recording.file_names import placed_by_name
 from planner.recording.geometry import read_geometry
+from planner.recording.hits import directed
 from planner.recording.points import ANYWHERE
-from planner.recording.read import hit_count, read
+from planner.recording.read import read
 from planner.recording.records import FrfRecord, Hit, Record, TimeRecord
 from planner.report.answer import RefusedFile
-from planner.report.modal_analysis import DEFAULT_BAND_HZ, sources_of
+from planner.report.modal_analysis import DEFAULT_BAND_HZ
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +42,7 @@ class FrfSet:
     tail_s: float = np.inf
     ended: FrfRecord | None = None
     ended_rate_1_s: float = 0.0
+    remarks: tuple[str, ...] = ()
 
     def matrix(self, quantity: str | None) -> FrfMatrix:
         """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
@@ -52,7 +55,7 @@ class FrfSet:
 
 
 def frf_set(
-    paths: Sequence[Path],
+    sources: Sequence[Source],
     band_hz: tuple[float, float] | None,
     estimator: str = "h1",
     window_rate_1_s: float = 0.0,
@@ -62,7 +65,6 @@ def frf_set(
     That is a pose, be it hits or FRFs, and read elsewhere. The first file that can be read says
     which of both is meant. Raises RefusedError where no hit can be used.
     """
-    sources = sources_of(paths)
     held, refused = _read(sources)
     records = [record for _, own in held for record in own]
     if records and isinstance(records[0], TimeRecord):
@@ -72,7 +74,7 @@ def frf_set(
         return _struck(sources, band_hz, estimator, window_rate_1_s)
     given, used = [], []
     for source, own in held:
-        frfs = [record for record in own if isinstance(record, FrfRecord)]
+        frfs = [_directed(record, source) for record in own if isinstance(record, FrfRecord)]
         given += frfs
         if frfs:
             used.append(source.name)
@@ -106,6 +108,12 @@ def _read(
     return held, refused
 
 
+def _directed(record: FrfRecord, source: Source) -> FrfRecord:
+    """With the axes that the table of recordings, or the file's name where asked, says."""
+    named = placed_by_name(record, source.name) if source.from_name else record
+    return directed(named, source.hit, source.response)
+
+
 def _one_sensor(times: Sequence[TimeRecord]) -> bool:
     """Whether hits are those of a pose: at one point, heard along x, y and z by one sensor.
 
@@ -134,12 +142,7 @@ def _struck(
 ) -> FrfSet:
     """FRFs of hits, screened and averaged as those of a pose are."""
     named = (replace(s, stated=replace(s.stated, names=ANYWHERE)) for s in sources)
-    parts = tuple(
-        part
-        for source in named
-        if read_geometry((source.path,)) is None
-        for part in source.parts(hit_count(source.path))
-    )
+    parts = in_parts(tuple(s for s in named if read_geometry((s.path,)) is None))
     band = band_hz or _band(parts)
     measured = MeasuredPose(parts, band, estimator, window_rate_1_s, store=user_store())
     verdicts, frf, ended = measured.verdicts, measured.whole, measured.ended_frf
@@ -160,6 +163,7 @@ def _struck(
         frf.tail_s,
         exported(ended, path, simulated),
         ended.exponential_rate_1_s,
+        told_of_files(verdicts),
     )
 
 

@@ -12,14 +12,20 @@ from rich.console import Group
 from planner.campaign.events import Amplitude
 from planner.campaign.log_conversion import from_homogeneity
 from planner.dataset.measure import measure
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.errors import InputError, RefusedError
 from planner.frf.frf import Frf
 from planner.frf.quantities import DERIVATIVE
 from planner.modal.estimate_modes import identification
 from planner.modal.modes import ModalModel, Mode
 from planner.modal.pole_identification import PoleIdentification
-from planner.recording.folder import TABLE, files_in, joint_columns, read_recordings
+from planner.recording.folder import (
+    CHANNELS,
+    TABLE,
+    files_in,
+    joint_columns,
+    read_recordings,
+)
 from planner.recording.points import ANYWHERE, PointNames
 from planner.recording.read import READERS
 from planner.report.answer import Answer, RefusedFile
@@ -139,23 +145,22 @@ def check_options(
 
 
 def modal_report(
-    paths: Sequence[Path],
+    sources: tuple[Source, ...],
     band_hz: tuple[float, float] | None = None,
     force: str | None = None,
     estimator: str = "h1",
     pictures: Pictures = NO_PICTURES,
     window_rate_1_s: float = 0.0,
 ) -> ModalReport:
-    """Analyse files, or folders of files, of one pose.
+    """Analyse the files of one pose.
 
     `force` names the force channel of a long record whose channels are not labelled. Raises
     RefusedError if no file could be used.
     """
-    sources = sources_of(paths)
     if force is not None:
         return _by_channel(sources, band_hz, force, pictures)
     band = band_hz or DEFAULT_BAND_HZ
-    measured = measure(sources, band, estimator, window_rate_1_s)
+    measured = measure(in_parts(sources), band, estimator, window_rate_1_s)
     refused = [RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted]
     if measured.modal is None:
         reasons = [file.reason for file in refused] or list(measured.remarks)
@@ -170,15 +175,18 @@ def modal_report(
         accepted=accepted,
         hits=measured.frf.hits,
         usable_band_hz=measured.frf.usable_band_hz,
-        remarks=measured.remarks,
+        remarks=(*told_of_files(measured.verdicts), *measured.remarks),
         amplitude=from_homogeneity(measured.homogeneity),
         simulated=simulated,
         **_draw(pictures, measured.frf, found, measured.modal, accepted, simulated),
     )
 
 
-def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
-    """All recordings that files and folders hold; InputError for what does not exist."""
+def sources_of(paths: Sequence[Path], from_names: bool = False) -> tuple[Source, ...]:
+    """All recordings that files and folders hold; InputError for what does not exist.
+
+    With `from_names` the names of files say where their FRFs were felt and hit.
+    """
     found: list[Source] = []
     for path in paths:
         if (path / TABLE).is_file():
@@ -187,10 +195,10 @@ def sources_of(paths: Sequence[Path]) -> tuple[Source, ...]:
         elif path.is_dir():
             found += [Source(file, str(file)) for file in files_in(path, READERS)]
         elif path.is_file():
-            found.append(Source(path, str(path)))
+            found += [Source(path, str(path))] if path.name != CHANNELS else []
         else:
             raise InputError(f"{path} does not exist; name the recordings of one pose.")
-    return tuple(found)
+    return tuple(replace(source, from_name=from_names) for source in found)
 
 
 def _of_no_robot(source: Source) -> Source:

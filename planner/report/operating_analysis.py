@@ -12,6 +12,7 @@ from rich.text import Text
 from planner.errors import InputError
 from planner.modal.operating import OperatingMode, OperatingModes, operating_modes
 from planner.recording.dof import Dof
+from planner.recording.filling import lost_samples
 from planner.recording.read import read
 from planner.recording.records import Channel, TimeRecord
 from planner.report.answer import Answer, RefusedFile
@@ -93,7 +94,7 @@ def operating_report(
     dofs = tuple(_dof(channel) for channel in channels)
     sign = np.array([dof.sign for dof in dofs])
     found = operating_modes(sign[:, None] * samples, record.sampling_rate_hz, band_hz)
-    told = [*record.remarks, UNSCALED]
+    told = [*record.remarks, *(fault.text for fault in lost_samples(record)), UNSCALED]
     if found.tones_hz:
         tones = ", ".join(f"{hz:.4g}" for hz in found.tones_hz)
         told.append(f"Tones, not modes, at {tones} Hz: what turns or hums there was left out.")

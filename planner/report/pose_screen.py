@@ -23,12 +23,16 @@ COLOURS = {"good": "bold green", "repeat": "bold red", "late": "bold yellow",
 
 @dataclass(frozen=True)
 class JudgedHit:
-    """A hit that waits: its number at this pose, axis, kind as of its verdict, why."""
+    """A hit that waits: its number at this pose, axis, kind as of its verdict, why.
+
+    `when`: " at 14.00 s" in a record of several hits.
+    """
 
     number: int
     axis: str
     kind: str
     text: str
+    when: str = ""
 
     @property
     def said(self) -> Text:
@@ -42,7 +46,7 @@ class JudgedHit:
         return self._headed(remedy_first(self.text)[0])
 
     def _headed(self, text: str) -> Text:
-        axis = self.axis or "axis not stated"
+        axis = (self.axis or "axis not stated") + self.when
         if self.kind == "good":
             but = f"hit {self.number} ({axis}): good, but: {text}"
             plain = Text(f"hit {self.number} ({axis}): good", style=COLOURS["good"])
@@ -50,7 +54,8 @@ class JudgedHit:
         named = f"{self.number} ({axis})"
         said = {
             "repeat": f"REPEAT HIT {named}:", "late": f"hit {named}, late?",
-            "unsure": f"hit {named}, right?", "unstated": f"hit {self.number}, along which axis?",
+            "unsure": f"hit {named}, right?",
+            "unstated": f"hit {self.number}{self.when}, along which axis?",
         }  # fmt: skip
         return Text(f"{said[self.kind]} {text}", style=COLOURS[self.kind])
 
@@ -68,6 +73,7 @@ class PosePage:
     expected_hz: tuple[float, ...]
     expected_sd_hz: tuple[float, ...]
     folder: Path
+    streams: tuple[str, ...] = ()  # of records of several hits: how many, and how many are good
     # Files that are being written or cannot be read, by name, and what is said of them.
     unfinished: tuple[tuple[str, str], ...] = ()
     progress: str = ""
@@ -92,6 +98,7 @@ class PosePage:
         rows = 1 + max(angles.row_count, hits.row_count)
         title = f"Measurement {self.number}: go to pose {self.proposal.pose}"
         parts = [Said([Text(title, style="bold reverse")]), *self._place(), *self._verdicts()]
+        parts += [Said([None, _said(text)], 5) for text in self.streams[-LAST:]]
         parts += [_unfinished(*one) for one in self.unfinished[-2:]]
         parts += [Said([None, _said(self.progress)], 6)] if self.progress else []
         paths = _end(str(self.folder)), str(self.folder)

@@ -1,4 +1,4 @@
-"""Every entry of robot.toml and campaign.toml, told by the types that read them."""
+"""Every entry of the TOML files that a user writes, told by the types that read them."""
 
 import inspect
 from collections.abc import Iterator
@@ -12,11 +12,15 @@ from rich.text import Text
 
 from planner.campaign.config import AcquisitionTable, CampaignConfig
 from planner.errors import InputError
+from planner.milling.cut import Cut
+from planner.milling.tool_file import ToolTable
 from planner.report.answer import Answer
 from planner.report.text import table
 from planner.robot.config import RobotConfig
 
-FILES: dict[str, type[msgspec.Struct]] = {"robot": RobotConfig, "campaign": CampaignConfig}
+FILES: dict[str, type[msgspec.Struct]] = {
+    "robot": RobotConfig, "campaign": CampaignConfig, "cut": Cut, "tool": ToolTable,
+}  # fmt: skip
 REQUIRED = "required"
 
 
@@ -75,7 +79,7 @@ class SchemaReport(Answer):
 
 
 def schema(file: str) -> SchemaReport:
-    """Of "robot" or "campaign"; InputError for others."""
+    """Of one of FILES; InputError for others."""
     if file not in FILES:
         raise InputError(f"There is no file {file}; name one of {', '.join(FILES)}.")
     kind = FILES[file]
@@ -88,12 +92,12 @@ def _tables(kind: type[msgspec.Struct], name: str) -> Iterator[SchemaTable]:
     assert isinstance(info, types.StructType)
     entries, inner = [], []
     for field in info.fields:
-        struct, many = _struct(field.type)
+        struct, form = _struct(field.type)
         if struct is None:
             entries.append(SchemaEntry(field.encode_name, _takes(field.type), _default(field)))
         else:
             path = f"{name.strip('[]')}.{field.encode_name}".strip(".")
-            inner.append((struct, f"[[{path}]]" if many else f"[{path}]"))
+            inner.append((struct, form.format(path)))
     yield SchemaTable(name, _about(kind), tuple(entries), _choices(kind))
     for struct, path in inner:
         yield from _tables(struct, path)
@@ -113,16 +117,15 @@ def _about(kind: type) -> str:
     return " ".join(" ".join(p.split()) for p in paragraphs)
 
 
-def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, bool]:
-    """The type of a table, or of the tables in a list; None for other entries."""
+def _struct(given: types.Type) -> tuple[type[msgspec.Struct] | None, str]:
+    """The type of a table, of those in a list or by name, and how its head is written."""
     for one in _alternatives(given):
         if isinstance(one, types.StructType):
-            return one.cls, False
-        if isinstance(one, types.VarTupleType | types.ListType) and isinstance(
-            one.item_type, types.StructType
-        ):
-            return one.item_type.cls, True
-    return None, False
+            return one.cls, "[{}]"
+        inner = getattr(one, "item_type", getattr(one, "value_type", None))
+        if isinstance(inner, types.StructType):
+            return inner.cls, "[{}.NAME]" if isinstance(one, types.DictType) else "[[{}]]"
+    return None, ""
 
 
 def _alternatives(given: types.Type) -> tuple[types.Type, ...]:

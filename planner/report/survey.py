@@ -13,7 +13,7 @@ from planner.campaign.low_fidelity import LowFidelity, learn
 from planner.campaign.misses import CampaignMisses, Visited, told_by
 from planner.dataset.hit_columns import hits_of
 from planner.dataset.measure import MeasuredPose, measure
-from planner.dataset.screened_files import Source
+from planner.dataset.screened_files import Source, in_parts
 from planner.dynamics.simulation import Simulation
 from planner.errors import RefusedError
 from planner.frf.frf import Frf
@@ -160,7 +160,7 @@ def survey(
     for number, name in enumerate(names):
         progress(f"pose {name}, {number} of {len(names)} done")
         rows = [row for row in table.rows if row.pose == name]
-        measured = measure(_sources(rows), band, estimator, window_rate_1_s)
+        measured = measure(in_parts(_sources(rows)), band, estimator, window_rate_1_s)
         refused += [
             RefusedFile(v.source.name, v.reason) for v in measured.verdicts if not v.accepted
         ]

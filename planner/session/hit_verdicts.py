@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one
+from planner.dataset.screened_files import FileVerdict, Source, not_averaged, read_one, when
 from planner.recording.driving_point import driving_point
 from planner.recording.force_levels import far_below, peak_n
 from planner.recording.points import PointNames, StatedPoints
-from planner.recording.read import hit_count
+from planner.recording.read import version
 from planner.recording.records import Hit
 from planner.recording.repeats import SAME, Doubt, doubts, likeness_to, screen_repeats
 from planner.recording.sampling_rates import sampled_otherwise
@@ -38,11 +38,12 @@ class HitVerdict:
     hits: tuple[Hit, ...] = ()
     number: int = 0
     weak: bool = False
+    at_s: float | None = None
 
     @property
     def name(self) -> str:
         """As other verdicts speak of it."""
-        return f"hit {self.number} ({self.path.name})"
+        return f"hit {self.number} ({self.path.name}{when(self.at_s)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,8 @@ class Verdicts:
         kind = "repeat" if verdict.reason else "good"
         kind = "unstated" if verdict.axis_missing else kind
         text = verdict.reason or " ".join(verdict.remarks)
-        return HitVerdict(path, verdict.axis or "", kind, text, own, number)
+        at_s = verdict.source.at_s
+        return HitVerdict(path, verdict.axis or "", kind, text, own, number, False, at_s)
 
     def _beside_repeats(self, judged: list[HitVerdict]) -> list[HitVerdict]:
         """With which do not go with the others, and what a vote among three and more says."""
@@ -170,13 +172,13 @@ class Verdicts:
 
     def _hits_of(self, path: Path) -> list[tuple[FileVerdict, tuple[Hit, ...]]]:
         """The verdict on each hit in a file by itself, and what of it is usable."""
-        stat, row = path.stat(), self.table.row(path)
-        key = path, stat.st_size, stat.st_mtime_ns, str(row)
+        row = self.table.row(path)
+        key = path, version(path), str(row)
         if key not in self._read:
             source = Source(path, path.name, stated=self._stated)
             if row is not None:
                 source = replace(Source.of(row), path=path, name=path.name)
-            judged = [read_one(one, self._band) for one in source.parts(hit_count(path))]
+            judged = [read_one(one, self._band) for one in source.parts()]
             self._read[key] = [(verdict, hits) for verdict, hits, _ in judged]
         return self._read[key]
 

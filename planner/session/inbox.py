@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from planner.campaign.store import read_bytes, sha256
+from planner.campaign.store import read_recording, sha256
 from planner.errors import ForeignFileError, PlannerError
-from planner.recording.folder import TABLE
-from planner.recording.read import READERS, read
+from planner.recording.folder import TABLES
+from planner.recording.read import READERS, read, version
 
 TEXT, TEXT_LONGER = (".csv", ".tsv", ".txt"), 3.0
 SETTLED = 8.0  # times `quiet_s`: what does not read until then is not being written any more
@@ -38,7 +38,7 @@ class Inbox:
     quiet_s: float = 0.6
     unfit: Callable[[Path], str] = lambda path: ""
     _seen: dict[Path, tuple[int, float, float]] = field(default_factory=dict)
-    _contents: dict[Path, tuple[tuple[int, float], Content]] = field(default_factory=dict)
+    _contents: dict[Path, tuple[tuple[int, ...], Content]] = field(default_factory=dict)
     _ignored: set[Path] = field(default_factory=set)
 
     def scan(self, done: set[str]) -> tuple[list[Path], list[tuple[Path, str]]]:
@@ -46,13 +46,13 @@ class Inbox:
         whole, waiting = [], []
         for path in self._candidates():
             try:
-                stat = path.stat()
+                stat, mark = path.stat(), version(path)
             except OSError:
                 continue
             if not self._still(path, stat.st_size, stat.st_mtime):
                 waiting += [] if _old(stat.st_mtime) else [(path, WRITING)]
                 continue
-            found = self._content(path, stat.st_size, stat.st_mtime)
+            found = self._content(path, mark)
             settled = self._settled(path)
             if found.digest in done:
                 continue
@@ -77,7 +77,7 @@ class Inbox:
     def _candidates(self) -> list[Path]:
         found = [
             p for p in self.folder.rglob("*")
-            if p.is_file() and p.name != TABLE and p.suffix.lower() in READERS
+            if p.is_file() and p.name not in TABLES and p.suffix.lower() in READERS
             and not p.name.startswith(".")
         ]  # fmt: skip
         return sorted(found, key=lambda p: (p.stat().st_mtime, p.name))
@@ -99,23 +99,23 @@ class Inbox:
         longer = TEXT_LONGER if path.suffix.lower() in TEXT else 1.0
         return self._quiet(path) >= longer * self.quiet_s
 
-    def _content(self, path: Path, size: int, modified: float) -> Content:
+    def _content(self, path: Path, mark: tuple[int, ...]) -> Content:
         """What a file holds, read anew where it changed."""
         known = self._contents.get(path)
-        if known is not None and known[0] == (size, modified):
+        if known is not None and known[0] == mark:
             return known[1]
         try:
-            digest = sha256(read_bytes(path))
+            digest = sha256(read_recording(path))
             read(path)
             found = Content(digest)
         except PlannerError as error:
             found = Content(fault=str(error), foreign=isinstance(error, ForeignFileError))
-        self._contents[path] = ((size, modified), found)
+        self._contents[path] = (mark, found)
         return found
 
     def digest(self, path: Path) -> str:
         """Content hash of a whole file."""
-        return sha256(read_bytes(path))
+        return sha256(read_recording(path))
 
 
 def _old(modified: float) -> bool:

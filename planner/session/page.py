@@ -6,10 +6,11 @@ from pathlib import Path
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
+from planner.dataset.screened_files import when
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
 from planner.session.course import BAD, Course
 from planner.session.hit_verdicts import HitVerdict
-from planner.words import short_name
+from planner.words import counted, short_name
 
 
 def page_without_hits(
@@ -40,6 +41,7 @@ def page_with_hits(
     hits = tuple(_judged(one, before, names) for one in verdicts)
     unfinished = tuple((short_name(path), _named(path, why)) for path, why in waiting)
     page = replace(page, hits=hits, unfinished=unfinished, progress=course.progress)
+    page = replace(page, streams=_streams(verdicts))
     return replace(page, keys="" if auto else _keys(page, before, undoable))
 
 
@@ -50,7 +52,19 @@ def _judged(verdict: HitVerdict, before: str, names: Sequence[str]) -> JudgedHit
         text = f"{text}, or [h]: it is right"
     for name in names:
         text = text.replace(name, short_name(name))
-    return JudgedHit(verdict.number, verdict.axis, verdict.kind, text)
+    return JudgedHit(verdict.number, verdict.axis, verdict.kind, text, when(verdict.at_s))
+
+
+def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
+    """How many hits of records of several are good."""
+    kinds: dict[Path, list[str]] = {}
+    for verdict in verdicts:
+        if verdict.at_s is not None:
+            kinds.setdefault(verdict.path, []).append(verdict.kind)
+    return tuple(
+        f"{counted(len(own), 'hit')} in {short_name(path)}: {own.count('good')} good"
+        for path, own in kinds.items()
+    )
 
 
 def _keys(page: PosePage, before: str, undoable: bool) -> str:

@@ -159,7 +159,8 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     course = replace(course, visit=visit)
     waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
     ready = [path for path in visit.whole if path not in visit.unstated]
-    if station.auto and ready and (len(ready) >= station.hits_at(visit.proposal) or waited):
+    hits = sum(verdict.path in ready for verdict in visit.verdicts)
+    if station.auto and ready and (hits >= station.hits_at(visit.proposal) or waited):
         return import_waiting(station, course, visit, ready)
     course = on_key(station, course, visit, station.key())
     return _unless_late(station, course) if course.visit is not None else course

@@ -16,6 +16,8 @@ from planner.campaign.example import EXAMPLE
 from planner.cli.app import app
 from planner.cli.run import run
 from planner.design.propose import ACQUISITIONS, DESIGNS, TOLD
+from planner.milling.cut import Cut, load_cut
+from planner.milling.tool_file import ToolTable, load_tool
 from planner.report.manual.words import TUTORIAL
 from planner.robot.config import RobotConfig
 
@@ -49,7 +51,10 @@ def names_of(kind: type[msgspec.Struct]) -> set[str]:
     return {field.encode_name for field in msgspec.structs.fields(kind)}
 
 
-@pytest.mark.parametrize(("file", "kind"), [("robot", RobotConfig), ("campaign", CampaignConfig)])
+KINDS = {"robot": RobotConfig, "campaign": CampaignConfig, "cut": Cut, "tool": ToolTable}
+
+
+@pytest.mark.parametrize(("file", "kind"), KINDS.items())
 def test_the_schema_names_every_entry(file, kind, capsys):
     assert run(["schema", file, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
@@ -115,3 +120,8 @@ def test_the_shell_completes(monkeypatch, capsys):
     with pytest.raises(SystemExit):
         typer.main.get_command(app)(prog_name="planner", args=[])
     assert {"replay", "report"} <= set(capsys.readouterr().out.split())
+
+
+def test_the_examples_of_cut_and_tool_are_taken():
+    assert load_cut(EXAMPLE / "cut.toml").teeth == 2
+    assert load_tool(EXAMPLE / "tool.toml").parts[0].contact is not None

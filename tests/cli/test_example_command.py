@@ -17,6 +17,7 @@ def test_the_example_goes_from_check_to_a_proposal(tmp_path, capsys):
     written = ask(capsys, "new", "--example", tmp_path / "own")
     assert {Path(f).name for f in written["files"]} == {
         "robot.toml", "robot.urdf", "campaign.toml", "ask_tell.py",
+        "cut.toml", "tool.toml",
     }  # fmt: skip
     assert all(
         "#" in Path(f).read_text() or "<!--" in Path(f).read_text() for f in written["files"]

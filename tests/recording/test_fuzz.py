@@ -21,11 +21,15 @@ from planner.recording.folder import read_poses, read_recordings
 from planner.robot.robot import Robot
 from planner.truth.hits import Hammer, SimulatedHit, write_uff
 from tests.support.bad_input import columns, write_csv, write_h5, write_mat, write_tdms
+from tests.support.containers import MANY_HITS, ONE_HIT
 from tests.support.outside import call, make_cell
 from tests.support.simulated_hits import RATE_HZ, make_hit
 
 LONGEST_S, LARGEST_GIB = 10, 2
 BAND = (4.0, 60.0)
+CONTAINERS = ("MAT: signals of a measuring program", "MAT: a cell array of columns",
+              "MAT 7.3: a list of channels", "LVM: many x columns, decimal commas",
+              "TDMS: a group a hit", "HDF5: a table")  # fmt: skip
 EXTREMES = (b"nan", b"inf", b"-1", b"0", b"1e308", b"-1e-300", b"99999999999999999999", b"", b"x",
             b"2147483648", b"-inf", b"1" * 400)  # fmt: skip
 
@@ -84,6 +88,10 @@ def subjects(folder: Path) -> list[tuple[Path, Callable[[Path], object]]]:
     frfs = {"frequency_hz": lines, **{f"accelerance_{a}x": lines + 1j for a in "xyz"}}
     write_mat(folder / "frf.mat", frfs)
     recordings = [folder / f"hit.{s}" for s in ("uff", "csv", "h5", "mat", "tdms", "csv.gz")]
+    for what in CONTAINERS:
+        name, write = (ONE_HIT | MANY_HITS)[what]
+        write(folder / f"of_{name}", [hit])
+        recordings.append(folder / f"of_{name}")
     read = [(path, judge) for path in (*recordings, folder / "frf.mat")]
     robot, plan, _ = make_cell(folder)
     assert call("new", folder / "cell", "--robot", robot, "--campaign", plan)[0] == 0

@@ -35,22 +35,6 @@ def write_waveforms(path: Path, columns: Columns, **properties: Any) -> None:
         writer.write_segment([RootObject({"hit": "+x"}), *made])
 
 
-def _two_groups_tdms(path: Path, columns: Columns) -> None:
-    from nptdms import ChannelObject, RootObject, TdmsWriter
-
-    made = [ChannelObject(group, n, v) for group in "ab" for n, v in columns.items()]
-    with TdmsWriter(str(path)) as writer:
-        writer.write_segment([RootObject({"hit": "+x"}), *made])
-
-
-def _two_groups_h5(path: Path, columns: Columns) -> None:
-    with h5py.File(path, "w") as file:
-        file.attrs["hit"] = "+x"
-        for group in "ab":
-            for name, values in columns.items():
-                file[f"{group}/{name}"] = values
-
-
 def _bomb_h5(path: Path, columns: Columns) -> None:
     """A few KB that unfold to 16 GiB."""
     with h5py.File(path, "w") as file:
@@ -123,12 +107,8 @@ def one_sample(values: np.ndarray) -> np.ndarray:
 
 
 ODD: dict[str, tuple[str, Callable[[Path, Columns], None]]] = {
-    "two groups of the same names, HDF5": ("two.h5", _two_groups_h5),
-    "two groups of the same names, TDMS": ("two.tdms", _two_groups_tdms),
     "rates that differ": ("rates.tdms", lambda path, c: write_waveforms(
         path, _without_time(c), wf_increment=1 / 1280, force_wf_increment=1 / 640)),
-    "channels that begin apart": ("apart.tdms", lambda path, c: write_waveforms(
-        path, _without_time(c), wf_increment=1 / 640, force_wf_start_offset=0.01)),
     "a rate that its times contradict": ("contradicts.tdms", lambda path, c: write_waveforms(
         path, c, wf_increment=1 / 1280)),
     "an increment of 1e-300": ("tiny.tdms", lambda path, c: write_waveforms(

@@ -10,8 +10,6 @@ from planner.report.page.html import Markup, document, joined, section, tag, wor
 from planner.report.schema import FILES, schema
 from planner.version import __version__
 
-SHIPPED = {"robot": "robot/robot.toml", "campaign": "campaign.toml"}
-
 
 def manual(commands: Sequence[tuple[str, str]]) -> str:
     """The whole file; `commands` are names and their help."""
@@ -41,7 +39,7 @@ def write_manual(out: Path, commands: Sequence[tuple[str, str]]) -> Path:
 
 def _file(name: str) -> Markup:
     """A TOML file: the shipped example, then every entry."""
-    parts: list[Markup] = [tag("pre", (EXAMPLE / SHIPPED[name]).read_text("utf-8"))]
+    parts: list[Markup] = [tag("pre", next(EXAMPLE.rglob(f"{name}.toml")).read_text("utf-8"))]
     for one in schema(name).tables:
         rows = [(entry.name, entry.takes, entry.default) for entry in one.entries]
         parts.append(tag("h3", one.name or f"{name}.toml, at its top"))

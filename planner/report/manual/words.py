@@ -6,7 +6,8 @@ TUTORIAL = (
     (
         "Begin with files that run.",
         "planner new --example cell7-robot",
-        "Three files with comments: robot/robot.toml, robot/robot.urdf and campaign.toml. Replace "
+        "Files with comments: robot/robot.toml, robot/robot.urdf and campaign.toml; cut.toml and "
+        "tool.toml are for planner stability and couple. Replace "
         "the URDF by your robot's (makers publish them, ROS packages hold many), keep two links on "
         "fixed joints: where the hammer hits and where the accelerometer sits. A link that moves "
         "needs an <inertial>; boxes or cylinders as <collision> are enough.",
@@ -77,7 +78,23 @@ FORMATS = (
     ("CSV, MAT, HDF5, TDMS", "columns or arrays named time_s, force_n, acceleration_x_m_s2, …; for "
      "FRFs frequency_hz, accelerance_xx, …; the hit as attribute hit = +x, in a CSV as its first "
      "line: # hit: +x; or else in recordings.csv"),
+    ("MAT, HDF5, TDMS, LVM", "as programs write them: structs, cell arrays and groups, also one a "
+     "hit; a matrix with a list of names beside it; unit, rate (fs, dt, wf_increment, …) and start "
+     "(t0, wf_start_time, …) of each channel; LabVIEW's .lvm with one or many x columns. Channels "
+     "that begin apart are laid over each other; what is no signal is left out"),
+    ("WAV", "of 16, 24 or 32 bits or floating-point; what its samples stand for is said in "
+     "channels.csv beside it: columns channel (from 1), name (force, acceleration x, …), unit and "
+     "full_scale, what the largest sample stands for in that unit; where wanted file, hit and "
+     "hit_point. Channels without a row are left out"),
+    ("all of them", "a record may hold several hits, along one axis: it is cut by the pulses. Wait "
+     "between two hits until the robot is at rest, and as long after the last"),
 )  # fmt: skip
+
+CHANNELS_CSV = """file,channel,name,unit,full_scale,hit
+x.wav,1,force,N,2200,+x
+x.wav,2,acceleration x,m/s^2,98.1,
+x.wav,3,acceleration y,m/s^2,98.1,
+x.wav,4,acceleration z,m/s^2,98.1,"""
 
 NUMBERS = (
     ("frequency_sd_hz of a measured mode", "what noise and scatter of the hits leave open of "
@@ -146,6 +163,8 @@ def recordings() -> Markup:
         words_table(("format", "what a file holds"), FORMATS),
         tag("p", "A file with named columns:"),
         tag("pre", NAMED_COLUMNS),
+        tag("p", "Beside WAV files, channels.csv:"),
+        tag("pre", CHANNELS_CSV),
         tag("p", "Poses for predict and export:"),
         tag("pre", POSES_CSV),
         id_="recordings",

@@ -1,0 +1,270 @@
+"""Entries of a file to its columns, each with what is stated of it, and to named columns."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.recording import stated
+from planner.recording.column_names import time_unit, unit_text
+from planner.recording.entries import EntryTree, text_of
+from planner.recording.frf_columns import holds_frfs
+from planner.recording.named_columns import Named, check_finite
+from planner.recording.sampling import UNEVEN, sampling_rate
+from planner.recording.units import Unit, lookup
+
+Stated = Mapping[str, object]
+
+
+@dataclass(frozen=True, eq=False)
+class EntryColumn:
+    """An array of a file: a column, or one that lacks names (`lacks` says so).
+
+    `own` is stated of it alone, `shared` of several; `title` is its name in a list beside it.
+    """
+
+    path: tuple[str, ...]
+    values: np.ndarray  # (n,) unless it lacks something
+    own: Stated
+    shared: Stated
+    title: str = ""
+    unit: str = ""
+    lacks: str = ""
+
+    @property
+    def last(self) -> str:
+        """The last part of its place in the file."""
+        return self.path[-1] if self.path else "data"
+
+    @property
+    def place(self) -> str:
+        """Where it stands, for reading."""
+        return "/".join(self.path) or "data"
+
+
+def found_in(file: Path, root: EntryTree) -> tuple[EntryColumn, ...]:
+    """Every array of a file. Raises InputError where a channel's own times are uneven."""
+    return tuple(_found(file, root, (), []))
+
+
+def _found(
+    file: Path,
+    tree: EntryTree,
+    path: tuple[str, ...],
+    above: list[tuple[bool, Stated]],
+) -> Iterator[EntryColumn]:
+    """Arrays below a group; `above`: what groups state, and whether of one array alone."""
+    tree = _with_own_times(file, tree)
+    here = [*above, (_arrays(tree) == 1, {**tree.attributes, **_beside(tree)})]
+    for name, part in tree.parts.items():
+        at = (*path, name) if name else path
+        if isinstance(part, EntryTree):
+            yield from _found(file, part, at, here)
+        else:
+            own = {k: v for alone, of in here if alone for k, v in of.items()}
+            own |= _of_one(name, here[-1][1])
+            if path and not (unit_text(name) or time_unit(name, "")):
+                own = {**_unit_of_all(here[-1][1]), **own}
+            shared = {k: v for alone, of in here if not alone for k, v in of.items()}
+            yield from _columns(at, part, own, shared)
+
+
+def _unit_of_all(attributes: Stated) -> dict[str, object]:
+    """The unit that a group states of all that is in it."""
+    unit = stated.unit_of(attributes)
+    return {"unit": unit} if lookup(unit) else {}
+
+
+def _of_one(name: str, beside: Stated) -> dict[str, object]:
+    """Of what is stated beside arrays that which names one: "Channel_1_Unit" of Channel_1_Data."""
+    stems = [stem for stem in (name.rpartition("_")[0], name) if stem]
+    return {
+        key[len(stem) + 1 :]: value
+        for stem in stems
+        for key, value in beside.items()
+        if key.startswith((f"{stem}_", f"{stem}."))
+    }
+
+
+def _columns(
+    at: tuple[str, ...], values: np.ndarray, own: dict[str, object], shared: dict[str, object]
+) -> Iterator[EntryColumn]:
+    if values.ndim == 1:
+        yield EntryColumn(at, values, own, shared, unit=stated.unit_of(own))
+        return
+    for count, turned in ((values.shape[1], values), (values.shape[0], values.T)):
+        for beside in (own, shared):
+            if values.ndim == 2 and (titles := stated.names_of(beside, count)):
+                each = (stated.units_of(of, count) for of in (own, shared))
+                units = next((u for u in each if u[0]), ("",) * count)
+                for title, unit, column in zip(titles, units, turned.T, strict=True):
+                    yield EntryColumn(at, column, own, shared, title, unit)
+                return
+    lacks = f"{min(values.shape)} names beside it" if values.ndim == 2 else "one column an FRF"
+    yield EntryColumn(at, values, own, shared, lacks=lacks)
+
+
+def _arrays(tree: EntryTree) -> int:
+    return sum(_arrays(p) if isinstance(p, EntryTree) else 1 for p in tree.parts.values())
+
+
+def _beside(tree: EntryTree) -> dict[str, object]:
+    """Attributes of the parts that hold no array: they tell of those beside them."""
+    found: dict[str, object] = {}
+    for name, part in tree.parts.items():
+        if isinstance(part, EntryTree) and not _arrays(part):
+            inner = {**part.attributes, **_beside(part)}
+            found |= {f"{name}.{key}": value for key, value in inner.items()}
+    return found
+
+
+def _with_own_times(file: Path, tree: EntryTree) -> EntryTree:
+    """A group with one array where its two are a channel and what its samples stand at."""
+    holding = {n: p for n, p in tree.parts.items() if not isinstance(p, EntryTree) or _arrays(p)}
+    arrays = {n: only for n, p in holding.items() if (only := _only(p))}
+    axes = {n: unit for n, (_, said) in arrays.items() if (unit := _axis_unit(n, said))}
+    if len(holding) != 2 or len(arrays) != 2 or len(axes) != 1:
+        return tree
+    ((name, unit),) = axes.items()
+    at = arrays[name][0] * unit.factor
+    if len({array.shape for array, _ in arrays.values()}) > 1 or not np.isrealobj(at):
+        return tree
+    check_finite(file, name, at)
+    axis = {"dt": 1 / sampling_rate(file, at), "t0": float(at[0]), "x_unit": unit.si}
+    rest = {n: p for n, p in tree.parts.items() if n != name}
+    return EntryTree({**tree.attributes, **axis}, rest, tree.unread)
+
+
+def _only(part: EntryTree | np.ndarray) -> tuple[np.ndarray, Stated] | None:
+    """The one column that a part holds and what is stated of it; None where it holds others."""
+    if not isinstance(part, EntryTree):
+        return (part, {}) if part.ndim == 1 else None
+    inner = [p for p in part.parts.values() if not isinstance(p, EntryTree) or _arrays(p)]
+    found = _only(inner[0]) if len(inner) == 1 else None
+    return (found[0], {**part.attributes, **_beside(part), **found[1]}) if found else None
+
+
+def _axis_unit(name: str, said: Stated) -> Unit | None:
+    """The unit of what samples stand at, where a part is named so."""
+    unit = lookup(stated.unit_of(said))
+    if unit and unit.quantity in ("time", "frequency") and stated.is_abscissa(name):
+        return unit
+    return time_unit(name, stated.unit_of(said))
+
+
+def named_from(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> Named:
+    """Columns with their names: those stated of them, or (`by_place`) the last part of their place.
+
+    Raises InputError where two have the same, or rates differ, or units are stated twice.
+    """
+    names = _names(file, columns, by_place)
+    axes = {
+        name: stated.axis_of(file, {**column.shared, **column.own})
+        for name, column in zip(names, columns, strict=True)
+    }
+    attributes = _attributes(columns)
+    for column in columns:
+        if said := stated.rescaled({**column.shared, **column.own}):
+            raise InputError(
+                f"{file}: {column.place} is in {column.unit or 'a unit'} and has a {said} beside "
+                f"it, so nothing says what its numbers are in; export it in N or m/s^2."
+            )
+    held = {n: c.values for n, c in zip(names, columns, strict=True)}
+    starts, first = _starts(file, axes)
+    if len({len(c.values) for c in columns}) > 1 and len(starts) < len(columns):
+        starts = {}  # what states no start cannot be laid beside the others
+    if step := _common_step(file, {n: a.step for n, a in axes.items() if a.step}):
+        if any(axis.quantity == "frequency" for axis in axes.values()):
+            lines = np.arange(max(len(values) for values in held.values())) * step + first
+            held, starts = {"frequency_hz": lines, **held}, {}
+            if not holds_frfs(Named(held, {})):
+                raise InputError(
+                    f"{file} holds spectra ({', '.join(names[:3])}, … over Hz) and no FRFs; export "
+                    f"time histories, or FRFs with real and imaginary part."
+                )
+        else:
+            attributes["sampling_rate_hz"] = repr(1 / step)
+    units = {n: c.unit for n, c in zip(names, columns, strict=True) if c.unit}
+    return Named(held, units, attributes, start_s=starts)
+
+
+def _starts(file: Path, axes: Mapping[str, stated.Axis]) -> tuple[dict[str, float], float]:
+    """When columns begin, in s after the first that says so, and the first's own offset.
+
+    A channel without a date begins with the others, if those begin together.
+    """
+    dates = {n: a.date_s for n, a in axes.items() if a.date_s is not None}
+    first_date = min(dates.values(), default=0.0)
+    undated = [n for n, a in axes.items() if n not in dates and a.step]
+    if undated and max(dates.values(), default=0.0) > first_date:
+        raise InputError(
+            f"{file}: {next(iter(dates))} and others say when they begin, {undated[0]} does not; "
+            f"export what was sampled together."
+        )
+    known = {
+        n: dates.get(n, first_date) - first_date + (a.offset or 0.0)
+        for n, a in axes.items()
+        if a.offset is not None or n in dates
+    }
+    first = min(known.values(), default=0.0)
+    return {n: start - first for n, start in known.items()}, first
+
+
+def _names(file: Path, columns: Sequence[EntryColumn], by_place: bool) -> list[str]:
+    """A name for each, by which they differ."""
+    names = [c.title or (not by_place and stated.name_of(c.own)) or c.last for c in columns]
+    same = _grouped(names, columns)
+    distinct = [
+        _differing(column.path, [c.path for c in same[name]]) if len(same[name]) > 1 else name
+        for name, column in zip(names, columns, strict=True)
+    ]
+    for alike in _grouped(distinct, columns).values():
+        if len(alike) > 1:
+            raise InputError(
+                f"{file} holds {alike[0].title or alike[0].last} twice, as {alike[0].place} and as "
+                f"{alike[1].place}; export each hit into a file of its own."
+            )
+    return distinct
+
+
+def _grouped(names: Sequence[str], columns: Sequence[EntryColumn]) -> dict[str, list[EntryColumn]]:
+    found: dict[str, list[EntryColumn]] = {}
+    for name, column in zip(names, columns, strict=True):
+        found.setdefault(name, []).append(column)
+    return found
+
+
+def _differing(path: tuple[str, ...], same: Sequence[tuple[str, ...]]) -> str:
+    """The last level at which places with one name differ."""
+    depth = 1
+    while depth < min(map(len, same)) and len({p[-depth] for p in same}) == 1:
+        depth += 1
+    return path[-depth] if path else ""
+
+
+def _common_step(file: Path, steps: Mapping[str, float]) -> float | None:
+    """The step that all which state one have; InputError where they contradict."""
+    for name, step in steps.items():
+        first = next(iter(steps))
+        if not abs(step - steps[first]) <= UNEVEN * abs(steps[first]):
+            raise InputError(
+                f"{file}: channels {first} and {name} have different rates; export channels that "
+                f"were sampled together."
+            )
+    return next(iter(steps.values()), None)
+
+
+def _attributes(columns: Sequence[EntryColumn]) -> dict[str, str]:
+    """What is stated of all columns, or of some and contradicted of none."""
+    found: dict[str, str] = {}
+    contradicted = set()
+    for column in columns:
+        for key, value in {**column.shared, **column.own}.items():
+            name, text = key.rpartition(".")[2], text_of(value)
+            if isinstance(value, tuple) or stated.is_axis(key):
+                continue
+            if found.setdefault(name, text) != text:
+                contradicted.add(name)
+    return {name: text for name, text in found.items() if name not in contradicted}

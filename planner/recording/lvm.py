@@ -1,0 +1,231 @@
+"""LabVIEW measurement files (.lvm): headers and segments of text, one or many x columns.
+
+Layout: "Specification for the LabVIEW Measurement File (.lvm)", National Instruments. Read here
+because the reader on PyPI takes files with special blocks, or whose header stands twice, for
+something else, and evaluates what stands in the cells.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.recording.entries import MOST_ENTRIES, EntryTree, tree_of
+from planner.recording.entry_records import records_of
+from planner.recording.named_columns import check_finite
+from planner.recording.records import Record
+from planner.recording.sampling import UNEVEN, sampling_rate
+from planner.recording.text_tables import MAX_BYTES, decoded, read_text
+
+FIRST_LINE = "LabVIEW Measurement"
+END, SPECIAL, END_SPECIAL = "***End_of_Header***", "***Start_Special***", "***End_Special***"
+ABSCISSA, COMMENT = "X_Value", "Comment"
+
+
+@dataclass
+class _Segment:
+    """A block of rows, what its header says of each column, and the columns' names."""
+
+    head: dict[str, str]  # what the file's header says
+    stated: dict[str, list[str]]
+    names: list[str]
+    first_row: int
+    rows: list[list[str]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, eq=False)
+class _Channel:
+    """One column of numbers (n,); `start_s` from `date`, `step` in s (of spectra in Hz)."""
+
+    name: str
+    unit: str
+    values: np.ndarray
+    start: float
+    step: float
+    date: np.datetime64 | None
+    of_spectrum: bool
+
+
+def read_lvm(path: Path) -> tuple[Record, ...]:
+    """Each segment is a record; those that go on where the last ended are one. Spectra are refused.
+
+    Raises InputError saying what is wrong, and where.
+    """
+    text = decoded(path, MAX_BYTES)
+    if not text.startswith(FIRST_LINE):
+        return read_text(path)  # as LabVIEW's "no header" writes it: a table
+    parts: list[list[_Channel]] = []
+    head: dict[str, str] = {}
+    for segment in _segments(text):
+        head = segment.head
+        channels = list(_channels(path, segment))
+        if parts and _goes_on(parts[-1], channels):
+            parts[-1] = [_joined(a, b) for a, b in zip(parts[-1], channels, strict=True)]
+        elif channels:
+            parts.append(channels)
+    if not parts:
+        raise InputError(f"{path} holds headers and no data; export it again.")
+    trees = {f"segment {number}": _tree(part) for number, part in enumerate(parts, 1)}
+    return records_of(path, tree_of(trees, head))
+
+
+def _segments(text: str) -> Iterator[_Segment]:
+    """Segments in order. A row of numbers after an empty line begins another of the same header."""
+    separator, special = "\t", False
+    head: dict[str, str] = {}
+    block: dict[str, list[str]] = {}
+    current: _Segment | None = None
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.startswith("Separator") and len(line) > len("Separator"):
+            separator = line[len("Separator")]
+        cells = [cell.strip() for cell in line.split(separator)]
+        first = cells[0]
+        if special or first == SPECIAL:
+            special = first != END_SPECIAL
+        elif current and any(cells) and _is_row(first):
+            current.rows.append(cells)
+        elif current and current.rows:  # it ends with an empty line, or where a header begins
+            yield current
+            current = None if any(cells) else _Segment(head, block, current.names, number + 1)
+            block = {first: cells} if any(cells) else block
+        elif first == ABSCISSA:
+            current = _Segment(head, block, cells, number + 1)
+        elif first == END and "Channels" not in block:  # of the file, not of its channels
+            head, block = {tag: found[1] for tag, found in block.items() if len(found) > 1}, {}
+        elif any(cells):
+            block = block if current is None else {}
+            block[first], current = cells, None
+    if current:
+        yield current
+
+
+def _is_row(first: str) -> bool:
+    """Whether a row is of numbers: its first cell is one, or empty as without x columns."""
+    return bool(re.match(r"[-+.,\d]|nan|inf|$", first, re.IGNORECASE))
+
+
+def _channels(path: Path, segment: _Segment) -> Iterator[_Channel]:
+    """Columns with their steps and starts."""
+    columns = {
+        column: _numbers(path, segment, column)
+        for column, name in enumerate(segment.names[:MOST_ENTRIES] if segment.rows else [])
+        if name != COMMENT and (name or _cell(segment, "Samples", column))
+    }
+    times = [column for column in columns if segment.names[column] == ABSCISSA]
+    for column, values in columns.items():
+        at = max((t for t in times if t < column), default=-1)
+        if column in times or not values.size:
+            continue
+        # An x column is that of the longest channel on its right.
+        own = [
+            c for c in columns if c > at and c not in times and not any(at < t < c for t in times)
+        ]
+        owner = max(own, key=lambda c: columns[c].size)
+        yield _channel(path, segment, column, values, owner, columns.get(at, np.zeros(0)))
+
+
+def _channel(
+    path: Path, segment: _Segment, column: int, values: np.ndarray, owner: int, x: np.ndarray
+) -> _Channel:
+    def stated(tag: str, at: int = column) -> str:
+        return _cell(segment, tag, at)
+
+    count = stated("Samples")
+    if count.isdecimal() and int(count) > len(values):
+        raise InputError(
+            f"{path} states {count} samples of {segment.names[column]} and holds {len(values)}; "
+            f"the file is cut off, export it again."
+        )
+    start, step = (_number(path, tag, stated(tag)) for tag in ("X0", "Delta_X"))
+    if x.size:  # times have more digits than steps
+        check_finite(path, ABSCISSA, x)
+        start += float(x[0]) - _number(path, "X0", stated("X0", owner))
+        step = 1 / sampling_rate(path, x - x[0])
+    of_spectrum = stated("X_Dimension") == "Frequency" or stated("X_Unit_Label") in ("Hz", "hertz")
+    # Seconds since 1904 are a date themselves.
+    date = _date(stated("Date"), stated("Time")) if abs(start) < 1e9 else None
+    name, unit = segment.names[column], stated("Y_Unit_Label")
+    return _Channel(name, unit, values, start, step, date, of_spectrum)
+
+
+def _cell(segment: _Segment, tag: str, column: int) -> str:
+    """What a header states of the channel in a column."""
+    cells = segment.stated.get(tag, [])
+    return cells[column] if 0 < column < len(cells) else ""
+
+
+def _numbers(path: Path, segment: _Segment, column: int) -> np.ndarray:
+    """The numbers of a column; one that ends before others is empty from there."""
+    texts = [row[column].replace(",", ".") if column < len(row) else "" for row in segment.rows]
+    while texts and not texts[-1]:
+        texts.pop()
+    try:
+        return np.array(texts, dtype=float)
+    except ValueError:
+        pass
+    for row, text in enumerate(texts):
+        try:
+            float(text)
+        except ValueError:
+            raise InputError(
+                f"{path}, row {segment.first_row + row}: {segment.names[column]} is "
+                f"{text[:20] or 'empty'}, no number; the file is cut off or mixed, export it again."
+            ) from None
+    return np.zeros(0)
+
+
+def _number(path: Path, tag: str, text: str) -> float:
+    try:
+        return float((text or "0").replace(",", "."))
+    except ValueError:
+        raise InputError(f"{path}: {tag} {text[:20]} is no number; export it again.") from None
+
+
+def _date(date: str, time: str) -> np.datetime64 | None:
+    day, clock = date.replace("/", "-"), time.replace(",", ".")[:18]  # to ns
+    try:
+        return np.datetime64(f"{day}T{clock}", "ns")
+    except ValueError:
+        return None
+
+
+def _goes_on(before: list[_Channel], after: list[_Channel]) -> bool:
+    """Whether each channel begins where it ended in the last segment."""
+    return len(before) == len(after) and all(
+        (a.name, a.unit, a.of_spectrum) == (b.name, b.unit, False)
+        and abs(_after(a, b) / a.step - len(a.values)) < max(0.5, UNEVEN * len(a.values))
+        for a, b in zip(before, after, strict=True)
+        if a.step > 0
+    )
+
+
+def _after(a: _Channel, b: _Channel) -> float:
+    """How long after `a` `b` begins, in s."""
+    apart = 0.0
+    if a.date is not None and b.date is not None:
+        apart = float((b.date - a.date) / np.timedelta64(1, "ns") * 1e-9)
+    return b.start - a.start + apart
+
+
+def _joined(a: _Channel, b: _Channel) -> _Channel:
+    return replace(a, values=np.concatenate([a.values, b.values]))
+
+
+def _tree(channels: list[_Channel]) -> EntryTree:
+    parts = {}
+    for number, channel in enumerate(channels, 1):
+        stated = {
+            "unit": channel.unit,
+            "t0": channel.start,
+            "dt": channel.step,
+            "start_time": channel.date,
+            "x_unit": "Hz" if channel.of_spectrum else "s",
+        }
+        same = [c.name for c in channels].count(channel.name) > 1
+        name = f"{channel.name} ({number})" if same or not channel.name else channel.name
+        known = {key: value for key, value in stated.items() if value is not None}
+        parts[name] = tree_of({"": channel.values}, known)
+    return EntryTree({}, parts)

@@ -1,0 +1,98 @@
+"""When channels were sampled: rates from times, and channels that do not begin together."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.recording.records import Channel
+
+UNEVEN = 1e-3  # share of a step by which sampling times may scatter beside their rounding
+MOST_DIGITS = 15
+LEAST_SAMPLES = 8
+SLOWEST_S = 1e6  # between two samples
+
+
+def sampling_rate(path: Path, time_s: np.ndarray) -> float:
+    """Rate in Hz of sampling times (n,) in s; InputError if they are not evenly spaced.
+
+    Times are even if none is farther from the straight line fitted to them than rounding, of it
+    and of the line, explains.
+    """
+    count = len(time_s)
+    if count < LEAST_SAMPLES:
+        raise InputError(f"{path} holds {count} samples; a hit has hundreds: export again.")
+    step = (time_s[-1] - time_s[0]) / (count - 1)
+    if not 0 < step < SLOWEST_S:
+        raise InputError(f"{path}: the time column does not increase; check the columns.")
+    middle = np.arange(count) - (count - 1) / 2
+    step = float(middle @ time_s / (middle @ middle))
+    off = np.abs(time_s - np.mean(time_s) - step * middle)
+    digits = 4 * np.finfo(np.float32).eps * max(abs(time_s[0]), abs(time_s[-1]))
+    if np.max(off) > max(UNEVEN * step, digits, 3 * rounding(time_s)):
+        steps = np.abs(np.diff(time_s) - step)
+        row = int(np.argmax(steps)) + 2
+        raise InputError(
+            f"{path}: time step {row} differs from the others; samples must be evenly spaced."
+        )
+    return 1 / step
+
+
+def rounding(values: np.ndarray) -> float:
+    """By how much `values` (n,) may have been rounded at most, as they were written.
+
+    To decimals (0.001 of 1.234, 2.5) or to significant digits (1e-4 of 10.9995 beside 9.00049).
+    """
+    size = np.abs(values)
+    written = values[size > 1e-12 * np.max(size)]  # a zero that arithmetic missed is a zero
+    magnitude = np.floor(np.log10(np.abs(written)))
+    places = _first_whole(written, np.zeros(len(written))), _first_whole(written, magnitude)
+    return float(np.max(places)) / 2
+
+
+def _first_whole(values: np.ndarray, magnitude: np.ndarray) -> np.ndarray:
+    """The coarsest decimal place, counted from each one's `magnitude`, at which all are whole."""
+    for digits in range(MOST_DIGITS):
+        place = 10.0 ** (magnitude - digits)
+        scaled = values / place
+        if np.all(np.abs(scaled - np.round(scaled)) < 1e-4):
+            return place
+    return np.zeros(len(values))
+
+
+def aligned(
+    path: Path, channels: Sequence[Channel], start_s: Sequence[float], rate_hz: float
+) -> tuple[tuple[Channel, ...], tuple[str, ...]]:
+    """Channels over the time that all of them have, and what was left out, in words.
+
+    `start_s` (one a channel) says when each begins. Raises InputError where channels that begin
+    together differ in length, and where they have no time in common.
+    """
+    begin = np.asarray(start_s, dtype=float)
+    lengths = np.array([len(channel.samples) for channel in channels])
+    late = np.max(begin) - begin
+    if np.all(late < 0.01 / rate_hz):
+        if len(set(lengths)) > 1:
+            raise InputError(
+                f"{path} has channels of {len(set(lengths))} lengths; export them together."
+            )
+        return tuple(channels), ()
+    skip = np.round(late * rate_hz).astype(int)
+    count = int(np.min(lengths - skip))
+    first, last = (channels[int(at(begin))].name for at in (np.argmin, np.argmax))
+    apart = f"{first} and {last} begin {np.max(late):.3g} s apart"
+    if count < LEAST_SAMPLES:
+        raise InputError(f"{path}: {apart} and have no time in common; export them together.")
+    remarks = []
+    if np.any(skip):
+        remarks.append(f"{apart}: the {count / rate_hz:.4g} s that all channels have are used.")
+    rest = float(np.max(np.abs(late * rate_hz - skip)))
+    if rest > 0.05:
+        remarks.append(f"{first} and {last} are {rest / rate_hz:.2g} s apart, less than a sample.")
+    cut = (
+        replace(channel, samples=channel.samples[at : at + count])
+        for channel, at in zip(channels, skip, strict=True)
+    )
+    return tuple(cut), tuple(remarks)

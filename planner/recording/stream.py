@@ -1,0 +1,146 @@
+"""A recorder that ran on while one hit again and again: its record cut into hits by the pulses."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from planner.recording.filling import lost_samples
+from planner.recording.pulse import NORMAL_MAD, RISING_SAMPLES
+from planner.recording.records import Fault, TimeRecord
+from planner.recording.screening import ANSWER_S, SILENCE, ScreeningLimits
+
+# No hand hits again so soon on purpose, and fewer samples tell nothing: such pulses are one hit.
+APART_S, APART_SAMPLES = 0.5, 64
+# Kept before each hit: a share of the usual pause between two, at most another one of its own.
+PRETRIGGER, MOST_PRETRIGGER = 0.1, 0.5
+SHORT = 0.5  # share of the usual length below which a hit that still rings at its end is cut off
+# Movement before or at the end of a hit, as a share of the answer to it, that is worth saying; it
+# stands out of the noise where its power is more than so many times the quietest.
+RESTLESS, OUT_OF_NOISE = 0.02, 2.0
+LEAST_QUIET = 2 * RISING_SAMPLES  # samples by which rest is judged
+
+
+@dataclass(frozen=True)
+class _Struck:
+    """Samples of a hit in a stream: of its pulse, and of the part that is kept of it.
+
+    `restless` is the movement before it as a share of the answer to it.
+    """
+
+    first: int
+    begin: int
+    stop: int
+    cut_off: bool
+    restless: float
+
+
+def cut_into_hits(record: TimeRecord) -> tuple[TimeRecord, ...]:
+    """Each hit of a record by itself; of a single hit the record as it is.
+
+    All hits are as long as the shortest that was not cut off by the next one or by the record's
+    end. What is wrong with each is in its faults.
+    """
+    forces = [c for c in record.channels if c.quantity == "force"]
+    pulses = _pulses(forces[0].samples, record.sampling_rate_hz) if len(forces) == 1 else []
+    if len(pulses) < 2:
+        found = lost_samples(record)
+        return (replace(record, faults=(*record.faults, *found)) if found else record,)
+    struck = _struck(record, pulses)
+    return tuple(_part(record, one, struck) for one in struck)
+
+
+def _pulses(force_n: np.ndarray, rate_hz: float) -> list[tuple[int, int]]:
+    """First sample and end of the pulses of each hit.
+
+    A pulse is a hit where one of a single hit would make it a double hit (`second_peak`) beside
+    any other; so the softest hits of a stream tell which pulses are still to be told.
+    """
+    limits = ScreeningLimits()
+    size = np.abs(force_n - np.median(force_n))
+    floor = limits.least_snr * NORMAL_MAD * float(np.median(size))
+    least, found = limits.second_peak * float(np.max(size)), []
+    apart = max(APART_S * rate_hz, APART_SAMPLES)
+    while True:
+        groups = _groups(np.flatnonzero(size > max(least, floor)), apart)
+        if len(groups) <= max(1, len(found)):
+            return found or groups
+        found = groups
+        least = limits.second_peak * min(float(np.max(size[a:b])) for a, b in groups)
+
+
+def _groups(samples: np.ndarray, apart: float) -> list[tuple[int, int]]:
+    if not samples.size:
+        return []
+    each = np.split(samples, np.flatnonzero(np.diff(samples) > apart) + 1)
+    return [(int(one[0]), int(one[-1]) + 1) for one in each]
+
+
+def _struck(record: TimeRecord, pulses: list[tuple[int, int]]) -> list[_Struck]:
+    """What is kept of each hit of a record, and how far it was from rest."""
+    samples = len(record.channels[0].samples)
+    first, end = np.array(pulses).T
+    pause = first[1:] - end[:-1]
+    usual = PRETRIGGER * np.median(pause)
+    before = np.append(usual, np.minimum(usual, MOST_PRETRIGGER * pause)).astype(int)
+    begin = np.maximum(first - before, 0)
+    stop = np.append(begin[1:], samples)
+    last = max(samples - int(usual), (int(first[-1]) + samples) // 2)
+    quiet = [*zip(begin, first - RISING_SAMPLES, strict=True), (last, samples)]
+    moved, answer = _movement(record, quiet, first)
+    restless = np.sqrt(np.nan_to_num(moved[:-1]) / answer)
+    ringing = np.sqrt(np.nan_to_num(moved[1:], nan=np.inf) / answer)
+    length = stop - first
+    cut_off = (length < SHORT * np.median(length)) & (ringing > RESTLESS)
+    stop = np.where(cut_off, stop, first + np.min(length[~cut_off]))
+    each = (a.tolist() for a in (first, begin, stop, cut_off, restless))
+    return [_Struck(*one) for one in zip(*each, strict=True)]
+
+
+def _movement(
+    record: TimeRecord, quiet: Sequence[tuple[int, int]], first: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Power of the accelerations (n + 1,) in parts of the record that should be quiet, without
+    the noise, NaN where they are too short; and of the answers (n,) to the n hits.
+    """
+    a = np.array([c.samples for c in record.channels if c.quantity == "acceleration"])
+    judged = [k for k, (start, stop) in enumerate(quiet) if stop - start >= LEAST_QUIET]
+    moved, answer = np.full(len(quiet), np.nan), np.full(len(first), SILENCE**2)
+    if not a.size or not judged:
+        return moved, answer
+    long = round(ANSWER_S * record.sampling_rate_hz)
+    answer += [float(np.sum(np.var(a[:, at : at + long], axis=1))) for at in first]
+    power = np.array([np.var(a[:, slice(*quiet[k])], axis=1) for k in judged])
+    noise = np.min(power, axis=0)
+    clear = np.sum(power, axis=1) > OUT_OF_NOISE * np.sum(noise)
+    moved[judged] = np.where(clear, np.sum(power - noise, axis=1), 0.0)
+    return moved, answer
+
+
+def _part(record: TimeRecord, one: _Struck, struck: list[_Struck]) -> TimeRecord:
+    """One hit of a record."""
+    rate, last = record.sampling_rate_hz, one is struck[-1]
+    kept = slice(one.begin, one.stop)
+    channels = tuple(replace(c, samples=c.samples[kept].copy()) for c in record.channels)
+    part = replace(record, channels=channels, at_s=float(one.first / rate), faults=())
+    told = [*(record.faults if last else ()), *lost_samples(part)]
+    if one.cut_off:
+        usual = min(s.stop - s.first for s in struck if not s.cut_off)
+        ends = "the record ends" if last else "the next hit follows"
+        told.append(
+            Fault(
+                "cut_off",
+                f"It is cut off: {ends} {(one.stop - one.first) / rate:.2g} s after it, other hits "
+                f"have {usual / rate:.2g} s; wait as long after each.",
+            )
+        )
+    if one.restless > RESTLESS:
+        told.append(
+            Fault(
+                "not_at_rest",
+                f"The structure was not at rest: before this hit it moved by "
+                f"{100 * one.restless:.0f} % of its answer; wait longer between hits.",
+                refuse=one.restless > 1 / ScreeningLimits().least_response_snr,
+            )
+        )
+    return replace(part, faults=tuple(told))

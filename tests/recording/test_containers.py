@@ -1,0 +1,206 @@
+"""Hits in containers as other programs write them: structs, cells, groups, waveforms, segments."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.io
+
+from planner.errors import InputError
+from planner.recording.hits import hits_from
+from planner.recording.read import hit_count, read
+from planner.recording.records import FrfRecord
+from tests.support.containers import MANY_HITS, ONE_HIT, late_h5, lvm_file, tdms
+from tests.support.lvm_files import lvm
+from tests.support.simulated_hits import make_hit
+
+
+def part(hit, at):
+    return replace(hit, force_n=hit.force_n[at], acceleration_m_s2=hit.acceleration_m_s2[:, at])
+
+
+HITS = [make_hit(np.random.default_rng(k), axis="+x", record_s=1.0) for k in range(3)]
+NAN = replace(HITS[1], force_n=np.where(np.arange(512) == 10, np.nan, HITS[1].force_n))
+
+
+def same(found, made, skip=0, digits=1e-6, rate=1e-4):
+    """Whether a hit was read as it was made, from a sample on."""
+    scale = np.max(np.abs(made.acceleration_m_s2))
+    assert found.sampling_rate_hz == pytest.approx(made.sampling_rate_hz, rel=rate)
+    np.testing.assert_allclose(found.force_n, made.force_n[skip:], rtol=0, atol=digits * 1e3)
+    np.testing.assert_allclose(
+        found.acceleration_m_s2, made.acceleration_m_s2[:, skip:], rtol=0, atol=digits * scale
+    )
+
+
+@pytest.mark.parametrize("what", ONE_HIT)
+def test_a_hit_is_read_from_any_container(tmp_path, what):
+    name, write = ONE_HIT[what]
+    write(tmp_path / name, HITS)
+    (hit,) = hits_from(read(tmp_path / name))
+    same(hit, HITS[0])
+    assert hit.axis == HITS[0].axis
+    assert hit_count(tmp_path / name) == 1
+    assert not hit.remarks
+
+
+@pytest.mark.parametrize("what", MANY_HITS)
+def test_each_group_that_is_a_hit_is_one(tmp_path, what):
+    name, write = MANY_HITS[what]
+    write(tmp_path / name, HITS)
+    found = hits_from(read(tmp_path / name))
+    assert len(found) == hit_count(tmp_path / name) == len(HITS)
+    for hit, made in zip(found, HITS, strict=True):
+        same(hit, made)
+
+
+LONG = make_hit(np.random.default_rng(5), record_s=4.0)
+LATE = {
+    "TDMS, wf_start_time": (".tdms", lambda p, by: tdms(p, [LONG], by=by)),
+    "TDMS, wf_start_offset": (".tdms", lambda p, by: tdms(p, [LONG], by=by, key="wf_start_offset")),
+    "LVM, one x column": (".lvm", lambda p, by: lvm_file(late=by)(p, [LONG])),
+    "LVM, many x columns": (".lvm", lambda p, by: lvm_file(late=by, x="Multi")(p, [LONG])),
+    "HDF5, t0": (".h5", lambda p, by: late_h5(p, LONG, by, lambda s: s)),
+    "HDF5, dates": (".h5", lambda p, by: late_h5(p, LONG, by, "2026-03-01T08:00:{:09.6f}Z".format)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("by", [26, 1536], ids=["51 ms", "3 s"])
+@pytest.mark.parametrize("what", LATE)
+def test_channels_that_begin_apart_are_laid_over_each_other(tmp_path, what, by):
+    suffix, write = LATE[what]
+    path = tmp_path / f"late{suffix}"
+    write(path, by)
+    (hit,) = hits_from(read(path), "+x")
+    same(hit, LONG, skip=by)
+    assert "begin" in hit.remarks[0]
+
+
+def test_what_is_no_part_of_a_hit_is_left_out_and_said(tmp_path):
+    from nptdms import ChannelObject
+
+    extra = [
+        ChannelObject("slow", "Temperature", np.arange(60.0), {"wf_increment": 1.0}),
+        ChannelObject("settings", "Sensitivity", np.arange(4.0)),
+        ChannelObject("settings", "Operator", ["us", "them"]),
+    ]
+    tdms(tmp_path / "more.tdms", HITS[:1], extra)
+    (hit,) = hits_from(read(tmp_path / "more.tdms"))
+    same(hit, HITS[0])
+    assert hit.remarks == ("Left out, as no part of a hit: slow/Temperature (60).",)
+
+
+def test_frfs_of_a_measuring_program_are_read(tmp_path):
+    lines = np.linspace(0.0, 100.0, 201)
+    values = (1 + 1j * lines) / 100
+    x = {"start_value": 0.0, "increment": 0.5, "quantity": {"label": "Hz"}}
+    scipy.io.savemat(
+        tmp_path / "frfs.mat",
+        {
+            f"FRF_{k}": {
+                "x_values": x,
+                "y_values": {"values": values * k, "quantity": {"label": "(mm/s^2)/N"}},
+                "function_record": {"name": f"acc {axis}"},
+            }
+            for k, axis in enumerate("XYZ", 1)
+        },
+    )
+    (record,) = read(tmp_path / "frfs.mat")
+    assert isinstance(record, FrfRecord)
+    assert (record.quantity, record.unit) == ("accelerance", "m/s^2/N")
+    assert record.response_direction == (1, 2, 3)
+    at = np.searchsorted(lines, record.frequency_hz)
+    np.testing.assert_allclose(record.frequency_hz, lines[at])
+    np.testing.assert_allclose(record.values, np.outer([1e-3, 2e-3, 3e-3], values[at]))
+
+
+def changed(old, new, **options):
+    """A LabVIEW file with words replaced."""
+    text = lvm(HITS[:1], **options)
+    assert old in text
+    return lambda path: path.write_text(text.replace(old, new, 1))
+
+
+def mat_of(**entries):
+    return lambda path: scipy.io.savemat(path, entries)
+
+
+UNIT_TWICE = {
+    "values": np.ones(99),
+    "quantity": {"label": "g", "unit_transformation": {"factor": 9.8}},
+}
+MATRIX = np.ones((300, 3))
+WORD = "\n0.009766\t", "\n0.009766\tx"
+WORD_ROW = lvm(HITS).split(WORD[0])[0].count("\n") + 2
+REFUSED = {
+    "a matrix without names": (".mat", mat_of(Freq=np.arange(300.0), Recep=MATRIX * 1j),
+        r"Freq \(300\), Recep \(300 × 3, lacks 3 names beside it\).*frequency_hz and receptance"),
+    "a struct without names": (".mat", mat_of(S={"y": {"values": MATRIX, "unit": "N"}, "dt": 1.0}),
+        r"S/y/values \(300 × 3, lacks 3 names"),
+    "a vector without a name": (".mat", mat_of(S={"p": np.ones(9), "q": np.ones(9)}),
+        r"S/p \(9, lacks a known name or unit\)"),
+    "no numbers": (".mat", mat_of(a=1.0, b="text"), "no arrays of numbers"),
+    "a factor beside a unit": (".mat", mat_of(S={"x": {"increment": 1e-3}, "y": UNIT_TWICE}),
+        "in g and has a factor 9.8"),
+    "two steps of one channel": (".mat", mat_of(force_n=np.ones(99), dt=1e-3, fs=2000.0),
+        r"steps of 0.0005 and 0.001 s"),
+    "a hit among others with what is no number": (
+        ".mat", lambda path: MANY_HITS["MAT: an array of structs"][1](path, [HITS[0], NAN]),
+        "sample 11 is not a finite"),
+    "LVM: spectra": (".lvm", changed("X_Dimension\tTime", "X_Dimension\tFrequency"), "over Hz"),
+    "LVM: a word": (".lvm", changed(*WORD), f"row {WORD_ROW}: Hammer is x"),
+    "LVM: fewer rows than stated": (".lvm", changed("Samples\t512", "Samples\t513"), "cut off"),
+    "LVM: two rates": (".lvm", changed("\t0.001953\t", "\t0.000977\t", x="No"), "different rates"),
+    "LVM: a header alone": (".lvm", lambda path: path.write_text(lvm(HITS)[:300]), "no data"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_not_understood_is_said(tmp_path, what):
+    suffix, write, words = REFUSED[what]
+    path = tmp_path / f"odd{suffix}"
+    write(path)
+    with pytest.raises(InputError, match=words):
+        read(path)
+
+
+def test_segments_that_go_on_are_one_record(tmp_path):
+    parts = [part(HITS[0], slice(256)), part(HITS[0], slice(256, None))]
+    text = lvm(parts).replace("08:01:30.25", "08:00:30.75").replace("hit\t+x", "hit\t-y")
+    (tmp_path / "on.lvm").write_text(text)
+    (hit,) = hits_from(read(tmp_path / "on.lvm"))
+    same(hit, HITS[0])
+    assert hit.axis == "-y"
+    (tmp_path / "on.lvm").write_text(text.replace("08:00:30.75", "08:00:31.75"))
+    assert hit_count(tmp_path / "on.lvm") == 2
+
+
+def test_damaged_containers_are_read_or_refused_in_words(tmp_path):
+    """Cuts and flipped bytes anywhere; every cut of MAT and LVM is found."""
+    rng = np.random.default_rng(0)
+    short = [part(hit, slice(40)) for hit in HITS]
+    kinds = [w for w in (ONE_HIT | MANY_HITS) if w.startswith(("MAT: ", "MAT 7", "LVM"))]
+    outcomes, sentences = Counter(), []
+    for number, what in enumerate(kinds * 12):
+        name, write = (ONE_HIT | MANY_HITS)[what]
+        path = tmp_path / name
+        write(path, short)
+        whole = path.read_bytes()
+        made, cut = bytearray(whole), number % 3 == 0
+        if cut:
+            del made[int(rng.integers(140, len(made) - 20)) :]
+        for place in rng.integers(128, len(made), size=0 if cut else 3):
+            made[place] = int(rng.integers(256))
+        path.write_bytes(made)
+        try:
+            read(path)
+        except InputError as error:
+            outcomes["refused", cut] += 1
+            sentences.append(str(error))
+        else:
+            outcomes["read", cut] += 1
+    assert all(sentence.endswith(".") for sentence in sentences)
+    assert outcomes["read", True] == 0
+    assert outcomes["read", False] > 0
+    assert outcomes["refused", False] > len(kinds)
