@@ -12,7 +12,7 @@ from planner.errors import InputError
 def modes(
     paths: Annotated[
         list[Path],
-        typer.Argument(metavar="PATH...", help="Hits of a pose, or FRFs of any points."),
+        typer.Argument(metavar="PATH...", help="Hits or FRFs, of a pose or of any points."),
     ],
     band_hz: Annotated[
         tuple[float, float] | None, typer.Option(metavar="LOW HIGH", help="Band in Hz.")
@@ -53,7 +53,7 @@ def modes(
     from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
-    """Experimental modal analysis: hits of one pose, FRFs of any points, a recordings folder.
+    """Experimental modal analysis: hits or FRFs, of a pose or any points; a recordings folder.
 
     Example: planner modes exports/P001/*.uff --plot pictures
     """

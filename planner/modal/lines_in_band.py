@@ -18,7 +18,7 @@ def too_few_lines(
     else:
         return RefusedError(
             f"Only {np.count_nonzero(usable)} usable frequency lines lie in the band of {band}, of "
-            f"FRFs between {first:g} and {last:g} Hz: give another band with --band-hz, record "
-            f"longer or hit with a harder tip."
+            f"FRFs between {first:g} and {last:g} Hz: give another band with --band-hz, "
+            f"record longer or hit with a harder tip."
         )
     return RefusedError(f"{off} in which modes are looked for; give another with --band-hz.")

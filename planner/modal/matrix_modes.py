@@ -176,7 +176,7 @@ def _mode(
     if scaled:
         shape = shape * (np.sign(shape[np.argmax(np.abs(shape))].real) or 1.0)
     else:
-        size = np.linalg.norm(shape)
+        size = max(float(np.linalg.norm(shape)), 1e-300)
         shape, shape_sd = shape * realign(shape) / size, shape_sd / size
     mass = 1 / float(np.max(np.abs(shape)) ** 2) if scaled else float("nan")
     spread = np.sqrt(fit.spread[m + k]) / (2 * np.pi)

@@ -25,8 +25,8 @@ def expected(
     Shapes (n, m), sds (n, m) of real and imaginary part each. Without neighbours points move about
     as far as those of the well determined half, either way.
     """
-    relative = sds / np.maximum(np.abs(shapes), 1e-300)
-    half = relative <= np.median(relative, axis=0)
+    certain = np.abs(shapes) / np.maximum(sds, 1e-300)
+    half = certain >= np.median(certain, axis=0)
     square = np.where(half, np.abs(shapes) ** 2, 0.0)
     power = np.sum(square, axis=0) / np.sum(half, axis=0)
     mean, variance = np.zeros(shapes.shape, complex), np.tile(power, (len(shapes), 1))

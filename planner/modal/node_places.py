@@ -58,7 +58,8 @@ def exchanged_nodes(
         and max(_turned(found, node) for node in nodes) < TURNED * gains[a, b]
         and np.max(_gains(after, nodes)[[a, b]]) < NEXT * usual
     )
-    return (nodes[a].name, nodes[b].name) if clear else None
+    first, second = sorted((a, b))  # which of both is rounding's
+    return (nodes[first].name, nodes[second].name) if clear else None
 
 
 def _nodes(dofs: Sequence[Dof]) -> list[Node]:

@@ -42,12 +42,12 @@ def with_axes(record: FrfRecord, hit: str | None, response: str | None) -> FrfRe
 def located(record: FrfRecord, stated: StatedPoints) -> FrfRecord:
     """The record with its nodes by the names of the points. Raises InputError as `hits_from`."""
     count, source = len(record.values), record.source
-    response = [
+    felt = [
         _axis_there(source, stated, *at)
         for at in zip(record.response_node or [""] * count, record.response_direction, strict=True)
     ]
     reference = [stated.hit_at(source, node) for node in record.reference_node or [""] * count]
-    return replace(record, response_node=tuple(response), reference_node=tuple(reference))
+    return replace(record, response_node=tuple(felt), reference_node=tuple(reference))
 
 
 def _completed(

@@ -71,6 +71,8 @@ def _sets(path: Path) -> list[dict[str, Any]]:
                 raise ForeignFileError(
                     f"{path} is no universal file (no dataset in it); export again."
                 )
+            if 0 in kinds:  # bytes between two datasets are damaged
+                raise InputError(f"{path} holds a dataset without a number; export it again.")
             sets: list[Any] = [file.read_sets(i) for i in range(len(kinds))]
             blocks = file._block_ind  # where datasets begin and end, which nothing public says
     except InputError:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.dataset.measure import MeasuredPose
-from planner.dataset.screened_files import Source, in_parts
+from planner.dataset.screened_files import Source, in_parts, told_of_files
 from planner.dataset.store import user_store
 from planner.errors import PlannerError, RefusedError
 from planner.frf.between_points import exported
@@ -40,6 +40,7 @@ class FrfSet:
     tail_s: float = np.inf
     ended: FrfRecord | None = None
     ended_rate_1_s: float = 0.0
+    remarks: tuple[str, ...] = ()
 
     def matrix(self, quantity: str | None) -> FrfMatrix:
         """The FRFs by places. Raises RefusedError or InputError as `matrix_of`."""
@@ -155,6 +156,7 @@ def _struck(
         frf.tail_s,
         exported(ended, path, simulated),
         ended.exponential_rate_1_s,
+        told_of_files(verdicts),
     )
 
 

@@ -143,7 +143,7 @@ def matrix_report(
         order=found.found.order,
         refused=given.refused,
         accepted=given.accepted,
-        remarks=found.remarks,
+        remarks=(*given.remarks, *found.remarks),
         simulated=matrix.simulated,
         exports=_export(matrix, found, geometry, real, files_to),
         **_draw(pictures, matrix, found, geometry, files),

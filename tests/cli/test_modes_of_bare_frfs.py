@@ -92,3 +92,21 @@ def test_bands_that_frfs_do_not_hold_are_named(kind, band, told, tmp_path, capsy
     assert told in err
     assert "--band-hz" in err
     assert len(err.strip().splitlines()) == 1
+
+
+def test_file_names_say_where_frfs_are_where_asked(tmp_path, capsys):
+    hz = np.arange(1, 601) * 0.25
+    paths = []
+    for k in range(3):
+        h = PLATE.accelerance(hz, [k], [0])[0, 0]
+        paths.append(tmp_path / f"H{k + 1}_1.csv")
+        table = np.column_stack([hz, h.real, h.imag])
+        head = "Frequency (Hz),Real ((m/s^2)/N),Imaginary ((m/s^2)/N)"
+        np.savetxt(paths[-1], table, delimiter=",", header=head, comments="", fmt="%.9g")
+    options = "--band-hz", *BAND
+    code, answer, err = modes(capsys, *paths, "--from-names", *options)
+    assert (code, err) == (0, "")
+    assert answer["dofs"] == [[1, "scalar"], [2, "scalar"], [3, "scalar"]]
+    assert all(mode["scaled"] for mode in answer["modes"])
+    code, answer, err = modes(capsys, *paths, *options)
+    assert (code, err, "dofs" in answer) == (0, "", False)
