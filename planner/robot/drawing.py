@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.link_bodies import LinkBody, shape_corners
+from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
+from planner.robot.shapes import shape_corners
 from planner.robot.skeleton import bodies
 
 
