@@ -228,12 +228,13 @@ def _taken_over(campaign_toml: Path, robot: str) -> str:
 def _default(directory: Path, robot_file: str) -> str:
     """A campaign.toml over the whole joint range, to be narrowed by the engineer."""
     from planner.robot.robot import Robot
+    from planner.robot.workspace import ranges_inside
 
     robot = Robot.load(directory / robot_file)
-    limits = robot.joints.shown([robot.lower_rad, robot.upper_rad]).T.round(3)
+    limits = ranges_inside(robot, robot.lower_rad, robot.upper_rad)
     document = tomlkit.document()
     document.add(tomlkit.comment("Whole range of every joint: narrow it to where the tool works."))
     document.add("robot", tomlkit.item(robot_file))
-    document.add("workspace", tomlkit.item({"joints_deg": limits.tolist()}))
+    document.add("workspace", tomlkit.item({"joints_deg": limits}))
     document.add("modes", tomlkit.item({"band_hz": list(robot.config.band_hz)}))
     return tomlkit.dumps(document)

@@ -11,8 +11,8 @@ from planner.errors import InputError
 from planner.identification.result import Identification
 from planner.robot.config import Compliance, entry_of
 from planner.robot.elastic_model import ElasticModel
-from planner.robot.robot import Robot
 from planner.robot.mesh_files import copy_meshes
+from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
 
 INERTIAL_ENTRIES = "mass_kg", "centre_m", "inertia_kg_m2"  # of [[link]]

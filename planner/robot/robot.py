@@ -277,6 +277,12 @@ class Robot:
         placement = self._data.oMf[self.tcp_id]
         return placement.rotation.copy(), placement.translation.copy()
 
+    def joint_places(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each joint: place (3,) and axis (3,) in the world at q (dof,)."""
+        pin.forwardKinematics(self.model, self._data, np.asarray(q, dtype=float))
+        placed = zip(self.joint_axes, list(self._data.oMi)[1:], strict=True)
+        return [(place.translation.copy(), place.rotation @ axis) for axis, place in placed]
+
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (n, 3, 3) and positions (n, 3) of the tcp at q (n, dof)."""
         both = [self.forward(row) for row in np.atleast_2d(q)]

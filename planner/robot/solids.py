@@ -29,9 +29,7 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
     return found
 
 
-def _solids(
-    robot: Robot, root: ElementTree.Element, kind: str
-) -> list[tuple[str, pin.Inertia]]:
+def _solids(robot: Robot, root: ElementTree.Element, kind: str) -> list[tuple[str, pin.Inertia]]:
     leave_out_unreadable(root, kind)
     with quiet():
         geometry = build_geometry(robot.model, root, kind)

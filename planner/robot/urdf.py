@@ -41,18 +41,31 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
 
 def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> ElementTree.Element:
     """The same of a URDF's text; errors name the file `urdf`."""
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
-        raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
-    if root.tag != "robot":
-        raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
+    root = _root(text, urdf)
     hold(root, held, urdf)
     moving = [joint for joint in root.findall("joint") if joint.get("type") not in FIXED]
     for joint in moving:
         _complete(joint, urdf)
     if not moving:
         raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
+    return root
+
+
+def read_tree(urdf: Path) -> ElementTree.Element:
+    """A URDF's XML as it is, whose joints form a tree. Raises InputError."""
+    try:
+        return _root(urdf_source(urdf), urdf)
+    except OSError as error:
+        raise InputError(f"{urdf} cannot be read ({error.strerror}); name a URDF.") from None
+
+
+def _root(text: bytes | str, urdf: Path) -> ElementTree.Element:
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError) as error:
+        raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
+    if root.tag != "robot":
+        raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
     _check_tree(root, urdf)
     return root
 
