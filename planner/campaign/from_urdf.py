@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 
 from planner.campaign.campaign import Campaign
-from planner.check.examine import examine
+from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.arm_chain import ArmChain, arm_chain
@@ -140,7 +140,7 @@ def _band(robot: Robot, low: np.ndarray, high: np.ndarray) -> tuple[tuple[float,
     simulation = Simulation(robot)
     q = np.random.default_rng(2).uniform(low, high, (POSES, len(low)))
     found = simulation.frequencies(q, simulation.elastic.size).frequency_hz
-    elsewhere = examine(robot).frequency_hz
+    elsewhere = simulation.frequencies(spread_poses(robot), 1).frequency_hz
     modes = min(MODES, int(np.isfinite(found).sum(axis=1).min()))
     lowest = min(np.nanmin(found), np.nanmin(elsewhere, initial=np.inf))
     below, above = WIDER[0] * lowest, WIDER[1] * np.nanmax(found[:, :modes])
