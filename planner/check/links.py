@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.check.remark import CheckRemark, Severity
-from planner.robot.link_bodies import LinkBody
+from planner.robot.link_bodies import LinkBody, guessed_masses
 from planner.robot.robot import Robot
 
 # Limits by which units are told; chosen between robots from 5 to 1,500 kg and a factor of 1000.
@@ -16,7 +16,10 @@ LONGEST_REACH_M, SHORTEST_REACH_M, NEVER_M = 12.0, 0.1, 100.0
 
 def check_links(robot: Robot, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
     """What looks wrong in the links of a robot."""
-    found = _lengths(robot)
+    found, guessed = _lengths(robot), guessed_masses(links)
+    if guessed:
+        remedy = "Put in what is known, or let recordings narrow it."
+        found.append(CheckRemark("note", guessed, f"{robot.path.name}, [[link]]", remedy))
     for link in links:
         if link.joint:
             turned = sum(other.mass for other in links if other.joint == link.joint)

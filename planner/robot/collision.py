@@ -131,7 +131,8 @@ class Collisions:
             q = rng.uniform(robot.lower_rad, robot.upper_rad)
             pin.updateGeometryPlacements(robot.model, kinematics, geometry, data, q)
             always = [k for k in always if pin.computeCollision(geometry, data, k)]
-        dropped = [geometry.collisionPairs[k] for k in always]
+        pairs = [(p.first, p.second) for p in geometry.collisionPairs]  # which removals shift
+        dropped = [pin.CollisionPair(*pairs[k]) for k in always]
         names = [(self._name(geometry, p.first), self._name(geometry, p.second)) for p in dropped]
         for pair in dropped:
             geometry.removeCollisionPair(pair)
