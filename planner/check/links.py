@@ -93,15 +93,22 @@ def _body(robot: Robot, link: LinkBody, turned: float) -> list[CheckRemark]:
     if high == 0:
         text = f"Its {link.mass:.4g} kg have no moments of inertia, as if they were in one point."
         found.append(CheckRemark("warning", text, where, "State ixx, iyy, izz in kg·m²."))
-    elif link.size_m > SMALLEST_SIZE_M:
-        found += _gyration(link, where)
+    else:
+        found += _gyration(robot, link, where)
     return found + _centre(robot, link, where)
 
 
-def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
+def _largest_m(robot: Robot, link: LinkBody) -> float:
+    """How large a link may be: half as large as the arm where no shape tells its size."""
+    told = link.whole and link.size_m > SMALLEST_SIZE_M
+    return link.size_m if told else max(link.size_m, 0.5 * robot.reach_m)
+
+
+def _gyration(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
     """How far from its centre of mass the mass would have to be."""
     gyration = float(np.sqrt(link.moments[2] / link.mass))
-    least, most = (share * link.size_m for share in GYRATION)
+    largest = _largest_m(robot, link)
+    least, most = GYRATION[0] * link.size_m, GYRATION[1] * largest
     if least <= gyration <= most:
         return []
     word = "far outside" if gyration > most else "at the middle of"
@@ -110,7 +117,7 @@ def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
             "warning",
             f"Its largest moment of inertia, {link.moments[2]:.3g} kg·m², puts its "
             f"{link.mass:.4g} kg at {gyration:.3g} m from their centre, {word} a link of "
-            f"{link.size_m:.2g} m.",
+            f"{link.size_m if least > gyration else largest:.2g} m.",
             where,
             "Moments are in kg·m² about the centre of mass, neither in kg·mm² nor about the joint.",
         )
@@ -118,8 +125,7 @@ def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
 
 
 def _centre(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
-    # Where neither shapes nor a next joint tell its size, the arm's own does.
-    size = link.size_m if link.size_m > SMALLEST_SIZE_M else 0.5 * robot.reach_m
+    size = _largest_m(robot, link)
     over = np.maximum(link.low_m - link.com_m, link.com_m - link.high_m).max()
     if over <= OUTSIDE * size:
         return []
