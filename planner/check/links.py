@@ -7,8 +7,9 @@ from planner.robot.link_bodies import LinkBody, guessed_masses
 from planner.robot.robot import Robot
 
 # Limits by which units are told; chosen between robots from 5 to 1,500 kg and a factor of 1000.
-HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.02
+HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.002
 GYRATION = 0.02, 1.2  # radius of gyration over the size of a link; a ball of that size has 0.18
+SMALL = 0.25  # of the size of what it is fixed to: less is a marker's, or weighs next to nothing
 SMALLEST_SIZE_M = 0.02  # smaller links tell nothing
 OUTSIDE = 0.5  # of its size may a centre of mass lie outside the box around a link
 LONGEST_REACH_M, SHORTEST_REACH_M, NEVER_M = 12.0, 0.1, 100.0
@@ -56,12 +57,17 @@ def _stated(robot: Robot, link: LinkBody, links: tuple[LinkBody, ...]) -> list[C
         if any(block.joint == link.joint for block in robot.config.compliance):
             text = f"{text}, though [[compliance]] lets {link.joint} swing"
             return [_weightless(robot, link, text, "error")]
-    elif link.shapes or link.visuals:
+    elif (link.shapes or link.visuals) and link.size_m > SMALL * _largest_weighed(turned):
         what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
         text = f"It has shapes but {what}, so that the simulation takes it for weightless"
     else:
         return []
     return [_weightless(robot, link, text, "warning")]
+
+
+def _largest_weighed(turned: list[LinkBody]) -> float:
+    """Size in m of the largest link that has a mass."""
+    return max((other.size_m for other in turned if other.mass > 0), default=0.0)
 
 
 def _weightless(robot: Robot, link: LinkBody, text: str, severity: Severity) -> CheckRemark:
