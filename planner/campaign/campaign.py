@@ -1,7 +1,7 @@
 """The campaign: the only thing with state, and its state is a fold over its log."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,12 +39,15 @@ class Campaign(CampaignReads):
     """A campaign folder, opened. Reads never write; every act is on the disk when it returns."""
 
     @classmethod
-    def new(cls, directory: Path, robot_toml: Path, campaign_toml: Path | None) -> "Campaign":
+    def new(
+        cls, directory: Path | str, robot_toml: Path | str, campaign_toml: Path | str | None
+    ) -> "Campaign":
         """Start a campaign: copy robot folder and decisions in, write the first event.
 
         Raises InputError if the folder is in use or any input is wrong.
         """
-        store.create_folder(directory, robot_toml, campaign_toml, _first_entry)
+        own = None if campaign_toml is None else Path(campaign_toml)
+        store.create_folder(Path(directory), Path(robot_toml), own, _first_entry)
         return cls(directory)
 
     def next(self, count: int = 1, acquisition: str | None = None) -> tuple[Proposal, ...]:
@@ -68,7 +71,7 @@ class Campaign(CampaignReads):
 
     def import_paths(
         self,
-        paths: tuple[Path, ...],
+        paths: Sequence[Path | str],
         pose: str | None = None,
         progress: Callable[[str], None] | None = None,
         from_names: bool = False,
@@ -85,16 +88,17 @@ class Campaign(CampaignReads):
         from planner.campaign.deliveries import sort_paths
         from planner.campaign.importing import place
 
+        given = tuple(map(Path, paths))
         with self._acting(), threadpool_limits(1):
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(
-                paths, self.cell.robot.joints, self.cell.robot.points, pose, default
+                given, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
             if from_names:
                 deliveries = tuple(delivery.placed_by_names() for delivery in deliveries)
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
-            named = frozenset(path for path in paths if path.is_file())
+            named = frozenset(path for path in given if path.is_file())
             reports = []
             for delivery, joints_deg in placed:
                 if progress:

@@ -22,11 +22,14 @@ def check_collision(
 ) -> list[CheckRemark]:
     """What collision geometry lacks, and what touches at home (dof,) in rad."""
     collisions, urdf = Collisions(robot), robot.urdf_path.name
-    if collisions.unchecked is not None:
-        remedy = "Add <collision> boxes or cylinders to its links."
-        return [CheckRemark("warning", collisions.unchecked, f"{urdf}, <collision>", remedy)]
     found = []
-    shaped = {link.joint for link in links if link.shapes}
+    if collisions.unchecked is not None:
+        remedy = "Add <collision> boxes or cylinders to its links, or the meshes."
+        found.append(CheckRemark("warning", collisions.unchecked, f"{urdf}, <collision>", remedy))
+    if collisions.none_checked:
+        return found
+    told = {one.link for one in collisions.left_out}
+    shaped = {link.joint for link in links if link.shapes or link.name in told}
     bare = [name for name in robot.joint_names if name not in shaped]
     if bare:
         moves = "moves" if any(map(robot.slides, bare)) else "turns"

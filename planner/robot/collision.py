@@ -1,6 +1,7 @@
 """Joint limits, self-collision and obstacles of a pose."""
 
-from functools import cached_property
+import xml.etree.ElementTree as ElementTree
+from functools import cached_property, lru_cache
 
 import coal
 import numpy as np
@@ -8,9 +9,15 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.robot import Robot
-from planner.robot.urdf import mesh_folders, quiet
+from planner.robot.shapes import (
+    UnusableShape,
+    build_geometry,
+    leave_out_unreadable,
+    unchecked_sentence,
+)
 
 LIMIT_TOLERANCE = 1e-9  # rad or m
+KEPT = 4  # robots whose collision shapes are at hand
 ALWAYS = 24  # poses at which a pair must touch to be taken for overlapping geometry
 
 
@@ -46,9 +53,15 @@ class Collisions:
 
     @property
     def unchecked(self) -> str | None:
-        """A sentence where the URDF has no collision geometry, so that nothing is checked."""
-        if _link_geometry(self.robot).ngeoms:
-            return None
+        """A sentence where collision geometry is missing, so that little or nothing is checked."""
+        geometry, left = self._links
+        if geometry.ngeoms:
+            return unchecked_sentence(left) or None
+        if unchecked_sentence(left):
+            return (
+                f"Nothing is checked for collision: {unchecked_sentence(left)} Look at each pose "
+                f"before the robot moves there."
+            )
         return (
             f"Nothing is checked for collision, because {self.robot.urdf_path.name} has no "
             f"collision geometry: look at each pose before the robot moves there."
@@ -59,10 +72,29 @@ class Collisions:
         """Pairs of links that touch at every pose and are not checked, one phrase each."""
         return self._geometry[3]
 
+    @property
+    def _links(self) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
+        return _link_geometry(self.robot)
+
+    @property
+    def left_out(self) -> tuple[UnusableShape, ...]:
+        """Shapes of the URDF that cannot be used."""
+        return self._links[1]
+
+    @property
+    def none_checked(self) -> bool:
+        """Whether no link has a shape that can be checked."""
+        return not self._links[0].ngeoms
+
     @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data, tuple[str, ...]]:
+        geometry, always = _with_pairs(self.robot)
+        return geometry, self._data(geometry), self.robot.model.createData(), always
+
+    def with_pairs(self) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+        """Shapes with the pairs to check, and which pairs touch at every pose."""
         robot = self.robot
-        geometry = _link_geometry(robot)
+        geometry = self._links[0].copy()
         links = list(range(geometry.ngeoms))
         for i, j in [(i, j) for i in links for j in links if i < j]:
             a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
@@ -74,7 +106,7 @@ class Collisions:
                 moves = geometry.geometryObjects[i].parentJoint > 0
                 if moves and not self._ignored(geometry, i, box):
                     geometry.addCollisionPair(pin.CollisionPair(i, box))
-        return geometry, self._data(geometry), robot.model.createData(), always
+        return geometry, always
 
     def _data(self, geometry: pin.GeometryModel) -> pin.GeometryData:
         data = geometry.createData()
@@ -99,12 +131,13 @@ class Collisions:
             return ()
         rng = np.random.default_rng(0)
         robot, data, kinematics = self.robot, self._data(geometry), self.robot.model.createData()
-        always = np.ones(len(geometry.collisionPairs), dtype=bool)
+        always = range(len(geometry.collisionPairs))
         for _ in range(ALWAYS):
             q = rng.uniform(robot.lower_rad, robot.upper_rad)
-            pin.computeCollisions(robot.model, kinematics, geometry, data, q, False)
-            always &= np.array([r.isCollision() for r in data.collisionResults], dtype=bool)
-        dropped = [p for p, a in zip(list(geometry.collisionPairs), always, strict=True) if a]
+            pin.updateGeometryPlacements(robot.model, kinematics, geometry, data, q)
+            always = [k for k in always if pin.computeCollision(geometry, data, k)]
+        pairs = [(p.first, p.second) for p in geometry.collisionPairs]  # which removals shift
+        dropped = [pin.CollisionPair(*pairs[k]) for k in always]
         names = [(self._name(geometry, p.first), self._name(geometry, p.second)) for p in dropped]
         for pair in dropped:
             geometry.removeCollisionPair(pair)
@@ -158,19 +191,17 @@ class Collisions:
         return limits + self.contacts(q) if np.all(np.isfinite(q)) else limits
 
 
-def _link_geometry(robot: Robot) -> pin.GeometryModel:
-    folders = mesh_folders(robot.urdf_path)
-    with quiet():
-        try:
-            return pin.buildGeomFromUrdfString(
-                robot.model, robot.urdf_text, pin.GeometryType.COLLISION, package_dirs=folders
-            )
-        except Exception as error:
-            text = " ".join(str(error).split())
-            raise InputError(
-                f"{robot.urdf_path}: its collision geometry cannot be loaded ({text}); put the "
-                f"meshes beside the URDF or use boxes and cylinders."
-            ) from None
+@lru_cache(maxsize=KEPT)
+def _with_pairs(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+    return Collisions(robot).with_pairs()
+
+
+@lru_cache(maxsize=KEPT)
+def _link_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
+    """Collision shapes of the links, and those of the URDF that are left out."""
+    root = ElementTree.fromstring(robot.urdf_text)
+    left = (*robot.left_out, *leave_out_unreadable(root))
+    return build_geometry(robot.model, root, "collision"), left
 
 
 def _obstacles(robot: Robot) -> list[pin.GeometryObject]:

@@ -76,6 +76,23 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class LinkTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a link weighs, in the stead of the URDF's <inertial>, and how sure that is.
+
+    Mass in kg, centre of mass in the link's frame, moments (xx, xy, xz, yy, yz, zz) in kg·m² about
+    that centre along the link's axes: all three or, where only the sd is to be stated, none.
+    `sd_percent` is that of mass and moments, the centre's in percent of the radius of gyration;
+    `guessed` numbers are marked wherever masses are shown.
+    """
+
+    link: str
+    mass_kg: float | None = None
+    centre_m: tuple[float, float, float] | None = None
+    inertia_kg_m2: tuple[float, float, float, float, float, float] | None = None
+    sd_percent: float | None = None
+    guessed: bool = False
+
+
 class Resonator(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A mass (kg) on a spring of its own, at a place of a link's joint frame, along a direction.
 
@@ -220,9 +237,10 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
-    `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
-    `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
-    m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
+    `urdf` is a file, named from the folder of robot.toml. `tcp_frame` names the link of it where
+    the hammer hits, `sensor_frame` the one where the accelerometer sits; their axes are parallel.
+    `gravity` is in m/s² along the axes of the URDF's base. `band_hz` is where the simulation is
+    meant to hold.
     `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for
     a rail, NAME_deg = 30 for a turntable. Others may slide or turn from pose to pose; wherever
     joints are listed (`joints_deg`), the number of one that slides (prismatic) is in millimetres.
@@ -244,6 +262,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stiffness_sd_percent: float | None = None
     stiffness_bias_sd_percent: float | None = None
     compliance: tuple[Compliance, ...] = ()
+    link: tuple[LinkTable, ...] = ()
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     point: tuple[PointTable, ...] = ()

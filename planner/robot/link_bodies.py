@@ -1,13 +1,15 @@
 """What a URDF says of each link: its mass, how it is spread, and how large the link is."""
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
+from planner.robot.link_inertias import link_inertia
 from planner.robot.robot import Robot
-from planner.robot.urdf_inertias import link_inertia
+from planner.robot.shapes import leave_out_unreadable, shape_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +19,9 @@ class LinkBody:
     `joint` turns it ("" for what stands still). Mass in kg, `com_m` (3,) in the link's frame,
     `moments` (3,) principal moments in kg·m² about it, increasing. `size_m` is the diagonal of a
     box around its shapes and what it carries, 0 where it has neither; `shapes` and `visuals` count
-    its collision and visual shapes. `low_m` and `high_m` (3,) are the corners of that box.
+    its collision and visual shapes. `low_m` and `high_m` (3,) are the corners of that box, `whole`
+    is whether it is known: there is a shape, and none is missing. `sd_percent` is how sure
+    robot.toml says its mass is, `guessed` that it is a guess.
     """
 
     name: str
@@ -31,6 +35,9 @@ class LinkBody:
     high_m: np.ndarray
     shapes: int
     visuals: int
+    whole: bool = True
+    sd_percent: float | None = None
+    guessed: bool = False
 
     @property
     def size_m(self) -> float:
@@ -41,8 +48,9 @@ class LinkBody:
 def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     """All links of the URDF in its order."""
     root = ElementTree.fromstring(robot.urdf_text)
-    shapes = shape_corners(root)
-    names = ("", *robot.joint_names)
+    left = (*robot.left_out, *leave_out_unreadable(root))
+    shapes, tables = shape_corners(root), {table.link: table for table in robot.config.link}
+    names, lacking = ("", *robot.joint_names), {one.link for one in left}
     found = []
     for link in root.findall("link"):
         name = link.get("name", "")
@@ -65,9 +73,36 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
                 high_m=corners.max(axis=0),
                 shapes=len(link.findall("collision")),
                 visuals=len(link.findall("visual")),
+                whole=bool(shapes.get(name)) and name not in lacking,
+                sd_percent=tables[name].sd_percent if name in tables else None,
+                guessed=name in tables and tables[name].guessed,
             )
         )
     return tuple(found)
+
+
+def guessed_masses(links: Sequence[LinkBody]) -> str:
+    """Which masses are guesses, in a sentence; "" where none is."""
+    guessed = [link for link in links if link.guessed and link.mass > 0]
+    if not guessed:
+        return ""
+    percent = max(link.sd_percent or 0.0 for link in guessed)
+    within = f", each with an sd of {percent:g} %" if percent else ""
+    named = ", ".join(link.name for link in guessed)
+    return f"Masses are guessed{within}: {named}."
+
+
+def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
+    """How low in the world anything is at q (dof,) that these joints move directly; inf: none."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.asarray(q, dtype=float))
+    corners = shape_corners(ElementTree.fromstring(robot.urdf_text))
+    found = [np.inf]
+    for body in link_bodies(robot):
+        place = data.oMf[robot.model.getFrameId(body.name, pin.FrameType.BODY)]
+        if body.joint in joints:
+            found += [float(place.act(corner)[2]) for corner in corners[body.name]]
+    return min(found)
 
 
 def _carried(root: ElementTree.Element, link: str) -> list[np.ndarray]:
@@ -78,41 +113,3 @@ def _carried(root: ElementTree.Element, link: str) -> list[np.ndarray]:
         if parent is not None and parent.get("link") == link and origin is not None:
             found.append(np.array([float(v) for v in origin.get("xyz", "0 0 0").split()]))
     return found
-
-
-def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
-    """Corners (3,) of boxes around the primitive shapes of each link, in its frame, eight each.
-
-    Collision shapes; visual ones where a link has no others.
-    """
-    found: dict[str, list[np.ndarray]] = {}
-    for link in root.findall("link"):
-        corners = found.setdefault(link.get("name", ""), [])
-        for part in link.findall("collision") or link.findall("visual"):
-            half = _half_size(part)
-            if half is not None:
-                rotation, place = _origin(part)
-                for signs in np.ndindex(2, 2, 2):
-                    corners.append(place + rotation @ (half * (2 * np.array(signs) - 1)))
-    return found
-
-
-def _half_size(part: ElementTree.Element) -> np.ndarray | None:
-    """Half edges (3,) of the box around a box, cylinder or sphere; None for a mesh."""
-    box, rod = part.find("geometry/box"), part.find("geometry/cylinder")
-    ball = part.find("geometry/sphere")
-    if box is not None:
-        return np.array([float(v) for v in box.get("size", "0 0 0").split()]) / 2
-    if rod is not None:
-        radius = float(rod.get("radius", "0"))
-        return np.array([radius, radius, float(rod.get("length", "0")) / 2])
-    return None if ball is None else np.full(3, float(ball.get("radius", "0")))
-
-
-def _origin(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
-    origin = part.find("origin")
-    if origin is None:
-        return np.eye(3), np.zeros(3)
-    rpy = np.array([float(v) for v in origin.get("rpy", "0 0 0").split()])
-    place = np.array([float(v) for v in origin.get("xyz", "0 0 0").split()])
-    return pin.rpy.rpyToMatrix(rpy), place

@@ -13,7 +13,9 @@ from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
 from planner.robot.config_file import check_own_springs, load_config, with_effects
+from planner.robot.link_inertias import state_inertias
 from planner.robot.points import PREFIX, check_points, names_of, with_points
+from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, joint_axes, joint_slides, parse_urdf, read_urdf
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
@@ -38,19 +40,24 @@ class Robot:
     config: RobotConfig
     path: Path  # robot.toml
     urdf_path: Path
-    urdf_text: str  # with continuous joints given limits of ±180°
+    urdf_text: str  # as it is used: limits for continuous joints, meshes named in full
     model: pin.Model
     joint_axes: tuple[np.ndarray, ...]  # unit vectors in the joints' own frames
     joints: JointUnits
+    left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
     @classmethod
-    def load(cls, robot_toml: Path, geometric_stiffness: bool = True) -> "Robot":
+    def load(cls, robot_toml: Path | str, geometric_stiffness: bool = True) -> "Robot":
         """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy.
 
         `geometric_stiffness` holds where robot.toml does not say.
         """
-        config = load_config(robot_toml, geometric_stiffness)
-        urdf = (robot_toml.parent / config.urdf).resolve()
+        return cls.of(load_config(Path(robot_toml), geometric_stiffness), Path(robot_toml))
+
+    @classmethod
+    def of(cls, config: RobotConfig, robot_toml: Path) -> "Robot":
+        """Of what robot.toml says, or would say if it stood there."""
+        urdf = _resolved(robot_toml, config.urdf)
         return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
 
     def described(self, config: RobotConfig, urdf_text: str) -> "Robot":
@@ -65,11 +72,13 @@ class Robot:
     def _built(
         cls, config: RobotConfig, robot_toml: Path, urdf: Path, root: ElementTree.Element
     ) -> "Robot":
+        left_out = leave_out_unusable(root, urdf)
+        state_inertias(root, config.link)
         text = ElementTree.tostring(root, encoding="unicode")
         model = build_model(text, urdf)
         names = tuple(model.names)[1:]
         axes, joints = joint_axes(root, names), JointUnits(names, joint_slides(root, names))
-        robot = cls(config, robot_toml, urdf, text, model, axes, joints)
+        robot = cls(config, robot_toml, urdf, text, model, axes, joints, left_out)
         robot._check()
         check_own_springs(config, joints, axes, robot_toml)
         check_points(config.point, robot_toml)
@@ -109,6 +118,8 @@ class Robot:
                 )
         for block in self.config.payload:
             self.frame_id("[[payload]] link", block.link)
+        for table in self.config.link:
+            self.frame_id("[[link]] link", table.link)
         bad = np.flatnonzero(~(self.lower_rad < self.upper_rad))
         if bad.size:
             raise InputError(
@@ -266,6 +277,12 @@ class Robot:
         placement = self._data.oMf[self.tcp_id]
         return placement.rotation.copy(), placement.translation.copy()
 
+    def joint_places(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each joint: place (3,) and axis (3,) in the world at q (dof,)."""
+        pin.forwardKinematics(self.model, self._data, np.asarray(q, dtype=float))
+        placed = zip(self.joint_axes, list(self._data.oMi)[1:], strict=True)
+        return [(place.translation.copy(), place.rotation @ axis) for axis, place in placed]
+
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (n, 3, 3) and positions (n, 3) of the tcp at q (n, dof)."""
         both = [self.forward(row) for row in np.atleast_2d(q)]
@@ -289,3 +306,12 @@ class Robot:
         scale = np.repeat([1 / arm, 1.0], 3)[:, None] * np.where(self.joints.slides, arm, 1.0)
         both = [np.linalg.svd(scale * self.jacobian(row), compute_uv=False)[-1] for row in q]
         return np.array(both)
+
+
+def _resolved(robot_toml: Path, urdf: str) -> Path:
+    try:
+        return (robot_toml.parent / urdf).resolve()
+    except (OSError, ValueError) as error:  # a name that no file can have
+        raise InputError(
+            f"{robot_toml}: its URDF {urdf!r} cannot be read ({error}); correct the entry urdf."
+        ) from None
