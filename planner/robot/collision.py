@@ -102,7 +102,9 @@ class Collisions:
         always = np.ones(len(geometry.collisionPairs), dtype=bool)
         for _ in range(ALWAYS):
             q = rng.uniform(robot.lower_rad, robot.upper_rad)
-            pin.computeCollisions(robot.model, kinematics, geometry, data, q, False)
+            pin.computeCollisions(
+                robot.model, kinematics, geometry, data, robot.linkage.at(q), False
+            )
             always &= np.array([r.isCollision() for r in data.collisionResults], dtype=bool)
         dropped = [p for p, a in zip(list(geometry.collisionPairs), always, strict=True) if a]
         names = [(self._name(geometry, p.first), self._name(geometry, p.second)) for p in dropped]
@@ -133,8 +135,8 @@ class Collisions:
         geometry, data, kinematics, _ = self._geometry
         if not len(geometry.collisionPairs):
             return ()
-        q = np.asarray(q, dtype=float)
-        pin.computeCollisions(self.robot.model, kinematics, geometry, data, q, False)
+        x = self.robot.linkage.at(q)
+        pin.computeCollisions(self.robot.model, kinematics, geometry, data, x, False)
         found = []
         for pair, result in zip(geometry.collisionPairs, data.collisionResults, strict=True):
             if result.isCollision():
@@ -149,8 +151,8 @@ class Collisions:
         geometry, data, kinematics, _ = self._geometry
         if not len(geometry.collisionPairs):
             return True
-        q = np.asarray(q, dtype=float)
-        return not pin.computeCollisions(self.robot.model, kinematics, geometry, data, q, True)
+        x = self.robot.linkage.at(q)
+        return not pin.computeCollisions(self.robot.model, kinematics, geometry, data, x, True)
 
     def violations(self, q: np.ndarray) -> tuple[str, ...]:
         """All that is wrong with a pose (dof,), limits first; empty when it is free."""

@@ -226,6 +226,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for
     a rail, NAME_deg = 30 for a turntable. Others may slide or turn from pose to pose; wherever
     joints are listed (`joints_deg`), the number of one that slides (prismatic) is in millimetres.
+    Joints that follow others (<mimic> in the URDF) go with them and are listed nowhere.
 
     Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
     gravity's own stiffness, of the size of weight times height, is added.

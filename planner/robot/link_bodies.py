@@ -42,7 +42,7 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     """All links of the URDF in its order."""
     root = ElementTree.fromstring(robot.urdf_text)
     shapes = shape_corners(root)
-    names = ("", *robot.joint_names)
+    names = ("", *robot.linkage.names)
     found = []
     for link in root.findall("link"):
         name = link.get("name", "")
