@@ -102,7 +102,7 @@ def _beyond_limits(
         return None, ""
     middle = (robot.lower_rad + robot.upper_rad) / 2
     whole = 2 * np.pi * np.round((q - middle) / (2 * np.pi))
-    q = q - np.where(robot.linkage.comes_round, whole, 0.0)
+    q = q - np.where(robot.linkage.comes_round(robot.tool_chain), whole, 0.0)
     broken = Collisions(robot).limits(q)
     return (None, broken[0]) if broken else (q, "")
 

@@ -3,7 +3,6 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -54,8 +53,7 @@ class Linkage:
         """Where all joints stand (n,) at q (dof,)."""
         return self.spread @ np.asarray(q, dtype=float) + self.offset
 
-    @cached_property
-    def comes_round(self) -> np.ndarray:
-        """Which joints of q (dof,) stand where they stood, with all that follows, a turn later."""
-        turning = ~np.array(self.slides)[:, None] | (self.spread == 0)
-        return np.all(turning & (self.spread == np.round(self.spread)), axis=0)
+    def comes_round(self, chain: Sequence[int]) -> np.ndarray:
+        """Which joints of q (dof,) bring a chain of joints back to where it was by a whole turn."""
+        spread, slides = self.spread[list(chain)], np.array(self.slides)[list(chain), None]
+        return np.all((spread == 0) | ((spread == np.round(spread)) & ~slides), axis=0)

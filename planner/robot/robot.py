@@ -237,36 +237,36 @@ class Robot:
         )
 
     @cached_property
-    def _chain(self) -> tuple[int, ...]:
-        """Numbers of all joints between the base and the tcp, from the tcp."""
+    def tool_chain(self) -> tuple[int, ...]:
+        """Places in `linkage` of all joints between the base and the tcp, from the tcp."""
         found, joint = [], self.model.frames[self.tcp_id].parentJoint
         while joint != 0:
-            found.append(joint)
+            found.append(joint - 1)
             joint = self.model.parents[joint]
         return tuple(found)
 
     @cached_property
     def shoulder_m(self) -> np.ndarray:
         """Where the first joint of the tcp's chain stands in the world (3,)."""
-        return np.array(self.model.jointPlacements[self._chain[-1]].translation)
+        return np.array(self.model.jointPlacements[self.tool_chain[-1] + 1].translation)
 
     @cached_property
     def reach_m(self) -> float:
         """No pose brings the tcp farther from the shoulder than this (arm pulled straight)."""
         ends = np.abs([self.linkage.at(self.lower_rad), self.linkage.at(self.upper_rad)])
-        slides = [k - 1 for k in self._chain if self.linkage.slides[k - 1]]
+        slides = [k for k in self.tool_chain if self.linkage.slides[k]]
         return self.arm_m + float(np.sum(ends.max(axis=0)[slides]))
 
     @cached_property
     def tool_joints(self) -> tuple[int, ...]:
         """Places in q of the joints that move the tcp."""
-        moved = self.linkage.spread[[k - 1 for k in self._chain]]
+        moved = self.linkage.spread[list(self.tool_chain)]
         return tuple(int(k) for k in np.flatnonzero(np.any(moved != 0, axis=0)))
 
     @cached_property
     def arm_m(self) -> float:
         """Length of the arm pulled straight, joints that slide at their zeros."""
-        places = [self.model.jointPlacements[k] for k in self._chain[:-1]]
+        places = [self.model.jointPlacements[k + 1] for k in self.tool_chain[:-1]]
         places.append(self.model.frames[self.tcp_id].placement)
         return float(sum(np.linalg.norm(place.translation) for place in places))
 

@@ -37,7 +37,7 @@ def drawn_tree(folder, seed, springs=1e12):
     links, joints, toml, masses = ['<link name="base"/>'], [], [], []
     for k, name in enumerate(names):
         mass, com, moments = rng.uniform(1, 5), rng.normal(size=3) / 5, rng.uniform(0.2, 0.3, 3)
-        axis, slides = rng.normal(size=3), rng.random() < 0.3
+        axis, place, slides = rng.normal(size=3), rng.normal(size=3) / 3, rng.random() < 0.3
         axis /= np.linalg.norm(axis)
         masses.append((mass, com, moments))
         box = f'<origin xyz="{_numbers(com)}"/><geometry><box size="0.2 0.2 0.2"/></geometry>'
@@ -58,7 +58,7 @@ def drawn_tree(folder, seed, springs=1e12):
         joints.append(
             f'<joint name="{name}" type="{"prismatic" if slides else "revolute"}">'
             f'<parent link="{parent}"/><child link="l{k}"/>'
-            f'<origin xyz="{_numbers(rng.normal(size=3) / 3)}" rpy="{_numbers(rng.normal(size=3))}"/>'
+            f'<origin xyz="{_numbers(place)}" rpy="{_numbers(3 * place)}"/>'
             f'<axis xyz="{_numbers(axis)}"/>{mimic}'
             f'<limit lower="-1.5" upper="1.2" velocity="1" effort="0"/></joint>'
         )
@@ -277,6 +277,8 @@ def test_a_follower_in_the_wrist_is_solved_for(factor, tmp_path):
     urdf.write_text(urdf.read_text().replace("</robot>", wrist + "</robot>"))
     robot = Robot.load(path)
     assert robot.tool_joints == tuple(range(6))
+    round_again = robot.linkage.comes_round(robot.tool_chain)  # the balancer is beside the chain
+    assert round_again.tolist() == [True] * 4 + [factor == -1, True]
     rng = np.random.default_rng(1)
     for _ in range(5):
         rotation, place = robot.forward(rng.uniform(robot.lower_rad, robot.upper_rad))
