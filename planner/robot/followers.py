@@ -61,8 +61,9 @@ def join_followers(joints: Joints, held: Mapping[str, float], urdf: Path) -> Non
             continue
         for old in joint.findall("mimic"):
             joint.remove(old)
-        entries = {"multiplier": repr(follow.factor), "offset": repr(follow.offset)}
-        ElementTree.SubElement(joint, "mimic", joint=follow.leader, **entries)
+        mimic = ElementTree.SubElement(joint, "mimic", joint=follow.leader)
+        mimic.set("multiplier", repr(follow.factor))
+        mimic.set("offset", repr(follow.offset))
 
 
 def narrow_leaders(joints: Joints, urdf: Path) -> None:

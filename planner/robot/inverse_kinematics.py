@@ -112,9 +112,8 @@ def _descend(
 ) -> tuple[np.ndarray | None, float]:
     """Solution or None, and the position error left (m)."""
     q, damping = start.copy(), DAMPING
-    best, since = np.inf, 0
+    best, since, at = np.inf, 0, robot.placement(q)
     for _ in range(iterations):
-        at = robot.placement(q)
         error = pin.log6(at.actInv(target)).vector
         size = float(np.linalg.norm(error))
         if size < TOLERANCE:
@@ -135,6 +134,7 @@ def _descend(
         q = q + step * min(1.0, 0.5 / max(longest, 1e-12))
         if bounded:
             q = np.clip(q, robot.lower_rad, robot.upper_rad)
+        at = robot.placement(q)
     left = float(np.linalg.norm(target.translation - at.translation))
     return None, left
 
