@@ -13,6 +13,7 @@ from tomlkit.exceptions import TOMLKitError
 from planner.campaign.config import load_campaign_config
 from planner.campaign.journal import sync_folder, write_synced
 from planner.errors import InputError
+from planner.robot.xacro_source import urdf_source
 from planner.toml_file import read_toml_text
 
 LOG = "log.jsonl"
@@ -178,16 +179,31 @@ def _alive(process: int) -> bool:
 
 
 def _copy_robot(robot_toml: Path, target: Path) -> None:
-    from planner.robot.config_file import load_config
+    """Copy robot.toml, its URDF with the meshes that this names, and other TOML files beside it.
 
-    source = robot_toml.parent.resolve()
-    urdf = (source / load_config(robot_toml).urdf).resolve()
-    if not urdf.is_relative_to(source):
-        raise InputError(
-            f"{robot_toml}: its URDF {urdf} lies outside the robot folder, which is copied whole; "
-            f"move it next to robot.toml."
-        )
-    shutil.copytree(source, target, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*"))
+    A URDF that lies elsewhere comes to lie beside robot.toml, and is expanded where it is xacro.
+    """
+    from planner.robot.config_file import load_config
+    from planner.robot.mesh_files import copy_meshes
+    from planner.robot.robot import Robot
+
+    source, named = robot_toml.parent.resolve(), load_config(robot_toml).urdf
+    urdf = Robot.load(robot_toml).urdf_path
+    inside = urdf.relative_to(source) if urdf.is_relative_to(source) else Path(urdf.name)
+    copy = target / inside
+    if copy.suffix == ".xacro":
+        copy = copy.with_name(f"{copy.name.split('.')[0]}.urdf")
+    copy.parent.mkdir(parents=True)
+    text = urdf_source(urdf)
+    copy.write_bytes(text)
+    copy_meshes(text, urdf, copy)
+    for file in source.glob("*.toml"):
+        shutil.copyfile(file, target / file.name)
+    place = copy.relative_to(target).as_posix()
+    if place != Path(named).as_posix():
+        document = tomlkit.parse(robot_toml.read_text(encoding="utf-8-sig"))
+        document["urdf"] = place
+        (target / robot_toml.name).write_text(tomlkit.dumps(document), encoding="utf-8")
 
 
 def _taken_over(campaign_toml: Path, robot: str) -> str:
@@ -212,12 +228,13 @@ def _taken_over(campaign_toml: Path, robot: str) -> str:
 def _default(directory: Path, robot_file: str) -> str:
     """A campaign.toml over the whole joint range, to be narrowed by the engineer."""
     from planner.robot.robot import Robot
+    from planner.robot.workspace import ranges_inside
 
     robot = Robot.load(directory / robot_file)
-    limits = robot.joints.shown([robot.lower_rad, robot.upper_rad]).T.round(3)
+    limits = ranges_inside(robot, robot.lower_rad, robot.upper_rad)
     document = tomlkit.document()
     document.add(tomlkit.comment("Whole range of every joint: narrow it to where the tool works."))
     document.add("robot", tomlkit.item(robot_file))
-    document.add("workspace", tomlkit.item({"joints_deg": limits.tolist()}))
+    document.add("workspace", tomlkit.item({"joints_deg": limits}))
     document.add("modes", tomlkit.item({"band_hz": list(robot.config.band_hz)}))
     return tomlkit.dumps(document)

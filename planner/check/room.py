@@ -22,10 +22,12 @@ def check_collision(
 ) -> list[CheckRemark]:
     """What collision geometry lacks, and what touches at home (dof,) in rad."""
     collisions, urdf = Collisions(robot), robot.urdf_path.name
-    if collisions.unchecked is not None:
-        remedy = "Add <collision> boxes or cylinders to its links."
-        return [CheckRemark("warning", collisions.unchecked, f"{urdf}, <collision>", remedy)]
     found = []
+    if collisions.unchecked is not None:
+        remedy = "Add <collision> boxes or cylinders to its links, or the meshes."
+        found.append(CheckRemark("warning", collisions.unchecked, f"{urdf}, <collision>", remedy))
+    if collisions.none_checked:
+        return found
     shaped = {link.joint for link in links if link.shapes}
     bare = [name for name in robot.joint_names if name not in shaped]
     if bare:

@@ -15,10 +15,10 @@ from planner.cli.documentation import manual, schema
 from planner.cli.handing_on import export, report
 from planner.cli.identification import identify
 from planner.cli.modes import modes
+from planner.cli.new import new
 from planner.cli.proving import prove
 from planner.cli.stability import stability
 from planner.cli.study import study
-from planner.errors import InputError
 
 app = typer.Typer(
     name="planner",
@@ -42,38 +42,6 @@ def _root(
         from planner.version import __version__
 
         print(f"planner {__version__}")
-
-
-@app.command()
-def new(
-    directory: Directory,
-    robot: Annotated[
-        Path | None, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")
-    ] = None,
-    campaign: Annotated[
-        Path | None, typer.Option(metavar="CAMPAIGN_TOML", help="Workspace, modes, acquisition.")
-    ] = None,
-    example: Annotated[
-        bool,
-        typer.Option("--example", help="Write robot.toml, campaign.toml and a URDF to change."),
-    ] = False,
-    as_json: AsJson = False,
-) -> int:
-    """Start a campaign, or write files to begin one with.
-
-    The robot is checked: what looks wrong is said, what cannot work is refused.
-
-    Example: planner new cell7 --robot robot/robot.toml --campaign campaign.toml
-    """
-    from planner.campaign.campaign import Campaign
-    from planner.campaign.example import write_example
-    from planner.report.campaign_acts import ExampleFolder, NewCampaign
-
-    if example == (robot is not None):
-        raise InputError("planner new needs either --robot ROBOT_TOML or --example; give one.")
-    if robot is None:
-        return respond(ExampleFolder(*write_example(directory)), as_json)
-    return respond(NewCampaign.of(Campaign.new(directory, robot, campaign)), as_json)
 
 
 @app.command(name="next")
@@ -235,8 +203,8 @@ def replay(
 
 
 for _command in (
-    undo, confirm, skip, withdraw, check, report, export, modes, identify, diagnose, prove, compare,
-    study, schema, manual, couple, stability,
+    new, undo, confirm, skip, withdraw, check, report, export, modes, identify, diagnose, prove,
+    compare, study, schema, manual, couple, stability,
 ):  # fmt: skip
     app.command()(_command)
 

@@ -15,10 +15,11 @@ from planner.diagnosis.linear_diagnosis import Candidate, Diagnosis
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
+from planner.identification.write_robot import drop_stated_inertias
 from planner.robot.config import EffectTable, entry_of, without_effects
 from planner.robot.massless_base import massless_base
+from planner.robot.mesh_files import copy_meshes
 from planner.robot.robot import BASE, Robot
-from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
 
 DIGITS = 6  # significant ones in robot.toml: more than any diagnosis knows
@@ -64,7 +65,7 @@ def write_explained(folder: Path, robot: Robot, diagnosis: Diagnosis, accepted: 
     try:
         folder.mkdir(parents=True, exist_ok=True)
         urdf.write_text(text, encoding="utf-8")
-        copy_meshes(robot.urdf_path, urdf)
+        copy_meshes(text, robot.urdf_path, urdf)
         path.write_text(_toml(robot, changes, urdf.name), encoding="utf-8")
     except OSError as error:
         raise InputError(f"{folder} cannot be written ({error.strerror}); name another.") from None
@@ -127,6 +128,7 @@ def _bearings(diagnosis: Diagnosis, found: Fit) -> tuple[dict[str, Any], ...]:
 def _toml(robot: Robot, changes: _Changes, urdf: str) -> str:
     document = tomlkit.parse(robot.path.read_text(encoding="utf-8-sig"))
     document["urdf"] = urdf
+    drop_stated_inertias(document)
     listed: Any = document["compliance"]
     for block, values in zip(listed, changes.springs, strict=True):
         for kind, value in values.items():

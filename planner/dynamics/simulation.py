@@ -19,6 +19,7 @@ from planner.dynamics.vibration import (
 )
 from planner.robot.config import EffectTable, without_effects
 from planner.robot.elastic_model import ElasticModel, Matrices
+from planner.robot.link_inertias import without_stated_inertias
 from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
 
@@ -84,7 +85,7 @@ class Simulation:
             for block, values in zip(own.compliance, springs, strict=True)
         ]
         config = msgspec.structs.replace(
-            own, compliance=tuple(blocks), effects=(*own.effects, *effects)
+            without_stated_inertias(own), compliance=tuple(blocks), effects=(*own.effects, *effects)
         )
         urdf, _ = urdf_with_inertias(self.robot, bodies, inertia_change)
         return Simulation(self.robot.described(config, urdf))

@@ -10,6 +10,7 @@ from planner.dynamics.gradient import Inertias
 from planner.dynamics.simulation import Elasticity, Simulation
 from planner.errors import InputError
 from planner.robot.config import LOSS_FACTOR_BELOW, Compliance, RobotConfig
+from planner.robot.urdf_inertias import stated_shares
 from planner.robot.virtual_joints import inertia_basis
 
 NEAR = 6.0
@@ -254,7 +255,8 @@ def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...],
     """Per body: mass at a fixed gyration radius, the COM's place, and moments about the COM.
 
     The COM moves the moments by a term of second order too, which keeps M from being linear: it is
-    left to the moments, whose sds are widened by as much.
+    left to the moments, whose sds are widened by as much. Links whose sd robot.toml states have
+    their own; what else turns with them has the prior's.
     """
     bodies = simulation.elastic.bodies
     change = np.zeros((len(bodies), len(INERTIAL), 10))
@@ -266,17 +268,21 @@ def _nuisances(simulation: Simulation, priors: Priors) -> tuple[tuple[str, ...],
         central = nominal[4:] - _point(m, com)
         size = np.sqrt(np.abs(central[[0, 2, 5]]))
         radius = np.sqrt(nominal[[4, 6, 9]].sum() / (2 * m)) if m > 0 else 0.0
-        com_m = np.hypot(priors.com_m, priors.elsewhere * radius)
-        change[b, 0] = priors.mass * nominal
+        shares = stated_shares(simulation.robot, bodies[b])
+        own = float(np.hypot.reduce([share * sd for share, sd in shares])) if shares else 0.0
+        rest = max(0.0, 1 - sum(share for share, _ in shares))
+        elsewhere = np.hypot(rest * priors.elsewhere, own)
+        com_m = np.hypot(rest * priors.com_m, elsewhere * radius)
+        change[b, 0] = np.hypot(rest * priors.mass, own) * nominal
         for axis in range(3):
             step = np.eye(3)[axis]
             change[b, 1 + axis, 1 + axis] = com_m * m
             slope = _point(m, com + step) - _point(m, com) - _point(m, step)
             change[b, 1 + axis, 4:] = com_m * slope
         for k, (i, j) in enumerate(MOMENTS, 4):
-            turned = priors.elsewhere * (size[i] ** 2 - size[j] ** 2)
-            own = np.hypot(priors.inertia * size[i] * size[j], turned)
-            change[b, k, k] = own + m * com_m**2
+            turned = elsewhere * (size[i] ** 2 - size[j] ** 2)
+            spread = np.hypot(rest * priors.inertia, own) * size[i] * size[j]
+            change[b, k, k] = np.hypot(spread, turned) + m * com_m**2
     return tuple(f"{what} of {body}" for body in bodies for what in INERTIAL), change
 
 

@@ -11,10 +11,11 @@ from planner.errors import InputError
 from planner.identification.result import Identification
 from planner.robot.config import Compliance, entry_of
 from planner.robot.elastic_model import ElasticModel
+from planner.robot.mesh_files import copy_meshes
 from planner.robot.robot import Robot
-from planner.robot.urdf import copy_meshes
 from planner.robot.urdf_inertias import urdf_with_inertias
 
+INERTIAL_ENTRIES = "mass_kg", "centre_m", "inertia_kg_m2"  # of [[link]]
 DIGITS = 6  # significant ones: more than any identification knows
 
 
@@ -23,6 +24,7 @@ def updated_toml(
 ) -> str:
     """The robot.toml `text` with the [[compliance]] blocks' numbers (and its urdf) replaced.
 
+    A new `urdf` is one of `urdf_with_inertias`, which has what [[link]] states in it.
     `added` blocks, which the identification counts last, follow those in the text.
     """
     document = tomlkit.parse(text)
@@ -42,7 +44,15 @@ def updated_toml(
             blocks[number][at] = float(f"{estimate.value:.{DIGITS}g}")
     if urdf is not None:
         document["urdf"] = urdf
+        drop_stated_inertias(document)
     return tomlkit.dumps(document)
+
+
+def drop_stated_inertias(document: tomlkit.TOMLDocument) -> None:
+    """Leave of [[link]] only how sure it is: the URDF has its numbers now."""
+    for block in document.get("link", ()):
+        for entry in INERTIAL_ENTRIES:
+            block.pop(entry, None)
 
 
 @dataclass(frozen=True)
@@ -75,7 +85,7 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
     out, bodies = out.absolute(), result.simulation.elastic.bodies
     change = result.simulation.elastic.inertia - ElasticModel(robot).inertia
     elsewhere = out.parent.resolve() != robot.path.parent.resolve()
-    urdf, name, shares, left = robot.urdf_path, None, {}, ()
+    urdf, name, shares = robot.urdf_path, None, {}
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         if elsewhere or np.any(change):
@@ -84,7 +94,7 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
             text, shares = urdf_with_inertias(robot, bodies, change)
             _write_new(urdf, text)
             if elsewhere:
-                left = copy_meshes(robot.urdf_path, urdf)
+                copy_meshes(text, robot.urdf_path, urdf)
         stated = robot.path.read_text(encoding="utf-8-sig")
         inside = sum(len(e.compliance) for e in robot.config.effects)
         added = robot.config.compliance[len(tomlkit.parse(stated)["compliance"]) + inside :]
@@ -93,9 +103,7 @@ def write_robot(out: Path, robot: Robot, result: Identification) -> Written:
         raise InputError(
             f"{out} cannot be written ({error.strerror}); name another file with --out."
         ) from None
-    said = [_impossible(body, share) for body, share in shares.items()]
-    said += [f"Mesh {mesh} lies outside the robot's folder and is not copied." for mesh in left]
-    return Written(out, urdf, tuple(said))
+    return Written(out, urdf, tuple(_impossible(body, share) for body, share in shares.items()))
 
 
 def _impossible(body: str, share: float) -> str:

@@ -6,12 +6,17 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Entry
+from planner.campaign.from_urdf import Guess, Guessed
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 from planner.report.log_words import act
+from planner.report.text import table
 from planner.words import significant
 
 
@@ -19,7 +24,8 @@ from planner.words import significant
 class NewCampaign(Answer):
     """Answer of `new`: `campaign` is the folder, `modes` how many of them are modelled.
 
-    `findings` are what a check of the robot warns of.
+    `findings` are what a check of the robot warns of. Of one begun from a URDF alone `guessed` is
+    all that was guessed, and `told` what to know of that.
     """
 
     campaign: str
@@ -30,28 +36,45 @@ class NewCampaign(Answer):
     remarks: tuple[str, ...]
     findings: tuple[CheckRemark, ...] = ()
     joint_units: Any = msgspec.UNSET
+    guessed: tuple[Guess, ...] = ()
+    told: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, campaign: Campaign) -> "NewCampaign":
-        """Of a campaign that was just started."""
+    def of(cls, campaign: Campaign, guessed: Guessed | None = None) -> "NewCampaign":
+        """Of a campaign that was just started, from a URDF alone where it was `guessed`."""
         cell = campaign.cell
         config, robot, said = cell.config, cell.robot, tuple(cell.remarks)
         warned = (r for r in cell.examined.remarks if r.severity == "warning")
         return cls(
             str(campaign.directory), robot.name, tuple(robot.joint_names), config.modes.count,
             config.acquisition.name, said, tuple(r for r in warned if r.what not in said),
-            robot.joints.declared,
+            robot.joints.declared, guessed.guesses if guessed else (),
+            guessed.remarks if guessed else (),
         )  # fmt: skip
 
-    def text(self) -> str:
+    def text(self) -> "str | Group":
         """What was started, and how it goes on."""
         warned = (f"Check: {finding.sentence}" for finding in self.findings)
-        remarks = "".join(f"{remark}\n" for remark in (*warned, *self.remarks))
-        return (
+        remarks = "".join(f"{remark}\n" for remark in (*warned, *self.remarks, *self.told))
+        said = (
             f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"
             f"{remarks}Next: planner next {self.campaign}"
         )
+        return Group(_guesses(self.guessed), Text(said)) if self.guessed else said
+
+
+def _guesses(guessed: tuple[Guess, ...]) -> Table:
+    """What was guessed; dampers follow their springs, and stand in the JSON alone."""
+    made = table("guessed", "what", "value", "± 1 sd")
+    for guess in guessed:
+        if not guess.what.startswith("damping"):
+            known = isinstance(guess.value, int | float)
+            value = f"{guess.value:.4g} {guess.unit}" if known else str(guess.value)
+            made.add_row(
+                guess.what, Text(value.strip()), "–" if guess.sd is None else f"{guess.sd:.3g}"
+            )
+    return made
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """The robot in a Rerun recording: the shapes of its URDF, and capsules where it has none."""
 
 import tempfile
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,6 @@ from rerun.chunk import Chunk
 
 from planner.robot.robot import Robot
 from planner.robot.skeleton import BodyShape, bodies
-from planner.robot.urdf import find_mesh
 
 WORLD = "tf#/"  # Rerun's frame of the root entity, in which entities lie that name no frame
 GREY = (150, 150, 155)
@@ -78,15 +76,10 @@ class RobotDrawing:
 
 
 def _load(robot: Robot) -> tuple[rru.UrdfTree, list[Chunk]]:
-    """The tree, and what it would log; Rerun itself finds no mesh by package:// outside ROS."""
-    root = ElementTree.fromstring(robot.urdf_text)
-    for mesh in root.iter("mesh"):
-        file = find_mesh(robot.urdf_path, mesh.get("filename", ""))
-        if file is not None:
-            mesh.set("filename", str(file))
+    """The tree, and what it would log."""
     with tempfile.TemporaryDirectory() as folder:
         urdf = Path(folder) / robot.urdf_path.name
-        urdf.write_bytes(ElementTree.tostring(root))
+        urdf.write_text(robot.urdf_text, encoding="utf-8")
         tree = rru.UrdfTree.from_file_path(urdf, entity_path_prefix="robot")
         return tree, tree.stream().to_chunks()
 

@@ -1,5 +1,6 @@
 """Joint limits, self-collision and obstacles of a pose."""
 
+import xml.etree.ElementTree as ElementTree
 from functools import cached_property
 
 import coal
@@ -8,7 +9,13 @@ import pinocchio as pin
 
 from planner.errors import InputError
 from planner.robot.robot import Robot
-from planner.robot.urdf import mesh_folders, quiet
+from planner.robot.shapes import (
+    UnusableShape,
+    build_geometry,
+    leave_out_unreadable,
+    unchecked_sentence,
+)
+from planner.robot.urdf import quiet
 
 LIMIT_TOLERANCE = 1e-9  # rad or m
 ALWAYS = 24  # poses at which a pair must touch to be taken for overlapping geometry
@@ -46,9 +53,15 @@ class Collisions:
 
     @property
     def unchecked(self) -> str | None:
-        """A sentence where the URDF has no collision geometry, so that nothing is checked."""
-        if _link_geometry(self.robot).ngeoms:
-            return None
+        """A sentence where collision geometry is missing, so that little or nothing is checked."""
+        geometry, left = self._links
+        if geometry.ngeoms:
+            return unchecked_sentence(left) or None
+        if unchecked_sentence(left):
+            return (
+                f"Nothing is checked for collision: {unchecked_sentence(left)} Look at each pose "
+                f"before the robot moves there."
+            )
         return (
             f"Nothing is checked for collision, because {self.robot.urdf_path.name} has no "
             f"collision geometry: look at each pose before the robot moves there."
@@ -60,9 +73,18 @@ class Collisions:
         return self._geometry[3]
 
     @cached_property
+    def _links(self) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
+        return _link_geometry(self.robot)
+
+    @property
+    def none_checked(self) -> bool:
+        """Whether no link has a shape that can be checked."""
+        return not self._links[0].ngeoms
+
+    @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data, tuple[str, ...]]:
         robot = self.robot
-        geometry = _link_geometry(robot)
+        geometry = self._links[0].copy()
         links = list(range(geometry.ngeoms))
         for i, j in [(i, j) for i in links for j in links if i < j]:
             a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
@@ -160,13 +182,13 @@ class Collisions:
         return limits + self.contacts(q) if np.all(np.isfinite(q)) else limits
 
 
-def _link_geometry(robot: Robot) -> pin.GeometryModel:
-    folders = mesh_folders(robot.urdf_path)
+def _link_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
+    """Collision shapes of the links, and those of the URDF that are left out."""
+    root = ElementTree.fromstring(robot.urdf_text)
+    left = (*robot.left_out, *leave_out_unreadable(root))
     with quiet():
         try:
-            return pin.buildGeomFromUrdfString(
-                robot.model, robot.urdf_text, pin.GeometryType.COLLISION, package_dirs=folders
-            )
+            return build_geometry(robot.model, root, "collision"), left
         except Exception as error:
             text = " ".join(str(error).split())
             raise InputError(

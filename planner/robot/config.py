@@ -76,6 +76,23 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     inertia: tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class LinkTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a link weighs, in the stead of the URDF's <inertial>, and how sure that is.
+
+    Mass in kg, centre of mass in the link's frame, moments (xx, xy, xz, yy, yz, zz) in kg·m² about
+    that centre along the link's axes: all three or, where only the sd is to be stated, none.
+    `sd_percent` is that of mass and moments, the centre's in percent of the radius of gyration;
+    `guessed` numbers are marked wherever masses are shown.
+    """
+
+    link: str
+    mass_kg: float | None = None
+    centre_m: tuple[float, float, float] | None = None
+    inertia_kg_m2: tuple[float, float, float, float, float, float] | None = None
+    sd_percent: float | None = None
+    guessed: bool = False
+
+
 class Resonator(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A mass (kg) on a spring of its own, at a place of a link's joint frame, along a direction.
 
@@ -245,6 +262,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     stiffness_sd_percent: float | None = None
     stiffness_bias_sd_percent: float | None = None
     compliance: tuple[Compliance, ...] = ()
+    link: tuple[LinkTable, ...] = ()
     payload: tuple[Payload, ...] = ()
     obstacle: tuple[Obstacle, ...] = ()
     point: tuple[PointTable, ...] = ()

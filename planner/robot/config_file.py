@@ -74,6 +74,7 @@ def _check(config: RobotConfig, path: Path) -> None:
     _check_percent(config.stiffness_sd_percent, f"{path}: stiffness_sd_percent")
     _check_percent(config.stiffness_bias_sd_percent, f"{path}: stiffness_bias_sd_percent")
     _check_payloads(config, path)
+    _check_links(config, path)
     _check_obstacles(config, path)
     check_sds(config.hits, f"{path}: [hits]")
     check_sds(config.sensor, f"{path}: [sensor]")
@@ -161,6 +162,33 @@ def _check_payloads(config: RobotConfig, path: Path) -> None:
             raise InputError(
                 f"{entry} has inertia {list(block.inertia)}, which no body can have; give "
                 f"xx, yy, zz, xy, xz, yz in kg·m² about its centre of mass."
+            )
+
+
+def _check_links(config: RobotConfig, path: Path) -> None:
+    named = [table.link for table in config.link]
+    for number, table in enumerate(config.link, 1):
+        entry = f"{path}: [[link]] number {number} ({table.link})"
+        if named.index(table.link) != number - 1:
+            raise InputError(f"{entry} states a link that an earlier one states; keep one of them.")
+        _check_percent(table.sd_percent, f"{entry}: sd_percent")
+        stated = (table.mass_kg, table.centre_m, table.inertia_kg_m2)
+        if all(value is None for value in stated):
+            if table.sd_percent is None:
+                raise InputError(f"{entry} states nothing; give mass_kg, centre_m, inertia_kg_m2.")
+            continue
+        if table.mass_kg is None or table.centre_m is None or table.inertia_kg_m2 is None:
+            raise InputError(f"{entry} needs mass_kg, centre_m and inertia_kg_m2; give all three.")
+        if not 0 < table.mass_kg < 1e5:
+            raise InputError(f"{entry} has mass_kg {table.mass_kg}; it must be above 0 kg.")
+        if not all(abs(value) < 1e2 for value in table.centre_m):
+            raise InputError(f"{entry} has centre_m {list(table.centre_m)}; give 3 lengths in m.")
+        xx, xy, xz, yy, yz, zz = table.inertia_kg_m2
+        moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if moments[0] < 0 or moments[0] + moments[1] < moments[2] * (1 - 1e-6):
+            raise InputError(
+                f"{entry} has inertia_kg_m2 {list(table.inertia_kg_m2)}, which no body can have; "
+                f"give xx, xy, xz, yy, yz, zz in kg·m² about its centre of mass."
             )
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from planner.robot.link_bodies import LinkBody, shape_corners
+from planner.robot.link_bodies import LinkBody
 from planner.robot.robot import Robot
+from planner.robot.shapes import shape_corners
 from planner.robot.skeleton import bodies
 
 
@@ -16,7 +17,8 @@ class RobotLines:
     """All in m, in the world.
 
     `links` are (start, end), `joints` (name, place, axis), `frames` (name, place, rotation) of tcp
-    and sensor, `masses` (kg, place), `shapes` and `obstacles` corners (8, 3) of boxes.
+    and sensor (one where both are one), `masses` (kg, place), `shapes` and `obstacles` corners
+    (8, 3) of boxes.
     """
 
     links: list[tuple[np.ndarray, np.ndarray]]
@@ -40,12 +42,10 @@ def robot_lines(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Rob
         (name, data.oMi[k + 1].translation.copy(), data.oMi[k + 1].rotation @ axis)
         for name, axis, k in axes
     ]
+    named = {robot.config.tcp_frame: robot.tcp_id, robot.config.sensor_frame: robot.sensor_id}
     frames = [
         (name, data.oMf[number].translation.copy(), data.oMf[number].rotation.copy())
-        for name, number in (
-            (robot.config.tcp_frame, robot.tcp_id),
-            (robot.config.sensor_frame, robot.sensor_id),
-        )
+        for name, number in named.items()
     ]
     masses = [(b.mass, place_of(b.name).act(b.com_m)) for b in links if b.joint and b.mass > 0]
     shapes = []

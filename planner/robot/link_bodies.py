@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from planner.robot.link_inertias import link_inertia
 from planner.robot.robot import Robot
-from planner.robot.urdf_inertias import link_inertia
+from planner.robot.shapes import shape_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,41 +79,3 @@ def _carried(root: ElementTree.Element, link: str) -> list[np.ndarray]:
         if parent is not None and parent.get("link") == link and origin is not None:
             found.append(np.array([float(v) for v in origin.get("xyz", "0 0 0").split()]))
     return found
-
-
-def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
-    """Corners (3,) of boxes around the primitive shapes of each link, in its frame, eight each.
-
-    Collision shapes; visual ones where a link has no others.
-    """
-    found: dict[str, list[np.ndarray]] = {}
-    for link in root.findall("link"):
-        corners = found.setdefault(link.get("name", ""), [])
-        for part in link.findall("collision") or link.findall("visual"):
-            half = _half_size(part)
-            if half is not None:
-                rotation, place = _origin(part)
-                for signs in np.ndindex(2, 2, 2):
-                    corners.append(place + rotation @ (half * (2 * np.array(signs) - 1)))
-    return found
-
-
-def _half_size(part: ElementTree.Element) -> np.ndarray | None:
-    """Half edges (3,) of the box around a box, cylinder or sphere; None for a mesh."""
-    box, rod = part.find("geometry/box"), part.find("geometry/cylinder")
-    ball = part.find("geometry/sphere")
-    if box is not None:
-        return np.array([float(v) for v in box.get("size", "0 0 0").split()]) / 2
-    if rod is not None:
-        radius = float(rod.get("radius", "0"))
-        return np.array([radius, radius, float(rod.get("length", "0")) / 2])
-    return None if ball is None else np.full(3, float(ball.get("radius", "0")))
-
-
-def _origin(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
-    origin = part.find("origin")
-    if origin is None:
-        return np.eye(3), np.zeros(3)
-    rpy = np.array([float(v) for v in origin.get("rpy", "0 0 0").split()])
-    place = np.array([float(v) for v in origin.get("xyz", "0 0 0").split()])
-    return pin.rpy.rpyToMatrix(rpy), place

@@ -13,8 +13,10 @@ from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
 from planner.robot.config_file import check_own_springs, load_config, with_effects
+from planner.robot.link_inertias import state_inertias
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
+from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, parse_urdf, read_urdf
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
@@ -40,19 +42,24 @@ class Robot:
     config: RobotConfig
     path: Path  # robot.toml
     urdf_path: Path
-    urdf_text: str  # with continuous joints given limits of ±180°
+    urdf_text: str  # as it is used: limits for continuous joints, meshes named in full
     model: pin.Model
     linkage: Linkage
     joints: JointUnits
+    left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
     @classmethod
-    def load(cls, robot_toml: Path, geometric_stiffness: bool = True) -> "Robot":
+    def load(cls, robot_toml: Path | str, geometric_stiffness: bool = True) -> "Robot":
         """Read robot.toml and its URDF. Raises InputError naming file, entry and remedy.
 
         `geometric_stiffness` holds where robot.toml does not say.
         """
-        config = load_config(robot_toml, geometric_stiffness)
-        urdf = (robot_toml.parent / config.urdf).resolve()
+        return cls.of(load_config(Path(robot_toml), geometric_stiffness), Path(robot_toml))
+
+    @classmethod
+    def of(cls, config: RobotConfig, robot_toml: Path) -> "Robot":
+        """Of what robot.toml says, or would say if it stood there."""
+        urdf = _resolved(robot_toml, config.urdf)
         return cls._built(config, robot_toml, urdf, read_urdf(urdf, robot_toml, config.held))
 
     def described(self, config: RobotConfig, urdf_text: str) -> "Robot":
@@ -67,11 +74,13 @@ class Robot:
     def _built(
         cls, config: RobotConfig, robot_toml: Path, urdf: Path, root: ElementTree.Element
     ) -> "Robot":
+        left_out = leave_out_unusable(root, urdf)
+        state_inertias(root, config.link)
         text = ElementTree.tostring(root, encoding="unicode")
         model = build_model(text, urdf)
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
-        robot = cls(config, robot_toml, urdf, text, model, linkage, joints)
+        robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
         robot._check()
         check_own_springs(config, joints, robot.joint_axes, robot_toml)
         check_points(config.point, robot_toml)
@@ -113,6 +122,8 @@ class Robot:
                 )
         for block in self.config.payload:
             self.frame_id("[[payload]] link", block.link)
+        for table in self.config.link:
+            self.frame_id("[[link]] link", table.link)
         bad = np.flatnonzero(~(self.lower_rad < self.upper_rad))
         if bad.size:
             raise InputError(
@@ -280,6 +291,12 @@ class Robot:
         placement = self.placement(q)
         return placement.rotation.copy(), placement.translation.copy()
 
+    def joint_places(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each joint of q: place (3,) and axis (3,) in the world at q (dof,)."""
+        pin.forwardKinematics(self.model, self._data, self.linkage.at(q))
+        placed = zip(self.joint_axes, self.linkage.leading(list(self._data.oMi)[1:]), strict=True)
+        return [(place.translation.copy(), place.rotation @ axis) for axis, place in placed]
+
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotations (n, 3, 3) and positions (n, 3) of the tcp at q (n, dof)."""
         both = [self.forward(row) for row in np.atleast_2d(q)]
@@ -293,3 +310,12 @@ class Robot:
             self.model, self._data, self.linkage.at(q), self.tcp_id, pin.LOCAL
         )
         return of_all @ self.linkage.spread
+
+
+def _resolved(robot_toml: Path, urdf: str) -> Path:
+    try:
+        return (robot_toml.parent / urdf).resolve()
+    except (OSError, ValueError) as error:  # a name that no file can have
+        raise InputError(
+            f"{robot_toml}: its URDF {urdf!r} cannot be read ({error}); correct the entry urdf."
+        ) from None

@@ -2,7 +2,6 @@
 
 import os
 import re
-import shutil
 import sys
 import tempfile
 import xml.etree.ElementTree as ElementTree
@@ -16,6 +15,7 @@ import pinocchio as pin
 from planner.errors import InputError
 from planner.robot.followers import follows, join_followers, narrow_leaders
 from planner.robot.held_joints import SLIDING, TURNING, fix, held_places
+from planner.robot.xacro_source import urdf_source
 
 LARGEST, FARTHEST_M = 1e7, 1e3  # kg, kg·m, kg·m² of what turns; between joints: no robot has it
 FIXED = ("fixed",)
@@ -27,7 +27,7 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
     `held` is robot.toml's: joints that stay where they are become fixed ones.
     """
     try:
-        text = urdf.read_bytes()
+        text = urdf_source(urdf)
     except FileNotFoundError:
         raise InputError(
             f"{robot_toml}: its URDF {urdf} does not exist; correct the entry urdf."
@@ -42,16 +42,28 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
 
 def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> ElementTree.Element:
     """The same of a URDF's text; errors name the file `urdf`."""
+    root = _root(text, urdf)
+    if not _settle_joints(root, urdf, held):
+        raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
+    return root
+
+
+def read_tree(urdf: Path) -> ElementTree.Element:
+    """A URDF's XML as it is, whose joints form a tree. Raises InputError."""
+    try:
+        return _root(urdf_source(urdf), urdf)
+    except OSError as error:
+        raise InputError(f"{urdf} cannot be read ({error.strerror}); name a URDF.") from None
+
+
+def _root(text: bytes | str, urdf: Path) -> ElementTree.Element:
     try:
         root = ElementTree.fromstring(text)
     except (ElementTree.ParseError, ValueError) as error:
         raise InputError(f"{urdf} is not a readable URDF ({error}); correct it.") from None
     if root.tag != "robot":
         raise InputError(f"{urdf} has <{root.tag}> at its top, not <robot>; name a URDF.")
-    if not _settle_joints(root, urdf, held):
-        raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
     _check_tree(root, urdf)
-    _check_shapes(root, urdf)
     return root
 
 
@@ -88,52 +100,8 @@ def build_model(text: str, urdf: Path) -> pin.Model:
 
 def joint_axis(joint: ElementTree.Element) -> np.ndarray:
     """Unit axis (3,) of a joint in its own frame."""
-    axis = _numbers(_axis_text(joint))
+    axis = numbers(_axis_text(joint))
     return axis / np.linalg.norm(axis)
-
-
-def mesh_folders(urdf: Path) -> list[str]:
-    """Where meshes (package://, relative) are looked for."""
-    return [str(urdf.parent), str(urdf.parent.parent)]
-
-
-def find_mesh(urdf: Path, name: str) -> Path | None:
-    """The file of a mesh as a URDF names it (package://, relative, absolute); None if missing."""
-    file = _mesh_file(name)
-    places = [Path(folder) / file for folder in ["/", *mesh_folders(urdf)]]
-    return next((place for place in places if place.is_file()), None)
-
-
-def copy_meshes(urdf: Path, target: Path) -> tuple[str, ...]:
-    """Copy the meshes that a URDF names to beside the same URDF at `target`.
-
-    Nothing is read outside the folders in which meshes are looked for, nor written outside that of
-    `target`; returns the names of meshes that would be.
-    """
-    names = re.findall(r"<mesh\b[^>]*\bfilename\s*=\s*[\"']([^\"']+)", urdf.read_text("utf-8"))
-    left = []
-    for name in dict.fromkeys(names):
-        file = _mesh_file(name)
-        if Path(file).is_absolute():
-            continue  # found by the same name from everywhere
-        for folder in mesh_folders(urdf):
-            found, copy = Path(folder) / file, target.parent / file
-            if not found.is_file():
-                continue
-            if not (_inside(found, Path(folder)) and _inside(copy, target.parent)):
-                left.append(name)
-            elif not copy.exists():
-                copy.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copyfile(found, copy)
-    return tuple(dict.fromkeys(left))
-
-
-def _inside(path: Path, folder: Path) -> bool:
-    return path.resolve().is_relative_to(folder.resolve())
-
-
-def _mesh_file(name: str) -> str:
-    return re.sub(r"^(package|model|file)://", "", name)
 
 
 @contextmanager
@@ -169,7 +137,8 @@ def _axis_text(joint: ElementTree.Element) -> str:
     return "1 0 0" if element is None else element.get("xyz", "1 0 0")
 
 
-def _numbers(text: str) -> np.ndarray:
+def numbers(text: str) -> np.ndarray:
+    """Numbers of an attribute, three NaN where it holds anything else."""
     try:
         return np.array([float(v) for v in text.split()])
     except ValueError:
@@ -184,7 +153,7 @@ def _complete(joint: ElementTree.Element, urdf: Path) -> None:
             f"{urdf}: joint {name} is of type {kind}, but only revolute, continuous and prismatic "
             f"joints move here; make it a fixed joint."
         )
-    axis = _numbers(_axis_text(joint))
+    axis = numbers(_axis_text(joint))
     if axis.shape != (3,) or not 1e-6 < np.linalg.norm(axis) < np.inf:
         raise InputError(
             f'{urdf}: joint {name} has axis "{_axis_text(joint)}"; give 3 numbers, not all 0.'
@@ -220,26 +189,6 @@ def _check_tree(root: ElementTree.Element, urdf: Path) -> None:
                 raise InputError(
                     f"{urdf}: the joints around link {link} form a loop; an arm must be a tree "
                     f"that starts at its base."
-                )
-
-
-def _check_shapes(root: ElementTree.Element, urdf: Path) -> None:
-    """Collision shapes need positive sizes, and meshes a file."""
-    for link in root.findall("link"):
-        for shape in link.findall("collision/geometry/*"):
-            sizes = [shape.get(key) for key in ("size", "radius", "length")]
-            numbers = _numbers(" ".join(size for size in sizes if size is not None))
-            if shape.tag != "mesh" and not np.all((numbers > 0) & (numbers < 1e4)):
-                raise InputError(
-                    f"{urdf}: the collision {shape.tag} of link {link.get('name', '?')} has sizes "
-                    f"{numbers.tolist()}; give lengths above 0 m."
-                )
-        for mesh in link.findall("collision/geometry/mesh"):
-            if find_mesh(urdf, mesh.get("filename", "")) is None:
-                raise InputError(
-                    f"{urdf}: collision mesh {mesh.get('filename', '')} of link "
-                    f"{link.get('name', '?')} cannot be found; put it beside the URDF or use a "
-                    f"box, cylinder or sphere."
                 )
 
 

@@ -5,10 +5,11 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pinocchio as pin
 
+from planner.robot.link_inertias import link_inertia, state_inertias, write_inertia
 from planner.robot.robot import BASE, Robot
-from planner.robot.virtual_joints import OUTER, SMALL
+from planner.robot.virtual_joints import OUTER, SMALL, body_inertia
+from planner.robot.xacro_source import urdf_source
 
-ENTRIES = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 ORDER = [(0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2)]  # of moments in Pinocchio's ten numbers
 SAFE = 0.99  # of the largest share of a change that leaves a body possible
 
@@ -18,13 +19,15 @@ def urdf_with_inertias(
 ) -> tuple[str, dict[str, float]]:
     """Text of the URDF after change (B, 10) of the bodies' inertias, which `bodies` names.
 
+    What [[link]] of robot.toml states is in it (see `link_inertias.without_stated_inertias`).
     Bodies, their frames and the ten numbers are those of `ElasticModel.inertia`. Of the links
     that make up a body the heaviest takes the change, or the share of it that leaves a link which
     matter can form; shares below 1 are returned by body.
     """
-    text = robot.urdf_path.read_bytes().decode("utf-8")
+    text = urdf_source(robot.urdf_path).decode("utf-8")
     keep = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     root = ElementTree.fromstring(text[text.index("<robot") :], keep)
+    state_inertias(root, robot.config.link)
     links = {link.get("name"): link for link in root.findall("link")}
     shares = {}
     for body, values in zip(bodies, change, strict=True):
@@ -45,9 +48,15 @@ def _of_whole(robot: Robot, link: str, values: np.ndarray) -> tuple[str, np.ndar
     return str(robot.model.names[carried[0]]), _seen_from(pin.SE3(np.eye(3), -half), values)
 
 
+def _joint_of(robot: Robot, body: str) -> int:
+    """Number of the joint that moves a body, 0 of the base."""
+    if body == BASE and BASE not in robot.joint_names:
+        return 0
+    return list(robot.model.names).index(body)
+
+
 def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
-    names = list(robot.model.names)
-    joint = 0 if body == BASE and BASE not in robot.joint_names else names.index(body)
+    joint = _joint_of(robot, body)
     frames = [
         frame
         for frame in robot.model.frames
@@ -56,23 +65,28 @@ def _heaviest(robot: Robot, body: str, links: dict) -> pin.Frame:
     return max(frames, key=lambda frame: link_inertia(links[frame.name]).mass)
 
 
-def link_inertia(link: ElementTree.Element) -> pin.Inertia:
-    """Of a link in its own frame; 0 where the URDF states none."""
-    inertial = link.find("inertial")
-    if inertial is None:
-        return pin.Inertia.Zero()
-    origin, mass, entries = (inertial.find(key) for key in ("origin", "mass", "inertia"))
-    xyz, rpy = np.zeros(3), np.zeros(3)
-    if origin is not None:
-        xyz = np.array([float(v) for v in origin.get("xyz", "0 0 0").split()])
-        rpy = np.array([float(v) for v in origin.get("rpy", "0 0 0").split()])
-    moments = np.zeros((3, 3))
-    if entries is not None:
-        for name, (i, j) in ENTRIES.items():
-            moments[i, j] = moments[j, i] = float(entries.get(name, "0"))
-    turn = pin.rpy.rpyToMatrix(rpy)
-    value = 0.0 if mass is None else float(mass.get("value", "0"))
-    return pin.Inertia(value, xyz, turn @ moments @ turn.T)
+def stated_shares(robot: Robot, body: str) -> tuple[tuple[float, float], ...]:
+    """Share of a body's mass and relative sd of each of its links that [[link]] states an sd of.
+
+    Bodies are named as in `ElasticModel.bodies`; of a link that bends both halves have its sd.
+    """
+    stated = {t.link: t.sd_percent / 100 for t in robot.config.link if t.sd_percent is not None}
+    if not stated or body.startswith(f"{SMALL} "):
+        return ()
+    if body.endswith(OUTER):
+        body, _ = _of_whole(robot, body.removesuffix(OUTER), np.zeros(10))
+    joint = _joint_of(robot, body)
+    whole, found = float(body_inertia(robot, joint)[0]), []
+    for link in ElementTree.fromstring(robot.urdf_text).findall("link"):
+        name = link.get("name", "")
+        if name in stated and _carrier(robot, name) == joint and whole > 0:
+            found.append((link_inertia(link).mass / whole, stated[name]))
+    return tuple(found)
+
+
+def _carrier(robot: Robot, link: str) -> int:
+    """Number of the joint that a link turns with."""
+    return robot.model.frames[robot.frame_id("[[link]] link", link)].parentJoint
 
 
 def _seen_from(placement: pin.SE3, values: np.ndarray) -> np.ndarray:
@@ -103,7 +117,7 @@ def _change(link: ElementTree.Element, values: np.ndarray) -> float:
     nominal = np.array(link_inertia(link).toDynamicParameters())
     share = _possible(_spread(nominal), _spread(values))
     if share > 0:
-        _write(link, pin.Inertia.FromDynamicParameters(nominal + share * values))
+        write_inertia(link, pin.Inertia.FromDynamicParameters(nominal + share * values))
     return share
 
 
@@ -116,18 +130,3 @@ def _possible(nominal: np.ndarray, change: np.ndarray) -> float:
     except np.linalg.LinAlgError:
         return 0.0
     return 1.0 if least > -SAFE else float(SAFE / -least)
-
-
-def _write(link: ElementTree.Element, inertia: pin.Inertia) -> None:
-    inertial = link.find("inertial")
-    assert inertial is not None
-    tail = inertial.text
-    for child in list(inertial):
-        inertial.remove(child)
-    parts = {
-        "origin": {"xyz": " ".join(f"{v:.9g}" for v in inertia.lever), "rpy": "0 0 0"},
-        "mass": {"value": f"{inertia.mass:.9g}"},
-        "inertia": {name: f"{inertia.inertia[at]:.9g}" for name, at in ENTRIES.items()},
-    }
-    for name, attributes in parts.items():
-        ElementTree.SubElement(inertial, name, attributes).tail = tail

@@ -46,7 +46,7 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
     carriers: list[int] = []
     bodies: list[np.ndarray] = []
     for joint in (joint for joint in range(source.njoints) if last[joint]):
-        name, whole = (str(source.names[joint]) if joint else BASE), _inertia(robot, joint)
+        name, whole = (str(source.names[joint]) if joint else BASE), body_inertia(robot, joint)
         if ends[joint][0] == last[joint]:
             parts = [(name, last[joint], whole)]
         else:
@@ -124,7 +124,7 @@ def halves_moved(robot: Robot, link: str) -> tuple[float, np.ndarray]:
     carried = robot.carries(link)
     assert carried is not None  # otherwise the link has no halves
     half = robot.model.jointPlacements[carried[1]].translation / 2
-    whole = _inertia(robot, carried[0])
+    whole = body_inertia(robot, carried[0])
     inner, outer = _halves(whole, half)
     apart = float(np.linalg.norm(outer[1:4] / outer[0] + half - inner[1:4] / inner[0])) / 2
     slope = np.zeros((3, 2, 10))
@@ -230,7 +230,7 @@ def _body(values: np.ndarray) -> pin.Inertia:
     return pin.Inertia(0.0, np.zeros(3), moments)
 
 
-def _inertia(robot: Robot, joint: int) -> np.ndarray:
+def body_inertia(robot: Robot, joint: int) -> np.ndarray:
     """(10,) of all links that a joint carries, and of the payloads on them."""
     total = robot.model.inertias[joint]
     for block in robot.config.payload:

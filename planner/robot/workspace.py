@@ -200,6 +200,16 @@ class Workspace:
         return reference, np.cross(self.tool_axis, reference)
 
 
+def ranges_inside(
+    robot: Robot, lower: np.ndarray, upper: np.ndarray, parts: float = 1000.0
+) -> list[list[float]]:
+    """Ranges as campaign.toml states them, rounded to their inside: to `parts` of ° (slides: mm)."""
+    low, high = robot.joints.shown([lower, upper]) * parts
+    rounded = np.array([np.ceil(low - 1e-6), np.floor(high + 1e-6)]) / parts
+    rounded = np.where(rounded[0] <= rounded[1], rounded, np.array([low, high]) / parts)
+    return (rounded.T + 0.0).tolist()
+
+
 def _first(collisions: Collisions, q: np.ndarray) -> str:
     if collisions.free(q):
         return ""

@@ -49,8 +49,11 @@ class DrivenPose:
 def heading(robot: Robot, simulated: bool) -> tuple[str, ...]:
     """What is to be known before the program is run, in lines of plain ASCII."""
     found = (CHECKED,)
-    if Collisions(robot).unchecked is not None:
+    collisions = Collisions(robot)
+    if collisions.none_checked:
         found = (UNCHECKED, f"{plain(robot.urdf_path.name)} has no collision geometry.")
+    elif collisions.unchecked is not None:
+        found = (UNCHECKED, plain(collisions.unchecked))
     return (*((SIMULATED,) if simulated else ()), *found, SLOWLY)
 
 

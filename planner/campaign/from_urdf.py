@@ -1,0 +1,242 @@
+"""A campaign from a maker's URDF alone: robot.toml and campaign.toml by guesses that are named."""
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import tomlkit
+
+from planner.campaign.campaign import Campaign
+from planner.check.examine import examine
+from planner.dynamics.simulation import Simulation
+from planner.errors import InputError
+from planner.robot.arm_chain import ArmChain, arm_chain
+from planner.robot.config import Compliance, LinkTable, Obstacle, Payload, RobotConfig
+from planner.robot.front import tool_direction, workspace_in_front
+from planner.robot.gear_springs import PAYLOAD_KG_M3, guessed_springs
+from planner.robot.guessed_inertias import guess_inertias, moving_without_mass, total_stated
+from planner.robot.link_bodies import link_bodies
+from planner.robot.robot import Robot
+from planner.robot.urdf import read_tree
+from planner.robot.workspace import ranges_inside
+
+MODES = 4  # asked for
+POSES = 12  # of the workspace, at which modes are looked for to state a band
+WIDER = 0.5, 2.0  # of the lowest and highest simulated frequency: springs may be off by 3
+PAYLOAD_SHARE, PAYLOAD_SD = 1 / 6, 0.5  # of the robot's mass: 1/3 to 1/9 in data sheets
+TOOL_SD, DAMPING_SD = 0.3, 4.0  # relative; of dampers e^sd is 5 in identification
+BELOW_M = 0.01  # how far below the base the floor lies
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What was guessed: a number with its sd, or a text or list with none."""
+
+    what: str
+    value: float | str | list[list[float]]
+    sd: float | None
+    unit: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Guessed:
+    """A robot as it was guessed, its workspace, and what the engineer has to know."""
+
+    robot: Robot
+    joints_deg: list[list[float]]
+    band_hz: tuple[float, float]
+    modes: int
+    guesses: tuple[Guess, ...]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What the engineer knows, in kg: the robot's mass, its rated payload, the tool's mass."""
+
+    robot: float | None = None
+    payload: float | None = None
+    tool: float | None = None
+
+
+def new_from_urdf(
+    directory: Path, urdf: Path, weights: Weights, campaign_toml: Path | None
+) -> tuple[Campaign, Guessed]:
+    """Begin a campaign for the arm of a URDF; raises InputError with one sentence."""
+    for option, value in (
+        ("--mass-kg", weights.robot), ("--payload-kg", weights.payload),
+        ("--tool-mass-kg", weights.tool),
+    ):  # fmt: skip
+        if value is not None and not 0 < value < 1e5:
+            raise InputError(f"{option} is {value:g}; give kg, above 0.")
+    with tempfile.TemporaryDirectory() as folder:
+        robot_toml = Path(folder).resolve() / "robot.toml"
+        guessed = guess(urdf.absolute(), weights, robot_toml, campaign_toml is None)
+        robot_toml.write_text(_robot_text(guessed), encoding="utf-8")
+        own = robot_toml.with_name("campaign.toml")
+        if campaign_toml is None:
+            own.write_text(_campaign_text(guessed), encoding="utf-8")
+        try:
+            campaign = Campaign.new(directory, robot_toml, campaign_toml or own)
+        except InputError as error:
+            raise InputError(str(error).replace(f"{folder}/", "")) from None
+    return campaign, guessed
+
+
+def guess(urdf: Path, weights: Weights, robot_toml: Path, planned: bool = True) -> Guessed:
+    """What robot.toml and campaign.toml of an arm are to say."""
+    root = read_tree(urdf)
+    chain = arm_chain(root)
+    if chain is None:
+        raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
+    name = root.get("name") or urdf.stem
+    config = RobotConfig(
+        name, str(urdf), chain.tcp, chain.tcp, held=chain.held, geometric_stiffness=True
+    )
+    robot = Robot.of(config, robot_toml)
+    if weights.robot is None and moving_without_mass(robot):
+        raise InputError(
+            f"{urdf} states no mass of what {', '.join(moving_without_mass(robot)[:3])} moves; "
+            f"give the robot's mass from its data sheet with --mass-kg."
+        )
+    links = guess_inertias(robot, weights.robot)
+    payload = weights.payload or PAYLOAD_SHARE * (weights.robot or total_stated(robot))
+    carried = (_tool(chain.tcp, weights.tool, robot),) if weights.tool else ()
+    floor = _floor(robot)
+    config = msgspec.structs.replace(config, link=links, payload=carried, obstacle=(floor,))
+    robot = guessed_springs(Robot.of(config, robot_toml), payload, chain.joints)
+    low, high = workspace_in_front(robot) if planned else (robot.lower_rad, robot.upper_rad)
+    band, modes = _band(robot, low, high)
+    robot = Robot.of(msgspec.structs.replace(robot.config, band_hz=band), robot_toml)
+    ranges = ranges_inside(robot, low, high, 1.0)
+    guesses = tuple(_guesses(robot, chain, weights, payload, ranges if planned else None))
+    return Guessed(robot, ranges, band, modes, guesses, tuple(_remarks(chain, weights, links)))
+
+
+def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
+    """A cube of the tool's mass that lies on the tcp frame, on its far side from the arm."""
+    side = (mass / PAYLOAD_KG_M3) ** (1 / 3)
+    q = (robot.lower_rad + robot.upper_rad) / 2
+    place = robot.forward(q)[0].T @ tool_direction(robot, q) * side / 2
+    moment = round(mass * side**2 / 6, 5)
+    com = tuple(round(float(v), 4) + 0.0 for v in place)
+    return Payload(tcp, mass, com, (moment, moment, moment, 0.0, 0.0, 0.0))
+
+
+def _floor(robot: Robot) -> Obstacle:
+    """A box below the lowest corner of what does not move."""
+    fixed = [body.low_m[2] for body in link_bodies(robot) if not body.joint and body.shapes]
+    top = min([0.0, *map(float, fixed)]) - BELOW_M
+    center = (0.0, 0.0, round(top - 0.05, 4))
+    size = float(np.ceil(2 * robot.reach_m + 1))
+    return Obstacle("floor", center, (size, size, 0.1))
+
+
+def _band(robot: Robot, low: np.ndarray, high: np.ndarray) -> tuple[tuple[float, float], int]:
+    """Where the lowest modes are expected, in Hz, and how many of them."""
+    simulation = Simulation(robot)
+    q = np.random.default_rng(2).uniform(low, high, (POSES, len(low)))
+    found = simulation.frequencies(q, simulation.elastic.size).frequency_hz
+    elsewhere = examine(robot).frequency_hz
+    modes = min(MODES, int(np.isfinite(found).sum(axis=1).min()))
+    lowest = min(np.nanmin(found), np.nanmin(elsewhere, initial=np.inf))
+    below, above = WIDER[0] * lowest, WIDER[1] * np.nanmax(found[:, :modes])
+    return (float(f"{below:.2g}"), float(f"{above:.2g}")), modes
+
+
+def _guesses(
+    robot: Robot,
+    chain: ArmChain,
+    weights: Weights,
+    payload: float,
+    ranges: list[list[float]] | None,
+) -> Iterator[Guess]:
+    config = robot.config
+    yield Guess("tcp_frame, where the hammer hits and the sensor sits", chain.tcp, None)
+    if weights.payload is None:
+        yield Guess("rated payload", round(payload, 3), round(PAYLOAD_SD * payload, 3), "kg")
+    for table in config.link:
+        mass = table.mass_kg or 0.0
+        yield Guess(f"mass of {table.link}", mass, _part(mass, table.sd_percent), "kg")
+    for body in config.payload:
+        size = float(np.linalg.norm(body.com_m))
+        yield Guess("tool's centre of mass beyond tcp_frame", size, TOOL_SD * size, "m")
+    told = set()
+    for block in config.compliance:
+        if block.tie in told:
+            continue  # the same number as another
+        told |= {block.tie} if block.tie else set()
+        across = "across its axis" if block.tie else "about its axis"
+        where = f"{block.joint} {'along its axis' if block.slide else across}"
+        k, c = ("N/m", "N·s/m") if block.slide else ("N·m/rad", "N·m·s/rad")
+        sd = _part(block.stiffness, block.stiffness_sd_percent)
+        yield Guess(f"stiffness of {where}", block.stiffness, sd, k)
+        yield Guess(f"damping of {where}", block.damping, DAMPING_SD * block.damping, c)
+    floor = config.obstacle[0]
+    yield Guess("height of the floor", round(floor.center_m[2] + floor.size_m[2] / 2, 4), None, "m")
+    if ranges is not None:
+        yield Guess("workspace joints_deg", ranges, None)
+
+
+def _part(value: float, percent: float | None) -> float:
+    return float(f"{value * (percent or 0.0) / 100:.4g}")
+
+
+def _remarks(chain: ArmChain, weights: Weights, links: tuple[LinkTable, ...]) -> Iterator[str]:
+    """What the engineer has to know, and what to put right first."""
+    if chain.others:
+        yield (
+            f"The arm is the longest chain of moving joints, {chain.joints[0]} to "
+            f"{chain.joints[-1]}; {', '.join(chain.others)} stay where [held] of robot.toml says."
+        )
+    first = f'tcp_frame = "{chain.tcp}"' + ("" if weights.tool else " and the tool's mass")
+    asked = ["[workspace] of campaign.toml", "floor, table and fence as [[obstacle]]"]
+    asked += [] if weights.payload else ["the rated payload, by which springs are guessed"]
+    yield f"Put right first: {first}; then {'; '.join(asked)}."
+    if links:
+        yield "Masses of links are guessed by their size, ± 30 %: see [[link]] of robot.toml."
+
+
+def _robot_text(guessed: Guessed) -> str:
+    """robot.toml, with a comment on what is guessed."""
+    config, document = guessed.robot.config, tomlkit.document()
+    for line in (
+        "Begun by planner new --urdf: numbers here are guesses by size and payload until they are",
+        "put right. First: tcp_frame and sensor_frame, the tool ([[payload]]), obstacles.",
+    ):
+        document.add(tomlkit.comment(line))
+    for entry in ("name", "urdf", "tcp_frame", "sensor_frame"):
+        document.add(entry, getattr(config, entry))
+    document.add("band_hz", list(config.band_hz))
+    if config.held:
+        document.add("held", tomlkit.item(config.held))
+    for name in ("payload", "obstacle", "link", "compliance"):
+        rows = tomlkit.aot()
+        for block in getattr(config, name):
+            rows.append(tomlkit.item(_entries(block)))
+        if len(rows):
+            document.add(name, rows)
+    return tomlkit.dumps(document)
+
+
+def _entries(block: Compliance | LinkTable | Payload | Obstacle) -> dict:
+    """What robot.toml states of a block: springs that slide by their own names."""
+    fields = msgspec.structs.fields(block)
+    told = {f.name: v for f in fields if (v := getattr(block, f.name)) != f.default}
+    if told.pop("slide", False):
+        told["stiffness_n_m"] = told.pop("stiffness")
+        told["damping_n_s_m"] = told.pop("damping")
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in told.items()}
+
+
+def _campaign_text(guessed: Guessed) -> str:
+    document = tomlkit.document()
+    document.add(tomlkit.comment("In front of the arm, guessed: put it where the tool works."))
+    document.add("robot", tomlkit.item("robot/robot.toml"))
+    document.add("workspace", tomlkit.item({"joints_deg": guessed.joints_deg}))
+    modes = {"count": guessed.modes, "band_hz": list(guessed.band_hz)}
+    document.add("modes", tomlkit.item(modes))
+    return tomlkit.dumps(document)

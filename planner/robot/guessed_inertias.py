@@ -1,0 +1,124 @@
+"""Masses of a robot whose maker states none: by the size of its parts, so that they add up."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+from planner.robot.config import LinkTable
+from planner.robot.link_inertias import link_inertia
+from planner.robot.robot import Robot
+from planner.robot.skeleton import BodyShape, bodies
+from planner.robot.solids import link_solids
+
+# Small parts are denser, gears and bearings to their covers: mass goes with volume to this power.
+# Fitted to 82 published robots whose makers state inertias (6 to 7 joints, 3 to 1,700 kg), by whose
+# convex hulls links 1 to 5 then come out within 26 to 36 % (rms of the logarithm).
+DENSER = 0.8
+SD_PERCENT = 30.0
+# Of bodies without shapes: cube root of volume over the arm's length, where what is left of the arm
+# beyond its joint is b of that. Medians of 203 published robots' hulls: 0.18, 0.18, 0.15, 0.12,
+# 0.08, 0.03 for b = 1, 0.91, 0.52, 0.35, 0.07, 0.
+LEAST, MORE = 0.04, 0.15
+SAME = 0.6  # two sds: stated masses that differ from the guess by more are no masses
+
+
+def total_stated(robot: Robot) -> float:
+    """What the URDF's <inertial>s add up to, in kg."""
+    links = ElementTree.fromstring(robot.urdf_text).findall("link")
+    return sum(link_inertia(link).mass for link in links)
+
+
+def moving_without_mass(robot: Robot) -> tuple[str, ...]:
+    """Joints that move nothing with a mass."""
+    inertias = robot.linkage.leading(list(robot.model.inertias)[1:])
+    masses = zip(robot.joint_names, inertias, strict=True)
+    return tuple(name for name, inertia in masses if not inertia.mass > 0)
+
+
+def guess_inertias(robot: Robot, mass_kg: float | None) -> tuple[LinkTable, ...]:
+    """[[link]] tables for all links of bodies without a mass; none where all have one.
+
+    `mass_kg` is the robot's. Stated masses that cannot be true beside it (placeholders) are
+    guessed as well. Without it what is stated tells the density; there must be something then.
+    """
+    parts, weights = _parts(robot), {}
+    stated = [float(inertia.mass) for inertia in robot.model.inertias]
+    for number, solids in parts.items():
+        weights[number] = sum(float(s.mass) for s in solids.values()) ** DENSER
+    known = {n for n in parts if stated[n] > 0}
+    if mass_kg is not None and known:
+        share = sum(weights[n] for n in known) / sum(weights.values())
+        told = sum(stated[n] for n in known)
+        if abs(told / (share * mass_kg) - 1) > SAME:
+            known = set()
+    open_ = [n for n in parts if n not in known]
+    if not open_:
+        return ()
+    density = _density(weights, stated, known, mass_kg)
+    tables = []
+    for number in open_:
+        whole = sum(float(s.mass) for s in parts[number].values())
+        for link, solid in parts[number].items():
+            mass = density * weights[number] * float(solid.mass) / whole
+            tables.append(_table(link, solid, mass))
+    return tuple(tables)
+
+
+def _density(
+    weights: Mapping[int, float], stated: list[float], known: set[int], mass_kg: float | None
+) -> float:
+    """kg for each unit of weight of the bodies that are not known."""
+    told, weight = sum(stated[n] for n in known), sum(weights[n] for n in known)
+    left = sum(weights.values()) - weight
+    if mass_kg is not None and mass_kg > told:
+        return (mass_kg - told) / left
+    return told / weight
+
+
+def _parts(robot: Robot) -> dict[int, dict[str, pin.Inertia]]:
+    """By body, counted from the base: solids of its links, or one of its usual size."""
+    solids, found = link_solids(robot), {}
+    for number, body in enumerate(bodies(robot)):
+        own = {link: solids[link] for link in body.links if link in solids}
+        found[number] = own or {body.link: _usual(robot, number, body)}
+    return found
+
+
+def _usual(robot: Robot, number: int, body: BodyShape) -> pin.Inertia:
+    """A cylinder from a body's joint to what it carries, as large as such bodies are."""
+    arm = robot.arm_m or 1.0
+    beyond = min(_beyond(robot, number) / arm, 1.0)
+    volume = ((LEAST + MORE * np.sqrt(beyond)) * arm) ** 3
+    end = body.ends_m[np.argmax(np.linalg.norm(body.ends_m, axis=1))]
+    length = max(float(np.linalg.norm(end)), float(volume) ** (1 / 3))
+    cylinder = pin.Inertia.FromCylinder(volume, np.sqrt(volume / np.pi / length), length)
+    along = end / np.linalg.norm(end) if np.any(end) else np.array([0.0, 0.0, 1.0])
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).toRotationMatrix()
+    return pin.SE3(turn, np.asarray(end) / 2).act(cylinder)
+
+
+def _beyond(robot: Robot, number: int) -> float:
+    """Length in m from a body's joint along the arm to the tcp, its own included."""
+    model = robot.model
+    tcp = model.frames[robot.tcp_id]
+    length, joint = float(np.linalg.norm(tcp.placement.translation)), tcp.parentJoint
+    while joint > max(number, 0) and model.parents[joint] != 0:
+        length += float(np.linalg.norm(model.jointPlacements[joint].translation))
+        joint = model.parents[joint]
+    return length
+
+
+def _table(link: str, solid: pin.Inertia, mass: float) -> LinkTable:
+    """A solid of any density as a [[link]] of `mass` in kg, in numbers as they are written."""
+    moments = solid.inertia * (mass / solid.mass)
+    upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+    return LinkTable(
+        link,
+        float(f"{mass:.4g}"),
+        tuple(round(float(v), 4) for v in solid.lever),
+        tuple(float(f"{moments[at]:.4g}") for at in upper),
+        SD_PERCENT,
+        guessed=True,
+    )

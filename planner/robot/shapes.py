@@ -1,0 +1,150 @@
+"""Shapes of a URDF's links that can be used, the sizes of their boxes, and which were left out."""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from planner.robot.mesh_files import find_mesh
+from planner.robot.urdf import numbers, quiet
+
+LARGEST_M = 1e4  # of a shape
+FEW = 3  # names in a sentence
+SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+_MESHES = coal.CachedMeshLoader()  # which reads a file once, until it changes
+
+
+@dataclass(frozen=True)
+class UnusableShape:
+    """A shape that cannot be used: of which link, of which kind, and why not."""
+
+    link: str
+    kind: str  # "collision" or "visual"
+    why: str
+
+
+def leave_out_unusable(root: ElementTree.Element, urdf: Path) -> tuple[UnusableShape, ...]:
+    """Name the files of all meshes in full; remove shapes without a file or a size."""
+    found = []
+    for link in root.findall("link"):
+        for part in [*link.findall("collision"), *link.findall("visual")]:
+            why = _fault(part, urdf)
+            if why:
+                link.remove(part)
+                found.append(UnusableShape(link.get("name", "?"), part.tag, why))
+    return tuple(found)
+
+
+def leave_out_unreadable(
+    root: ElementTree.Element, kind: str = "collision"
+) -> tuple[UnusableShape, ...]:
+    """Remove shapes of a kind whose mesh cannot be read."""
+    found = []
+    for link in root.findall("link"):
+        for part in link.findall(kind):
+            mesh = part.find("geometry/mesh")
+            if mesh is not None and load_mesh(mesh) is None:
+                link.remove(part)
+                why = f"{mesh.get('filename', '')} is no mesh that can be read"
+                found.append(UnusableShape(link.get("name", "?"), part.tag, why))
+    return tuple(found)
+
+
+def build_geometry(model: pin.Model, root: ElementTree.Element, kind: str) -> pin.GeometryModel:
+    """Shapes of a kind, "collision" or "visual"; raises what the loader makes of a mesh."""
+    text = ElementTree.tostring(root, encoding="unicode")
+    named = pin.GeometryType.COLLISION if kind == "collision" else pin.GeometryType.VISUAL
+    return pin.buildGeomFromUrdfString(model, text, named, mesh_loader=_MESHES)
+
+
+def unchecked_sentence(left: Sequence[UnusableShape]) -> str:
+    """Which links are not, or not wholly, checked for collision, and why; "" where none is."""
+    left = [one for one in left if one.kind == "collision"]
+    if not left:
+        return ""
+    links = list(dict.fromkeys(one.link for one in left))
+    reasons = list(dict.fromkeys(one.why for one in left))
+    more = f", and {len(reasons) - FEW} more" if len(reasons) > FEW else ""
+    shapes = "A collision shape is" if len(left) == 1 else f"{len(left)} collision shapes are"
+    return (
+        f"{shapes} left out ({'; '.join(reasons[:FEW])}{more}): {', '.join(links)} "
+        f"{'is' if len(links) == 1 else 'are'} not, or not wholly, checked for collision."
+    )
+
+
+def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
+    """Corners (3,) of boxes around the shapes of each link, in its frame, eight each.
+
+    Collision shapes; visual ones where a link has no others. `root` names its meshes in full.
+    """
+    found: dict[str, list[np.ndarray]] = {}
+    for link in root.findall("link"):
+        corners = found.setdefault(link.get("name", ""), [])
+        for part in link.findall("collision") or link.findall("visual"):
+            box = _box(part)
+            if box is not None:
+                rotation, place = _origin(part)
+                for signs in np.ndindex(2, 2, 2):
+                    corners.append(place + rotation @ np.where(signs, box[1], box[0]))
+    return found
+
+
+def load_mesh(mesh: ElementTree.Element) -> coal.BVHModelBase | None:
+    """A <mesh> whose file is named in full, to scale, in m; None where it cannot be read."""
+    scale = numbers(mesh.get("scale", "1 1 1"))
+    with quiet():
+        try:
+            return _MESHES.load(mesh.get("filename", ""), scale)
+        except (ValueError, RuntimeError):
+            return None
+
+
+def _fault(part: ElementTree.Element, urdf: Path) -> str:
+    """Why a shape cannot be used, "" where it can; names a mesh's file in full."""
+    shape = part.find("geometry/*")
+    if shape is None:
+        return "it has no geometry"
+    if shape.tag == "mesh":
+        name = shape.get("filename", "")
+        file, scale = find_mesh(urdf, name), numbers(shape.get("scale", "1 1 1"))
+        if file is None:
+            return f"{name or 'a mesh without a name'} cannot be found"
+        shape.set("filename", str(file))
+        return "" if scale.shape == (3,) and np.all(np.abs(scale) > 0) else "its scale is 0"
+    sizes = numbers(" ".join(shape.get(key, "") for key in SIZES.get(shape.tag, ())))
+    if not sizes.size or not np.all((sizes > 0) & (sizes < LARGEST_M)):
+        return f"a {shape.tag} of size {', '.join(f'{v:g}' for v in sizes) or 'unknown'}"
+    return ""
+
+
+def _box(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray] | None:
+    """Lowest and highest corner (3,) of the box around a shape, in its own frame."""
+    shape = part.find("geometry/*")
+    if shape is None:
+        return None
+    if shape.tag == "mesh":
+        mesh = load_mesh(shape)
+        if mesh is None:
+            return None
+        mesh.computeLocalAABB()
+        return np.array(mesh.aabb_local.min_), np.array(mesh.aabb_local.max_)
+    if shape.tag == "box":
+        half = numbers(shape.get("size", "0 0 0")) / 2
+    elif shape.tag == "cylinder":
+        radius = float(shape.get("radius", "0"))
+        half = np.array([radius, radius, float(shape.get("length", "0")) / 2])
+    else:
+        half = np.full(3, float(shape.get("radius", "0")))
+    return -half, half
+
+
+def _origin(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:
+    origin = part.find("origin")
+    if origin is None:
+        return np.eye(3), np.zeros(3)
+    turn = pin.rpy.rpyToMatrix(numbers(origin.get("rpy", "0 0 0")))
+    return turn, numbers(origin.get("xyz", "0 0 0"))

@@ -1,0 +1,35 @@
+"""The text of a URDF; of a xacro file, from which URDFs are made, what it expands to."""
+
+import xml.etree.ElementTree as ElementTree
+from importlib import import_module
+from pathlib import Path
+
+from planner.errors import InputError
+
+
+def urdf_source(urdf: Path) -> bytes:
+    """The URDF's text. Raises OSError where it cannot be read, InputError for unexpanded xacro."""
+    text = urdf.read_bytes()
+    return _expanded(urdf) if urdf.suffix == ".xacro" or _is_xacro(text) else text
+
+
+def _is_xacro(text: bytes) -> bool:
+    """Whether elements of xacro are left, which a comment or a namespace alone is not."""
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError):
+        return False
+    return any("xacro" in str(element.tag).partition("}")[0] for element in root.iter())
+
+
+def _expanded(urdf: Path) -> bytes:
+    remedy = f"expand it first, with xacro {urdf.name} > robot.urdf, and name that."
+    try:
+        xacro = import_module("xacro")
+    except ImportError:
+        raise InputError(f"{urdf} is xacro, from which a URDF is made; {remedy}") from None
+    try:
+        return xacro.process_file(str(urdf)).toxml(encoding="utf-8")
+    except Exception as error:  # whatever its macros raise
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(f"{urdf} is xacro, and could not be expanded ({why}); {remedy}") from None
