@@ -160,7 +160,7 @@ def test_mass_and_gravity_are_those_of_all_that_moves(folder, seed):
     assert told.mass[0] == pytest.approx(mass, abs=1e-5 * np.abs(mass).max())
     assert told.geometric[0] == pytest.approx(gravity, abs=1e-3)
     ends = robot.jacobian(q)[:3, order]
-    assert told.hit[0] == pytest.approx(ends, abs=1e-9)
+    assert told.hit[0] == pytest.approx(ends, abs=1e-7)  # but for sag
 
 
 @FEW
