@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import msgspec
 
+BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 LOSS_FACTOR_BELOW = 2.0  # of a spring: more is a damper
 SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
 STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}

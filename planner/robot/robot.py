@@ -16,11 +16,11 @@ from planner.robot.config_file import check_own_springs, load_config, with_effec
 from planner.robot.link_inertias import state_inertias
 from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
+from planner.robot.robot_entries import check_entries
 from planner.robot.shapes import UnusableShape, leave_out_unusable
 from planner.robot.urdf import build_model, parse_urdf, read_urdf
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
-BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 # A link and the joint that carries it may share a name; the link is meant.
 FRAME_TYPES = (
     pin.FrameType.BODY,
@@ -81,7 +81,7 @@ class Robot:
         linkage = Linkage.of(root, tuple(model.names)[1:])
         joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
         robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
-        robot._check()
+        check_entries(robot)
         check_own_springs(config, joints, robot.joint_axes, robot_toml)
         check_points(config.point, robot_toml)
         with_points(model, config.point, [robot._link_of_point(p) for p in config.point])
@@ -94,42 +94,6 @@ class Robot:
         if not point.link and point.name in own:
             return own[point.name]
         return self.frame_id(f"[[point]] {point.name}: link", point.link)
-
-    def _check(self) -> None:
-        for entry, name in (
-            ("tcp_frame", self.config.tcp_frame),
-            ("sensor_frame", self.config.sensor_frame),
-        ):
-            if self.model.frames[self.frame_id(entry, name)].parentJoint == 0:
-                raise InputError(
-                    f'{self.path}: {entry} "{name}" is fixed to the base and never moves; name a '
-                    f"frame on the tool."
-                )
-        for block in self.config.compliance:
-            if block.joint not in (*self.joint_names, BASE) and not self.carries(block.joint):
-                fault = f"is no actuated joint of {self.urdf_path.name}, nor a link with one beyond"
-                if block.joint in self.linkage.names:
-                    fault = "follows another (<mimic>), with which it gives"
-                raise InputError(
-                    f'{self.path}: [[compliance]] joint "{block.joint}" {fault}; name one of '
-                    f"{', '.join(self.joint_names)}."
-                )
-        for block in (*self.config.resonator, *self.config.harmonic):
-            if block.joint not in self.joint_names:
-                raise InputError(
-                    f'{self.path}: [[effects]] joint "{block.joint}" is no actuated joint of '
-                    f"{self.urdf_path.name}; it has {', '.join(self.joint_names)}."
-                )
-        for block in self.config.payload:
-            self.frame_id("[[payload]] link", block.link)
-        for table in self.config.link:
-            self.frame_id("[[link]] link", table.link)
-        bad = np.flatnonzero(~(self.lower_rad < self.upper_rad))
-        if bad.size:
-            raise InputError(
-                f"{self.urdf_path}: {self.joint_names[bad[0]]} has no range between its limits; "
-                f"give lower and upper in {'m' if self.joints.slides[bad[0]] else 'rad'}."
-            )
 
     @property
     def name(self) -> str:

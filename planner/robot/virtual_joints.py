@@ -7,8 +7,9 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.robot.config import BASE
 from planner.robot.points import PREFIX
-from planner.robot.robot import BASE, Robot
+from planner.robot.robot import Robot
 
 SMALL = "resonator"  # and its number: a body of its own too
 BETWEEN = 0.75  # share of a rod's second moment that its halves' centres have
