@@ -39,12 +39,15 @@ class Campaign(CampaignReads):
     """A campaign folder, opened. Reads never write; every act is on the disk when it returns."""
 
     @classmethod
-    def new(cls, directory: Path, robot_toml: Path, campaign_toml: Path | None) -> "Campaign":
+    def new(
+        cls, directory: Path | str, robot_toml: Path | str, campaign_toml: Path | str | None
+    ) -> "Campaign":
         """Start a campaign: copy robot folder and decisions in, write the first event.
 
         Raises InputError if the folder is in use or any input is wrong.
         """
-        store.create_folder(directory, robot_toml, campaign_toml, _first_entry)
+        own = None if campaign_toml is None else Path(campaign_toml)
+        store.create_folder(Path(directory), Path(robot_toml), own, _first_entry)
         return cls(directory)
 
     def next(self, count: int = 1, acquisition: str | None = None) -> tuple[Proposal, ...]:

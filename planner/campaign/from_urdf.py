@@ -10,7 +10,7 @@ import numpy as np
 import tomlkit
 
 from planner.campaign.campaign import Campaign
-from planner.check.examine import examine
+from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.robot.arm_chain import ArmChain, arm_chain
@@ -18,7 +18,7 @@ from planner.robot.config import Compliance, LinkTable, Obstacle, Payload, Robot
 from planner.robot.front import tool_direction, workspace_in_front
 from planner.robot.gear_springs import PAYLOAD_KG_M3, guessed_springs
 from planner.robot.guessed_inertias import guess_inertias, moving_without_mass, total_stated
-from planner.robot.link_bodies import link_bodies
+from planner.robot.link_bodies import guessed_masses, link_bodies, lowest_m
 from planner.robot.robot import Robot
 from planner.robot.urdf import read_tree
 from planner.robot.workspace import ranges_inside
@@ -54,7 +54,7 @@ class Guessed:
 
 
 @dataclass(frozen=True)
-class Weights:
+class StatedMasses:
     """What the engineer knows, in kg: the robot's mass, its rated payload, the tool's mass."""
 
     robot: float | None = None
@@ -63,7 +63,7 @@ class Weights:
 
 
 def new_from_urdf(
-    directory: Path, urdf: Path, weights: Weights, campaign_toml: Path | None
+    directory: Path, urdf: Path, weights: StatedMasses, campaign_toml: Path | None
 ) -> tuple[Campaign, Guessed]:
     """Begin a campaign for the arm of a URDF; raises InputError with one sentence."""
     for option, value in (
@@ -86,7 +86,7 @@ def new_from_urdf(
     return campaign, guessed
 
 
-def guess(urdf: Path, weights: Weights, robot_toml: Path, planned: bool = True) -> Guessed:
+def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = True) -> Guessed:
     """What robot.toml and campaign.toml of an arm are to say."""
     root = read_tree(urdf)
     chain = arm_chain(root)
@@ -113,7 +113,7 @@ def guess(urdf: Path, weights: Weights, robot_toml: Path, planned: bool = True) 
     robot = Robot.of(msgspec.structs.replace(robot.config, band_hz=band), robot_toml)
     ranges = ranges_inside(robot, low, high, 1.0)
     guesses = tuple(_guesses(robot, chain, weights, payload, ranges if planned else None))
-    return Guessed(robot, ranges, band, modes, guesses, tuple(_remarks(chain, weights, links)))
+    return Guessed(robot, ranges, band, modes, guesses, tuple(_remarks(robot, chain, weights)))
 
 
 def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
@@ -127,9 +127,10 @@ def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
 
 
 def _floor(robot: Robot) -> Obstacle:
-    """A box below the lowest corner of what does not move."""
-    fixed = [body.low_m[2] for body in link_bodies(robot) if not body.joint and body.shapes]
-    top = min([0.0, *map(float, fixed)]) - BELOW_M
+    """A box below the lowest corner of the base, and of what its first joint moves."""
+    first = robot.joint_names[min(robot.tool_joints)]
+    q = (robot.lower_rad + robot.upper_rad) / 2
+    top = min(0.0, lowest_m(robot, q, ("", first))) - BELOW_M
     center = (0.0, 0.0, round(top - 0.05, 4))
     size = float(np.ceil(2 * robot.reach_m + 1))
     return Obstacle("floor", center, (size, size, 0.1))
@@ -140,7 +141,7 @@ def _band(robot: Robot, low: np.ndarray, high: np.ndarray) -> tuple[tuple[float,
     simulation = Simulation(robot)
     q = np.random.default_rng(2).uniform(low, high, (POSES, len(low)))
     found = simulation.frequencies(q, simulation.elastic.size).frequency_hz
-    elsewhere = examine(robot).frequency_hz
+    elsewhere = simulation.frequencies(spread_poses(robot), 1).frequency_hz
     modes = min(MODES, int(np.isfinite(found).sum(axis=1).min()))
     lowest = min(np.nanmin(found), np.nanmin(elsewhere, initial=np.inf))
     below, above = WIDER[0] * lowest, WIDER[1] * np.nanmax(found[:, :modes])
@@ -150,7 +151,7 @@ def _band(robot: Robot, low: np.ndarray, high: np.ndarray) -> tuple[tuple[float,
 def _guesses(
     robot: Robot,
     chain: ArmChain,
-    weights: Weights,
+    weights: StatedMasses,
     payload: float,
     ranges: list[list[float]] | None,
 ) -> Iterator[Guess]:
@@ -185,7 +186,7 @@ def _part(value: float, percent: float | None) -> float:
     return float(f"{value * (percent or 0.0) / 100:.4g}")
 
 
-def _remarks(chain: ArmChain, weights: Weights, links: tuple[LinkTable, ...]) -> Iterator[str]:
+def _remarks(robot: Robot, chain: ArmChain, weights: StatedMasses) -> Iterator[str]:
     """What the engineer has to know, and what to put right first."""
     if chain.others:
         yield (
@@ -196,8 +197,16 @@ def _remarks(chain: ArmChain, weights: Weights, links: tuple[LinkTable, ...]) ->
     asked = ["[workspace] of campaign.toml", "floor, table and fence as [[obstacle]]"]
     asked += [] if weights.payload else ["the rated payload, by which springs are guessed"]
     yield f"Put right first: {first}; then {'; '.join(asked)}."
-    if links:
-        yield "Masses of links are guessed by their size, ± 30 %: see [[link]] of robot.toml."
+    springs = {block.joint for block in robot.config.compliance}
+    bare = [joint for joint in chain.joints if joint not in springs]
+    if bare:
+        yield (
+            f"{', '.join(bare)} has no spring: it moves next to nothing as long as --tool-mass-kg, "
+            f"or [[payload]] of robot.toml, does not say what it carries."
+        )
+    guessed = guessed_masses(link_bodies(robot))
+    if guessed:
+        yield f"{guessed} See [[link]] of robot.toml."
 
 
 def _robot_text(guessed: Guessed) -> str:

@@ -37,9 +37,9 @@ T = TypeVar("T")
 class CampaignReads:
     """What can be asked of a campaign folder; nothing here writes into it."""
 
-    def __init__(self, directory: Path, models: Store | None = None):
+    def __init__(self, directory: Path | str, models: Store | None = None):
         """Open a folder; `models` keeps fitted models, by default in the user's cache folder."""
-        self.directory = directory.resolve()
+        self.directory = Path(directory).resolve()
         self._kept = model_cache.user_models() if models is None else models
         self._journal = Journal(self.directory / store.LOG)
         self._cells: dict[str, Cell] = {}

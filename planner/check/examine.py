@@ -1,6 +1,7 @@
 """The whole check of a robot's description: findings, masses, modes at home and elsewhere."""
 
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -108,14 +109,16 @@ def _without(sentence: str, path: Path) -> str:
     return sentence.removeprefix(str(path)).lstrip(": ")
 
 
-def _spread(robot: Robot) -> np.ndarray:
-    """A few poses (n, dof) in rad between the limits, or within half a turn of home."""
-    rng, collisions, home = np.random.default_rng(0), Collisions(robot), home_of(robot)
+def spread_poses(robot: Robot) -> np.ndarray:
+    """Home, then poses (n, dof) in rad between the limits, or within half a turn of home."""
+    rng, home = np.random.default_rng(0), home_of(robot)
     low = np.maximum(robot.lower_rad, home - np.pi)
     high = np.minimum(robot.upper_rad, home + np.pi)
-    found: list[np.ndarray] = []
-    for _ in range(TRIES):
-        q = rng.uniform(low, high)
-        if len(found) < POSES and not collisions.contacts(q):
-            found.append(q)
-    return np.array(found).reshape(-1, len(home))
+    return np.array([home, *(rng.uniform(low, high) for _ in range(TRIES))])
+
+
+def _spread(robot: Robot) -> np.ndarray:
+    """A few poses (n, dof) in rad of these at which the robot touches nothing."""
+    collisions = Collisions(robot)
+    free = (q for q in spread_poses(robot)[1:] if not collisions.contacts(q))
+    return np.array([*islice(free, POSES)]).reshape(-1, len(robot.joint_names))

@@ -7,7 +7,7 @@ from planner.robot.robot import Robot
 
 WIDEST_RAD = 20.0  # of a limit: three turns; 360 rad are 57
 NEVER_RAD = 20 * np.pi  # ten turns to a side
-FASTEST_RAD_S = 20.0  # of industrial arms' joints, small ones included
+FASTEST_RAD_S = 50.0  # hands of the fastest reach 42; heavy arms' slowest joints have 60°/s
 LONGEST_M, FASTEST_M_S = 100.0, 10.0  # of a rail; in mm both are a thousand times as much
 PARALLEL_DEG = 1.0
 APART_M = 0.6  # between where the hammer hits and where the sensor sits

@@ -3,7 +3,7 @@
 import numpy as np
 
 from planner.check.remark import CheckRemark, Severity
-from planner.robot.link_bodies import LinkBody
+from planner.robot.link_bodies import LinkBody, guessed_masses
 from planner.robot.robot import Robot
 
 # Limits by which units are told; chosen between robots from 5 to 1,500 kg and a factor of 1000.
@@ -16,10 +16,14 @@ LONGEST_REACH_M, SHORTEST_REACH_M, NEVER_M = 12.0, 0.1, 100.0
 
 def check_links(robot: Robot, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
     """What looks wrong in the links of a robot."""
-    found = _lengths(robot)
+    found, guessed = _lengths(robot), guessed_masses(links)
+    if guessed:
+        remedy = "Put in what is known, or let recordings narrow it."
+        found.append(CheckRemark("note", guessed, f"{robot.path.name}, [[link]]", remedy))
     for link in links:
         if link.joint:
-            found += _stated(robot, link, links) if not link.stated else _body(robot, link)
+            turned = sum(other.mass for other in links if other.joint == link.joint)
+            found += _body(robot, link, turned) if link.mass else _stated(robot, link, links)
     return found
 
 
@@ -43,16 +47,18 @@ def _lengths(robot: Robot) -> list[CheckRemark]:
 
 
 def _stated(robot: Robot, link: LinkBody, links: tuple[LinkBody, ...]) -> list[CheckRemark]:
-    """A link without <inertial>: a frame may be one, a part of the arm may not."""
+    """A link without a mass: a frame may be one, a part of the arm may not."""
     turned = [other for other in links if other.joint == link.joint]
     whole = any(other.mass > 0 for other in turned)
     if link.first and not whole:
-        text = f"What {link.joint} turns has no mass: no <inertial>, here or on what is fixed to it"
+        what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
+        text = f"What {link.joint} turns has no mass: {what}, here or on what is fixed to it"
         if any(block.joint == link.joint for block in robot.config.compliance):
             text = f"{text}, though [[compliance]] lets {link.joint} swing"
             return [_weightless(robot, link, text, "error")]
     elif link.shapes or link.visuals:
-        text = "It has shapes but no <inertial>, so that the simulation takes it for weightless"
+        what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
+        text = f"It has shapes but {what}, so that the simulation takes it for weightless"
     else:
         return []
     return [_weightless(robot, link, text, "warning")]
@@ -63,15 +69,15 @@ def _weightless(robot: Robot, link: LinkBody, text: str, severity: Severity) -> 
         severity,
         f"{text}: simulated frequencies come out too high.",
         _where(robot, link),
-        "Add its mass (kg), centre of mass (m) and moments of inertia (kg·m²).",
+        "Add its mass (kg), centre of mass (m) and moments of inertia (kg·m²), there or in "
+        "robot.toml's [[link]]; planner new --urdf guesses them.",
     )
 
 
-def _body(robot: Robot, link: LinkBody) -> list[CheckRemark]:
+def _body(robot: Robot, link: LinkBody, turned: float) -> list[CheckRemark]:
+    """A link with a mass; all that turns with it weighs `turned`."""
     found, where = [], _where(robot, link)
-    if link.mass == 0:
-        return [CheckRemark("warning", "It has an <inertial> of mass 0.", where, "State its mass.")]
-    if not LIGHTEST_KG <= link.mass <= HEAVIEST_KG:
+    if link.mass > HEAVIEST_KG or turned < LIGHTEST_KG:
         text = f"It has a mass of {link.mass:,.4g} kg."
         if link.mass > HEAVIEST_KG:
             text = f"It has a mass of {link.mass:,.0f} kg, {link.mass / 1000:.3g} t."

@@ -47,15 +47,15 @@ def new(
     """
     from planner.campaign.campaign import Campaign
     from planner.campaign.example import write_example
-    from planner.campaign.from_urdf import Weights, new_from_urdf
+    from planner.campaign.from_urdf import StatedMasses, new_from_urdf
     from planner.report.campaign_acts import ExampleFolder, NewCampaign
 
     if (robot is not None) + example + (urdf is not None) != 1:
         raise InputError(
             "planner new needs one of --robot ROBOT_TOML, --urdf ARM.urdf and --example; give one."
         )
-    weights = Weights(mass_kg, payload_kg, tool_mass_kg)
-    if urdf is None and weights != Weights():
+    weights = StatedMasses(mass_kg, payload_kg, tool_mass_kg)
+    if urdf is None and weights != StatedMasses():
         raise InputError("--mass-kg, --payload-kg and --tool-mass-kg go with --urdf; give that.")
     if urdf is not None:
         begun, guessed = new_from_urdf(directory, urdf, weights, campaign)

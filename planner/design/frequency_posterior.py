@@ -152,8 +152,9 @@ class FrequencyOutputs:
         if not pose.information.shape[-1]:
             return replace(self, planned=planned)
         gained = root.T @ pose.information[0, list(axes)].sum(axis=0) @ root
-        factor = np.linalg.cholesky(np.eye(len(root)) + gained)
-        left = np.linalg.solve(factor, root.T).T  # root (I + G)⁻¹ rootᵀ = left leftᵀ
+        # G ≥ 0, though rounding may say otherwise where a resonance has next to no damping.
+        values, vectors = np.linalg.eigh(gained)
+        left = root @ vectors / np.sqrt(1 + np.maximum(values, 0))  # root (I + G)⁻¹ rootᵀ
         return replace(self, planned=planned, covariance_root=left)
 
     def covariance(self, k: int, a: Poses, b: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -109,7 +109,11 @@ class OpenParameters:
             inertias = self.parametrisation.inertias(self.simulation.elastic.body_jacobians(q))
         springs = self.simulation.elasticity
         h, slope = response_gradient(matrices, springs, laplace(frequency), None, inertias)
-        weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / self._sd(h)
+        # What no hit along an axis moves is never measured along it: it tells nothing.
+        sd = self._sd(h)
+        weight = np.sqrt(2 * count[:, None, None] / self.noise.misfit) / np.where(
+            sd > 0, sd, np.inf
+        )
         slope = (slope * weight[:, None])[:, :, self._channels(layout)]
         spread = self.parametrisation.spread
         n, p = len(q), len(self.covariance)

@@ -21,7 +21,10 @@ COLOURS = {"error": "bold red", "warning": "yellow", "note": "dim"}
 
 @dataclass(frozen=True)
 class CheckedLink:
-    """A link: what turns it (null: nothing), mass, centre of mass and principal moments."""
+    """A link: what turns it (null: nothing), mass, centre of mass and principal moments.
+
+    `guessed` masses have an sd, `mass_sd_kg`, as others may that robot.toml states.
+    """
 
     link: str
     joint: str | None
@@ -30,6 +33,8 @@ class CheckedLink:
     moments_kg_m2: tuple[float, ...]
     inertial: bool
     collision_shapes: int
+    guessed: bool = False
+    mass_sd_kg: float | None = None
 
 
 @dataclass(frozen=True)
@@ -81,7 +86,8 @@ class RobotCheckReport(Answer):
         links = tuple(
             CheckedLink(
                 b.name, b.joint or None, b.mass, tuple(b.com_m.tolist()),
-                tuple(b.moments.tolist()), b.stated, b.shapes,
+                tuple(b.moments.tolist()), b.stated, b.shapes, b.guessed,
+                None if b.sd_percent is None else b.mass * b.sd_percent / 100,
             )
             for b in found.links
         )  # fmt: skip
@@ -124,6 +130,8 @@ class RobotCheckReport(Answer):
             if link.inertial or link.collision_shapes:
                 place = ", ".join(f"{v:.3g}" for v in link.com_m) if link.mass_kg else "–"
                 mass = f"{link.mass_kg:.4g}" if link.inertial else "–"
+                mass += f" ± {link.mass_sd_kg:.2g}" if link.mass_sd_kg else ""
+                mass += " (guessed)" if link.guessed else ""
                 cells = link.joint or "–", mass, place, str(link.collision_shapes)
                 masses.add_row(Text(link.link), *cells)
         modes = table("simulated modes", "pose", "frequency in Hz (damping in %), from the lowest")

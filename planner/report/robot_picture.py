@@ -32,7 +32,8 @@ def robot_figure(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> Fi
     grid = figure.add_gridspec(1, 3)
     for column, (name, pair) in enumerate(VIEWS):
         panel = figure.add_subplot(grid[0, column])
-        _flat(panel, lines, pair, FRAME * robot.arm_m)
+        guessed = any(link.guessed for link in links)
+        _flat(panel, lines, pair, FRAME * robot.arm_m, " (guessed)" if guessed else "")
         panel.set(title=name, xlabel=f"{'xyz'[pair[0]]} (m)", ylabel=f"{'xyz'[pair[1]]} (m)")
     _space(figure.add_subplot(grid[0, 2], projection="3d"), lines, FRAME * robot.arm_m)
     return figure
@@ -47,7 +48,9 @@ def _close(lines: RobotLines, beside: float) -> RobotLines:
     return replace(lines, obstacles=[c for c in cut if np.ptp(c, axis=0).all()])
 
 
-def _flat(panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float) -> None:
+def _flat(
+    panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float, remark: str
+) -> None:
     a, b = pair
     for box, colour in ((lines.obstacles, OBSTACLE), (lines.shapes, SHAPE)):
         for corners in box:
@@ -64,7 +67,7 @@ def _flat(panel: Axes, lines: RobotLines, pair: tuple[int, int], length: float) 
     _names(panel, lines, pair, NEAR * length / FRAME)
     whole = sum(mass for mass, _ in lines.masses) or 1.0
     for k, (mass, place) in enumerate(lines.masses):
-        label = "centre of mass, area ~ mass" if k == 0 else None
+        label = f"centre of mass, area ~ mass{remark}" if k == 0 else None
         panel.scatter(place[a], place[b], s=AREA_PER_SHARE * mass / whole, color=MASS, alpha=0.6,
                       zorder=3, lw=0, label=label)  # fmt: skip
     for k, (name, place, rotation) in enumerate(lines.frames):

@@ -129,8 +129,8 @@ def _limits(joint: ElementTree.Element) -> tuple[float, float]:
         return -np.pi, np.pi
     if limit is None:
         return 0.0, 0.0
-    low, high = (float(numbers(limit.get(key, "0"))[0]) for key in ("lower", "upper"))
-    return low, high
+    ends = [float(numbers(limit.get(key, "0"))[0]) for key in ("lower", "upper")]
+    return min(ends), max(ends)
 
 
 def _entry(joint: ElementTree.Element) -> str:

@@ -1,7 +1,7 @@
 """Joint limits, self-collision and obstacles of a pose."""
 
 import xml.etree.ElementTree as ElementTree
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import coal
 import numpy as np
@@ -15,9 +15,9 @@ from planner.robot.shapes import (
     leave_out_unreadable,
     unchecked_sentence,
 )
-from planner.robot.urdf import quiet
 
 LIMIT_TOLERANCE = 1e-9  # rad or m
+KEPT = 4  # robots whose collision shapes are at hand
 
 
 class Collisions:
@@ -72,7 +72,7 @@ class Collisions:
         """Pairs of links whose shapes overlap and are not checked, one phrase each."""
         return self._geometry[3]
 
-    @cached_property
+    @property
     def _links(self) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
         return _link_geometry(self.robot)
 
@@ -83,6 +83,11 @@ class Collisions:
 
     @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data, tuple[str, ...]]:
+        geometry, overlapping = _with_pairs(self.robot)
+        return geometry, self._data(geometry), self.robot.model.createData(), overlapping
+
+    def with_pairs(self) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+        """Shapes with the pairs to check, and which pairs of links overlap."""
         robot = self.robot
         geometry = self._links[0].copy()
         links = list(range(geometry.ngeoms))
@@ -96,7 +101,7 @@ class Collisions:
                 moves = geometry.geometryObjects[i].parentJoint > 0
                 if moves and not self._ignored(geometry, i, box):
                     geometry.addCollisionPair(pin.CollisionPair(i, box))
-        return geometry, self._data(geometry), robot.model.createData(), overlapping
+        return geometry, overlapping
 
     def _data(self, geometry: pin.GeometryModel) -> pin.GeometryData:
         data = geometry.createData()
@@ -179,19 +184,17 @@ class Collisions:
         return limits + self.contacts(q) if np.all(np.isfinite(q)) else limits
 
 
+@lru_cache(maxsize=KEPT)
+def _with_pairs(robot: Robot) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+    return Collisions(robot).with_pairs()
+
+
+@lru_cache(maxsize=KEPT)
 def _link_geometry(robot: Robot) -> tuple[pin.GeometryModel, tuple[UnusableShape, ...]]:
     """Collision shapes of the links, and those of the URDF that are left out."""
     root = ElementTree.fromstring(robot.urdf_text)
     left = (*robot.left_out, *leave_out_unreadable(root))
-    with quiet():
-        try:
-            return build_geometry(robot.model, root, "collision"), left
-        except Exception as error:
-            text = " ".join(str(error).split())
-            raise InputError(
-                f"{robot.urdf_path}: its collision geometry cannot be loaded ({text}); put the "
-                f"meshes beside the URDF or use boxes and cylinders."
-            ) from None
+    return build_geometry(robot.model, root, "collision"), left
 
 
 def _obstacles(robot: Robot) -> list[pin.GeometryObject]:

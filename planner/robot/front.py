@@ -1,5 +1,7 @@
 """A workspace in front of a robot: ranges of its joints in which it can stand everywhere."""
 
+from itertools import islice
+
 import numpy as np
 
 from planner.errors import NoPoseLeftError
@@ -25,9 +27,11 @@ def workspace_in_front(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     poses that are looked at.
     """
     collisions, best, width = Collisions(robot), None, 0.0
-    free = [q for q in _by_nearness(robot) if collisions.free(q)]
-    regular = [q for q in free if singularity(robot, q[None])[0] >= SINGULAR]
-    for at in (regular or free)[:SOME]:  # some arms are singular everywhere
+    poses = _by_nearness(robot)
+    regular = (q for q in poses if singularity(robot, q[None])[0] >= SINGULAR)
+    free = [*islice(filter(collisions.free, regular), SOME)]
+    free = free or [*islice(filter(collisions.free, poses), SOME)]  # of one singular everywhere
+    for at in free:
         low, high, share = _narrowed(robot, collisions, at)
         if share > width:
             best, width = (low, high), share

@@ -17,6 +17,7 @@ GIVES_RAD, GIVES_M = 1e-3, 1e-4  # under what it carries: a gear, a rail's drive
 ACROSS = 3.0  # stiffness of a bearing across its axis, of the gear's; published arms have 2 to 5
 SD_PERCENT = 200.0  # e^sd of 3: another robot of the same payload may well differ by that
 DAMPING_RATIO = 0.03  # of each spring alone; measured arms have 1 to 5 %
+RIGID_HZ = 5e3  # alone, of what is no spring to a hammer: a bare flange on a large gear
 POSES = 200  # at which the torque that a gear carries is looked for
 PAYLOAD_KG_M3 = 2500.0  # payload charts have a cube of this density lie on the flange
 
@@ -35,7 +36,8 @@ def guessed_springs(robot: Robot, payload_kg: float, joints: tuple[str, ...]) ->
     inertia = np.diagonal(ElasticModel(elastic).matrices(middle).mass[0])
     damped = [
         msgspec.structs.replace(b, damping=_rounded(2 * DAMPING_RATIO * np.sqrt(b.stiffness * i)))
-        for b, i in zip(elastic.config.compliance, _alike(blocks, inertia), strict=True)
+        for b, i in zip(blocks, _alike(blocks, inertia), strict=True)
+        if np.sqrt(b.stiffness / i) < 2 * np.pi * RIGID_HZ
     ]
     return _with(robot, damped)
 

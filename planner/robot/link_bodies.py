@@ -1,6 +1,7 @@
 """What a URDF says of each link: its mass, how it is spread, and how large the link is."""
 
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ class LinkBody:
     `moments` (3,) principal moments in kg·m² about it, increasing. `size_m` is the diagonal of a
     box around its shapes and what it carries, 0 where it has neither; `shapes` and `visuals` count
     its collision and visual shapes. `low_m` and `high_m` (3,) are the corners of that box.
+    `sd_percent` is how sure robot.toml says its mass is, `guessed` that it is a guess.
     """
 
     name: str
@@ -32,6 +34,8 @@ class LinkBody:
     high_m: np.ndarray
     shapes: int
     visuals: int
+    sd_percent: float | None = None
+    guessed: bool = False
 
     @property
     def size_m(self) -> float:
@@ -42,7 +46,7 @@ class LinkBody:
 def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     """All links of the URDF in its order."""
     root = ElementTree.fromstring(robot.urdf_text)
-    shapes = shape_corners(root)
+    shapes, tables = shape_corners(root), {table.link: table for table in robot.config.link}
     names = ("", *robot.linkage.names)
     found = []
     for link in root.findall("link"):
@@ -66,9 +70,35 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
                 high_m=corners.max(axis=0),
                 shapes=len(link.findall("collision")),
                 visuals=len(link.findall("visual")),
+                sd_percent=tables[name].sd_percent if name in tables else None,
+                guessed=name in tables and tables[name].guessed,
             )
         )
     return tuple(found)
+
+
+def guessed_masses(links: Sequence[LinkBody]) -> str:
+    """Which masses are guesses, in a sentence; "" where none is."""
+    guessed = [link for link in links if link.guessed and link.mass > 0]
+    if not guessed:
+        return ""
+    percent = max(link.sd_percent or 0.0 for link in guessed)
+    within = f", each with an sd of {percent:g} %" if percent else ""
+    named = ", ".join(link.name for link in guessed)
+    return f"Masses are guessed{within}: {named}."
+
+
+def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
+    """How low in the world anything is at q (dof,) that these joints move directly; inf: none."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.asarray(q, dtype=float))
+    corners = shape_corners(ElementTree.fromstring(robot.urdf_text))
+    found = [np.inf]
+    for body in link_bodies(robot):
+        place = data.oMf[robot.model.getFrameId(body.name, pin.FrameType.BODY)]
+        if body.joint in joints:
+            found += [float(place.act(corner)[2]) for corner in corners[body.name]]
+    return min(found)
 
 
 def _carried(root: ElementTree.Element, link: str) -> list[np.ndarray]:

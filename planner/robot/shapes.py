@@ -1,8 +1,10 @@
 """Shapes of a URDF's links that can be used, the sizes of their boxes, and which were left out."""
 
+import hashlib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import coal
@@ -15,7 +17,7 @@ from planner.robot.urdf import numbers, quiet
 LARGEST_M = 1e4  # of a shape
 FEW = 3  # names in a sentence
 SIZES = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
-_MESHES = coal.CachedMeshLoader()  # which reads a file once, until it changes
+KEPT = 256  # meshes at hand
 
 
 @dataclass(frozen=True)
@@ -39,13 +41,11 @@ def leave_out_unusable(root: ElementTree.Element, urdf: Path) -> tuple[UnusableS
     return tuple(found)
 
 
-def leave_out_unreadable(
-    root: ElementTree.Element, kind: str = "collision"
-) -> tuple[UnusableShape, ...]:
-    """Remove shapes of a kind whose mesh cannot be read."""
+def leave_out_unreadable(root: ElementTree.Element) -> tuple[UnusableShape, ...]:
+    """Remove collision shapes whose mesh cannot be read."""
     found = []
     for link in root.findall("link"):
-        for part in link.findall(kind):
+        for part in link.findall("collision"):
             mesh = part.find("geometry/mesh")
             if mesh is not None and load_mesh(mesh) is None:
                 link.remove(part)
@@ -55,10 +55,22 @@ def leave_out_unreadable(
 
 
 def build_geometry(model: pin.Model, root: ElementTree.Element, kind: str) -> pin.GeometryModel:
-    """Shapes of a kind, "collision" or "visual"; raises what the loader makes of a mesh."""
-    text = ElementTree.tostring(root, encoding="unicode")
-    named = pin.GeometryType.COLLISION if kind == "collision" else pin.GeometryType.VISUAL
-    return pin.buildGeomFromUrdfString(model, text, named, mesh_loader=_MESHES)
+    """Shapes of a kind, "collision" or "visual", that can be used."""
+    geometry = pin.GeometryModel()
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        if not model.existFrame(name, pin.FrameType.BODY):
+            continue
+        number = model.getFrameId(name, pin.FrameType.BODY)
+        frame = model.frames[number]
+        for place, part in enumerate(link.findall(kind)):
+            shape = _shape(part)
+            if shape is not None:
+                at = frame.placement * pin.SE3(*_origin(part))
+                named = f"{name}_{place}"
+                made = pin.GeometryObject(named, frame.parentJoint, number, at, shape)
+                geometry.addGeometryObject(made)
+    return geometry
 
 
 def unchecked_sentence(left: Sequence[UnusableShape]) -> str:
@@ -95,12 +107,48 @@ def shape_corners(root: ElementTree.Element) -> dict[str, list[np.ndarray]]:
 
 def load_mesh(mesh: ElementTree.Element) -> coal.BVHModelBase | None:
     """A <mesh> whose file is named in full, to scale, in m; None where it cannot be read."""
-    scale = numbers(mesh.get("scale", "1 1 1"))
+    file, scale = Path(mesh.get("filename", "")), numbers(mesh.get("scale", "1 1 1"))
+    try:
+        digest = hashlib.sha256(file.read_bytes()).digest()
+    except OSError:
+        return None
+    return _read(_MeshFile(digest, tuple(scale.tolist()), file))
+
+
+@dataclass(frozen=True)
+class _MeshFile:
+    """What a mesh is read from; copies of a file are one mesh."""
+
+    digest: bytes
+    scale: tuple[float, ...]
+    file: Path = field(compare=False)
+
+
+@lru_cache(maxsize=KEPT)
+def _read(given: _MeshFile) -> coal.BVHModelBase | None:
     with quiet():
         try:
-            return _MESHES.load(mesh.get("filename", ""), scale)
+            mesh = coal.MeshLoader().load(str(given.file), np.array(given.scale))
         except (ValueError, RuntimeError):
             return None
+    if not isinstance(mesh, coal.BVHModelBase) or not mesh.num_tris:
+        return None
+    mesh.computeLocalAABB()
+    return mesh
+
+
+def _shape(part: ElementTree.Element) -> coal.CollisionGeometry | None:
+    shape = part.find("geometry/*")
+    if shape is None:
+        return None
+    if shape.tag == "mesh":
+        return load_mesh(shape)
+    if shape.tag == "box":
+        return coal.Box(*numbers(shape.get("size", "")))
+    radius = float(shape.get("radius", "0"))
+    if shape.tag == "cylinder":
+        return coal.Cylinder(radius, float(shape.get("length", "0")))
+    return coal.Sphere(radius)
 
 
 def _fault(part: ElementTree.Element, urdf: Path) -> str:
@@ -123,23 +171,11 @@ def _fault(part: ElementTree.Element, urdf: Path) -> str:
 
 def _box(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray] | None:
     """Lowest and highest corner (3,) of the box around a shape, in its own frame."""
-    shape = part.find("geometry/*")
+    shape = _shape(part)
     if shape is None:
         return None
-    if shape.tag == "mesh":
-        mesh = load_mesh(shape)
-        if mesh is None:
-            return None
-        mesh.computeLocalAABB()
-        return np.array(mesh.aabb_local.min_), np.array(mesh.aabb_local.max_)
-    if shape.tag == "box":
-        half = numbers(shape.get("size", "0 0 0")) / 2
-    elif shape.tag == "cylinder":
-        radius = float(shape.get("radius", "0"))
-        half = np.array([radius, radius, float(shape.get("length", "0")) / 2])
-    else:
-        half = np.full(3, float(shape.get("radius", "0")))
-    return -half, half
+    shape.computeLocalAABB()
+    return np.array(shape.aabb_local.min_), np.array(shape.aabb_local.max_)
 
 
 def _origin(part: ElementTree.Element) -> tuple[np.ndarray, np.ndarray]:

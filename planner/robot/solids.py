@@ -7,8 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from planner.robot.robot import Robot
-from planner.robot.shapes import build_geometry, leave_out_unreadable
-from planner.robot.urdf import quiet
+from planner.robot.shapes import build_geometry
 
 
 def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
@@ -30,9 +29,7 @@ def link_solids(robot: Robot) -> dict[str, pin.Inertia]:
 
 
 def _solids(robot: Robot, root: ElementTree.Element, kind: str) -> list[tuple[str, pin.Inertia]]:
-    leave_out_unreadable(root, kind)
-    with quiet():
-        geometry = build_geometry(robot.model, root, kind)
+    geometry = build_geometry(robot.model, root, kind)
     found = []
     for shape in geometry.geometryObjects:
         frame = robot.model.frames[shape.parentFrame]

@@ -203,7 +203,7 @@ class Workspace:
 def ranges_inside(
     robot: Robot, lower: np.ndarray, upper: np.ndarray, parts: float = 1000.0
 ) -> list[list[float]]:
-    """Ranges as campaign.toml states them, rounded inwards: to `parts` of a ° (slides: mm)."""
+    """Ranges as campaign.toml states them, rounded inwards to `parts` of a degree (slides: mm)."""
     low, high = robot.joints.shown([lower, upper]) * parts
     rounded = np.array([np.ceil(low - 1e-6), np.floor(high + 1e-6)]) / parts
     rounded = np.where(rounded[0] <= rounded[1], rounded, np.array([low, high]) / parts)

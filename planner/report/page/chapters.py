@@ -24,6 +24,7 @@ from planner.report.page.html import (
 )
 from planner.report.text import number
 from planner.report.text import with_sd as pm
+from planner.robot.link_bodies import guessed_masses
 from planner.version import __version__
 from planner.words import local_time, significant
 
@@ -35,6 +36,7 @@ def asked(facts: Facts) -> Markup:
     mass = sum(link.mass for link in links if link.joint)
     rows = [
         ("Robot", f"{robot.name}: {len(robot.joint_names)} joints, {mass:.4g} kg move"),
+        *([("Masses", guessed_masses(links))] if guessed_masses(links) else []),
         ("Simulation", _simulation(config, len(robot.config.compliance))),
         ("Hit point and sensor", f"{robot.config.tcp_frame}, {robot.config.sensor_frame}"),
         *_points(facts),
