@@ -91,7 +91,7 @@ def guessed_masses(links: Sequence[LinkBody]) -> str:
 def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
     """How low in the world anything is at q (dof,) that these joints move directly; inf: none."""
     data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, np.asarray(q, dtype=float))
+    pin.framesForwardKinematics(robot.model, data, robot.linkage.at(q))
     corners = shape_corners(ElementTree.fromstring(robot.urdf_text))
     found = [np.inf]
     for body in link_bodies(robot):

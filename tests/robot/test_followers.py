@@ -291,13 +291,15 @@ def test_a_follower_in_the_wrist_is_solved_for(factor, tmp_path):
         assert not Collisions(robot).limits(found.q)
 
 
-def test_followers_are_no_columns_from_check_to_a_proposal(tmp_path, capsys):
-    toml = str(balanced(tmp_path / "robot"))
+@pytest.mark.parametrize("begun_by", ["--robot", "--urdf"])
+def test_followers_are_no_columns_from_check_to_a_proposal(begun_by, tmp_path, capsys):
+    robot = balanced(tmp_path / "robot")
     plan = tmp_path / "campaign.toml"
     plan.write_text(campaign_text(3).replace("candidates = 200", "candidates = 40"))
-    assert run(["check", toml, "--campaign", str(plan)]) == 0
-    cell = str(tmp_path / "cell")
-    assert run(["new", cell, "--robot", toml, "--campaign", str(plan)]) == 0
+    assert run(["check", str(robot), "--campaign", str(plan)]) == 0
+    cell, urdf = str(tmp_path / "cell"), str(robot.with_name("arm.urdf"))
+    own = ["--robot", str(robot)] if begun_by == "--robot" else ["--urdf", urdf, "--mass-kg", "55"]
+    assert run(["new", cell, *own, "--campaign", str(plan)]) == 0
     capsys.readouterr()
     assert run(["next", cell, "--json"]) == 0
     assert len(json.loads(capsys.readouterr().out)["proposals"][0]["joints_deg"]) == 6
