@@ -10,6 +10,7 @@ import numpy as np
 import tomlkit
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.store import CONFIG, ROBOT
 from planner.check.examine import spread_poses
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
@@ -17,7 +18,7 @@ from planner.robot.arm_chain import ArmChain, arm_chain
 from planner.robot.config import Compliance, LinkTable, Obstacle, Payload, RobotConfig
 from planner.robot.front import tool_direction, workspace_in_front
 from planner.robot.gear_springs import PAYLOAD_KG_M3, guessed_springs
-from planner.robot.guessed_inertias import guess_inertias, moving_without_mass, total_stated
+from planner.robot.guessed_inertias import guess_inertias, nothing_stated, total_stated
 from planner.robot.link_bodies import guessed_masses, link_bodies, lowest_m
 from planner.robot.robot import Robot
 from planner.robot.urdf import read_tree
@@ -73,16 +74,17 @@ def new_from_urdf(
         if value is not None and not 0 < value < 1e5:
             raise InputError(f"{option} is {value:g}; give kg, above 0.")
     with tempfile.TemporaryDirectory() as folder:
-        robot_toml = Path(folder).resolve() / "robot.toml"
+        robot_toml = Path(folder).resolve() / ROBOT / "robot.toml"
+        robot_toml.parent.mkdir()
         guessed = guess(urdf.absolute(), weights, robot_toml, campaign_toml is None)
         robot_toml.write_text(_robot_text(guessed), encoding="utf-8")
-        own = robot_toml.with_name("campaign.toml")
+        own = robot_toml.parents[1] / CONFIG
         if campaign_toml is None:
             own.write_text(_campaign_text(guessed), encoding="utf-8")
         try:
             campaign = Campaign.new(directory, robot_toml, campaign_toml or own)
         except InputError as error:
-            raise InputError(str(error).replace(f"{folder}/", "")) from None
+            raise InputError(str(error).replace(f"{robot_toml.parents[1]}/", "")) from None
     return campaign, guessed
 
 
@@ -97,10 +99,9 @@ def guess(urdf: Path, weights: StatedMasses, robot_toml: Path, planned: bool = T
         name, str(urdf), chain.tcp, chain.tcp, held=chain.held, geometric_stiffness=True
     )
     robot = Robot.of(config, robot_toml)
-    if weights.robot is None and moving_without_mass(robot):
+    if weights.robot is None and nothing_stated(robot):
         raise InputError(
-            f"{urdf} states no mass of what {', '.join(moving_without_mass(robot)[:3])} moves; "
-            f"give the robot's mass from its data sheet with --mass-kg."
+            f"{urdf} states no masses; give the robot's, from its data sheet, with --mass-kg."
         )
     links = guess_inertias(robot, weights.robot)
     payload = weights.payload or PAYLOAD_SHARE * (weights.robot or total_stated(robot))

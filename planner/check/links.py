@@ -7,8 +7,9 @@ from planner.robot.link_bodies import LinkBody, guessed_masses
 from planner.robot.robot import Robot
 
 # Limits by which units are told; chosen between robots from 5 to 1,500 kg and a factor of 1000.
-HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.02
+HEAVIEST_KG, LIGHTEST_KG = 2e4, 0.002
 GYRATION = 0.02, 1.2  # radius of gyration over the size of a link; a ball of that size has 0.18
+SMALL = 0.25  # of the size of what it is fixed to: less is a marker's, or weighs next to nothing
 SMALLEST_SIZE_M = 0.02  # smaller links tell nothing
 OUTSIDE = 0.5  # of its size may a centre of mass lie outside the box around a link
 LONGEST_REACH_M, SHORTEST_REACH_M, NEVER_M = 12.0, 0.1, 100.0
@@ -56,12 +57,17 @@ def _stated(robot: Robot, link: LinkBody, links: tuple[LinkBody, ...]) -> list[C
         if any(block.joint == link.joint for block in robot.config.compliance):
             text = f"{text}, though [[compliance]] lets {link.joint} swing"
             return [_weightless(robot, link, text, "error")]
-    elif link.shapes or link.visuals:
+    elif (link.shapes or link.visuals) and link.size_m > SMALL * _largest_weighed(turned):
         what = "an <inertial> of mass 0" if link.stated else "no <inertial>"
         text = f"It has shapes but {what}, so that the simulation takes it for weightless"
     else:
         return []
     return [_weightless(robot, link, text, "warning")]
+
+
+def _largest_weighed(turned: list[LinkBody]) -> float:
+    """Size in m of the largest link that has a mass."""
+    return max((other.size_m for other in turned if other.mass > 0), default=0.0)
 
 
 def _weightless(robot: Robot, link: LinkBody, text: str, severity: Severity) -> CheckRemark:
@@ -93,15 +99,22 @@ def _body(robot: Robot, link: LinkBody, turned: float) -> list[CheckRemark]:
     if high == 0:
         text = f"Its {link.mass:.4g} kg have no moments of inertia, as if they were in one point."
         found.append(CheckRemark("warning", text, where, "State ixx, iyy, izz in kg·m²."))
-    elif link.size_m > SMALLEST_SIZE_M:
-        found += _gyration(link, where)
+    else:
+        found += _gyration(robot, link, where)
     return found + _centre(robot, link, where)
 
 
-def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
+def _largest_m(robot: Robot, link: LinkBody) -> float:
+    """How large a link may be: half as large as the arm where no shape tells its size."""
+    told = link.whole and link.size_m > SMALLEST_SIZE_M
+    return link.size_m if told else max(link.size_m, 0.5 * robot.reach_m)
+
+
+def _gyration(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
     """How far from its centre of mass the mass would have to be."""
     gyration = float(np.sqrt(link.moments[2] / link.mass))
-    least, most = (share * link.size_m for share in GYRATION)
+    largest = _largest_m(robot, link)
+    least, most = GYRATION[0] * link.size_m, GYRATION[1] * largest
     if least <= gyration <= most:
         return []
     word = "far outside" if gyration > most else "at the middle of"
@@ -110,7 +123,7 @@ def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
             "warning",
             f"Its largest moment of inertia, {link.moments[2]:.3g} kg·m², puts its "
             f"{link.mass:.4g} kg at {gyration:.3g} m from their centre, {word} a link of "
-            f"{link.size_m:.2g} m.",
+            f"{link.size_m if least > gyration else largest:.2g} m.",
             where,
             "Moments are in kg·m² about the centre of mass, neither in kg·mm² nor about the joint.",
         )
@@ -118,8 +131,7 @@ def _gyration(link: LinkBody, where: str) -> list[CheckRemark]:
 
 
 def _centre(robot: Robot, link: LinkBody, where: str) -> list[CheckRemark]:
-    # Where neither shapes nor a next joint tell its size, the arm's own does.
-    size = link.size_m if link.size_m > SMALLEST_SIZE_M else 0.5 * robot.reach_m
+    size = _largest_m(robot, link)
     over = np.maximum(link.low_m - link.com_m, link.com_m - link.high_m).max()
     if over <= OUTSIDE * size:
         return []

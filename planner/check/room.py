@@ -28,7 +28,8 @@ def check_collision(
         found.append(CheckRemark("warning", collisions.unchecked, f"{urdf}, <collision>", remedy))
     if collisions.none_checked:
         return found
-    shaped = {link.joint for link in links if link.shapes}
+    told = {one.link for one in collisions.left_out}
+    shaped = {link.joint for link in links if link.shapes or link.name in told}
     bare = [name for name in robot.joint_names if name not in shaped]
     if bare:
         moves = "moves" if any(map(robot.slides, bare)) else "turns"

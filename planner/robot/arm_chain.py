@@ -57,7 +57,13 @@ class _Tree:
 
     def __init__(self, root: ElementTree.Element):
         self.above: dict[str, ElementTree.Element] = {}
-        self._links = [link.get("name", "") for link in root.findall("link")]
+        links = root.findall("link")
+        self._links = [link.get("name", "") for link in links]
+        self._shaped = {
+            link.get("name", "")
+            for link in links
+            if link.findall("visual") + link.findall("collision")
+        }
         self._below: dict[str, list[str]] = defaultdict(list)
         for joint in root.findall("joint"):
             parent, child = joint.find("parent"), joint.find("child")
@@ -96,14 +102,16 @@ class _Tree:
         return moving or any(self._moving_below(child) for child in self._below[link])
 
     def tool(self, link: str) -> str:
-        """The frame fixed to a link that a tool is likeliest to be bolted to."""
+        """The frame fixed to a link that a tool is likeliest to be bolted to: by its name, then
+        the farthest one, rather one without a shape.
+        """
         found, depth = [link], {link: 0}
         for one in found:  # which grows meanwhile
             for child in self._below[one]:
                 if self.above[child].get("type") == "fixed" and child not in depth:
                     depth[child] = depth[one] + 1
                     found.append(child)
-        return min(found, key=lambda one: (_rank(one), -depth[one]))
+        return min(found, key=lambda one: (_rank(one), -depth[one], one in self._shaped))
 
 
 def _rank(link: str) -> int:

@@ -77,6 +77,11 @@ class Collisions:
         return _link_geometry(self.robot)
 
     @property
+    def left_out(self) -> tuple[UnusableShape, ...]:
+        """Shapes of the URDF that cannot be used."""
+        return self._links[1]
+
+    @property
     def none_checked(self) -> bool:
         """Whether no link has a shape that can be checked."""
         return not self._links[0].ngeoms

@@ -93,7 +93,8 @@ class ElasticModel:
             raise InputError(
                 f"{self.robot.path}: [[compliance]] number {number + 1} ({block.joint}) moves no "
                 f"inertia of its own; give the links outboard of it an <inertial> in "
-                f"{self.robot.urdf_path.name}, or remove the block if its axis is listed twice."
+                f"{self.robot.urdf_path.name} or a [[link]], or remove the block if its axis is "
+                f"listed twice."
             )
 
     def _own(self, joint: str) -> int:

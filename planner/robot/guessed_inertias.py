@@ -30,11 +30,9 @@ def total_stated(robot: Robot) -> float:
     return sum(link_inertia(link).mass for link in links)
 
 
-def moving_without_mass(robot: Robot) -> tuple[str, ...]:
-    """Joints that move nothing with a mass."""
-    inertias = robot.linkage.leading(list(robot.model.inertias)[1:])
-    masses = zip(robot.joint_names, inertias, strict=True)
-    return tuple(name for name, inertia in masses if not inertia.mass > 0)
+def nothing_stated(robot: Robot) -> bool:
+    """Whether no joint moves anything with a mass."""
+    return not any(inertia.mass > 0 for inertia in list(robot.model.inertias)[1:])
 
 
 def guess_inertias(robot: Robot, mass_kg: float | None) -> tuple[LinkTable, ...]:

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from planner.robot.link_inertias import link_inertia
 from planner.robot.robot import Robot
-from planner.robot.shapes import shape_corners
+from planner.robot.shapes import leave_out_unreadable, shape_corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +19,9 @@ class LinkBody:
     `joint` turns it ("" for what stands still). Mass in kg, `com_m` (3,) in the link's frame,
     `moments` (3,) principal moments in kg·m² about it, increasing. `size_m` is the diagonal of a
     box around its shapes and what it carries, 0 where it has neither; `shapes` and `visuals` count
-    its collision and visual shapes. `low_m` and `high_m` (3,) are the corners of that box.
-    `sd_percent` is how sure robot.toml says its mass is, `guessed` that it is a guess.
+    its collision and visual shapes. `low_m` and `high_m` (3,) are the corners of that box, `whole`
+    is whether it is known: there is a shape, and none is missing. `sd_percent` is how sure
+    robot.toml says its mass is, `guessed` that it is a guess.
     """
 
     name: str
@@ -34,6 +35,7 @@ class LinkBody:
     high_m: np.ndarray
     shapes: int
     visuals: int
+    whole: bool = True
     sd_percent: float | None = None
     guessed: bool = False
 
@@ -46,8 +48,9 @@ class LinkBody:
 def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     """All links of the URDF in its order."""
     root = ElementTree.fromstring(robot.urdf_text)
+    left = (*robot.left_out, *leave_out_unreadable(root))
     shapes, tables = shape_corners(root), {table.link: table for table in robot.config.link}
-    names = ("", *robot.linkage.names)
+    names, lacking = ("", *robot.linkage.names), {one.link for one in left}
     found = []
     for link in root.findall("link"):
         name = link.get("name", "")
@@ -70,6 +73,7 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
                 high_m=corners.max(axis=0),
                 shapes=len(link.findall("collision")),
                 visuals=len(link.findall("visual")),
+                whole=bool(shapes.get(name)) and name not in lacking,
                 sd_percent=tables[name].sd_percent if name in tables else None,
                 guessed=name in tables and tables[name].guessed,
             )

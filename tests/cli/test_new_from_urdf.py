@@ -1,0 +1,167 @@
+"""`planner new --urdf`: from a maker's description to the first pose, whatever it lacks."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planner.campaign.campaign import Campaign
+from planner.cli.run import run
+from planner.robot.robot import Robot
+from tests.support.published import HAND, LIMITS, PACKAGE, RAIL, published, robot_toml
+
+GIVEN = "--mass-kg", "420", "--payload-kg", "20"
+
+
+def ask(capsys, *arguments: object) -> dict:
+    code = run([*map(str, arguments), "--json"])
+    said = capsys.readouterr()
+    assert code == 0, said.err
+    return json.loads(said.out)
+
+
+def whole(folder: Path) -> Path:
+    return published(folder, inertias=True)
+
+
+def renamed(folder: Path) -> Path:
+    return published(folder, package="arm-main")
+
+
+def no_meshes(folder: Path) -> Path:
+    urdf = published(folder)
+    shutil.rmtree(urdf.parents[1] / "meshes")
+    return urdf
+
+
+def zero_sizes(folder: Path) -> Path:
+    urdf = published(folder)
+    mesh = f'<mesh filename="package://{PACKAGE}/meshes/link_{{}}.stl"/>'
+    text = urdf.read_text().replace(mesh.format(4), '<box size="0 0 0"/>')
+    urdf.write_text(text.replace(mesh.format(6), '<cylinder radius="0" length="0.1"/>'))
+    return urdf
+
+
+def rail(folder: Path) -> Path:
+    return published(folder, more=RAIL)
+
+
+def hand(folder: Path) -> Path:
+    return published(folder, more=HAND)
+
+
+def odd_limits(folder: Path) -> Path:
+    """Limits that no three digits of a degree state, and a joint without a range."""
+    urdf = published(folder)
+    text = urdf.read_text()
+    for low, high in LIMITS:
+        text = text.replace(f'lower="{low}"', f'lower="{low / 3:.9f}"', 1)
+        text = text.replace(f'upper="{high}"', f'upper="{high / 3:.9f}"', 1)
+    urdf.write_text(re.sub(r'lower="[^"]+" upper="[^"]+"(?=[^>]*></joint>\n<link name="tool0")',
+                           'lower="0.1" upper="0.1"', text))  # fmt: skip
+    return urdf
+
+
+KINDS = {
+    "whole": whole, "renamed": renamed, "no meshes": no_meshes, "zero sizes": zero_sizes,
+    "rail": rail, "hand": hand, "odd limits": odd_limits,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
+def test_it_goes_from_a_description_to_a_first_pose(kind, tmp_path, capsys):
+    urdf, cell = kind(tmp_path / "src"), tmp_path / "cell"
+    given = () if kind is whole else GIVEN
+    new = ask(capsys, "new", cell, "--urdf", urdf, *given, "--tool-mass-kg", 8)
+    named = {guess["what"] for guess in new["guessed"]}
+    assert {"stiffness of joint_1 about its axis", "workspace joints_deg"} <= named
+    assert ("mass of link_2" in named) == (kind is not whole)
+    assert all({"what", "value", "sd"} <= set(guess) for guess in new["guessed"])
+    masses = [g["value"] for g in new["guessed"] if g["what"].startswith("mass of")]
+    assert kind is whole or sum(masses) == pytest.approx(420, rel=1e-3)
+    shutil.rmtree(tmp_path / "src")  # the campaign holds all it needs
+    checked = ask(capsys, "check", cell / "robot" / "robot.toml", "--campaign",
+                  cell / "campaign.toml")  # fmt: skip
+    warned = [f["what"] for f in checked["findings"] if f["severity"] != "note"]
+    assert len(warned) == (kind in (no_meshes, zero_sizes)), warned
+    assert all("left out" in what for what in warned)
+    assert {link["guessed"] for link in checked["links"] if link["mass_kg"]} == {kind is not whole}
+    (proposal,) = ask(capsys, "next", cell)["proposals"]
+    robot = Robot.load(cell / "robot" / "robot.toml")
+    q = robot.joints.internal(proposal["joints_deg"])
+    assert np.all((robot.lower_rad <= q) & (q <= robot.upper_rad))
+    x, _, z = proposal["position_m"]
+    assert x > 0.3  # in front
+    assert z > 0.0
+    assert ask(capsys, "replay", cell)["reproduced"]
+
+
+def test_it_copies_what_it_needs_and_nothing_else(tmp_path, capsys):
+    urdf = published(tmp_path)
+    (urdf.parent / "notes.pdf").write_text("x")
+    ask(capsys, "new", tmp_path / "cell", "--urdf", urdf, *GIVEN)
+    files = {p.name for p in (tmp_path / "cell" / "robot").rglob("*") if p.is_file()}
+    meshes = {f"link_{i}.stl" for i in range(1, 7)}
+    assert files == {"robot.toml", "arm.urdf", "base_link.stl", *meshes}
+
+
+def test_joints_beside_the_arm_are_held_and_named(tmp_path, capsys):
+    new = ask(capsys, "new", tmp_path / "cell", "--urdf", hand(tmp_path / "src"), *GIVEN)
+    assert len(new["joints"]) == 6
+    (told,) = [text for text in new["told"] if "longest chain" in text]
+    assert "finger_joint_left" in told
+    with_rail = ask(capsys, "new", tmp_path / "two", "--urdf", rail(tmp_path / "rail"), *GIVEN)
+    assert with_rail["joint_units"] == ["mm", *["deg"] * 6]
+
+
+def test_the_screen_says_what_to_put_right_first(tmp_path, capsys):
+    cell = tmp_path / "cell"
+    assert run(["new", str(cell), "--urdf", str(published(tmp_path)), *GIVEN]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert 'Put right first: tcp_frame = "tool0" and the tool\'s mass' in said
+    assert "Masses are guessed" in said
+    assert run(["check", str(cell / "robot" / "robot.toml")]) == 0
+    assert "(guessed)" in capsys.readouterr().out
+    assert run(["report", str(cell)]) == 0
+    assert "Masses are guessed" in next(cell.glob("*.html")).read_text()
+
+
+REFUSED = {
+    "no mass": (lambda p: ["--urdf", str(published(p))], "--mass-kg"),
+    "mass 0": (lambda p: ["--urdf", str(published(p)), "--mass-kg", "0"], "above 0"),
+    "no file": (lambda p: ["--urdf", str(p / "none.urdf"), *GIVEN], "none.urdf cannot be read"),
+    "two robots": (lambda p: ["--urdf", "a.urdf", "--robot", "b.toml"], "give one"),
+    "mass of a robot.toml": (lambda p: ["--robot", "b.toml", *GIVEN], "go with --urdf"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "words"), REFUSED.values(), ids=REFUSED)
+def test_what_is_missing_is_asked_for(arguments, words, tmp_path, capsys):
+    assert run(["new", str(tmp_path / "cell"), *arguments(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert len(said.strip().splitlines()) == 1
+    assert not (tmp_path / "cell").exists()
+
+
+def test_a_robot_toml_may_name_a_urdf_elsewhere(tmp_path, capsys):
+    (tmp_path / "own").mkdir()
+    toml = robot_toml(tmp_path / "own" / "robot.toml", whole(tmp_path / "src"))
+    ask(capsys, "new", tmp_path / "cell", "--robot", toml)
+    shutil.rmtree(tmp_path / "src")
+    assert len(ask(capsys, "next", tmp_path / "cell")["proposals"]) == 1
+
+
+@pytest.mark.parametrize("high", [1.4, 2.61799387799149, 0.123456789])
+def test_the_default_workspace_lies_within_the_limits(high, tmp_path, capsys):
+    urdf = whole(tmp_path / "src")
+    urdf.write_text(urdf.read_text().replace('upper="1.4"', f'upper="{high}"'))
+    (tmp_path / "own").mkdir()
+    toml = robot_toml(tmp_path / "own" / "robot.toml", urdf)
+    ask(capsys, "new", tmp_path / "cell", "--robot", toml)
+    ranges = Campaign(str(tmp_path / "cell")).cell.config.workspace.joints_deg
+    assert ranges is not None
+    assert np.rad2deg(high) - 1e-3 <= ranges[2][1] <= np.rad2deg(high) + 1e-9
