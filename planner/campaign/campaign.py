@@ -1,7 +1,7 @@
 """The campaign: the only thing with state, and its state is a fold over its log."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,7 +71,7 @@ class Campaign(CampaignReads):
 
     def import_paths(
         self,
-        paths: tuple[Path, ...],
+        paths: Sequence[Path | str],
         pose: str | None = None,
         progress: Callable[[str], None] | None = None,
     ) -> "tuple[ImportReport, ...]":
@@ -86,6 +86,7 @@ class Campaign(CampaignReads):
         from planner.campaign.deliveries import sort_paths
         from planner.campaign.importing import place
 
+        paths = tuple(map(Path, paths))
         with self._acting(), threadpool_limits(1):
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None

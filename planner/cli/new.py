@@ -37,13 +37,11 @@ def new(
     ] = None,
     as_json: AsJson = False,
 ) -> int:
-    """Start a campaign, or write files to begin one with.
+    """Start a campaign from robot.toml or from a maker's URDF, or write files to begin one with.
 
     The robot is checked: what looks wrong is said, what cannot work is refused.
 
-    Examples: planner new cell7 --robot robot/robot.toml --campaign campaign.toml
-
-    planner new cell7 --urdf arm_support/urdf/arm.urdf --mass-kg 1068 --payload-kg 210
+    Example: planner new cell7 --urdf arm.urdf --mass-kg 1068 --payload-kg 210
     """
     from planner.campaign.campaign import Campaign
     from planner.campaign.example import write_example

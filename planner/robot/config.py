@@ -238,9 +238,10 @@ class ControllerTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The whole of robot.toml; what `effects` add stands in the other lists, after their own.
 
-    `urdf` is a file beside robot.toml. `tcp_frame` names the link of it where the hammer hits,
-    `sensor_frame` the one where the accelerometer sits; their axes are parallel. `gravity` is in
-    m/s² along the axes of the URDF's base. `band_hz` is where the simulation is meant to hold.
+    `urdf` is a file, named from the folder of robot.toml. `tcp_frame` names the link of it where
+    the hammer hits, `sensor_frame` the one where the accelerometer sits; their axes are parallel.
+    `gravity` is in m/s² along the axes of the URDF's base. `band_hz` is where the simulation is
+    meant to hold.
     `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for
     a rail, NAME_deg = 30 for a turntable. Others may slide or turn from pose to pose; wherever
     joints are listed (`joints_deg`), the number of one that slides (prismatic) is in millimetres.

@@ -3,8 +3,10 @@
 import contextlib
 import io
 import json
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -158,3 +160,21 @@ def test_a_campaign_goes_on_without_the_scatter_that_it_began_without(robot, tmp
     for cell, learned in ((fresh, True), (earlier, False)):
         assert all(s["check"] in ("kept", "identical") for s in ask("replay", cell)["steps"])
         assert Campaign(cell).cell.visit_scatter is learned
+
+
+def without_damping(robot: Path) -> None:
+    robot.write_text(re.sub(r"damping = .*", "damping = 0.0", robot.read_text()))
+
+
+def sensor_elsewhere(robot: Path) -> None:
+    """On the first link, which hits along some axes do not move at all."""
+    robot.write_text(robot.read_text().replace('sensor_frame = "tcp"', 'sensor_frame = "link_1"'))
+
+
+@pytest.mark.parametrize("change", [without_damping, sensor_elsewhere])
+def test_a_pose_is_proposed_for_odd_robots_too(change, robot, tmp_path):
+    change(robot)
+    plan = plain_campaign(tmp_path / "campaign.toml")
+    call("new", tmp_path / "cell", "--robot", robot, "--campaign", plan)
+    proposal, *_ = ask("next", tmp_path / "cell", "--count", 2)["proposals"]
+    assert np.isfinite(proposal["score"])

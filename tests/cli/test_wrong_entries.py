@@ -44,6 +44,8 @@ def test_an_entry_of_a_list_of_tables(cell):
     assert "[[compliance]] stiffness must be a number, not" in call("check", robot)[2]
     robot.write_text(text.replace('urdf = "arm.urdf"\n', ""))
     assert "urdf is missing; add it." in call("check", robot)[2]
+    robot.write_text(text.replace('urdf = "arm.urdf"', 'urdf = "a\\u0000.urdf"'))
+    assert "correct the entry urdf" in call("check", robot)[2]
     robot.write_text(text.replace("damping = ", "dampening = ", 1))
     assert (
         '[[compliance]] has no entry "dampening"; "damping" may be meant.'

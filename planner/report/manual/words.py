@@ -167,7 +167,7 @@ def folder() -> Markup:
     """What a campaign's folder holds."""
     rows = (
         ("campaign.toml", "what you decided; may be edited, the next command follows and logs it"),
-        ("robot/", "robot.toml, URDF, meshes; may be edited too"),
+        ("robot/", "robot.toml, URDF and the meshes that it names; may be edited too"),
         ("log.jsonl", "every act, one line each, checksummed, never changed; undo adds a line"),
         ("recordings/", "every raw file and every version of the robot by content hash"),
         ("predictions/, export/, report.html", "made from the above; may be deleted"),
