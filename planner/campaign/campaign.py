@@ -86,15 +86,15 @@ class Campaign(CampaignReads):
         from planner.campaign.deliveries import sort_paths
         from planner.campaign.importing import place
 
-        paths = tuple(map(Path, paths))
+        given = tuple(map(Path, paths))
         with self._acting(), threadpool_limits(1):
             open_poses = self.state.open
             default = open_poses[0] if len(open_poses) == 1 else None
             deliveries = sort_paths(
-                paths, self.cell.robot.joints, self.cell.robot.points, pose, default
+                given, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
-            named = frozenset(path for path in paths if path.is_file())
+            named = frozenset(path for path in given if path.is_file())
             reports = []
             for delivery, joints_deg in placed:
                 if progress:

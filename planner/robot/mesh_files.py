@@ -23,6 +23,11 @@ def find_mesh(urdf: Path, name: str) -> Path | None:
     return next((place for place in _places(urdf.absolute(), name) if _has_content(place)), None)
 
 
+def find_package(urdf: Path, name: str) -> Path | None:
+    """The folder of a package as a URDF names it; None if missing."""
+    return next((p for p in _packages(urdf.absolute(), name) if p.is_dir()), None)
+
+
 def _places(urdf: Path, name: str) -> Iterator[Path]:
     parts, above = _parts(name), urdf.parents
     if not parts:
@@ -30,13 +35,17 @@ def _places(urdf: Path, name: str) -> Iterator[Path]:
     scheme, _, path = name.rpartition("://")
     if scheme in ("", "file"):
         yield urdf.parent / path
-    yield from (folder.joinpath(*parts) for folder in above)
-    if scheme not in ("", "file"):
-        package, rest = parts[0], parts[1:]
-        for folder in (*_named(urdf.parent, package), *_on_paths(package)):
-            yield folder.joinpath(*rest)
+        yield from (folder.joinpath(*parts) for folder in above)
+    else:
+        yield from (folder.joinpath(*parts[1:]) for folder in _packages(urdf, parts[0]))
     for start in range(1, len(parts)):
         yield from (folder.joinpath(*parts[start:]) for folder in above)
+
+
+def _packages(urdf: Path, name: str) -> Iterator[Path]:
+    """Folders that a package of this name may be."""
+    yield from (folder / name for folder in urdf.parents)
+    yield from (*_named(urdf.parent, name), *_on_paths(name))
 
 
 def _parts(name: str) -> tuple[str, ...]:
@@ -89,7 +98,7 @@ def _has_content(path: Path) -> bool:
         return False
 
 
-def copy_meshes(text: str, urdf: Path, target: Path) -> None:
+def copy_meshes(text: bytes | str, urdf: Path, target: Path) -> None:
     """Copy the meshes that a URDF's text names to below the folder of its copy at `target`.
 
     They are found from there by the same names. Nothing that exists is overwritten.

@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+from importlib import import_module
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -159,10 +160,13 @@ def test_xacro_is_expanded_or_said_to_be_xacro(tmp_path, monkeypatch):
 
     def process_file(name):
         assert name == str(source)
+        index = import_module("ament_index_python.packages")  # as xacro does for $(find NAME)
+        assert index.get_package_share_directory(PACKAGE) == str(tmp_path / PACKAGE)
         return SimpleNamespace(toxml=lambda encoding: whole.encode(encoding))
 
     monkeypatch.setitem(sys.modules, "xacro", SimpleNamespace(process_file=process_file))
     assert len(Robot.load(path).joint_names) == len(AXES)
+    assert "ament_index_python" not in sys.modules
     monkeypatch.setitem(sys.modules, "xacro", SimpleNamespace(process_file=lambda name: 1 / 0))
     with pytest.raises(InputError, match="could not be expanded"):
         Robot.load(path)
