@@ -20,6 +20,7 @@ from planner.errors import InputError
 from planner.identification.measurement_model import Tolerances
 from planner.milling.cut import Cut, load_cut
 from planner.robot.collision import Collisions
+from planner.robot.inverse_kinematics import singularity
 from planner.robot.robot import Robot
 from planner.robot.workspace import Candidates, Workspace
 
@@ -133,7 +134,7 @@ class Cell:
             low, high = table.hammer_height_m
             allowed &= (found.position_m[:, 2] >= low) & (found.position_m[:, 2] <= high)
         if table.singularity_margin > 0:
-            allowed &= self.robot.singularity(found.q) >= table.singularity_margin
+            allowed &= singularity(self.robot, found.q) >= table.singularity_margin
         for zone in self.config.forbidden:
             at = found.position_m if zone.position_m else self.robot.joints.shown(found.q)
             box = np.array(zone.position_m or zone.joints_deg, dtype=float)

@@ -35,7 +35,18 @@ def check_joints(robot: Robot, planned: bool = False) -> list[CheckRemark]:
             text = "It has no speed limit: what it takes to get to a pose cannot be told."
             unit = "m/s" if robot.slides(name) else "rad/s"
             found.append(CheckRemark("note", text, where, f"Add velocity in {unit} to <limit>."))
-    return found
+    return found + _followers(robot)
+
+
+def _followers(robot: Robot) -> list[CheckRemark]:
+    linkage = robot.linkage
+    following = sorted(set(range(len(linkage.names))) - set(linkage.leads))
+    leader = {k: robot.joint_names[int(np.flatnonzero(linkage.spread[k])[0])] for k in following}
+    if not following:
+        return []
+    said = "; ".join(f"{linkage.names[k]} follows {leader[k]}" for k in following)
+    text = f"{said}: never listed among the joints, and within their limits wherever these are."
+    return [CheckRemark("note", text, f"{robot.urdf_path.name}, <mimic>")]
 
 
 def _turns(low: float, high: float, speed: float) -> list[tuple[str, str]]:

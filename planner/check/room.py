@@ -45,9 +45,9 @@ def check_collision(
         text = f"At home {'; '.join(touching)}."
         remedy = "Shrink the shapes, or list the pair in [collision] ignore."
         found.append(CheckRemark("note", text, f"{urdf}, <collision>", remedy))
-    always = collisions.always_touching
-    if always:
-        text = f"At every pose {'; '.join(always)}: not checked."
+    overlapping = collisions.overlapping
+    if overlapping:
+        text = f"In the middle of all joints' ranges {'; '.join(overlapping)}: not checked."
         remedy = "Shrink the shapes if they are to be checked."
         found.append(CheckRemark("note", text, f"{urdf}, <collision>", remedy))
     return found

@@ -4,8 +4,7 @@ import numpy as np
 
 from planner.check.remark import CheckRemark
 from planner.dynamics.simulation import Simulation
-from planner.robot.config import Compliance
-from planner.robot.robot import BASE
+from planner.robot.config import BASE, Compliance
 
 # By which a stiffness in another unit is told: each spring alone, with the inertia that it moves.
 # Springs of the arms in campaigns/ lie between 5 and 500 Hz.

@@ -16,10 +16,10 @@ from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.identification.parameters import KINDS
 from planner.identification.write_robot import drop_stated_inertias
-from planner.robot.config import EffectTable, entry_of, without_effects
+from planner.robot.config import BASE, EffectTable, entry_of, without_effects
 from planner.robot.massless_base import massless_base
 from planner.robot.mesh_files import copy_meshes
-from planner.robot.robot import BASE, Robot
+from planner.robot.robot import Robot
 from planner.robot.urdf_inertias import urdf_with_inertias
 
 DIGITS = 6  # significant ones in robot.toml: more than any diagnosis knows

@@ -37,7 +37,8 @@ class RobotDrawing:
 
     def move(self, q: np.ndarray) -> None:
         """Bring the robot to q (dof,) in rad (slides: m), at the recording's current time."""
-        for name, angle in zip(self._robot.joint_names, q, strict=True):
+        linkage = self._robot.linkage
+        for name, angle in zip(linkage.names, linkage.at(q), strict=True):
             joint = self._tree.get_joint_by_name(name)
             if joint is not None:
                 transform = joint.compute_transform(float(angle), clamp=False)

@@ -30,21 +30,23 @@ class AngleSlopes:
 
 
 def turned(jacobian: np.ndarray, rigid: np.ndarray, elastic: np.ndarray) -> np.ndarray:
-    """Slopes (..., dof, 6, e) of the elastic columns of a Jacobian (..., 6, v) in its own frame.
+    """Slopes (..., dof, 6, e) of a Jacobian (..., 6, v) in its own frame, of elastic rotations.
 
-    `rigid` (dof,) and `elastic` (e,) are the columns of the joints and of the elastic rotations;
-    those nearer to the floor come first.
+    `rigid` (v, dof) and `elastic` (v, e) say how the joints and the elastic rotations move the v
+    coordinates; those nearer to the floor come first.
     """
-    joint = np.moveaxis(jacobian[..., rigid], -1, -2)[..., None]  # (..., dof, 6, 1)
-    inner = (elastic < rigid[:, None])[:, None]
-    column = np.where(inner, jacobian[..., None, :, elastic], 0.0)
+    turning, giving = (np.flatnonzero(moves.any(axis=1)) for moves in (rigid, elastic))
+    joint = np.moveaxis(jacobian[..., turning], -1, -2)[..., None]  # (..., turning, 6, 1)
+    inner = (giving < turning[:, None])[:, None]
+    column = np.where(inner, jacobian[..., None, :, giving], 0.0)
     linear, angular = slice(0, 3), slice(3, 6)
 
     def cross(a: slice, b: slice) -> np.ndarray:
         return np.cross(joint[..., a, :], column[..., b, :], axis=-2)
 
     moved = cross(angular, linear) + cross(linear, angular)
-    return -np.concatenate([moved, cross(angular, angular)], axis=-2)
+    slopes = -np.concatenate([moved, cross(angular, angular)], axis=-2) @ elastic[giving]
+    return np.moveaxis(np.tensordot(rigid[turning], slopes, axes=(0, -3)), 0, -3)
 
 
 def mass_slopes(
@@ -52,7 +54,7 @@ def mass_slopes(
 ) -> np.ndarray:
     """(n, dof, e, e) of M = Σ Jᵀ I J, of Jacobians (n, B, 6, v) and inertias (B, 6, 6)."""
     slope = turned(bodies, rigid, elastic)
-    momentum = inertia @ bodies[..., elastic]
+    momentum = inertia @ (bodies @ elastic)
     n, _, dof, _, e = slope.shape
     rows = np.moveaxis(slope, (2, 4), (1, 2)).reshape(n, dof * e, -1)
     half = (rows @ momentum.reshape(n, -1, e)).reshape(n, dof, e, e)

@@ -18,17 +18,17 @@ from planner.robot.shapes import (
 
 LIMIT_TOLERANCE = 1e-9  # rad or m
 KEPT = 4  # robots whose collision shapes are at hand
-ALWAYS = 24  # poses at which a pair must touch to be taken for overlapping geometry
 
 
 class Collisions:
     """Says what keeps a robot from standing at a pose.
 
     Checked are all pairs of links except neighbours (shapes at a joint overlap by design), links
-    that touch at every one of a spread of poses (their geometry does, not the robot), and those
-    that robot.toml's [collision] ignores; and every moving link against every [[obstacle]].
-    An obstacle that is always touched stays in: there it is the obstacle that is wrong, and only
-    the engineer can tell. Raises InputError where [collision] names what does not exist.
+    that touch in the middle of all joints' ranges (there, far from all limits, a robot stands free:
+    it is coarse shapes that overlap), and those that robot.toml's [collision] ignores; and every
+    moving link against every [[obstacle]]. An obstacle that is touched there stays in: it is the
+    obstacle that is wrong, and only the engineer can tell. Raises InputError where [collision]
+    names what does not exist.
     """
 
     def __init__(self, robot: Robot):
@@ -68,8 +68,8 @@ class Collisions:
         )
 
     @property
-    def always_touching(self) -> tuple[str, ...]:
-        """Pairs of links that touch at every pose and are not checked, one phrase each."""
+    def overlapping(self) -> tuple[str, ...]:
+        """Pairs of links whose shapes overlap and are not checked, one phrase each."""
         return self._geometry[3]
 
     @property
@@ -88,11 +88,11 @@ class Collisions:
 
     @cached_property
     def _geometry(self) -> tuple[pin.GeometryModel, pin.GeometryData, pin.Data, tuple[str, ...]]:
-        geometry, always = _with_pairs(self.robot)
-        return geometry, self._data(geometry), self.robot.model.createData(), always
+        geometry, overlapping = _with_pairs(self.robot)
+        return geometry, self._data(geometry), self.robot.model.createData(), overlapping
 
     def with_pairs(self) -> tuple[pin.GeometryModel, tuple[str, ...]]:
-        """Shapes with the pairs to check, and which pairs touch at every pose."""
+        """Shapes with the pairs to check, and which pairs of links overlap."""
         robot = self.robot
         geometry = self._links[0].copy()
         links = list(range(geometry.ngeoms))
@@ -100,13 +100,13 @@ class Collisions:
             a, b = geometry.geometryObjects[i], geometry.geometryObjects[j]
             if not self._ignored(geometry, i, j) and not _neighbours(robot.model, a, b):
                 geometry.addCollisionPair(pin.CollisionPair(i, j))
-        always = self._drop_overlapping(geometry)
+        overlapping = self._drop_overlapping(geometry)
         for box in [geometry.addGeometryObject(obj) for obj in _obstacles(robot)]:
             for i in links:
                 moves = geometry.geometryObjects[i].parentJoint > 0
                 if moves and not self._ignored(geometry, i, box):
                     geometry.addCollisionPair(pin.CollisionPair(i, box))
-        return geometry, always
+        return geometry, overlapping
 
     def _data(self, geometry: pin.GeometryModel) -> pin.GeometryData:
         data = geometry.createData()
@@ -126,21 +126,19 @@ class Collisions:
         return any(names == set(pair) for pair in self.robot.config.collision.ignore)
 
     def _drop_overlapping(self, geometry: pin.GeometryModel) -> tuple[str, ...]:
-        """Remove pairs of links that touch at every one of a spread of poses; names them."""
+        """Remove pairs of links that touch in the middle of all ranges; names them."""
         if not len(geometry.collisionPairs):
             return ()
-        rng = np.random.default_rng(0)
-        robot, data, kinematics = self.robot, self._data(geometry), self.robot.model.createData()
-        always = range(len(geometry.collisionPairs))
-        for _ in range(ALWAYS):
-            q = rng.uniform(robot.lower_rad, robot.upper_rad)
-            pin.updateGeometryPlacements(robot.model, kinematics, geometry, data, q)
-            always = [k for k in always if pin.computeCollision(geometry, data, k)]
-        pairs = [(p.first, p.second) for p in geometry.collisionPairs]  # which removals shift
-        dropped = [pin.CollisionPair(*pairs[k]) for k in always]
-        names = [(self._name(geometry, p.first), self._name(geometry, p.second)) for p in dropped]
-        for pair in dropped:
-            geometry.removeCollisionPair(pair)
+        robot, data = self.robot, self._data(geometry)
+        middle = robot.linkage.at((robot.lower_rad + robot.upper_rad) / 2)
+        pin.computeCollisions(robot.model, robot.model.createData(), geometry, data, middle, False)
+        # Numbers: the model's own list moves up under its elements when one of them is removed.
+        pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
+        touching = zip(pairs, list(data.collisionResults), strict=True)
+        dropped = [pair for pair, result in touching if result.isCollision()]
+        for i, j in dropped:
+            geometry.removeCollisionPair(pin.CollisionPair(i, j))
+        names = [(self._name(geometry, i), self._name(geometry, j)) for i, j in dropped]
         return tuple(dict.fromkeys(" touches ".join(pair) for pair in names))
 
     def limits(self, q: np.ndarray) -> tuple[str, ...]:
@@ -166,8 +164,8 @@ class Collisions:
         geometry, data, kinematics, _ = self._geometry
         if not len(geometry.collisionPairs):
             return ()
-        q = np.asarray(q, dtype=float)
-        pin.computeCollisions(self.robot.model, kinematics, geometry, data, q, False)
+        x = self.robot.linkage.at(q)
+        pin.computeCollisions(self.robot.model, kinematics, geometry, data, x, False)
         found = []
         for pair, result in zip(geometry.collisionPairs, data.collisionResults, strict=True):
             if result.isCollision():
@@ -182,8 +180,8 @@ class Collisions:
         geometry, data, kinematics, _ = self._geometry
         if not len(geometry.collisionPairs):
             return True
-        q = np.asarray(q, dtype=float)
-        return not pin.computeCollisions(self.robot.model, kinematics, geometry, data, q, True)
+        x = self.robot.linkage.at(q)
+        return not pin.computeCollisions(self.robot.model, kinematics, geometry, data, x, True)
 
     def violations(self, q: np.ndarray) -> tuple[str, ...]:
         """All that is wrong with a pose (dof,), limits first; empty when it is free."""

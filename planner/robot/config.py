@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import msgspec
 
+BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 LOSS_FACTOR_BELOW = 2.0  # of a spring: more is a damper
 SLIDE_SD_MM = 0.5  # as far as 0.05° take a tool at half a metre
 STATED_OF_SLIDE = {"stiffness": "stiffness_n_m", "damping": "damping_n_s_m"}
@@ -244,6 +245,7 @@ class RobotConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     `held` says where joints stay that do not move in the tests: NAME_m = 1.2 or NAME_mm = 1200 for
     a rail, NAME_deg = 30 for a turntable. Others may slide or turn from pose to pose; wherever
     joints are listed (`joints_deg`), the number of one that slides (prismatic) is in millimetres.
+    Joints that follow others (<mimic> in the URDF) go with them and are listed nowhere.
 
     Unless `geometric_stiffness` is false the robot is linearised where it sags under gravity, and
     gravity's own stiffness, of the size of weight times height, is added.

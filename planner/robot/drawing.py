@@ -32,15 +32,15 @@ class RobotLines:
 def robot_lines(robot: Robot, q: np.ndarray, links: tuple[LinkBody, ...]) -> RobotLines:
     """The robot at q (dof,) in rad."""
     model, data = robot.model, robot.model.createData()
-    pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
+    pin.framesForwardKinematics(model, data, robot.linkage.at(q))
 
     def place_of(name: str) -> pin.SE3:
         return data.oMf[model.getFrameId(name, pin.FrameType.BODY)]
 
-    axes = zip(robot.joint_names, robot.joint_axes, strict=True)
+    axes = zip(robot.joint_names, robot.joint_axes, robot.linkage.leads, strict=True)
     joints = [
-        (name, data.oMi[k].translation.copy(), data.oMi[k].rotation @ axis)
-        for k, (name, axis) in enumerate(axes, 1)
+        (name, data.oMi[k + 1].translation.copy(), data.oMi[k + 1].rotation @ axis)
+        for name, axis, k in axes
     ]
     named = {robot.config.tcp_frame: robot.tcp_id, robot.config.sensor_frame: robot.sensor_id}
     frames = [

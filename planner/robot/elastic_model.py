@@ -78,7 +78,6 @@ class ElasticModel:
         weighed = self._virtual if inertia_change is None else virtual_model(robot)
         self._model, self._weighed = self._virtual.model, weighed.model
         self._elastic = self._virtual.elastic
-        self._grid = np.ix_(self._elastic, self._elastic)
         self._check_mass()
 
     def _check_mass(self) -> None:
@@ -153,7 +152,7 @@ class ElasticModel:
         data, weight = self._model.createData(), self._weighed.createData()
         whole = np.empty((n, self._model.nv, self._model.nv))
         geometric, own_axis = np.zeros((n, e, e)), np.arange(e)
-        out = [np.empty((n, len(group), 6, e)) for group in ids]
+        out = [np.empty((n, len(group), 6, self._model.nv)) for group in ids]
         for i, row in enumerate(q):
             full = self._standing(row, weight)
             if robot.config.geometric_stiffness:
@@ -165,10 +164,11 @@ class ElasticModel:
                     frame = self._virtual.frames[number]
                     jacobians[i, k] = pin.computeFrameJacobian(
                         self._model, data, full, frame, pin.LOCAL
-                    )[:, self._elastic]
+                    )
+        out = [jacobians @ self._elastic for jacobians in out]
         # Of the mass matrix the upper half is given.
         whole = np.triu(whole) + np.swapaxes(np.triu(whole, 1), 1, 2)
-        mass = whole[:, *self._grid]
+        mass = self._elastic.T @ whole @ self._elastic
         hit, sensor = (jacobians[:, :, :3].reshape(n, -1, e) for jacobians in out)
         hit_turn, sensor_turn = (jacobians[:, :, 3:].reshape(n, -1, e) for jacobians in out)
         return Matrices(mass, hit, sensor, geometric, hit_turn, sensor_turn)
@@ -211,13 +211,12 @@ class ElasticModel:
         """
         q = np.atleast_2d(q)
         data, weight = self._model.createData(), self._weighed.createData()
-        out = np.empty((len(q), len(self.bodies), 6, self.size))
+        out = np.empty((len(q), len(self.bodies), 6, self._model.nv))
         for i, row in enumerate(q):
             pin.computeJointJacobians(self._model, data, self._standing(row, weight))
             for b, joint in enumerate(self._virtual.carriers):
-                jacobian = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
-                out[i, b] = jacobian[:, self._elastic]
-        return out
+                out[i, b] = pin.getJointJacobian(self._model, data, joint, pin.LOCAL)
+        return out @ self._elastic
 
     def sag(self, q: np.ndarray) -> np.ndarray:
         """By how much the springs give (n, e) under the weight at q (n, dof), in rad (slides: m).
@@ -227,19 +226,20 @@ class ElasticModel:
         q, data = np.atleast_2d(q), self._weighed.createData()
         out = np.empty((len(q), self.size))
         for i, row in enumerate(q):
-            full = np.zeros(self._model.nq)
-            full[self._virtual.rigid] = row
-            weight = pin.computeGeneralizedGravity(self._weighed, data, full)
-            out[i] = -weight[self._elastic] / (self._carrying + self._with_angle(row))
+            weight = pin.computeGeneralizedGravity(self._weighed, data, self._upright(row))
+            out[i] = -(weight @ self._elastic) / (self._carrying + self._with_angle(row))
         return out
 
     def _standing(self, q: np.ndarray, data: pin.Data) -> np.ndarray:
         """Coordinates of the virtual model at q (dof,), sagged unless robot.toml says otherwise."""
-        full = np.zeros(self._model.nq)
-        full[self._virtual.rigid] = q
-        if self.robot.config.geometric_stiffness:
-            self._sag(full, self._carrying + self._with_angle(q), data)
-        return full
+        upright = self._upright(q)
+        if not self.robot.config.geometric_stiffness:
+            return upright
+        return self._sagged(upright, self._carrying + self._with_angle(q), data)
+
+    def _upright(self, q: np.ndarray) -> np.ndarray:
+        """Coordinates of the virtual model at q (dof,), without weight."""
+        return self._virtual.rigid @ q + self._virtual.offset
 
     def _with_angle(self, q: np.ndarray) -> np.ndarray:
         """What harmonics of the joint angles q (dof,) add to the stiffness (e,)."""
@@ -259,14 +259,16 @@ class ElasticModel:
             change[joint, number] += wave.order * slope
         return change
 
-    def _sag(self, full: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> None:
-        """To where springs of this stiffness (e,) carry the weight: K δ = −g(q + δ)."""
+    def _sagged(self, upright: np.ndarray, stiffness: np.ndarray, data: pin.Data) -> np.ndarray:
+        """Where springs of this stiffness (e,) carry the weight: K δ = −g(q + δ)."""
+        full = upright
         for _ in range(SAG_STEPS):
             weight = pin.computeGeneralizedGravity(self._weighed, data, full)
-            full[self._elastic] = -weight[self._elastic] / stiffness
+            full = upright - self._elastic @ ((weight @ self._elastic) / stiffness)
+        return full
 
     def _gravity_stiffness(self, full: np.ndarray, data: pin.Data) -> np.ndarray:
         """Second derivative of the potential energy of the weight, (e, e)."""
         gradient = pin.computeGeneralizedGravityDerivatives(self._weighed, data, full)
-        part = np.array(gradient)[self._grid]
+        part = self._elastic.T @ np.array(gradient) @ self._elastic
         return (part + part.T) / 2

@@ -6,6 +6,7 @@ import numpy as np
 
 from planner.errors import NoPoseLeftError
 from planner.robot.collision import Collisions
+from planner.robot.inverse_kinematics import singularity
 from planner.robot.robot import Robot
 
 AHEAD = 0.55  # of the arm's length: where a workpiece is, seen from the shoulder
@@ -14,7 +15,7 @@ NARROWER = 0.7  # by which all are, as long as too many of their poses cannot be
 REACHED = 0.75  # share of poses in the ranges that must be free
 POSES, LOOKED_AT, NARROWINGS, SOME = 800, 48, 8, 8
 DOWN = 0.3  # how much the tool's direction counts, against distances in units of the arm
-SINGULAR = 0.01  # see `Robot.singularity`
+SINGULAR = 0.01  # see `singularity`
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -27,7 +28,7 @@ def workspace_in_front(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
     """
     collisions, best, width = Collisions(robot), None, 0.0
     poses = _by_nearness(robot)
-    regular = (q for q in poses if robot.singularity(q[None])[0] >= SINGULAR)
+    regular = (q for q in poses if singularity(robot, q[None])[0] >= SINGULAR)
     free = [*islice(filter(collisions.free, regular), SOME)]
     free = free or [*islice(filter(collisions.free, poses), SOME)]  # of one singular everywhere
     for at in free:

@@ -55,10 +55,12 @@ def carried(robot: Robot, payload_kg: float) -> np.ndarray:
     data, rng = model.createData(), np.random.default_rng(0)
     largest = np.zeros(len(robot.joint_names))
     for _ in range(POSES):
-        pin.centerOfMass(model, data, rng.uniform(robot.lower_rad, robot.upper_rad), True)
+        at = robot.linkage.at(rng.uniform(robot.lower_rad, robot.upper_rad))
+        pin.centerOfMass(model, data, at, True)
         for i, axis in enumerate(robot.joint_axes):
-            mass = data.mass[i + 1]
-            moment = mass * np.linalg.norm(np.cross(axis, data.com[i + 1]))
+            joint = robot.linkage.leads[i] + 1
+            mass = data.mass[joint]
+            moment = mass * np.linalg.norm(np.cross(axis, data.com[joint]))
             carries = i in robot.tool_joints
             torque = gravity * (moment + carries * payload_kg * lever)
             force = gravity * mass

@@ -1,4 +1,4 @@
-"""Joints that stay where they are: rails, turntables, joints that follow others.
+"""Joints that stay where they are: rails, turntables.
 
 [held] of robot.toml says where. In the URDF they become fixed joints there, with all that they
 carry, so that nothing else has to know of them.
@@ -14,16 +14,18 @@ import pinocchio as pin
 from planner.errors import InputError
 
 TURNING, SLIDING = ("revolute", "continuous"), ("prismatic",)
+Joints = Mapping[str, ElementTree.Element]  # by name
 UNITS = {"_deg": TURNING, "_m": SLIDING, "_mm": SLIDING}
 IN_SI = {"_deg": np.pi / 180, "_m": 1.0, "_mm": 1e-3}
 
 
-def hold(root: ElementTree.Element, held: Mapping[str, float], urdf: Path) -> None:
-    """Make the joints of `held` fixed ones; its keys end in _deg (turning) or _m, _mm (sliding).
+def held_places(joints: Joints, held: Mapping[str, float], urdf: Path) -> dict[str, float]:
+    """Where joints stay, in rad or m, by name: keys of `held` end in _deg (turning), _m or _mm.
 
-    Raises InputError where a key names no such joint, or a place beyond its limits.
+    Joints that are fixed are left out: a text that was made from a robot is read again. Raises
+    InputError where a key names no such joint, or a place beyond its limits.
     """
-    joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
+    found = {}
     for key, value in held.items():
         unit = next((u for u in UNITS if key.endswith(u)), "")
         joint = joints.get(key.removesuffix(unit))
@@ -33,19 +35,21 @@ def hold(root: ElementTree.Element, held: Mapping[str, float], urdf: Path) -> No
                 f"{urdf}: [held] {key} names no joint; give NAME_deg or NAME_m of {known}."
             )
         if joint.get("type") == "fixed":
-            continue  # held already, where a text that was made from this robot is read again
+            continue
         if joint.get("type") not in UNITS[unit]:
             other = "_m" if unit == "_deg" else "_deg"
             raise InputError(
                 f"{urdf}: joint {joint.get('name')} is {joint.get('type')}; give [held] "
                 f"{joint.get('name')}{other}."
             )
-        _fix(joint, value * IN_SI[unit], unit, key, urdf)
+        place = value * IN_SI[unit]
+        _check_limits(joint, place, 1 / IN_SI[unit], key, urdf)
+        found[joint.get("name", "")] = place
+    return found
 
 
-def _fix(joint: ElementTree.Element, value: float, unit: str, key: str, urdf: Path) -> None:
+def fix(joint: ElementTree.Element, value: float, urdf: Path) -> None:
     """Make a joint fixed at its coordinate `value`, in rad or m."""
-    _check_limits(joint, value, 1 / IN_SI[unit], key, urdf)
     origin, axis = joint.find("origin"), joint.find("axis")
     if origin is None:
         origin = ElementTree.SubElement(joint, "origin")

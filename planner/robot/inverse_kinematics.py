@@ -73,6 +73,18 @@ def solve(
     return _unreached(miss_m)
 
 
+def singularity(robot: Robot, q: np.ndarray) -> np.ndarray:
+    """Distance (n,) from singular poses of q (n, dof) in rad; 0 at one.
+
+    Least singular value of the tcp's Jacobian, its linear part, and what slides, in units of
+    the arm's length.
+    """
+    arm = robot.arm_m or 1.0  # of a gantry whose joints all meet in one point
+    scale = np.repeat([1 / arm, 1.0], 3)[:, None] * np.where(robot.joints.slides, arm, 1.0)
+    both = [np.linalg.svd(scale * robot.jacobian(row), compute_uv=False)[-1] for row in q]
+    return np.array(both)
+
+
 def _unreached(miss_m: float) -> InverseResult:
     text = f"{OUT_OF_REACH}: the tool comes no closer than {miss_m:.3f} m in this orientation"
     return InverseResult(None, text, OUT_OF_REACH)
@@ -90,7 +102,7 @@ def _beyond_limits(
         return None, ""
     middle = (robot.lower_rad + robot.upper_rad) / 2
     whole = 2 * np.pi * np.round((q - middle) / (2 * np.pi))
-    q = q - np.where(robot.joints.slides, 0.0, whole)
+    q = q - np.where(robot.linkage.comes_round(robot.tool_chain), whole, 0.0)
     broken = Collisions(robot).limits(q)
     return (None, broken[0]) if broken else (q, "")
 
@@ -99,12 +111,10 @@ def _descend(
     robot: Robot, target: pin.SE3, start: np.ndarray, bounded: bool, iterations: int = 60
 ) -> tuple[np.ndarray | None, float]:
     """Solution or None, and the position error left (m)."""
-    model, data, frame = robot.model, robot._data, robot.tcp_id
     q, damping = start.copy(), DAMPING
-    best, since = np.inf, 0
+    best, since, at = np.inf, 0, robot.placement(q)
     for _ in range(iterations):
-        pin.framesForwardKinematics(model, data, q)
-        error = pin.log6(data.oMf[frame].actInv(target)).vector
+        error = pin.log6(at.actInv(target)).vector
         size = float(np.linalg.norm(error))
         if size < TOLERANCE:
             return q, 0.0
@@ -113,7 +123,7 @@ def _descend(
         best = min(best, size)
         if since == STALLED:
             break
-        jacobian = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
+        jacobian = robot.jacobian(q)
         step = _step(jacobian, error, damping)
         if bounded:
             # Joints pushed against a limit are taken out, and the step is found without them.
@@ -124,7 +134,8 @@ def _descend(
         q = q + step * min(1.0, 0.5 / max(longest, 1e-12))
         if bounded:
             q = np.clip(q, robot.lower_rad, robot.upper_rad)
-    left = float(np.linalg.norm(target.translation - data.oMf[frame].translation))
+        at = robot.placement(q)
+    left = float(np.linalg.norm(target.translation - at.translation))
     return None, left
 
 

@@ -50,7 +50,7 @@ def link_bodies(robot: Robot) -> tuple[LinkBody, ...]:
     root = ElementTree.fromstring(robot.urdf_text)
     left = (*robot.left_out, *leave_out_unreadable(root))
     shapes, tables = shape_corners(root), {table.link: table for table in robot.config.link}
-    names, lacking = ("", *robot.joint_names), {one.link for one in left}
+    names, lacking = ("", *robot.linkage.names), {one.link for one in left}
     found = []
     for link in root.findall("link"):
         name = link.get("name", "")
@@ -95,7 +95,7 @@ def guessed_masses(links: Sequence[LinkBody]) -> str:
 def lowest_m(robot: Robot, q: np.ndarray, joints: Sequence[str]) -> float:
     """How low in the world anything is at q (dof,) that these joints move directly; inf: none."""
     data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, np.asarray(q, dtype=float))
+    pin.framesForwardKinematics(robot.model, data, robot.linkage.at(q))
     corners = shape_corners(ElementTree.fromstring(robot.urdf_text))
     found = [np.inf]
     for body in link_bodies(robot):

@@ -14,12 +14,13 @@ from planner.recording.points import SENSOR, TCP, Layout, PointNames
 from planner.robot.config import Compliance, PointTable, RobotConfig
 from planner.robot.config_file import check_own_springs, load_config, with_effects
 from planner.robot.link_inertias import state_inertias
+from planner.robot.linkage import Linkage
 from planner.robot.points import PREFIX, check_points, names_of, with_points
+from planner.robot.robot_entries import check_entries
 from planner.robot.shapes import UnusableShape, leave_out_unusable
-from planner.robot.urdf import build_model, joint_axes, joint_slides, parse_urdf, read_urdf
+from planner.robot.urdf import build_model, parse_urdf, read_urdf
 
 LEVER_M = 0.3  # half the length of a carriage, chosen
-BASE = "base"  # as the joint of a [[compliance]]: between floor and robot
 # A link and the joint that carries it may share a name; the link is meant.
 FRAME_TYPES = (
     pin.FrameType.BODY,
@@ -33,6 +34,7 @@ FRAME_TYPES = (
 class Robot:
     """Immutable; angles in rad, lengths in m, joints in the URDF's actuated order.
 
+    Joints that follow others (<mimic>) are none of them: only `model` and `linkage` have them too.
     Joint coordinates q are in rad, of joints that slide in m; `joints` converts them from and to
     the degrees and millimetres of files and answers.
     """
@@ -42,7 +44,7 @@ class Robot:
     urdf_path: Path
     urdf_text: str  # as it is used: limits for continuous joints, meshes named in full
     model: pin.Model
-    joint_axes: tuple[np.ndarray, ...]  # unit vectors in the joints' own frames
+    linkage: Linkage
     joints: JointUnits
     left_out: tuple[UnusableShape, ...] = ()  # shapes of the URDF that cannot be used
 
@@ -76,11 +78,11 @@ class Robot:
         state_inertias(root, config.link)
         text = ElementTree.tostring(root, encoding="unicode")
         model = build_model(text, urdf)
-        names = tuple(model.names)[1:]
-        axes, joints = joint_axes(root, names), JointUnits(names, joint_slides(root, names))
-        robot = cls(config, robot_toml, urdf, text, model, axes, joints, left_out)
-        robot._check()
-        check_own_springs(config, joints, axes, robot_toml)
+        linkage = Linkage.of(root, tuple(model.names)[1:])
+        joints = JointUnits(linkage.leading(linkage.names), linkage.leading(linkage.slides))
+        robot = cls(config, robot_toml, urdf, text, model, linkage, joints, left_out)
+        check_entries(robot)
+        check_own_springs(config, joints, robot.joint_axes, robot_toml)
         check_points(config.point, robot_toml)
         with_points(model, config.point, [robot._link_of_point(p) for p in config.point])
         _ = robot.points
@@ -93,53 +95,24 @@ class Robot:
             return own[point.name]
         return self.frame_id(f"[[point]] {point.name}: link", point.link)
 
-    def _check(self) -> None:
-        for entry, name in (
-            ("tcp_frame", self.config.tcp_frame),
-            ("sensor_frame", self.config.sensor_frame),
-        ):
-            if self.model.frames[self.frame_id(entry, name)].parentJoint == 0:
-                raise InputError(
-                    f'{self.path}: {entry} "{name}" is fixed to the base and never moves; name a '
-                    f"frame on the tool."
-                )
-        for block in self.config.compliance:
-            if block.joint not in (*self.joint_names, BASE) and not self.carries(block.joint):
-                raise InputError(
-                    f'{self.path}: [[compliance]] joint "{block.joint}" is no actuated joint of '
-                    f"{self.urdf_path.name}, nor a link with one beyond; it has "
-                    f"{', '.join(self.joint_names)}."
-                )
-        for block in (*self.config.resonator, *self.config.harmonic):
-            if block.joint not in self.joint_names:
-                raise InputError(
-                    f'{self.path}: [[effects]] joint "{block.joint}" is no actuated joint of '
-                    f"{self.urdf_path.name}; it has {', '.join(self.joint_names)}."
-                )
-        for block in self.config.payload:
-            self.frame_id("[[payload]] link", block.link)
-        for table in self.config.link:
-            self.frame_id("[[link]] link", table.link)
-        bad = np.flatnonzero(~(self.lower_rad < self.upper_rad))
-        if bad.size:
-            raise InputError(
-                f"{self.urdf_path}: {self.joint_names[bad[0]]} has no range between its limits; "
-                f"give lower and upper in {'m' if self.joints.slides[bad[0]] else 'rad'}."
-            )
-
     @property
     def name(self) -> str:
         """Name in robot.toml."""
         return self.config.name
 
-    @cached_property
+    @property
     def joint_names(self) -> tuple[str, ...]:
         """Actuated joints in order."""
-        return tuple(self.model.names)[1:]
+        return self.joints.names
+
+    @cached_property
+    def joint_axes(self) -> tuple[np.ndarray, ...]:
+        """Unit vectors (3,) of the actuated joints in their own frames."""
+        return self.linkage.leading(self.linkage.axes)
 
     def link_of(self, joint: str) -> str:
-        """The link that a joint moves; KeyError if there is no such joint."""
-        number = (None, *self.joint_names).index(joint)
+        """The link that a joint moves, of all joints; KeyError if there is no such joint."""
+        number = (None, *self.linkage.names).index(joint)
         for frame in self.model.frames:
             if frame.type == pin.FrameType.BODY and frame.parentJoint == number:
                 return frame.name
@@ -173,26 +146,27 @@ class Robot:
 
     def carries(self, link: str) -> tuple[int, int] | None:
         """Numbers of the joint that moves a link and of the one that it carries, if it does."""
-        for joint, name in enumerate(self.joint_names, 1):
+        for joint, name in enumerate(self.linkage.names, 1):
             if self.link_of(name) == link:
                 beyond = [k for k in range(1, self.model.njoints) if self.model.parents[k] == joint]
+                beyond.sort(key=lambda k: k - 1 not in self.linkage.leads)  # balancers come last
                 return (joint, beyond[0]) if beyond else None
         return None
 
     @cached_property
     def lower_rad(self) -> np.ndarray:
         """Lower joint limits (dof,) in rad, of joints that slide in m."""
-        return np.array(self.model.lowerPositionLimit)
+        return np.array(self.model.lowerPositionLimit)[list(self.linkage.leads)]
 
     @cached_property
     def upper_rad(self) -> np.ndarray:
         """Upper joint limits (dof,) in rad, of joints that slide in m."""
-        return np.array(self.model.upperPositionLimit)
+        return np.array(self.model.upperPositionLimit)[list(self.linkage.leads)]
 
     @cached_property
     def velocity_rad_s(self) -> np.ndarray:
         """Joint speeds (dof,) of the URDF in rad/s, of joints that slide in m/s."""
-        return np.array(self.model.velocityLimit)
+        return np.array(self.model.velocityLimit)[list(self.linkage.leads)]
 
     @cached_property
     def _data(self) -> pin.Data:
@@ -238,49 +212,53 @@ class Robot:
         )
 
     @cached_property
-    def shoulder_m(self) -> np.ndarray:
-        """Where the first joint of the tcp's chain stands in the world (3,)."""
-        joint = self.model.frames[self.tcp_id].parentJoint
-        while self.model.parents[joint] != 0:
-            joint = self.model.parents[joint]
-        return np.array(self.model.jointPlacements[joint].translation)
-
-    @cached_property
-    def reach_m(self) -> float:
-        """No pose brings the tcp farther from the shoulder than this (arm pulled straight)."""
-        farthest = np.maximum(np.abs(self.lower_rad), np.abs(self.upper_rad))
-        slides = [k for k in self.tool_joints if self.joints.slides[k]]
-        return self.arm_m + float(np.sum(farthest[slides]))
-
-    @cached_property
-    def tool_joints(self) -> tuple[int, ...]:
-        """Places in q of the joints that move the tcp."""
+    def tool_chain(self) -> tuple[int, ...]:
+        """Places in `linkage` of all joints between the base and the tcp, from the tcp."""
         found, joint = [], self.model.frames[self.tcp_id].parentJoint
         while joint != 0:
             found.append(joint - 1)
             joint = self.model.parents[joint]
-        return tuple(sorted(found))
+        return tuple(found)
+
+    @cached_property
+    def shoulder_m(self) -> np.ndarray:
+        """Where the first joint of the tcp's chain stands in the world (3,)."""
+        return np.array(self.model.jointPlacements[self.tool_chain[-1] + 1].translation)
+
+    @cached_property
+    def reach_m(self) -> float:
+        """No pose brings the tcp farther from the shoulder than this (arm pulled straight)."""
+        ends = np.abs([self.linkage.at(self.lower_rad), self.linkage.at(self.upper_rad)])
+        slides = [k for k in self.tool_chain if self.linkage.slides[k]]
+        return self.arm_m + float(np.sum(ends.max(axis=0)[slides]))
+
+    @cached_property
+    def tool_joints(self) -> tuple[int, ...]:
+        """Places in q of the joints that move the tcp."""
+        moved = self.linkage.spread[list(self.tool_chain)]
+        return tuple(int(k) for k in np.flatnonzero(np.any(moved != 0, axis=0)))
 
     @cached_property
     def arm_m(self) -> float:
         """Length of the arm pulled straight, joints that slide at their zeros."""
-        frame = self.model.frames[self.tcp_id]
-        length, joint = float(np.linalg.norm(frame.placement.translation)), frame.parentJoint
-        while self.model.parents[joint] != 0:
-            length += float(np.linalg.norm(self.model.jointPlacements[joint].translation))
-            joint = self.model.parents[joint]
-        return length
+        places = [self.model.jointPlacements[k + 1] for k in self.tool_chain[:-1]]
+        places.append(self.model.frames[self.tcp_id].placement)
+        return float(sum(np.linalg.norm(place.translation) for place in places))
+
+    def placement(self, q: np.ndarray) -> pin.SE3:
+        """Where the tcp is in the world at q (dof,); good until the next call."""
+        pin.framesForwardKinematics(self.model, self._data, self.linkage.at(q))
+        return self._data.oMf[self.tcp_id]
 
     def forward(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rotation (3, 3) and position (3,) of the tcp in the world at q (dof,)."""
-        pin.framesForwardKinematics(self.model, self._data, np.asarray(q, dtype=float))
-        placement = self._data.oMf[self.tcp_id]
+        placement = self.placement(q)
         return placement.rotation.copy(), placement.translation.copy()
 
     def joint_places(self, q: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each joint: place (3,) and axis (3,) in the world at q (dof,)."""
-        pin.forwardKinematics(self.model, self._data, np.asarray(q, dtype=float))
-        placed = zip(self.joint_axes, list(self._data.oMi)[1:], strict=True)
+        """Of each joint of q: place (3,) and axis (3,) in the world at q (dof,)."""
+        pin.forwardKinematics(self.model, self._data, self.linkage.at(q))
+        placed = zip(self.joint_axes, self.linkage.leading(list(self._data.oMi)[1:]), strict=True)
         return [(place.translation.copy(), place.rotation @ axis) for axis, place in placed]
 
     def forward_batch(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -292,20 +270,10 @@ class Robot:
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Jacobian (6, dof) of the tcp in its own frame, linear part first."""
-        return pin.computeFrameJacobian(
-            self.model, self._data, np.asarray(q, dtype=float), self.tcp_id, pin.LOCAL
+        of_all = pin.computeFrameJacobian(
+            self.model, self._data, self.linkage.at(q), self.tcp_id, pin.LOCAL
         )
-
-    def singularity(self, q: np.ndarray) -> np.ndarray:
-        """Distance (n,) from singular poses of q (n, dof) in rad; 0 at one.
-
-        Least singular value of the tcp's Jacobian, its linear part, and what slides, in units of
-        the arm's length.
-        """
-        arm = self.arm_m or 1.0  # of a gantry whose joints all meet in one point
-        scale = np.repeat([1 / arm, 1.0], 3)[:, None] * np.where(self.joints.slides, arm, 1.0)
-        both = [np.linalg.svd(scale * self.jacobian(row), compute_uv=False)[-1] for row in q]
-        return np.array(both)
+        return of_all @ self.linkage.spread
 
 
 def _resolved(robot_toml: Path, urdf: str) -> Path:

@@ -42,10 +42,11 @@ def _body(robot: Robot, number: int) -> BodyShape:
 def _ends(robot: Robot, joint: int) -> list[np.ndarray]:
     """Where a joint is on what carries it, (3,) each: of one that slides, both ends of its way."""
     place = robot.model.jointPlacements[joint]
-    if not robot.joints.slides[joint - 1]:
+    linkage, own = robot.linkage, joint - 1
+    if not linkage.slides[own]:
         return [place.translation]
-    way = robot.lower_rad[joint - 1], robot.upper_rad[joint - 1]
-    return [place.translation + place.rotation @ (v * robot.joint_axes[joint - 1]) for v in way]
+    way = linkage.at(robot.lower_rad)[own], linkage.at(robot.upper_rad)[own]
+    return [place.translation + place.rotation @ (v * linkage.axes[own]) for v in way]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +71,6 @@ def skeleton(robot: Robot, q: np.ndarray) -> Skeleton:
 def placements(robot: Robot, q: np.ndarray, frames: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
     """Rotations (n, 3, 3) and places (n, 3) of frames, by Pinocchio's numbers, in the world."""
     data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, np.asarray(q, float))
+    pin.framesForwardKinematics(robot.model, data, robot.linkage.at(q))
     rotation = np.array([data.oMf[i].rotation for i in frames]).reshape(-1, 3, 3)
     return rotation, np.array([data.oMf[i].translation for i in frames]).reshape(-1, 3)

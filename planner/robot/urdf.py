@@ -13,7 +13,8 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
-from planner.robot.held_joints import SLIDING, TURNING, hold
+from planner.robot.followers import follows, join_followers, narrow_leaders
+from planner.robot.held_joints import SLIDING, TURNING, fix, held_places
 from planner.robot.xacro_source import urdf_source
 
 LARGEST, FARTHEST_M = 1e7, 1e3  # kg, kg·m, kg·m² of what turns; between joints: no robot has it
@@ -42,11 +43,7 @@ def read_urdf(urdf: Path, robot_toml: Path, held: Mapping[str, float]) -> Elemen
 def parse_urdf(text: bytes | str, urdf: Path, held: Mapping[str, float]) -> ElementTree.Element:
     """The same of a URDF's text; errors name the file `urdf`."""
     root = _root(text, urdf)
-    hold(root, held, urdf)
-    moving = [joint for joint in root.findall("joint") if joint.get("type") not in FIXED]
-    for joint in moving:
-        _complete(joint, urdf)
-    if not moving:
+    if not _settle_joints(root, urdf, held):
         raise InputError(f"{urdf} has no joint that moves; name the URDF of a robot arm.")
     return root
 
@@ -70,6 +67,22 @@ def _root(text: bytes | str, urdf: Path) -> ElementTree.Element:
     return root
 
 
+def _settle_joints(root: ElementTree.Element, urdf: Path, held: Mapping[str, float]) -> int:
+    """Hold, join and complete the joints; returns how many move."""
+    joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
+    places = held_places(joints, held, urdf)
+    join_followers(joints, places, urdf)
+    for name, place in places.items():
+        fix(joints[name], place, urdf)
+    moving = [joint for joint in joints.values() if joint.get("type") not in FIXED]
+    for joint in (joint for joint in moving if follows(joint) is None):
+        _complete(joint, urdf)
+    narrow_leaders(joints, urdf)
+    for joint in (joint for joint in moving if follows(joint) is not None):
+        _complete(joint, urdf)
+    return len(moving)
+
+
 def build_model(text: str, urdf: Path) -> pin.Model:
     """Pinocchio's model; InputError with the parser's own words where it refuses or skips."""
     with quiet() as said:
@@ -85,17 +98,10 @@ def build_model(text: str, urdf: Path) -> pin.Model:
     return model
 
 
-def joint_axes(root: ElementTree.Element, names: tuple[str, ...]) -> tuple[np.ndarray, ...]:
-    """Unit axes (3,) of the named joints in their own frames."""
-    joints = {joint.get("name"): joint for joint in root.findall("joint")}
-    axes = [numbers(_axis_text(joints[name])) for name in names]
-    return tuple(axis / np.linalg.norm(axis) for axis in axes)
-
-
-def joint_slides(root: ElementTree.Element, names: tuple[str, ...]) -> tuple[bool, ...]:
-    """Which of the named joints slide along their axes instead of turning about them."""
-    joints = {joint.get("name"): joint for joint in root.findall("joint")}
-    return tuple(joints[name].get("type") in SLIDING for name in names)
+def joint_axis(joint: ElementTree.Element) -> np.ndarray:
+    """Unit axis (3,) of a joint in its own frame."""
+    axis = numbers(_axis_text(joint))
+    return axis / np.linalg.norm(axis)
 
 
 @contextmanager
@@ -151,12 +157,6 @@ def _complete(joint: ElementTree.Element, urdf: Path) -> None:
     if axis.shape != (3,) or not 1e-6 < np.linalg.norm(axis) < np.inf:
         raise InputError(
             f'{urdf}: joint {name} has axis "{_axis_text(joint)}"; give 3 numbers, not all 0.'
-        )
-    if joint.find("mimic") is not None:
-        raise InputError(
-            f"{urdf}: joint {name} follows another joint (<mimic>), which is not simulated; give "
-            f"[held] {name}{'_m' if kind in SLIDING else '_deg'} in robot.toml if it stands still "
-            f"in the tests, or leave <mimic> out and state where it stands in every pose."
         )
     if kind == "continuous":
         speed = "3.14" if limit is None else limit.get("velocity", "3.14")

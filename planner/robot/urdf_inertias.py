@@ -5,8 +5,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pinocchio as pin
 
+from planner.robot.config import BASE
 from planner.robot.link_inertias import link_inertia, state_inertias, write_inertia
-from planner.robot.robot import BASE, Robot
+from planner.robot.robot import Robot
 from planner.robot.virtual_joints import OUTER, SMALL, body_inertia
 from planner.robot.xacro_source import urdf_source
 

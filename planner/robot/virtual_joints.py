@@ -7,8 +7,9 @@ import numpy as np
 import pinocchio as pin
 
 from planner.errors import InputError
+from planner.robot.config import BASE
 from planner.robot.points import PREFIX
-from planner.robot.robot import BASE, Robot
+from planner.robot.robot import Robot
 
 SMALL = "resonator"  # and its number: a body of its own too
 BETWEEN = 0.75  # share of a rod's second moment that its halves' centres have
@@ -17,15 +18,18 @@ OUTER = ", outer half"  # of a link that bends: a body of its own
 
 @dataclass(frozen=True, eq=False)
 class VirtualModel:
-    """Model in whose coordinates the robot's own joints and the elastic ones have their places.
+    """Model whose coordinates are x = rigid · q + offset + elastic · δ.
 
-    `elastic` follows robot.toml, resonators last, `bodies` names what moves (joints, the base
-    where it is elastic, the outer halves of links that bend, resonators), `carriers` are the
-    joints of `model` that carry them, `frames` translates the robot's frame numbers.
+    `rigid` (n, dof) moves its joints, followers too, with those of the robot, `elastic` (n, e) with
+    the elastic degrees of freedom: those of robot.toml, resonators last. `bodies` names what moves
+    (joints, the base where it is elastic, the outer halves of links that bend, resonators),
+    `carriers` are the joints of `model` that carry them, `frames` translates the robot's frame
+    numbers.
     """
 
     model: pin.Model
     rigid: np.ndarray
+    offset: np.ndarray
     elastic: np.ndarray
     bodies: tuple[str, ...]
     carriers: tuple[int, ...]
@@ -38,7 +42,7 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
     """The virtual model; inertia_change (bodies, 10) is added to the inertias of its bodies."""
     source, model = robot.model, pin.Model()
     model.gravity = pin.Motion(np.array([*robot.config.gravity, 0.0, 0.0, 0.0]))
-    last, ends, rigid, elastic = _add_joints(robot, model)
+    last, ends, own, springs = _add_joints(robot, model)
     names: list[str] = []
     carriers: list[int] = []
     bodies: list[np.ndarray] = []
@@ -59,14 +63,37 @@ def virtual_model(robot: Robot, inertia_change: np.ndarray | None = None) -> Vir
         names.append(f"{SMALL} {number + 1}")
         carriers.append(small[number])
         bodies.append(np.array([block.mass, *np.zeros(9)]))
-    elastic = np.append(elastic, [model.joints[k].idx_q for k in small]).astype(int)
+    springs = np.append(springs, [model.joints[k].idx_q for k in small]).astype(int)
     inertia = np.array(bodies)
     if inertia_change is not None:
         inertia = inertia + inertia_change
     for carrier, values in zip(carriers, inertia, strict=True):
         model.appendBodyToJoint(carrier, _body(values), pin.SE3.Identity())
     frames = tuple(model.addFrame(_carried(f, last, ends)) for f in source.frames)
-    return VirtualModel(model, rigid, elastic, tuple(names), tuple(carriers), inertia, frames)
+    rigid, offset = np.zeros((model.nq, len(robot.joint_names))), np.zeros(model.nq)
+    rigid[own], offset[own] = robot.linkage.spread, robot.linkage.offset
+    elastic = _elastic(robot, own, springs, model.nq)
+    return VirtualModel(
+        model, rigid, offset, elastic, tuple(names), tuple(carriers), inertia, frames
+    )
+
+
+def _elastic(robot: Robot, own: np.ndarray, springs: np.ndarray, size: int) -> np.ndarray:
+    """(size, e): each spring moves its own joint, and what follows the joint that it sits at.
+
+    A follower goes with what its leader gives about its axis (or along it), as if it were rigid.
+    `own` are the places in x of the robot's joints, followers among them, `springs` of the springs.
+    """
+    linkage, moves = robot.linkage, np.zeros((size, len(springs)))
+    moves[springs, np.arange(len(springs))] = 1.0
+    for number, block in enumerate(robot.config.compliance):
+        if block.joint in robot.joint_names and block.slide == robot.slides(block.joint):
+            leader = robot.joint_names.index(block.joint)
+            factors = linkage.spread[:, leader].copy()
+            factors[linkage.leads[leader]] = 0.0  # the joint itself is held
+            along = np.array(block.axis) @ robot.joint_axes[leader] / np.linalg.norm(block.axis)
+            moves[own, number] += factors * along
+    return moves
 
 
 def _carried(frame: pin.Frame, last: list[int], ends: list[tuple[int, pin.SE3]]) -> pin.Frame:
@@ -140,7 +167,7 @@ def _halves(
 def _add_joints(
     robot: Robot, model: pin.Model
 ) -> tuple[list[int], list[tuple[int, pin.SE3]], np.ndarray, np.ndarray]:
-    """What carries each body, what hangs on it; places of the robot's joints and of the elastic."""
+    """What carries each body, what hangs on it; places of the robot's joints and of the springs."""
     source, blocks = robot.model, robot.config.compliance
     last: list[int] = []  # carries the body of the same number
     ends: list[tuple[int, pin.SE3]] = []  # carries what hangs on it, and where the body is then
@@ -160,8 +187,8 @@ def _add_joints(
         name, outer = (str(source.names[joint]) if joint else BASE), 0
         if joint:
             parent, back = ends[source.parents[joint]]
-            axis, place = robot.joint_axes[joint - 1], back * source.jointPlacements[joint]
-            outer = _add_joint(model, parent, axis, place, name, robot.joints.slides[joint - 1])
+            axis, place = robot.linkage.axes[joint - 1], back * source.jointPlacements[joint]
+            outer = _add_joint(model, parent, axis, place, name, robot.linkage.slides[joint - 1])
             rigid.append(model.joints[outer].idx_q)
         if joint or BASE not in robot.joint_names:
             outer = give(outer, pin.SE3.Identity(), name)

@@ -115,6 +115,21 @@ def test_free_agrees_with_violations_and_only_links_apart_can_touch(arm):
     assert 0 < touched < 150
 
 
+def test_shapes_that_overlap_in_the_middle_of_all_ranges_are_said_and_not_checked(arm):
+    """A maker's coarse hull of link 3 reaches back to link 1 and far over link 5."""
+    assert collisions(arm).overlapping == ()
+    urdf = arm.with_name("arm.urdf")
+    urdf.write_text(urdf.read_text().replace('size="0.16 0.14 0.14"', 'size="1.2 0.14 1.2"'))
+    found = collisions(arm)
+    unchecked = {"link_1 touches link_3", "link_3 touches link_5"}
+    assert set(found.overlapping) == unchecked
+    rng, robot = np.random.default_rng(0), Robot.load(arm)
+    poses = rng.uniform(robot.lower_rad, robot.upper_rad, (50, 6))
+    touching = set().union(*(found.contacts(q) for q in poses))
+    assert not touching & unchecked
+    assert {"base_link touches link_3", "link_3 touches floor"} <= touching
+
+
 def test_a_robot_without_collision_shapes_has_its_limits_only(arm):
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", (arm.parent / "arm.urdf").read_text())
     (arm.parent / "arm.urdf").write_text(text)

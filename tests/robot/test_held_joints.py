@@ -70,15 +70,6 @@ def test_a_turn_about_the_axis_is_as_the_urdf_means_it(tmp_path):
     np.testing.assert_allclose(place.rotation @ [1, 0, 0], tilt @ [0, 0, -1], atol=1e-9)
 
 
-def test_a_follower_is_held_too(tmp_path):
-    more = '<mimic joint="joint_a2" multiplier="-1"/>'
-    rail = RAIL.format(kind="revolute", more=more)
-    with pytest.raises(InputError, match=r"rail follows another joint.*\[held\] rail_deg"):
-        Robot.load(arm(tmp_path / "asked", rail))
-    held = arm(tmp_path / "held", rail, "[held]\nrail_deg = 20")
-    assert "rail" not in Robot.load(held).joint_names
-
-
 @pytest.mark.parametrize(
     ("toml", "words"),
     [("[held]\nrail = 1", "NAME_deg"),

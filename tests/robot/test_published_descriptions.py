@@ -135,19 +135,6 @@ def check_left_out(path: Path, words: str) -> None:
     assert warned == [said]
 
 
-def test_pairs_that_touch_at_every_pose_are_dropped_all_of_them(tmp_path):
-    path = robot_toml(tmp_path / "robot.toml", published(tmp_path, inertias=True))
-    urdf = tmp_path / PACKAGE / "urdf" / "arm.urdf"
-    ball = '<collision><geometry><sphere radius="0.9"/></geometry></collision></link>'
-    start = urdf.read_text().index('<link name="link_1"')
-    end = urdf.read_text().index("</link>", start)
-    urdf.write_text(urdf.read_text()[:end] + ball + urdf.read_text()[end + len("</link>") :])
-    collisions = Collisions(Robot.load(path))
-    always = set(collisions.always_touching)
-    assert always == {"link_1 touches link_3"}
-    assert not always & set(collisions.contacts(FREE))
-
-
 def test_the_size_of_a_mesh_tells_units(tmp_path):
     urdf = published(tmp_path, inertias=True)
     text = urdf.read_text()

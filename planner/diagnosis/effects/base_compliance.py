@@ -9,7 +9,7 @@ from planner.diagnosis.effects.extra_compliance import ExtraCompliance, Give, to
 from planner.diagnosis.effects.places import missing_axes
 from planner.diagnosis.thresholds import BASE_STIFFNESS
 from planner.dynamics.simulation import Simulation
-from planner.robot.robot import BASE
+from planner.robot.config import BASE
 
 
 @dataclass(frozen=True)
