@@ -113,11 +113,9 @@ def _limit(machine: Machine) -> float:
 
 def _turned(machine: Machine, turn: float) -> Machine:
     c, s = np.cos(turn), np.sin(turn)
-    plane, modes, frf = np.array([[c, s], [-s, c]]), machine.modes, machine.frf
+    plane, modes = np.array([[c, s], [-s, c]]), machine.modes
     turned = replace(
         modes, shapes=modes.shapes @ plane.T, drives=modes.drives @ plane.T,
         residual=plane @ modes.residual @ plane.T,
     )  # fmt: skip
-    if frf is not None:
-        frf = replace(frf, receptance=np.einsum("ia,abf,jb->ijf", plane, frf.receptance, plane))
-    return replace(machine, modes=turned, frf=frf)
+    return replace(machine, modes=turned)

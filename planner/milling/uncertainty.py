@@ -1,13 +1,11 @@
 """Which depth is stable with a probability: limits of samples of structure and coefficients."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.inference.parallel import side_by_side
-from planner.milling.cutter_modes import CutterModes
-from planner.milling.directional import Coefficients
 from planner.milling.first_loss import (
     GrowthAtDepth,
     first_unstable,
@@ -120,17 +118,3 @@ def _bracket(seen: list[GrowthAtDepth]) -> tuple[GrowthAtDepth, GrowthAtDepth] |
             return before, level
         before = level
     return None
-
-
-def with_samples(
-    machine: Machine, samples: Sequence[tuple[CutterModes, Coefficients]]
-) -> list[Machine]:
-    """The machine with each sample's modes and coefficients; FRFs change as the modes do."""
-    found, frf = [], machine.frf
-    for modes, k in samples:
-        shifted = None
-        if frf is not None:
-            change = modes.receptance(frf.frequency_hz) - machine.modes.receptance(frf.frequency_hz)
-            shifted = replace(frf, receptance=frf.receptance + change.transpose(1, 2, 0))
-        found.append(replace(machine, modes=modes, coefficients=k, frf=shifted))
-    return found
