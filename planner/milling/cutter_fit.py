@@ -1,4 +1,4 @@
-"""Modes at the cutter from measured FRFs, as `planner modes` finds them, and how sure noise leaves it.
+"""Modes at the cutter from measured FRFs, as `planner modes` finds them, and how sure they are.
 
 They are fitted in accelerance, as sensors measure it: its noise is alike at all lines, and lines
 that hold nothing else count for nothing. Divided by ω² the lowest of them would govern the fit.
@@ -78,7 +78,8 @@ class CutterFit:
         Poles that are not established are left out.
         """
         poles, residues = self.plain.modes()
-        s, size = 2j * np.pi * self.frf.frequency_hz, np.linalg.norm(self.frf.receptance, axis=(0, 1))
+        s = 2j * np.pi * self.frf.frequency_hz
+        size = np.linalg.norm(self.frf.receptance, axis=(0, 1))
         known = {mode.pole for mode in self.found.modes}
         sd = np.sqrt(self.plain.residue_variance().sum(axis=0))
         residue, parts = self._whole(residues.residue), []

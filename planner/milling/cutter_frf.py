@@ -26,7 +26,6 @@ EXACT = 1e-3
 BESIDE_SD = 0.1  # of the FRFs' sd: a fit as close as this adds nothing to it; chosen
 
 
-
 @dataclass(frozen=True, eq=False)
 class CutterFrf:
     """Receptance (3, 3, F) in m/N at lines (F,) above 0 Hz: response axis, then force axis.
@@ -69,14 +68,13 @@ class CutterFrf:
 
     def _with_cross(self, used: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
         """FRFs between axes in use (3,) that have one each, where these lack, and what they are."""
-        h, known, taken = self.receptance.copy(), self._known, []
+        h, known, said = self.receptance.copy(), self._known, []
         there = used & known.diagonal()
         for i, j in np.argwhere(np.outer(there, there) & ~known):
             h[i, j] = self.receptance[j, i] if known[j, i] else 0.0
-            other = f"{AXES[j]}{AXES[i]}" if known[j, i] else "0"
-            taken.append(f"{AXES[i]}{AXES[j]} as {other}")
-        said = f"{self.name} lacks cross FRFs; taken are {', '.join(taken)}."
-        return h, (said,) if taken else ()
+            other = f"as {AXES[j]}{AXES[i]}" if known[j, i] else "as 0"
+            said.append(f"{self.name} lacks the FRF {AXES[i]}{AXES[j]}: it is taken {other}.")
+        return h, tuple(said)
 
 
 def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from planner.milling.spread import ModeSpread, explaining, sampled
 from planner.milling.uncertainty import REPLICATES
 from planner.milling.zeroth_order import LobeCurves, curves
 
-EXACT = 1e-6  # relative error of a fit that is one of rounding
+EXACT = 1e-5  # relative error of a fit that is one of rounding in a file
 SAMPLES = 200
 SEED = 11  # of samples: the same answer for the same question
 

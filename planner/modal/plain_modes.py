@@ -47,7 +47,7 @@ class PlainModes:
         point, poles = fit.refined.point, fit.refined.poles
         entries, columns = point.coefficients.shape
         start = np.concatenate([poles.real, poles.imag, point.coefficients.ravel()])
-        problem = _Problem(data, data.response.reshape(entries, -1),
+        problem = _PlainProblem(data, data.response.reshape(entries, -1),
                            2 / fit.variance.reshape(entries, -1), poles.size)  # fmt: skip
         full = problem.at(start)
         held = _held(full, _nothings(poles.size, entries, columns, pairs))
@@ -92,7 +92,7 @@ class PlainModes:
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
+class _FitPoint:
     """χ² at values (n,), its slope (n,) and curvature (n, n)/2, in units (n,) of which it is 1."""
 
     values: np.ndarray
@@ -111,7 +111,7 @@ class _Point:
 
 
 @dataclass(frozen=True, eq=False)
-class _Problem:
+class _PlainProblem:
     """Responses (e, F) and weights 2/variance to be fitted by so many modes."""
 
     data: Data
@@ -128,7 +128,7 @@ class _Problem:
         """(m,) of all values."""
         return values[: self.modes] + 1j * values[self.modes : 2 * self.modes]
 
-    def at(self, values: np.ndarray, unit: np.ndarray | None = None) -> _Point:
+    def at(self, values: np.ndarray, unit: np.ndarray | None = None) -> _FitPoint:
         """The point; units of its own curvature where none are given."""
         poles, m, lines = self.poles(values), self.modes, self.data.lines
         columns, slope = basis(lines, poles), basis_slope(lines, poles)
@@ -147,10 +147,10 @@ class _Problem:
             gradient[index] += (weighted @ off).real
             square += float(w @ np.abs(off) ** 2)
         unit = 1 / np.sqrt(np.diag(normal)) if unit is None else unit
-        return _Point(values, square, unit, unit * gradient, unit[:, None] * normal * unit)
+        return _FitPoint(values, square, unit, unit * gradient, unit[:, None] * normal * unit)
 
-    def settled(self, start: _Point, free: np.ndarray) -> _Point:
-        """Where χ² is least with values that move along `free` (n, r) from nothing, in its units."""
+    def settled(self, start: _FitPoint, free: np.ndarray) -> _FitPoint:
+        """Where χ² is least with values along `free` (n, r) alone, in the start's units."""
         here = free @ (start.inside(free) @ (free.T @ start.normal @ (start.values / start.unit)))
         own = 2 * self.modes  # poles stay for once, if the step is too far
         values = np.concatenate([start.values[:own], (start.unit * here)[own:]])
@@ -165,7 +165,8 @@ class _Problem:
                 break
         return point
 
-def _held(full: _Point, groups: list[np.ndarray]) -> list[np.ndarray]:
+
+def _held(full: _FitPoint, groups: list[np.ndarray]) -> list[np.ndarray]:
     """The combinations of values that are nothing as far as the fit tells."""
     values = full.values / full.unit
     held: list[np.ndarray] = []
@@ -184,9 +185,7 @@ def _held(full: _Point, groups: list[np.ndarray]) -> list[np.ndarray]:
     return held
 
 
-def _nothings(
-    m: int, entries: int, columns: int, pairs: list[tuple[int, int]]
-) -> list[np.ndarray]:
+def _nothings(m: int, entries: int, columns: int, pairs: list[tuple[int, int]]) -> list[np.ndarray]:
     """Combinations (r, n) of the values that may each be nothing, one thing after the other."""
     terms = (columns - 2 * m) // 2
     unit = np.eye(2 * m + entries * columns)

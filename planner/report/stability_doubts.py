@@ -11,9 +11,7 @@ from planner.milling.uncertainty import SampledLimits
 OPEN = 0.05  # of a limit, half of what holds 90 % of its samples, that is worth a sentence
 
 
-def doubts(
-    fit: CutterFit, cut: Cut, depth_m: np.ndarray, drawn: SampledLimits | None
-) -> list[str]:
+def doubts(fit: CutterFit, cut: Cut, depth_m: np.ndarray, drawn: SampledLimits | None) -> list[str]:
     """On limits (n,) in m, NaN where none is known, and their samples."""
     said = []
     if drawn is not None:
