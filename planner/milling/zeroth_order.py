@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+NOTHING = 1e-60  # 1/m: of an eigenvalue
+
 
 @dataclass(frozen=True, eq=False)
 class Zeroth:
@@ -56,8 +58,9 @@ def _depth(inverse: np.ndarray) -> np.ndarray:
 def curves(frequency_hz: np.ndarray, receptance: np.ndarray, mean: np.ndarray) -> LobeCurves:
     """Of receptances (F, 2, 2) in the cut's plane, in m/N, and the mean matrix (2, 2) in N/m²."""
     values = _followed(np.linalg.eigvals(mean @ receptance))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return LobeCurves(np.asarray(frequency_hz, dtype=float), 1 / values)
+    # Where nothing gives way in a direction, next to nothing: its depth is beyond all others.
+    values = np.where(values == 0, NOTHING, values)
+    return LobeCurves(np.asarray(frequency_hz, dtype=float), 1 / values)
 
 
 def _followed(values: np.ndarray) -> np.ndarray:

@@ -71,8 +71,7 @@ def _answer(
                 f"Depths at {100 * PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, known "
                 f"to ± {100 * np.median(off):.1f} % (median over speeds)."
             )
-    if structure.fit is not None:
-        remarks += doubts(structure.fit, cut, depth, drawn)
+        remarks += doubts(structure, cut, depth, ~drawn.open(depth))
     return StabilityReport(
         spindle_rpm=cut.speeds_rpm,
         depth_limit_m=depth,
