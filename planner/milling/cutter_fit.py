@@ -42,7 +42,8 @@ class CutterFit:
         accelerance = frf.receptance * (2j * np.pi * frf.frequency_hz) ** 2
         there = np.any(accelerance != 0, axis=-1)
         known = accelerance if np.all(there) else accelerance[there][:, None]
-        data = Data(frf.frequency_hz, known, None)
+        # Of two poles where one mode drifted both may stay: it is their FRF that chatters.
+        data = Data(frf.frequency_hz, known, None, steady=True)
         found = identify(data) if np.any(there) else None
         if found is None:
             ends = frf.frequency_hz[[0, -1]]

@@ -129,6 +129,17 @@ def test_limits_are_not_lost_between_lines(method: str, step_hz: float):
     np.testing.assert_allclose(*depth, rtol=1e-4)
 
 
+def test_two_modes_that_are_alike_stay_two():
+    """1.81 Hz between lines, 0.9 Hz between modes of nearly one direction, no noise."""
+    modes = real_modes(np.array([81.6, 82.5]), np.array([0.02, 0.04]), np.array([15.0, 40.0]),
+                       np.array([[1.0, 0.0], [np.cos(0.15), np.sin(0.15)]]))  # fmt: skip
+    given = cut(spindle_rpm=(2000.0, 8000.0, 4), depth_m=(0.0, 0.5, 100), method="zeroth_order")
+    found = of_frf(tip(modes, 1.81 * np.arange(1, 80)), given)
+    depth = [[loss.depth_m for loss in losses(m)] for m in
+             (found.machine(given), machine(modes, given))]  # fmt: skip
+    np.testing.assert_allclose(*depth, rtol=1e-3)
+
+
 def noisy(modes: CutterModes, lines: np.ndarray, share: float, seed: int) -> CutterFrf:
     """Measured: noise on every line alike, of a share of the largest accelerance."""
     h = modes.receptance(lines).transpose(1, 2, 0) * (2j * np.pi * lines) ** 2
