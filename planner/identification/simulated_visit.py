@@ -17,8 +17,6 @@ from planner.identification.parameters import Parametrisation
 from planner.modal.residues import Lines, unit, unit_slope
 from planner.robot.elastic_model import Matrices
 
-# Of each joint: what a robot's encoders and its geometry leave.
-READBACK_DEG, READBACK_M = 0.05, 5e-4
 REACH = 1.5  # highest lines: modes up to there may each be off, those above only together
 # Relative error of a simulated pole, where modal shapes are off by 1: frequencies are fitted far
 # better than shapes (on simulated cells shapes err by 0.1 to 1 %, poles by 0.01 to 0.1 %).
@@ -98,8 +96,7 @@ class SimulatedPoses:
         h, moment, turning = whole[:3, :3], whole[:3, 3:], whole[3:, :3]
         poles, residues = self.solved.poles[pose], self.solved.residues[pose, :, :3, :3]
         slope, by_angle = self._slopes(pose, lines.x)
-        slides = self.solved.simulation.robot.joints.slides
-        off = np.where(slides, READBACK_M, np.deg2rad(READBACK_DEG))
+        off = np.broadcast_to(t.joint_rad, len(by_angle))
         exact = SimulatedVisit(
             h,
             hit_basis(h[None], moment[None], t)[0],

@@ -1,4 +1,4 @@
-"""FRFs at the cutter: read from files, seen in the plane of a cut, and as modes."""
+"""FRFs at the cutter: read from files, seen in the plane of a cut, and, if predicted, as modes."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,11 +41,15 @@ class CutterFrf:
     simulated: bool = False
 
     def in_plane(self, cut: Cut) -> "PlaneFrf":
-        """In the plane of the cut; InputError where an axis that this needs is not known."""
-        h = _turned(self.receptance, cut.plane)
+        """In the plane of the cut; InputError where an axis that this needs is not known.
+
+        Cross FRFs that lack are those of the other way round, else 0, as a tap test has it.
+        """
+        used = np.any(np.abs(cut.plane) > SEEN, axis=0)
+        whole, remarks = self._with_cross(used)
+        h = _turned(whole, cut.plane)
         if not np.all(np.isfinite(h)):
-            missing = [AXES[i] for i in range(3) if not np.all(np.isfinite(self.receptance[i, i]))]
-            missing = missing or ["each axis, of hits along the other"]
+            missing = [AXES[i] for i in np.flatnonzero(used & ~self._known.diagonal())]
             raise InputError(
                 f"{self.name} lacks FRFs along {', '.join(missing)}, which the cut's plane needs; "
                 f"measure them, or check feed and axis in the cut's file."
@@ -55,7 +59,22 @@ class CutterFrf:
             # Errors of different entries are taken as independent of each other.
             square = _turned(np.nan_to_num(self.sd) ** 2, cut.plane**2)
             sd = np.sqrt(square.real)
-        return PlaneFrf(self.name, self.frequency_hz, h, sd, self.simulated)
+        return PlaneFrf(self.name, self.frequency_hz, h, sd, self.simulated, remarks)
+
+    @property
+    def _known(self) -> np.ndarray:
+        """(3, 3) which entries are known."""
+        return np.all(np.isfinite(self.receptance), axis=-1)
+
+    def _with_cross(self, used: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+        """FRFs between axes in use (3,) that have one each, where these lack, and what they are."""
+        h, known, said = self.receptance.copy(), self._known, []
+        there = used & known.diagonal()
+        for i, j in np.argwhere(np.outer(there, there) & ~known):
+            h[i, j] = self.receptance[j, i] if known[j, i] else 0.0
+            other = f"as {AXES[j]}{AXES[i]}" if known[j, i] else "as 0"
+            said.append(f"{self.name} lacks the FRF {AXES[i]}{AXES[j]}: it is taken {other}.")
+        return h, tuple(said)
 
 
 def _turned(values: np.ndarray, plane: np.ndarray) -> np.ndarray:
@@ -75,9 +94,10 @@ class PlaneFrf:
     receptance: np.ndarray
     sd: np.ndarray | None = None
     simulated: bool = False
+    remarks: tuple[str, ...] = ()
 
     def fitted(self) -> CutterModes:
-        """As modes."""
+        """Predicted FRFs, which have no noise, as modes; of measured ones see `cutter_fit`."""
         fit = rational_fit(self.frequency_hz, self.receptance, close=self._close)
         modes = as_modes(fit, self.frequency_hz)
         if self.error(modes) > max(WORSE * fit.error, CLOSE):

@@ -7,7 +7,6 @@ import numpy as np
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
-from planner.milling.cutter_frf import PlaneFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients, mean_matrix
 from planner.milling.period import Discretisation, Period, period
@@ -24,15 +23,11 @@ MOST_POINTS = 400  # of a period: with more, each depth takes a second
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """Modes in the plane of the cut, the cut, and the coefficients that hold.
-
-    With `frf`, from which the modes are, the zeroth order takes these FRFs as they are.
-    """
+    """Modes in the plane of the cut, the cut, and the coefficients that hold."""
 
     modes: CutterModes
     cut: Cut
     coefficients: Coefficients
-    frf: PlaneFrf | None = None
 
     def grid(self, rpm: float, factor: float = 1.0) -> Discretisation:
         """As fine as the fastest mode asks for at this speed, times a factor."""
@@ -68,11 +63,8 @@ class Machine:
         ]
 
     def floor(self) -> LobeCurves:
-        """Zeroth-order curves: of the FRFs, or over lines that resolve every mode."""
+        """Zeroth-order curves over lines that resolve every mode."""
         mean = mean_matrix(self.cut, self.coefficients)
-        if self.frf is not None:
-            lines = self.frf.frequency_hz
-            return curves(lines, self.frf.receptance.transpose(2, 0, 1), mean)
         lines = resolving_lines(self.modes)
         return curves(lines, self.modes.receptance(lines), mean)
 

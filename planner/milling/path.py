@@ -20,12 +20,13 @@ TURNS_DEG = np.arange(0.0, 360.0, 15.0)  # of the feed about the tool's axis tha
 class PathLimits:
     """Of p poses at n speeds: first losses, and depths (p, n) in m that are stable at 95 %.
 
-    inf where nothing is lost up to the largest depth.
+    inf where nothing is lost up to the largest depth. `known` (p, n): whether samples agree.
     """
 
     names: tuple[str, ...]
     found: tuple[tuple[Loss, ...], ...]
     robust_m: np.ndarray
+    known: np.ndarray
 
     @property
     def depth_m(self) -> np.ndarray:
@@ -48,17 +49,20 @@ def along(
     poses: Sequence[tuple[str, Structure]], cut: Cut, samples: int, tell: Tell = quietly
 ) -> PathLimits:
     """Limits at every pose, with so many samples of what is uncertain."""
-    found, robust = [], []
+    found, robust, known = [], [], []
     for i, (_, structure) in enumerate(poses):
         part = within(tell, i / len(poses), (i + 1) / len(poses))
         own = losses(structure.machine(cut))
         drawn = structure.samples(cut, samples)
         depth = np.array([loss.depth_m for loss in own])
         depth = np.where(np.isnan(depth), np.inf, depth)
-        robust.append(sampled_limits(drawn, own, part).robust(PROBABILITY) if drawn else depth)
+        limits = sampled_limits(drawn, own, part) if drawn else None
+        robust.append(depth if limits is None else limits.robust(PROBABILITY))
+        known.append(depth > 0 if limits is None else ~limits.open(depth))
         found.append(own)
         part("poses", 1.0)
-    return PathLimits(tuple(name for name, _ in poses), tuple(found), np.array(robust))
+    names = tuple(name for name, _ in poses)
+    return PathLimits(names, tuple(found), np.array(robust), np.array(known))
 
 
 def best_speed_of(
@@ -113,11 +117,9 @@ def _limit(machine: Machine) -> float:
 
 def _turned(machine: Machine, turn: float) -> Machine:
     c, s = np.cos(turn), np.sin(turn)
-    plane, modes, frf = np.array([[c, s], [-s, c]]), machine.modes, machine.frf
+    plane, modes = np.array([[c, s], [-s, c]]), machine.modes
     turned = replace(
         modes, shapes=modes.shapes @ plane.T, drives=modes.drives @ plane.T,
         residual=plane @ modes.residual @ plane.T,
     )  # fmt: skip
-    if frf is not None:
-        frf = replace(frf, receptance=np.einsum("ia,abf,jb->ijf", plane, frf.receptance, plane))
-    return replace(machine, modes=turned, frf=frf)
+    return replace(machine, modes=turned)

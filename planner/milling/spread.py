@@ -44,6 +44,11 @@ class ModeSpread:
         frequency, damping, size = np.split(numbers[:-1], 3)
         return cls(frequency, damping, size, float(numbers[-1]))
 
+    @classmethod
+    def none(cls, count: int) -> "ModeSpread":
+        """Of so many modes of which nothing is uncertain."""
+        return cls.of(np.zeros(3 * count + 1))
+
     @property
     def any(self) -> bool:
         """Whether anything is uncertain."""
@@ -75,7 +80,7 @@ def explaining(modes: CutterModes, frf: PlaneFrf) -> tuple[ModeSpread, float]:
     """Sds that explain those of an FRF, and the share of its variance that they give."""
     count = len(np.unique(modes.poles))
     if frf.sd is None or not np.any(frf.sd > 0):
-        return ModeSpread.of(np.zeros(3 * count + 1)), 1.0
+        return ModeSpread.none(count), 1.0
     every = max(1, len(frf.frequency_hz) // MOST_LINES)
     hertz, sd = frf.frequency_hz[::every], frf.sd[..., ::every].transpose(2, 0, 1)
     here = modes.receptance(hertz)

@@ -1,21 +1,23 @@
 """What is known of the structure in the plane of a cut, from modes or from FRFs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from planner.errors import InputError
 from planner.milling.cut import Cut
+from planner.milling.cutter_fit import CutterFit
 from planner.milling.cutter_frf import CutterFrf, PlaneFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients, mean_matrix
+from planner.milling.hidden_modes import hidden_below
 from planner.milling.machine import Machine, check_structure
 from planner.milling.mode_file import ModeFile
 from planner.milling.spread import ModeSpread, explaining, sampled
-from planner.milling.uncertainty import REPLICATES, with_samples
-from planner.milling.zeroth_order import curves
+from planner.milling.uncertainty import REPLICATES
+from planner.milling.zeroth_order import LobeCurves, curves
 
-POOR_FIT = 0.05  # relative error of a modal fit that is warned of
+EXACT = 1e-5  # relative error of a fit that is one of rounding in a file
 SAMPLES = 200
 SEED = 11  # of samples: the same answer for the same question
 
@@ -26,28 +28,36 @@ class OutOfBandError(InputError):
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Modes in the cut's plane, how uncertain they are, and the FRFs that they are from, if any."""
+    """Modes in the cut's plane, how uncertain they are, and the FRFs that they are from, if any.
+
+    Modes from FRFs without a stated sd are as uncertain as their `fit` is by the FRFs' noise.
+    """
 
     modes: CutterModes
     spread: ModeSpread
     frf: PlaneFrf | None = None
     remarks: tuple[str, ...] = ()
+    fit: CutterFit | None = None
 
     def machine(self, cut: Cut) -> Machine:
         """With a cut and its coefficients as stated."""
-        return Machine(self.modes, cut, Coefficients.of(cut), self.frf)
+        return Machine(self.modes, cut, Coefficients.of(cut))
 
     def samples(self, cut: Cut, count: int = SAMPLES, seed: int = SEED) -> list[Machine]:
         """So many machines that are as likely as each other; none where nothing is uncertain."""
         sds = cut.kt_sd_percent / 100, cut.kr_sd_percent / 100
-        if not self.spread.any and not any(sds):
+        if not self.spread.any and not any(sds) and self.fit is None:
             return []
         k, each = Coefficients.of(cut), -(-count // REPLICATES)
         drawn = [
             sample for part in range(REPLICATES)
             for sample in sampled(self.modes, self.spread, k, sds, each, seed + part)
         ]  # fmt: skip
-        return with_samples(self.machine(cut), drawn)
+        if self.fit is not None:
+            own = self.fit.drawn(len(drawn), seed)
+            drawn = [(modes, k) for modes, (_, k) in zip(own, drawn, strict=True)]
+        machine = self.machine(cut)
+        return [replace(machine, modes=modes, coefficients=k) for modes, k in drawn]
 
 
 def of_modes(file: ModeFile, cut: Cut) -> Structure:
@@ -63,23 +73,37 @@ def of_modes(file: ModeFile, cut: Cut) -> Structure:
 
 
 def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
-    """From FRFs and their sd: modes are fitted, and how well is said."""
+    """From FRFs, predicted with an sd or measured: modes are fitted, and how well is said."""
     plane = frf.in_plane(cut)
-    check_band(plane, cut)
+    return _predicted(plane, cut) if plane.sd is not None else _measured(plane, cut)
+
+
+def _measured(plane: PlaneFrf, cut: Cut) -> Structure:
+    fit, mean = CutterFit.of(plane), mean_matrix(cut, Coefficients.of(cut))
+    check_structure(fit.modes)
+    floor = Machine(fit.modes, cut, Coefficients.of(cut)).floor().floor_m
+    # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
+    told = plane.frequency_hz > (hidden_below(fit, mean, floor) or 0.0)
+    check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
+    count = len(np.unique(fit.modes.poles))
+    said = f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance."
+    noisy = fit if fit.error > EXACT else None
+    return Structure(fit.modes, ModeSpread.none(count), plane, (*plane.remarks, said), noisy)
+
+
+def _predicted(plane: PlaneFrf, cut: Cut) -> Structure:
+    mean = mean_matrix(cut, Coefficients.of(cut))
+    check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
     modes = plane.fitted()
     check_structure(modes)
     error = plane.error(modes)
     spread, given = explaining(modes, plane)
-    count = len(np.unique(modes.poles))
     remarks = [
-        f"{count} modes fitted to {frf.name} are off by {100 * error:.2g} % of the FRFs (root mean "
-        f"square over the lines)."
+        *plane.remarks,
+        f"{len(np.unique(modes.poles))} modes fitted to {plane.name} are off by {100 * error:.2g} "
+        f"% of the FRFs (root mean square over the lines).",
     ]
-    if error > POOR_FIT and cut.method != "zeroth_order":
-        remarks.append('The fit is poor; method = "zeroth_order" takes the FRFs as they are.')
-    if frf.sd is None:
-        remarks.append("These FRFs come without sd: they are taken as exact.")
-    elif spread.any:
+    if spread.any:
         remarks.append(
             f"The FRFs' sd is sampled as independent errors of each mode's frequency, damping and "
             f"size, which give {100 * given:.0f} % of its square."
@@ -87,22 +111,23 @@ def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     return Structure(modes, spread, plane, tuple(remarks))
 
 
-def check_band(frf: PlaneFrf, cut: Cut) -> None:
-    """OutOfBandError where chatter would be at the end of the FRFs' lines, or beyond."""
-    found = curves(
-        frf.frequency_hz, frf.receptance.transpose(2, 0, 1),
-        mean_matrix(cut, Coefficients.of(cut)),
-    )  # fmt: skip
-    ends = frf.frequency_hz[0], frf.frequency_hz[-1]
+def check_band(frf: PlaneFrf, found: LobeCurves, told: np.ndarray | None = None) -> None:
+    """OutOfBandError where chatter would be at the end of the FRFs' lines, or beyond.
+
+    Or at the first of the lines (F,) bool that tell of modes below, where it is not theirs.
+    """
+    lines = frf.frequency_hz
     if not np.isfinite(found.floor_m):
         where = "at no frequency within them"
-    elif found.floor_hz in ends:
+    elif found.floor_hz in (lines[0], lines[-1]):
         where = "at their very end or beyond"
+    elif told is not None and np.any(told) and found.floor_hz == lines[told][0]:
+        where = f"below {found.floor_hz:.3g} Hz, where noise hides the mode"
     else:
         return
     raise OutOfBandError(
-        f"{frf.name}: the FRFs reach from {ends[0]:g} to {ends[1]:g} Hz and the cut would chatter "
-        f"{where}; measure over the band of the modes that chatter."
+        f"{frf.name}: the FRFs reach from {lines[0]:.6g} to {lines[-1]:.6g} Hz and the cut would "
+        f"chatter {where}; measure over the band of the modes that chatter."
     )
 
 

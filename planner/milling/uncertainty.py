@@ -1,13 +1,11 @@
 """Which depth is stable with a probability: limits of samples of structure and coefficients."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from planner.inference.parallel import side_by_side
-from planner.milling.cutter_modes import CutterModes
-from planner.milling.directional import Coefficients
 from planner.milling.first_loss import (
     GrowthAtDepth,
     first_unstable,
@@ -20,6 +18,7 @@ from planner.milling.machine import Machine
 from planner.progress import Tell, quietly
 
 PROBABILITY = 0.95  # that the robust depth is stable
+OPEN = 0.05  # of a limit: half of what holds 90 % of its samples, beyond which it is not known
 REPLICATES = 4  # Latin hypercubes, whose difference shows how far quantiles have converged
 # Shares of the limit without uncertainty at which samples are looked at first.
 FIRST = np.array([0.4, 0.6, 0.75, 0.88, 1.0, 1.15, 1.4])
@@ -43,6 +42,13 @@ class SampledLimits:
         found = np.array([_quantile(part, 1 - probability) for part in parts])
         with np.errstate(invalid="ignore"):
             return np.std(found, axis=0, ddof=1) / np.sqrt(REPLICATES) / np.mean(found, axis=0)
+
+    def open(self, depth_m: np.ndarray) -> np.ndarray:
+        """(n,) bool: where limits (n,) in m (NaN: none) may well be others."""
+        low, high = np.quantile(self.depth_m, (0.05, 0.95), axis=0, method="nearest")
+        with np.errstate(invalid="ignore"):
+            known = (high - low) / 2 <= OPEN * depth_m
+        return ~known & ~(np.isinf(low) & ~np.isfinite(depth_m))
 
     def probability(self, depths: np.ndarray) -> np.ndarray:
         """(speeds, depths) of being stable at depths (b,) in m."""
@@ -120,17 +126,3 @@ def _bracket(seen: list[GrowthAtDepth]) -> tuple[GrowthAtDepth, GrowthAtDepth] |
             return before, level
         before = level
     return None
-
-
-def with_samples(
-    machine: Machine, samples: Sequence[tuple[CutterModes, Coefficients]]
-) -> list[Machine]:
-    """The machine with each sample's modes and coefficients; FRFs change as the modes do."""
-    found, frf = [], machine.frf
-    for modes, k in samples:
-        shifted = None
-        if frf is not None:
-            change = modes.receptance(frf.frequency_hz) - machine.modes.receptance(frf.frequency_hz)
-            shifted = replace(frf, receptance=frf.receptance + change.transpose(1, 2, 0))
-        found.append(replace(machine, modes=modes, coefficients=k, frf=shifted))
-    return found

@@ -22,7 +22,8 @@ class Data:
     time from the pulse to the end of the record (see `residues`). `force_share` and
     `force_window_s` say how the noise of the force spoils whole columns (see `Frf`). `pooled`: an
     unknown variance is taken as a level for each entry times one profile of lines. `near`: modes
-    may lie close below the band.
+    may lie close below the band. `steady`: nothing changes between hits, so that
+    poles close to each other are modes, however alike.
     """
 
     frequency_hz: np.ndarray  # (F,)
@@ -35,6 +36,7 @@ class Data:
     force_window_s: float = 0.0
     pooled: bool = False
     near: bool = False
+    steady: bool = False
 
     @cached_property
     def lines(self) -> Lines:

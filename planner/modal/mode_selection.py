@@ -48,7 +48,7 @@ def fit(data: Data, start: np.ndarray, rounds: int = MAX_ROUNDS) -> PoleFit:
         grown = _refine(data, poles, current)
         if _worth(data, current, grown):
             current = _prune(data, grown)
-    return _unsplit(data, current)
+    return current if data.steady else _unsplit(data, current)
 
 
 def _refine(data: Data, poles: np.ndarray, before: PoleFit | None) -> PoleFit:

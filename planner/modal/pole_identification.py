@@ -106,7 +106,7 @@ def modes_of_fit(data: Data, fitted: PoleFit, sets: tuple[PoleSet, ...]) -> tupl
                 damping,
                 float(sd[1]),
                 residue,
-                np.sqrt(variance),
+                np.sqrt(np.maximum(variance, 0.0)),  # less by rounding alone
                 presence,
                 supported,
                 probability(presence, supported, float(weak[k])),

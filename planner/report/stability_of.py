@@ -13,6 +13,7 @@ from planner.milling.uncertainty import PROBABILITY, SampledLimits, sampled_limi
 from planner.progress import Tell, quietly, within
 from planner.report.plot_files import Pictures
 from planner.report.stability import StabilityReport
+from planner.report.stability_doubts import doubts
 from planner.report.stability_source import Asked, structure_of
 from planner.report.text import SIMULATED_TITLE
 
@@ -70,6 +71,7 @@ def _answer(
                 f"Depths at {100 * PROBABILITY:.0f} % are from {len(drawn.depth_m)} samples, known "
                 f"to ± {100 * np.median(off):.1f} % (median over speeds)."
             )
+        remarks += doubts(structure, cut, depth, ~drawn.open(depth))
     return StabilityReport(
         spindle_rpm=cut.speeds_rpm,
         depth_limit_m=depth,

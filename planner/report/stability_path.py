@@ -15,6 +15,7 @@ from planner.progress import Tell, quietly, within
 from planner.report.answer import Answer
 from planner.report.path_poses import Travelled, Way
 from planner.report.plot_files import Pictures
+from planner.report.stability_doubts import doubts
 from planner.report.stability_source import Asked, outside, structures_of_file
 from planner.report.stability_turns import TurnAdvice, turn_advice, turns_figure
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, number, remarks, table
@@ -170,6 +171,11 @@ def _answer(poses: list[tuple[str, Structure]], limits: PathLimits, cut: Cut) ->
     said = [
         f"{name}: {text}" for (name, structure), row in zip(poses, limits.found, strict=True)
         if (text := beyond(structure, np.array([loss.chatter_hz for loss in row])))
+    ]  # fmt: skip
+    rows = zip(poses, limits.depth_m, limits.known, strict=True)
+    said += [
+        f"{name}: {text}" for (name, structure), row, known in rows
+        for text in doubts(structure, cut, row, known)
     ]  # fmt: skip
     turned = by_feed(poses, cut, float(rpm[best]))
     return PathReport(

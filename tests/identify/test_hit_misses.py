@@ -27,9 +27,20 @@ def known(tmp_path_factory):
     return Known(nominal, p, np.concatenate([p.mean, np.zeros(len(p.nuisances))]))
 
 
-def made(known, x, chain):
+def made(known, x, chain, t=T):
     poses = SimulatedPoses.of(known.simulation(x), known.parametrisation, KR10.poses(1, 5))
-    return poses.visit(0, LINES, T, chain)
+    return poses.visit(0, LINES, t, chain)
+
+
+def test_joints_stand_beside_their_readback_as_far_as_is_stated(known):
+    """`[readback]` of campaign.toml, joint by joint: 0.05° where nothing is stated."""
+    chain = np.zeros(CHAIN_NUMBERS)
+    per_rad = made(known, known.x, chain, Tolerances(joint_rad=1.0)).readback
+    usual = made(known, known.x, chain).readback
+    assert usual == pytest.approx(np.deg2rad(0.05) * per_rad, rel=1e-9)
+    sds = tuple(1e-3 * np.arange(1.0, 7.0))
+    stated = made(known, known.x, chain, Tolerances(joint_rad=sds)).readback
+    assert stated == pytest.approx(np.array(sds)[:, None, None, None] * per_rad, rel=1e-9)
 
 
 def test_columns_of_chain_and_parameters_are_slopes(known):

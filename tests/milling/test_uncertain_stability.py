@@ -1,5 +1,6 @@
 """FRFs instead of modes, and what is not known: fits, samples, robust depths."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from planner.milling.spread import ModeSpread, explaining, moved, sampled
 from planner.milling.structure import Structure, of_frf
 from planner.milling.uncertainty import sampled_limits
 from planner.modal.rational_fit import rational_fit
+from planner.report.stability_doubts import doubts
 from tests.support.milling_cases import cut, machine, one_mode, two_each_way
 
 LINES = np.arange(200.0, 2400.0, 2.0)
@@ -91,8 +93,103 @@ def test_frfs_that_end_before_the_chatter_are_refused():
 
 def test_frfs_that_lack_an_axis_of_the_cut_are_refused():
     given = cut(feed=(0.0, 0.0, 1.0), axis=(1.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="lacks FRFs along z"):
+    with pytest.raises(InputError, match="lacks FRFs along z,"):
         of_frf(tip(two_each_way()), given)
+
+
+@pytest.mark.parametrize(("lacking", "taken"), [(((0, 1), (1, 0)), "0"), (((1, 0),), "xy")])
+def test_cross_frfs_that_lack_are_taken_as_the_others_or_nothing_and_named(lacking, taken):
+    """Machinists tap along feed and normal alone: xx and yy."""
+    given, full = cut(milling="down", radial_immersion=0.5), tip(two_each_way())
+    part = replace(full, receptance=full.receptance.copy())
+    for i, j in lacking:
+        part.receptance[i, j] = np.nan
+    found = of_frf(part, given)
+    assert [f"lacks the FRF {'xy'[i]}{'xy'[j]}: it is taken as {taken}." in " ".join(found.remarks)
+            for i, j in lacking] == [True] * len(lacking)  # fmt: skip
+    depth = [[loss.depth_m for loss in losses(s.machine(given))]
+             for s in (found, of_frf(full, given))]  # fmt: skip
+    np.testing.assert_allclose(*depth, rtol=1e-6)
+
+
+@pytest.mark.parametrize("method", ["zeroth_order", "full_discretisation"])
+@pytest.mark.parametrize("step_hz", [0.5, 1.0, 2.0])
+def test_limits_are_not_lost_between_lines(method: str, step_hz: float):
+    """Modes of 0.6 to 1.7 lines' width at 1 Hz: of 12, 23 and 41 Hz, whatever the method."""
+    modes = real_modes(
+        np.array([12.0, 23.0, 41.0]), np.array([0.03, 0.025, 0.02]), np.array([300.0, 200, 150]),
+        np.array([[1.0, 0.0], [0.0, 1.0], [0.6, 0.8]]),
+    )  # fmt: skip
+    given = cut(milling="down", radial_immersion=0.5, kt_n_m2=7e8, method=method,
+                spindle_rpm=(1200.0, 2400.0, 4), depth_m=(0.0, 0.2, 100))  # fmt: skip
+    found = of_frf(tip(modes, step_hz * np.arange(1, 121)), given)
+    depth = [[loss.depth_m for loss in losses(m)] for m in
+             (found.machine(given), machine(modes, given))]  # fmt: skip
+    assert np.all(np.isfinite(depth[1]))
+    np.testing.assert_allclose(*depth, rtol=1e-4)
+
+
+def test_two_modes_that_are_alike_stay_two():
+    """1.81 Hz between lines, 0.9 Hz between modes of nearly one direction, no noise."""
+    modes = real_modes(np.array([81.6, 82.5]), np.array([0.02, 0.04]), np.array([15.0, 40.0]),
+                       np.array([[1.0, 0.0], [np.cos(0.15), np.sin(0.15)]]))  # fmt: skip
+    given = cut(spindle_rpm=(2000.0, 8000.0, 4), depth_m=(0.0, 0.5, 100), method="zeroth_order")
+    found = of_frf(tip(modes, 1.81 * np.arange(1, 80)), given)
+    depth = [[loss.depth_m for loss in losses(m)] for m in
+             (found.machine(given), machine(modes, given))]  # fmt: skip
+    np.testing.assert_allclose(*depth, rtol=1e-3)
+
+
+def noisy(modes: CutterModes, lines: np.ndarray, share: float, seed: int) -> CutterFrf:
+    """Measured: noise on every line alike, of a share of the largest accelerance."""
+    h = modes.receptance(lines).transpose(1, 2, 0) * (2j * np.pi * lines) ** 2
+    parts = np.random.default_rng(seed).standard_normal((2, *h.shape)) / np.sqrt(2)
+    whole = np.full((3, 3, len(lines)), np.nan + 0j)
+    whole[:2, :2] = h + share * np.abs(h).max() * (parts[0] + 1j * parts[1])
+    return of_accelerance("tap", lines, whole, None)
+
+
+@pytest.mark.parametrize("step_hz", [0.25, 0.9, 2.0])
+def test_lines_in_the_noise_govern_nothing(step_hz: float):
+    """0.1 % noise, lines from the first on: divided by ω² these were pure noise."""
+    given, modes = cut(spindle_rpm=(5000.0, 20000.0, 8)), two_each_way()
+    found = of_frf(noisy(modes, step_hz * np.arange(1, int(2200 / step_hz)), 1e-3, 3), given)
+    depth = [[loss.depth_m for loss in losses(m)] for m in
+             (found.machine(given), machine(modes, given))]  # fmt: skip
+    np.testing.assert_allclose(*depth, rtol=0.03)
+
+
+def test_noise_is_sampled_as_wide_as_it_scatters():
+    """Limits by other noises lie within the samples of one as often as these say."""
+    given = cut(spindle_rpm=(9000.0, 12000.0, 3), method="zeroth_order")
+    lines, modes = np.arange(2.0, 2200.0, 2.0), two_each_way()
+    true = np.array([loss.depth_m for loss in losses(machine(modes, given))])
+    inside = []
+    for seed in range(8):
+        found = of_frf(noisy(modes, lines, 0.003, 10 + seed), given)
+        drawn = sampled_limits(found.samples(given, 40), losses(found.machine(given))).depth_m
+        low, high = np.quantile(drawn, (0.05, 0.95), axis=0)
+        inside.append((low <= true) & (true <= high))
+    assert np.mean(inside) > 0.7
+    assert np.max((high - low) / true) < 0.1
+
+
+def test_what_lines_and_noise_leave_open_is_said():
+    """A stiff mode of 30 Hz in the noise of one at 1 kHz, lines as wide as itself."""
+    modes = real_modes(np.array([30.0, 1000.0]), np.array([0.02, 0.02]),
+                       np.array([2e6, 2e6]) / (2 * np.pi * np.array([30.0, 1000.0])) ** 2,
+                       np.eye(2))  # fmt: skip
+    given = cut(spindle_rpm=(5000.0, 20000.0, 4), method="zeroth_order")
+    said = {}
+    for share in (0.0, 0.01):
+        found = of_frf(noisy(modes, np.arange(2.0, 1300.0, 2.0), share, 5), given)
+        depth = np.array([loss.depth_m for loss in losses(found.machine(given))])
+        said[share] = doubts(found, given, depth, depth > 0)
+    assert said[0.0] == []
+    (text,) = said[0.01]
+    hidden = re.search(r"Below (\S+) Hz .* would hide a mode", text)
+    assert hidden is not None
+    assert 30 < float(hidden[1]) < 1000
 
 
 def test_spread_of_modes_explains_the_sd_that_it_makes():
@@ -188,4 +285,3 @@ def test_mean_of_uncertain_frfs_is_fitted_by_modes_as_close_as_its_sd_asks():
     fit = rational_fit(lines, frf.receptance)
     assert np.all(fit.poles.imag > 0)
     assert frf.error(frf.fitted()) < 0.03
-    assert frf.error(replace(frf, sd=None).fitted()) < 0.03

@@ -1,0 +1,122 @@
+"""Modes at the cutter from measured FRFs, as `planner modes` finds them, and how sure they are.
+
+They are fitted in accelerance, as sensors measure it: its noise is alike at all lines, and lines
+that hold nothing else count for nothing. Divided by ω² the lowest of them would govern the fit.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from planner.errors import InputError
+from planner.milling.cutter_frf import PlaneFrf
+from planner.milling.cutter_modes import CutterModes
+from planner.modal.fit_data import Data
+from planner.modal.mode_selection import scales
+from planner.modal.model_check import inflation
+from planner.modal.plain_modes import PlainModes
+from planner.modal.pole_identification import PoleIdentification, identify
+from planner.modal.residues import Residues
+
+# Of a residue's second part: share of the FRF, anywhere, and sds of its noise that count.
+SECOND, TOLD = 1e-3, 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class CutterFit:
+    """FRFs in the plane of a cut and the modes found in them.
+
+    FRFs that are 0 throughout are no data: `there` (2, 2) has the others, which are fitted as rows
+    of one column where some are not.
+    """
+
+    frf: PlaneFrf
+    there: np.ndarray
+    found: PoleIdentification
+    plain: PlainModes
+
+    @classmethod
+    def of(cls, frf: PlaneFrf) -> "CutterFit":
+        """InputError where the FRFs hold no mode."""
+        accelerance = frf.receptance * (2j * np.pi * frf.frequency_hz) ** 2
+        there = np.any(accelerance != 0, axis=-1)
+        known = accelerance if np.all(there) else accelerance[there][:, None]
+        # Of two poles where one mode drifted both may stay: it is their FRF that chatters.
+        data = Data(frf.frequency_hz, known, None, steady=True)
+        found = identify(data) if np.any(there) else None
+        if found is None:
+            ends = frf.frequency_hz[[0, -1]]
+            raise InputError(
+                f"{frf.name}: no mode shows between {ends[0]:g} and {ends[1]:g} Hz; measure over "
+                f"the band of the modes that chatter, at finer lines or with more averages."
+            )
+        alone = np.zeros((2 * found.fit.refined.poles.size,) * 2)
+        scale = scales(data, found.fit) * inflation(data, found.fit, alone)
+        number = np.cumsum(there.ravel()).reshape(2, 2) - 1
+        pairs = [(int(number[0, 1]), int(number[1, 0]))] if there[0, 1] and there[1, 0] else []
+        return cls(frf, there, found, PlainModes.of(data, found.fit, scale, pairs))
+
+    @cached_property
+    def modes(self) -> CutterModes:
+        """Those that are established, and what modes above the lines give way."""
+        return self._as_modes(*self.plain.modes())
+
+    def drawn(self, count: int, seed: int) -> list[CutterModes]:
+        """So many sets of modes that are as likely as each other, by the noise of the FRFs."""
+        return [self._as_modes(*one) for one in self.plain.drawn(count, seed)]
+
+    def _whole(self, values: np.ndarray) -> np.ndarray:
+        """(2, 2, n) of values (e, n) of the fitted FRFs."""
+        out = np.zeros((2, 2, values.shape[-1]), values.dtype)
+        out[self.there] = values
+        return out
+
+    @cached_property
+    def _parts(self) -> list[tuple[int, int]]:
+        """Pole by pole how many shapes and drives its residue is of: two where two modes are one.
+
+        Poles that are not established are left out.
+        """
+        poles, residues = self.plain.modes()
+        s = 2j * np.pi * self.frf.frequency_hz
+        size = np.linalg.norm(self.frf.receptance, axis=(0, 1))
+        known = {mode.pole for mode in self.found.modes}
+        sd = np.sqrt(self.plain.residue_variance().sum(axis=0))
+        residue, parts = self._whole(residues.residue), []
+        for k, pole in enumerate(poles):
+            if complex(self.found.fit.refined.poles[k]) not in known:
+                continue
+            second = np.linalg.svd(residue[..., k], compute_uv=False)[1]
+            shows = second * np.max((1 / np.abs(s - pole) + 1 / np.abs(s - pole.conj())) / size)
+            parts.append((k, 1 + int(shows > SECOND and second > TOLD * sd[k])))
+        return parts
+
+    def _as_modes(self, fitted: np.ndarray, residues: Residues) -> CutterModes:
+        poles, shapes, drives = [], [], []
+        residue, upper = self._whole(residues.residue), self._whole(residues.rest)[..., -1]
+        for k, count in self._parts:
+            left, sizes, right = np.linalg.svd(residue[..., k])
+            for part in range(count):
+                poles.append(fitted[k])
+                shapes.append(left[:, part] * sizes[part])
+                drives.append(right[part])
+        return CutterModes(np.array(poles), np.array(shapes), np.array(drives), upper.real)
+
+    def receptance(self, told: np.ndarray) -> np.ndarray:
+        """(F, 2, 2) in m/N of the modes; of others below too at lines (F,) that tell of these."""
+        s = 2j * np.pi * self.frf.frequency_hz[told, None, None]
+        found = self.modes.receptance(self.frf.frequency_hz)
+        found[told] += self._whole(self.plain.modes()[1].rest)[..., 0] / s**2
+        return found
+
+    @property
+    def noise(self) -> np.ndarray:
+        """(F,) in m/N: root of E‖δH‖² at each line."""
+        square = np.sum(self.found.fit.variance, axis=(0, 1))
+        return np.sqrt(square) / (2 * np.pi * self.frf.frequency_hz) ** 2
+
+    @property
+    def error(self) -> float:
+        """‖accelerance − fit‖/‖accelerance‖."""
+        return self.found.fit_error
