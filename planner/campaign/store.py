@@ -23,6 +23,11 @@ RECORDINGS = "recordings"
 MAX_FILE_BYTES = 512 * 1024 * 1024
 
 
+def is_campaign(path: Path) -> bool:
+    """Whether a path is a campaign's folder, be it damaged."""
+    return any((path / name).exists() for name in (LOG, CONFIG))
+
+
 def sha256(data: bytes) -> str:
     """Content hash under which a file is kept."""
     return hashlib.sha256(data).hexdigest()

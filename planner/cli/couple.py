@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, respond
+from planner.cli.answer import AsJson, FromNames, respond
 
 
 def couple(
@@ -14,7 +14,7 @@ def couple(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="FRFs at the tested tool's tip: npz of predict or couple, UFF, or a campaign.",
+            help="FRFs at the tested tool's tip: npz, measured (a file or folder), or a campaign.",
         ),
     ],
     tool: Annotated[Path, typer.Option(metavar="TOOL_TOML", help="The tool that is put on.")],
@@ -45,6 +45,7 @@ def couple(
     ] = None,
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
+    from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
     """Predict the FRFs of another tool: the tested one is taken off, the other put on.
@@ -60,7 +61,7 @@ def couple(
     pictures = Pictures(plot, format_, rrd)
     target = load_tool(tool)
     tested = None if reference is None else load_tool(reference)
-    tip, name = tip_of(source, tested, pose, robot, noise / 100)
+    tip, name = tip_of(source, tested, pose, robot, noise / 100, from_names)
     tip = within(tip, band_hz, source)
     contact = None
     if contact_from is not None:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, respond
+from planner.cli.answer import AsJson, FromNames, respond
 from planner.errors import InputError
 
 MAP_POSES, WAY_POSES = 40, 12
@@ -14,7 +14,10 @@ MAP_POSES, WAY_POSES = 40, 12
 def stability(
     source: Annotated[
         Path,
-        typer.Argument(metavar="SOURCE", help="npz of predict, UFF FRFs, a campaign, modes TOML."),
+        typer.Argument(
+            metavar="SOURCE",
+            help="npz of predict, FRFs (a file or a folder), a campaign, modes TOML.",
+        ),
     ],
     cut: Annotated[Path, typer.Option("--cut", metavar="CUT_TOML", help="Cutter and cut.")],
     pose: Annotated[
@@ -58,6 +61,7 @@ def stability(
     ] = None,
     format_: Annotated[str, typer.Option("--format", help="Of the picture: png or svg.")] = "png",
     rrd: Annotated[Path | None, typer.Option(help="Write a Rerun recording to this file.")] = None,
+    from_names: FromNames = False,
     as_json: AsJson = False,
 ) -> int:
     """To which depth a cut is stable at each spindle speed, and how it chatters beyond.
@@ -69,7 +73,9 @@ def stability(
     from planner.report.plot_files import Pictures
     from planner.report.stability_source import Asked
 
-    asked = Asked(source, cut, pose, point, samples, tool, reference, robot, noise / 100)
+    asked = Asked(
+        source, cut, pose, point, samples, tool, reference, robot, noise / 100, from_names
+    )
     pictures = Pictures(plot, format_, rrd)
     check(path, origin, turns, poses, map_, pose)
     with counting(quiet=as_json) as tell:

@@ -11,7 +11,7 @@ from planner.frf.quantities import convert
 from planner.milling.cut import Cut
 from planner.milling.cutter_modes import CutterModes
 from planner.modal.rational_fit import CLOSE, RationalFit, rational_fit
-from planner.recording.read import read
+from planner.recording.frf_files import read_frfs
 from planner.recording.records import AXES, FrfRecord
 
 SEEN = 1e-9  # share of a direction in the plane of the cut that does not count
@@ -144,15 +144,18 @@ def as_modes(fit: RationalFit, frequency_hz: np.ndarray, far: float = FAR) -> Cu
     return CutterModes(np.array(poles), np.array(shapes), np.array(drives), rest)
 
 
-def read_frf(path: Path, pose: str | None) -> CutterFrf:
-    """An npz of `predict` or `couple`, or exported FRFs; InputError in one sentence."""
-    if not path.is_file():
+def read_frf(path: Path, pose: str | None, from_names: bool = False) -> CutterFrf:
+    """An npz of `predict` or `couple`, or exported FRFs, in a file or a folder of files.
+
+    `from_names` as in `read_frfs`. Raises InputError in one sentence.
+    """
+    if not path.exists():
         raise InputError(f"{path} does not exist; name FRFs, modes or a campaign.")
     if path.suffix.lower() == ".npz":
         return _npz(path, pose)
     if pose is not None:
         raise InputError(f"{path} holds FRFs of one pose only; leave --pose out.")
-    return _exported(path)
+    return _exported(path, read_frfs(path, from_names))
 
 
 def of_accelerance(
@@ -209,10 +212,7 @@ def _held(path: Path) -> tuple[list[str], np.ndarray, np.ndarray, np.ndarray | N
     return poses, hertz, mean, sd
 
 
-def _exported(path: Path) -> CutterFrf:
-    records = [record for record in read(path) if isinstance(record, FrfRecord)]
-    if not records:
-        raise InputError(f"{path} holds no FRFs; export FRFs, or give modes as TOML.")
+def _exported(path: Path, records: tuple[FrfRecord, ...]) -> CutterFrf:
     frequency, frfs = labelled_frfs(records, "accelerance", InputError)
     h = np.full((3, 3, len(frequency)), np.nan + 0j)
     for one in frfs:

@@ -20,8 +20,8 @@ from planner.milling.coupling import TipReceptance
 from planner.milling.rotations import TwoPoints, two_point_receptance
 from planner.milling.smoothing import smoothed
 from planner.milling.tool import Tool
+from planner.recording.frf_files import read_frfs
 from planner.recording.joints import JointUnits
-from planner.recording.read import read
 from planner.recording.records import AXES, FrfRecord
 from planner.toml_file import load_toml
 
@@ -49,17 +49,17 @@ class TipMotion:
 
 
 def read_tip(
-    path: Path, tool: Tool | None, pose: str | None, noise: float
+    path: Path, tool: Tool | None, pose: str | None, noise: float, from_names: bool = False
 ) -> TipReceptance | TipMotion:
     """What a file holds; `tool` is the tested one, `noise` a relative sd where it states none.
 
-    Raises InputError in one sentence.
+    `from_names` as in `read_frfs`, of FRFs. Raises InputError in one sentence.
     """
     if path.suffix.lower() == ".npz":
         return _npz(path, pose)
     if path.suffix.lower() == ".toml":
         return _modes(path, noise)
-    return _frfs(path, tool, noise)
+    return _frfs(path, read_frfs(path, from_names), tool, noise)
 
 
 def _npz(path: Path, pose: str | None) -> TipReceptance | TipMotion:
@@ -128,10 +128,9 @@ def _few(names: list[str]) -> str:
     return ", ".join(names[:5]) + (", …" if len(names) > 5 else "")
 
 
-def _frfs(path: Path, tool: Tool | None, noise: float) -> TipReceptance:
-    records = [r for r in read(path) if isinstance(r, FrfRecord)]
-    if not records:
-        raise InputError(f"{path} holds no FRFs; {MEASURE}.")
+def _frfs(
+    path: Path, records: tuple[FrfRecord, ...], tool: Tool | None, noise: float
+) -> TipReceptance:
     if tool is None or len(tool.points) < 2:
         raise InputError(
             f"{path}: where its points are is not stated; give --reference with two [[point]] "

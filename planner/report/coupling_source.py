@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from planner.campaign.campaign import Campaign
+from planner.campaign.store import is_campaign
 from planner.dynamics.simulation import Simulation
 from planner.errors import InputError
 from planner.milling.contact_fit import ContactFit, fit_contact
@@ -20,15 +21,21 @@ LINES = 1e-6  # Hz by which lines of two files may differ
 
 
 def tip_of(
-    source: Path, tested: Tool | None, pose: str | None, robot: Path | None, noise: float
+    source: Path,
+    tested: Tool | None,
+    pose: str | None,
+    robot: Path | None,
+    noise: float,
+    from_names: bool = False,
 ) -> tuple[TipReceptance, str]:
     """Receptances at the tip of the tested tool, and the name of the pose.
 
-    `noise` is the relative sd of FRFs whose file states none. Raises InputError in one sentence.
+    `noise` is the relative sd of FRFs whose file states none, `from_names` as in `read_frfs`.
+    Raises InputError in one sentence.
     """
-    if source.is_dir():
+    if is_campaign(source):
         return _campaign(source, pose)
-    found = read_tip(source, tested, pose, noise)
+    found = read_tip(source, tested, pose, noise, from_names)
     if isinstance(found, TipReceptance):
         return found, pose or source.stem
     if robot is None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planner.campaign.planned import inside, outside_remark
+from planner.campaign.store import is_campaign
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_frf import CutterFrf, names_in, of_accelerance, read_frf
@@ -39,6 +40,7 @@ class Asked:
     reference: Path | None = None
     robot: Path | None = None
     noise: float = 0.0
+    from_names: bool = False  # FRFs' places from the names of their files
 
     @property
     def wanted(self) -> tuple[float, float] | None:
@@ -123,7 +125,7 @@ def _directions(cut: Cut, tool: "Tool", file: Path | None) -> str:
 def structure_of(asked: Asked, cut: Cut) -> Structure:
     """From modes, FRFs, or a campaign at a pose."""
     source, change = asked.source, ToolChange.of(asked, cut)
-    if source.is_dir():
+    if is_campaign(source):
         campaign, q = _stands(source, asked.pose)
         (found,) = at_poses(campaign, (str(asked.pose),), q[None], cut, change)
         return _with(found, outside(campaign, (str(asked.pose),), q[None]))
@@ -134,7 +136,7 @@ def structure_of(asked: Asked, cut: Cut) -> Structure:
         if asked.pose is not None:
             raise InputError(f"{source} states modes of one pose; leave --pose out.")
         return of_modes(load_mode_file(source), cut)
-    return of_frf(read_frf(source, asked.pose), cut)
+    return of_frf(read_frf(source, asked.pose, asked.from_names), cut)
 
 
 def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
@@ -152,7 +154,9 @@ def structures_of_file(asked: Asked, cut: Cut) -> list[tuple[str, Structure]]:
 def _coupled(asked: Asked, change: ToolChange, pose: str | None, cut: Cut) -> Structure:
     from planner.report.coupling_source import tip_of
 
-    tip, name = tip_of(asked.source, change.tested, pose, asked.robot, asked.noise)
+    tip, name = tip_of(
+        asked.source, change.tested, pose, asked.robot, asked.noise, asked.from_names
+    )
     frf, remarks = change.coupled(tip, f"{asked.source}, pose {name}")
     return _with(of_frf(frf, cut), remarks)
 
