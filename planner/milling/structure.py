@@ -7,7 +7,7 @@ import numpy as np
 from planner.errors import InputError
 from planner.milling.cut import Cut
 from planner.milling.cutter_fit import CutterFit
-from planner.milling.cutter_frf import CutterFrf, PlaneFrf
+from planner.milling.cutter_frf import EXACT, CutterFrf, PlaneFrf
 from planner.milling.cutter_modes import CutterModes
 from planner.milling.directional import Coefficients, mean_matrix
 from planner.milling.hidden_modes import hidden_below
@@ -17,7 +17,7 @@ from planner.milling.spread import ModeSpread, explaining, sampled
 from planner.milling.uncertainty import REPLICATES
 from planner.milling.zeroth_order import LobeCurves, curves
 
-EXACT = 1e-5  # relative error of a fit that is one of rounding in a file
+ROUNDING = 1e-5  # relative error of a fit that is one of rounding in a file
 SAMPLES = 200
 SEED = 11  # of samples: the same answer for the same question
 
@@ -75,11 +75,14 @@ def of_modes(file: ModeFile, cut: Cut) -> Structure:
 def of_frf(frf: CutterFrf, cut: Cut) -> Structure:
     """From FRFs, predicted with an sd or measured: modes are fitted, and how well is said."""
     plane = frf.in_plane(cut)
-    return _predicted(plane, cut) if plane.sd is not None else _measured(plane, cut)
+    fit = CutterFit.of(plane) if plane.sd is None else None
+    if fit is None or (fit.error > ROUNDING and plane.error(plane.fitted()) < EXACT):
+        return _computed(plane, cut)  # or without noise: what modes outside the lines add counts
+    return _measured(fit, plane, cut)
 
 
-def _measured(plane: PlaneFrf, cut: Cut) -> Structure:
-    fit, mean = CutterFit.of(plane), mean_matrix(cut, Coefficients.of(cut))
+def _measured(fit: CutterFit, plane: PlaneFrf, cut: Cut) -> Structure:
+    mean = mean_matrix(cut, Coefficients.of(cut))
     check_structure(fit.modes)
     floor = Machine(fit.modes, cut, Coefficients.of(cut)).floor().floor_m
     # Lines in the noise tell nothing of modes below, whose flank may seem to matter there.
@@ -87,11 +90,11 @@ def _measured(plane: PlaneFrf, cut: Cut) -> Structure:
     check_band(plane, curves(plane.frequency_hz, fit.receptance(told), mean), told)
     count = len(np.unique(fit.modes.poles))
     said = f"{count} modes fitted to {plane.name} leave {100 * fit.error:.2g} % of the accelerance."
-    noisy = fit if fit.error > EXACT else None
+    noisy = fit if fit.error > ROUNDING else None
     return Structure(fit.modes, ModeSpread.none(count), plane, (*plane.remarks, said), noisy)
 
 
-def _predicted(plane: PlaneFrf, cut: Cut) -> Structure:
+def _computed(plane: PlaneFrf, cut: Cut) -> Structure:
     mean = mean_matrix(cut, Coefficients.of(cut))
     check_band(plane, curves(plane.frequency_hz, plane.receptance.transpose(2, 0, 1), mean))
     modes = plane.fitted()
