@@ -6,7 +6,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TypeVar
 
-from planner.errors import AxisNotStatedError, PlannerError
+from planner.errors import AxisNotStatedError, InputError, PlannerError
 from planner.recording.points import StatedPoints
 from planner.recording.records import FrfRecord, Hit, PoseRow, Record
 from planner.words import counted
@@ -20,7 +20,8 @@ class Source:
 
     `part` is which of the file's hits it is, from 1; 0: all that the file holds. `response` is the
     signed axis of an FRF's response; `from_name`: what FRFs do not say of their places, the file's
-    name does. `at_s` is when, in a record of several hits.
+    name does. `at_s` is when, in a record of several hits; `hits` are the axes that the table lists
+    for a file of several, which says itself which is which.
     """
 
     path: Path
@@ -32,12 +33,14 @@ class Source:
     response: str | None = None
     from_name: bool = False
     at_s: float | None = None
+    hits: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, row: PoseRow) -> "Source":
         """The file that a row of the table names."""
         assert row.file is not None
-        return cls(row.file, str(row.file), row.hit, row.repeat, row.stated, response=row.response)
+        own = row.file, str(row.file), row.hit, row.repeat, row.stated
+        return cls(*own, response=row.response, hits=row.hits)
 
     def read(self) -> tuple[tuple[Hit, ...], tuple[FrfRecord, ...]]:
         """Hits, or exported FRFs, that the file holds. Raises InputError or RefusedError."""
@@ -47,8 +50,21 @@ class Source:
         records: tuple[Record, ...] = read_hits(self.path)
         frfs = [record for record in records if isinstance(record, FrfRecord)]
         if frfs and not self.part:
-            return (), tuple(located(self.placed(record), self.stated) for record in frfs)
+            given = tuple(located(self.placed(record), self.stated) for record in frfs)
+            self._check_hits({"xyz"[abs(d) - 1] for r in given for d in r.reference_direction if d})
+            return (), given
+        if self.hits:
+            every = hits_from(records, None, self.stated)
+            self._check_hits({hit.axis[1] for hit in every})
         return hits_from(self._meant(records), self.hit, self.stated), ()
+
+    def _check_hits(self, found: set[str]) -> None:
+        """Raise InputError where a file was not hit along the axes that the table lists for it."""
+        if self.hits and found != {axis[1] for axis in self.hits}:
+            raise InputError(
+                f"{self.name} was hit along {', '.join(sorted(found))}, the table lists "
+                f"{', '.join(self.hits)}; correct the one that is wrong."
+            )
 
     def placed(self, record: RecordT) -> RecordT:
         """FRFs with the places that they do not state themselves; time histories as they are."""

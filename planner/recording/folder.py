@@ -81,7 +81,7 @@ def read_recordings(
         rows.append(row)
     if columns:
         _same_angles(path, rows, units)
-    _distinct_files(path, rows)
+    rows = _one_row_a_file(path, rows)
     return RecordingsFolder(folder, units, tuple(rows))
 
 
@@ -285,13 +285,24 @@ def _same_angles(path: Path, rows: list[PoseRow], joints: JointUnits) -> None:
             )
 
 
-def _distinct_files(path: Path, rows: list[PoseRow]) -> None:
-    seen: dict[Path, int] = {}
+def _one_row_a_file(path: Path, rows: list[PoseRow]) -> list[PoseRow]:
+    """Rows of which those that name the same file, for each hit in it, are one.
+
+    The file itself then says along which axes it was hit. Raises InputError where rows that name
+    one file are of different poses, or of the same hit.
+    """
+    first: dict[Path, PoseRow] = {}
     for row in rows:
         assert row.file is not None
-        if row.file in seen:
+        assert row.hit is not None
+        known = first.setdefault(row.file, row)
+        if known is row:
+            continue
+        if known.pose != row.pose or row.hit in (known.hit, *known.hits):
             raise InputError(
-                f"{path}, row {row.row}: {row.file.name} is listed in row {seen[row.file]} "
-                f"already; each hit has a file of its own."
+                f"{path}, row {row.row}: {row.file.name} is listed in row {known.row} already, for "
+                f"the same hit or another pose; each hit has a file, or a row, of its own."
             )
-        seen[row.file] = row.row
+        hits = *(known.hits or (known.hit or "",)), row.hit
+        first[row.file] = replace(known, hit=None, hits=hits)
+    return list(first.values())

@@ -181,6 +181,7 @@ class PoseRow:
     file: Path | None = None
     peak_force_n: float | None = None
     response: str | None = None  # signed axis of an FRF's response, where the table says it
+    hits: tuple[str, ...] = ()  # of a file with several hits that has a row for each
     stated: StatedPoints = field(default_factory=StatedPoints)
 
 

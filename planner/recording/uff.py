@@ -171,8 +171,9 @@ def _unit(path: Path, s: dict[str, Any], axis: str = "ordinate") -> Unit:
 def _by_hit(sets: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
     """Time histories hit by hit, where a file holds a whole run of them.
 
-    The n-th force and the n-th history of each response are the n-th hit; where they are not
-    equally many, nothing says which belong together, and all stay one record.
+    The n-th force and the n-th history of each response are the n-th hit. Where responses are not
+    equally many, as of a sensor that roves, a hit is a force and what follows it (or what it
+    follows), if that is equally much each time; else all stay one record.
     """
     each: dict[tuple, list[dict[str, Any]]] = {}
     for s in sets:
@@ -180,9 +181,15 @@ def _by_hit(sets: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
         response = int(s["rsp_node"]), int(s["rsp_dir"])
         each.setdefault(("force",) if force else response, []).append(s)
     counts = {len(of_one) for of_one in each.values()}
-    if ("force",) not in each or len(counts) != 1:
-        return [sets] if sets else []
-    return [list(hit) for hit in zip(*each.values(), strict=True)]
+    if ("force",) in each and len(counts) == 1:
+        return [list(hit) for hit in zip(*each.values(), strict=True)]
+    forces = {id(s) for s in each.get(("force",), [])}
+    size = len(sets) // max(1, len(forces))
+    runs = [sets[i : i + size] for i in range(0, len(sets), size)] if size > 1 else []
+    for place in (0, -1):
+        if runs and all({id(s) for s in run} & forces == {id(run[place])} for run in runs):
+            return runs
+    return [sets] if sets else []
 
 
 def _time_record(path: Path, sets: list[dict[str, Any]]) -> TimeRecord:

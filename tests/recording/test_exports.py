@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import read_poses
+from planner.recording.folder import read_poses, read_recordings
 from planner.recording.named_columns import Named, to_records
 from planner.recording.read import read
 from planner.recording.sampling import sampling_rate
@@ -248,3 +249,37 @@ def test_datasets_of_other_kinds_do_not_disturb(tmp_path):
     none = dataset_58(1, ANSWER, NONE)
     (record,) = read(write(tmp_path / "n.uff", none))
     assert record.channels[0].quantity == "unknown"
+
+
+@pytest.mark.parametrize("force_first", [True, False])
+def test_a_sensor_that_roves_through_one_universal_file(tmp_path, force_first):
+    force, answer = (13, "Force", "N"), (12, "Acceleration", "m/s^2")
+    sets = []
+    for node in (3, 4, 5):
+        pair = [dataset_58(1, FORCE, force, hit=(1, 3)),
+                dataset_58(1, node * ANSWER, answer, felt=(node, 3))]  # fmt: skip
+        sets += pair if force_first else pair[::-1]
+    records = read(write(tmp_path / "rove.uff", *sets))
+    felt = [[c for c in r.channels if c.quantity == "acceleration"] for r in records]
+    assert [[c.node for c in one] for one in felt] == [["3"], ["4"], ["5"]]
+    (odd,) = read(write(tmp_path / "odd.uff", *sets[:5]))
+    assert len(odd.channels) == 5
+
+
+def test_rows_of_one_file_with_several_hits(tmp_path):
+    frfs = [dataset_58(4, FRF, (12, "A", "m/s^2"), (13, "F", "N"), (1, felt), (1, hit), step=0.25)
+            for hit in (1, 2) for felt in (1, 2, 3)]  # fmt: skip
+    write(tmp_path / "all.uff", *frfs)
+    head = "pose,joint_1_deg,hit,file\n"
+    table = tmp_path / "recordings.csv"
+    table.write_text(f"{head}P1,5,+x,all.uff\nP1,5,+y,all.uff\n")
+    (row,) = read_recordings(tmp_path, ["joint_1"]).rows
+    ((), (record,)) = Source.of(row).read()
+    assert len(record.values) == 6
+    table.write_text(f"{head}P1,5,+x,all.uff\nP1,5,+z,all.uff\n")
+    (row,) = read_recordings(tmp_path, ["joint_1"]).rows
+    with pytest.raises(InputError, match="was hit along x, y, the table lists"):
+        Source.of(row).read()
+    table.write_text(f"{head}P1,5,+x,all.uff\nP2,6,+y,all.uff\n")
+    with pytest.raises(InputError, match="listed in row 2 already"):
+        read_recordings(tmp_path, ["joint_1"])
