@@ -123,8 +123,8 @@ def _tool(tcp: str, mass: float, robot: Robot) -> Payload:
     q = (robot.lower_rad + robot.upper_rad) / 2
     place = robot.forward(q)[0].T @ tool_direction(robot, q) * side / 2
     moment = round(mass * side**2 / 6, 5)
-    com = tuple(round(float(v), 4) + 0.0 for v in place)
-    return Payload(tcp, mass, com, (moment, moment, moment, 0.0, 0.0, 0.0))
+    x, y, z = (round(float(v), 4) + 0.0 for v in place)
+    return Payload(tcp, mass, (x, y, z), (moment, moment, moment, 0.0, 0.0, 0.0))
 
 
 def _floor(robot: Robot) -> Obstacle:

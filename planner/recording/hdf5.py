@@ -89,7 +89,7 @@ class _Reader:
         if depth > DEEPEST:
             raise InputError(f"{self._path} is nested too deep; export a hit a file.")
         entries: dict[str, object] = {}
-        for name in group:
+        for name in map(str, group):
             if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue  # MATLAB's own, and links to what is read elsewhere
             item = group[name]
@@ -125,7 +125,8 @@ class _Reader:
             if isinstance(item, h5py.Group):
                 found.append(self._struct(item, depth + 1))
             else:
-                found.append(self._dataset(item, depth + 1) if item is not None else {})
+                named = isinstance(item, h5py.Dataset)
+                found.append(self._dataset(item, depth + 1) if named else {})
         return found
 
     def _dataset(self, dataset: "h5py.Dataset", depth: int) -> object:

@@ -54,7 +54,7 @@ def _root(path: Path) -> EntryTree:
 
 def _channel(channel: "nptdms.TdmsChannel") -> EntryTree:
     """A channel's numbers with its properties; dates are times in s. What is neither is empty."""
-    values = channel[:]
+    values: Any = channel[:]
     if isinstance(values, np.ndarray) and values.dtype.names and values.size:
         seconds = (values["seconds"] - values["seconds"][0]).astype(float)
         return EntryTree({"unit": "s"}, {"": seconds + values["second_fractions"] / 2.0**64})

@@ -81,10 +81,10 @@ def _sets(path: Path) -> list[dict[str, Any]]:
         raise InputError(
             f"{path} cannot be read as a universal file ({type(error).__name__}); export it again."
         ) from None
-    system = _SYSTEMS[1]
+    system = None
     for kind, one, (first, end) in zip(kinds, sets, blocks, strict=True):
         if kind == 164:
-            system = _system(path, one)
+            system = one
         elif kind == 58:
             one["system"] = system
             if one["binary"] and len(one["data"]) != int(one["num_pts"]):
@@ -93,8 +93,10 @@ def _sets(path: Path) -> list[dict[str, Any]]:
     return sets
 
 
-def _system(path: Path, s: dict[str, Any]) -> tuple[float, float]:
-    """Units of length and of force that are one of SI's, as a dataset 164 states them."""
+def _system(path: Path, s: dict[str, Any] | None) -> tuple[float, float]:
+    """Units of length and of force that are one of SI's, as a dataset 164 states them, if any."""
+    if s is None:
+        return _SYSTEMS[1]
     stated = float(s["length"]), float(s["force"])
     known = _SYSTEMS.get(int(s["units_code"]), stated)
     if not all(f > 0 and abs(f / k - 1) < 0.01 for f, k in zip(stated, known, strict=True)):
@@ -155,7 +157,7 @@ def _unit(path: Path, s: dict[str, Any], axis: str = "ordinate") -> Unit:
     if label.upper() in _NONE:
         if stated is None:
             return Unit("unknown", "", 1.0)
-        length, force = s["system"]
+        length, force = _system(path, s["system"])
         factor = {"force": 1 / force, "pressure": length**2 / force}.get(stated, 1 / length)
         return Unit(stated, _SI[stated], factor)
     known = lookup(label)

@@ -70,7 +70,7 @@ def carried(robot: Robot, payload_kg: float) -> np.ndarray:
 
 def _springs(robot: Robot, name: str, axis: np.ndarray, load: float) -> list[Compliance]:
     """A joint's own spring, and two across it that share their stiffness."""
-    own = tuple(round(float(v), 9) for v in axis)
+    own = _direction(axis)
     if robot.slides(name):
         k = _rounded(load / GIVES_M)
         return [Compliance(name, own, k, 0.0, slide=True, stiffness_sd_percent=SD_PERCENT)]
@@ -79,12 +79,18 @@ def _springs(robot: Robot, name: str, axis: np.ndarray, load: float) -> list[Com
     across = np.linalg.svd(axis[None])[2][1:]
     tie = f"bearing of {name}"
     for direction in across:
-        tilt = tuple(round(float(v), 9) + 0.0 for v in direction)
+        tilt = _direction(direction)
         k_across = _rounded(ACROSS * load / GIVES_RAD)
         blocks.append(
             Compliance(name, tilt, k_across, 0.0, tie=tie, stiffness_sd_percent=SD_PERCENT)
         )
     return blocks
+
+
+def _direction(axis: np.ndarray) -> tuple[float, float, float]:
+    """An axis (3,) in numbers as they are written."""
+    x, y, z = (round(float(v), 9) + 0.0 for v in axis)
+    return x, y, z
 
 
 def _alike(blocks: list[Compliance], inertia: np.ndarray) -> list[float]:

@@ -126,12 +126,13 @@ def _beyond(robot: Robot, number: int) -> float:
 def _table(link: str, solid: pin.Inertia, mass: float) -> LinkTable:
     """A solid of any density as a [[link]] of `mass` in kg, in numbers as they are written."""
     moments = solid.inertia * (mass / solid.mass)
-    upper = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]
+    x, y, z = (round(float(v), 4) for v in solid.lever)
+    xx, xy, xz, yy, yz, zz = (float(f"{v:.4g}") for v in moments[np.triu_indices(3)])
     return LinkTable(
         link,
         float(f"{mass:.4g}"),
-        tuple(round(float(v), 4) for v in solid.lever),
-        tuple(float(f"{moments[at]:.4g}") for at in upper),
+        (x, y, z),
+        (xx, xy, xz, yy, yz, zz),
         SD_PERCENT,
         guessed=True,
     )

@@ -21,7 +21,7 @@ from tests.support.outside import call, make_cell, record, told
 from tests.support.robots import JOINTS_DEG
 
 MIDDLE = [round((a + b) / 2, 3) for a, b in JOINTS_DEG]
-TRIED = ["two groups of the same names, HDF5", "a flipped byte in gzip", "an acceleration of 1e200",
+TRIED = ["an external link", "a flipped byte in gzip", "an acceleration of 1e200",
          "FRFs of unequal length", "spectra that are a word", "rates that differ"]  # fmt: skip
 
 

@@ -24,6 +24,7 @@ from tests.support.bad_input import columns, write_csv, write_h5, write_mat, wri
 from tests.support.containers import MANY_HITS, ONE_HIT
 from tests.support.outside import call, make_cell
 from tests.support.simulated_hits import RATE_HZ, make_hit
+from tests.support.uff_files import dataset_58, units_164, write
 
 LONGEST_S, LARGEST_GIB = 10, 2
 BAND = (4.0, 60.0)
@@ -81,8 +82,8 @@ def subjects(folder: Path) -> list[tuple[Path, Callable[[Path], object]]]:
     table["time_s"] = np.arange(hit.force_n.size) / RATE_HZ
     hammer = Hammer(sampling_rate_hz=RATE_HZ)
     write_uff(folder / "hit.uff", SimulatedHit("+x", hit.force_n, hit.acceleration_m_s2), hammer)
-    for write in (write_csv, write_h5, write_mat, write_tdms):
-        write(folder / f"hit.{write.__name__.removeprefix('write_')}", table)
+    for write_one in (write_csv, write_h5, write_mat, write_tdms):
+        write_one(folder / f"hit.{write_one.__name__.removeprefix('write_')}", table)
     (folder / "hit.csv.gz").write_bytes(gzip.compress((folder / "hit.csv").read_bytes()))
     lines = np.linspace(0.0, 100.0, 100)
     frfs = {"frequency_hz": lines, **{f"accelerance_{a}x": lines + 1j for a in "xyz"}}
@@ -92,7 +93,8 @@ def subjects(folder: Path) -> list[tuple[Path, Callable[[Path], object]]]:
         name, write = (ONE_HIT | MANY_HITS)[what]
         write(folder / f"of_{name}", [hit])
         recordings.append(folder / f"of_{name}")
-    read = [(path, judge) for path in (*recordings, folder / "frf.mat")]
+    others = _as_people_write_them(folder, table)
+    read = [(path, judge) for path in (*recordings, folder / "frf.mat", *others)]
     robot, plan, _ = make_cell(folder)
     assert call("new", folder / "cell", "--robot", robot, "--campaign", plan)[0] == 0
     names = Robot.load(robot).joint_names
@@ -111,6 +113,24 @@ def subjects(folder: Path) -> list[tuple[Path, Callable[[Path], object]]]:
         (plan, load_campaign_config),
         (folder / "cell" / "log.jsonl", Journal),
     ]
+
+
+def _as_people_write_them(folder: Path, table: dict[str, np.ndarray]) -> list[Path]:
+    """The hit with decimal commas in UTF-16, FRFs as text, and a system of units of its own."""
+    names = [*table]
+    rows = ["\t".join(f"{table[n][i]:.6g}" for n in names) for i in range(len(table["time_s"]))]
+    text = "# hit: +x\n" + "\t".join(names) + "\n" + "\n".join(rows).replace(".", ",")
+    (folder / "german.txt").write_text(text, encoding="utf-16")
+    frf = ["# hit: +x", "# response: +x", "Freq [Hz];Magnitude (dB re 1 m/s²/N);Phase [deg]"]
+    frf += [f"{f:.2f};{-f:.3f};{f:.1f}" for f in np.arange(1.0, 90.0, 0.5)]
+    (folder / "frf.txt").write_text("\n".join(frf))
+    force, answer = (13, "Force", "NONE"), (12, "Acceleration", "NONE")
+    samples = [table["force_n"], *(table[f"acceleration_{a}_m_s2"] for a in "xyz")]
+    sets = [dataset_58(1, samples[0], force, felt=(1, 1), step=1 / RATE_HZ)]
+    sets += [dataset_58(1, s, answer, felt=(2, k), step=1 / RATE_HZ)
+             for k, s in enumerate(samples[1:], 1)]  # fmt: skip
+    write(folder / "inch.uff", units_164(7, 39.37007874, 0.2248089431), *sets)
+    return [folder / name for name in ("german.txt", "frf.txt", "inch.uff")]
 
 
 def late(*_: object) -> None:

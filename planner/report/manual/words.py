@@ -78,6 +78,15 @@ FORMATS = (
     ("CSV, MAT, HDF5, TDMS", "columns or arrays named time_s, force_n, acceleration_x_m_s2, …; for "
      "FRFs frequency_hz, accelerance_xx, …; the hit as attribute hit = +x, in a CSV as its first "
      "line: # hit: +x; or else in recordings.csv"),
+    ("text of spreadsheets and analysers", "columns parted by comma, semicolon, tab or blanks, "
+     "decimals with point or comma, UTF-8, UTF-16 or Latin; names such as Time (s), Force [N], "
+     "Acc X (g), t/s, or units in the line below; one column of times, or one for each channel"),
+    ("FRFs as text", "Frequency (Hz) with Real and Imag, or Magnitude (also in dB) and Phase (deg "
+     "or rad), their unit such as (m/s²)/N or m/N in the name or below it, Coherence; where they "
+     "were felt and hit as lines # response: +y and # hit: +x before the names, as columns "
+     "response and hit of recordings.csv, or with --from-names from the file's name: tap_yx "
+     "(response y, hit x), H3_1 (nodes). A file that holds several hits, or all FRFs, of a pose "
+     "may have a row for each hit"),
     ("MAT, HDF5, TDMS, LVM", "as programs write them: structs, cell arrays and groups, also one a "
      "hit; a matrix with a list of names beside it; unit, rate (fs, dt, wf_increment, …) and start "
      "(t0, wf_start_time, …) of each channel; LabVIEW's .lvm with one or many x columns. Channels "
