@@ -7,18 +7,12 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, refusals, respond
+from planner.cli.answer import RECORDED, AsJson, RobotOption, refusals, respond
 
 
 def diagnose(
-    recordings: Annotated[
-        Path,
-        typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv, or a campaign."),
-    ],
-    robot: Annotated[
-        Path | None,
-        typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml (a campaign has its own)."),
-    ] = None,
+    recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
+    robot: RobotOption = None,
     predict: Annotated[
         Path | None, typer.Option(metavar="POSES_CSV", help="Poses whose FRFs are wanted.")
     ] = None,
