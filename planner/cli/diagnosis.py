@@ -34,6 +34,7 @@ def diagnose(
     from planner.cli.progress import counting
     from planner.recording.folder import read_poses
     from planner.report.modal_analysis import check_options
+    from planner.report.status import model_beside
 
     started = time.perf_counter()
     check_options(window_rate_1_s=window_rate_1_s)
@@ -48,6 +49,9 @@ def diagnose(
             answer = answer.with_predictions([row.pose for row in wanted], q, npz)
         if out is not None:
             answer = answer.write(out)
+    if given.campaign is not None and robot is None:
+        both = model_beside(given.campaign, answer.to_json())
+        answer = replace(answer, remarks=(*answer.remarks, *filter(None, (both,))))
     answer = replace(answer, seconds=time.perf_counter() - started)
     return respond(answer, as_json, refusals(answer.refused))
 

@@ -29,7 +29,7 @@ class MismatchPlaces:
         where = f", at poses {', '.join(self.poses)}" if self.poses else ""
         along = f", along {', '.join(self.directions)}" if self.directions else ""
         off = f"the simulation is clearly off at {bands} Hz{where}{along}"
-        return f"Refitted without any effect, {off}."
+        return f"With its own springs refitted and nothing added, {off}."
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ class MismatchShares:
         text = (
             f"The simulation is off from the measured FRFs by {stated} % (root mean square) as "
             f"robot.toml states it, by {refitted} % once its own springs and dampers are refitted, "
-            f"and by {explained} % with what was found. Most likely errors of hits and sensor "
-            f"taken out of that, {left} % remains."
+            f"and by {explained} % with what was found. Once the likeliest errors of hits "
+            f"and sensor are taken out too, {left} % remains."
         )
         if self.refitted <= self.stated:
             return text

@@ -13,8 +13,10 @@ from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
 from planner.report.diagnosis_plots import _overlay, _residuals
+from planner.report.kept_diagnosis import two_answers
 from planner.report.mismatch import MismatchShares
 from planner.report.place_names import place_names, with_names
+from planner.report.refitted_springs import RefittedSpring
 from planner.robot.robot import Robot
 from tests.support.plain_arm import make_plain_arm
 
@@ -59,6 +61,28 @@ def test_where_nothing_is_near_nothing_is_named():
     assert "none of the effects that planner knows describes it" in said
     assert "explains" in report("explained", (BASE, 1.0)).verdict_text
     assert report("explained", (BASE, 1.0)).to_json()["verdict_text"]
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (["base_compliance base"], "adds springs at A5 and base, the diagnosis names base."),
+        (["base_compliance base", "transverse_compliance joint_5"], ""),
+        (["joint_stiffness joint_2"], ""),
+        ([], ""),
+    ],
+)
+def test_a_model_and_a_diagnosis_that_differ_are_one_answer(found, said):
+    axis = (1.0, 0.0, 0.0)
+    springs = [
+        RefittedSpring(joint, axis, stated, 1e6, 1e4, "N·m/rad", True)
+        for joint, stated in (("A2", 2e6), ("A5", None), ("base", None))
+    ]
+    each = [dict(zip(("effect", "at"), one.split(), strict=True)) for one in found]
+    answer = {"findings": each, "place_names": {"joint_2": "A2", "joint_5": "A5"}}
+    both = two_answers(springs, answer)
+    assert said in both
+    assert bool(said) == bool(both)
 
 
 def test_small_probabilities_are_not_called_none():
