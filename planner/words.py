@@ -26,6 +26,14 @@ def significant(value: float, digits: int = 2) -> str:
     return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
 
 
+def probable(probability: float) -> str:
+    """A probability in %, with as many digits as still say something: "98 %", "above 99.9 %"."""
+    if not 1e-3 <= probability <= 0.999:
+        return "below 0.1 %" if probability < 0.5 else "above 99.9 %"
+    percent = 100 * probability
+    return f"{percent:.{int(not 1 <= percent <= 99)}f} %"
+
+
 def short_name(path: str | Path, most: int = 24) -> str:
     """The name of a file; of a long one its beginning and, as names differ there, more of its end.
 

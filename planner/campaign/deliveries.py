@@ -5,7 +5,7 @@ from pathlib import Path
 
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
+from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings, table_folders
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import READERS
@@ -42,11 +42,8 @@ def sort_paths(
     deliveries: list[Delivery] = []
     bare: list[Path] = []
     for path in paths:
-        table = path if path.name == TABLE else path / TABLE
-        if table.is_file():
-            deliveries += _from_table(table.parent, joints, points, pose)
-        elif path.is_dir() and (tables := sorted(path.rglob(TABLE))):
-            deliveries += _from_tables(path, tables, joints, points, pose)
+        if path.exists() and (folders := table_folders(path)):
+            deliveries += _from_tables(path, folders, joints, points, pose)
         elif path.is_dir():
             bare += files_in(path, READERS)
         elif path.is_file():
@@ -66,20 +63,20 @@ def sort_paths(
 
 
 def _from_tables(
-    folder: Path,
-    tables: list[Path],
+    path: Path,
+    folders: tuple[Path, ...],
     joints: JointUnits,
     points: PointNames,
     pose: str | None,
 ) -> list[Delivery]:
-    """Deliveries of a folder's subfolders, each with a table of its own; `pose` picks one."""
-    if len(tables) == 1:
-        return _from_table(tables[0].parent, joints, points, pose)
-    every = [d for table in tables for d in _from_table(table.parent, joints, points, None)]
+    """Deliveries of folders, each with a table of its own; `pose` picks one."""
+    if len(folders) == 1:
+        return _from_table(folders[0], joints, points, pose)
+    every = [d for folder in folders for d in _from_table(folder, joints, points, None)]
     found = [d for d in every if pose in (None, d.pose)]
     if not found:
         names = ", ".join(dict.fromkeys(d.pose for d in every))
-        raise InputError(f"No table in {folder} has pose {pose}; their poses are {names}.")
+        raise InputError(f"No table in {path} has pose {pose}; their poses are {names}.")
     return found
 
 

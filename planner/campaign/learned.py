@@ -10,6 +10,7 @@ from planner.identification.parameters import Priors, parametrise
 from planner.identification.result import Estimate, Identification
 from planner.inference.block_diagonal import block_diagonal
 from planner.inference.evidence import laplace
+from planner.words import counted
 
 # Misfit (χ² per value) from which the simulation is suspected to lack physics. On generated cells
 # that lacked nothing it was 0.5 to 1.4, where a link bent 2.7.
@@ -87,16 +88,21 @@ def likeliest(found: Sequence[Learned]) -> Learned:
 
 def lacking(found: tuple[str, ...], poses: int = PLACED) -> str:
     """What to tell of springs that were `found` at so many poses; as `Learned.found`."""
-    text = "robot.toml lacks compliance that the recordings show"
+    text = "The robot gives way where robot.toml has no spring"
     if not found:
-        return f"{text}, but not yet where; tilts of all joints and the floor are identified."
+        return (
+            f"{text}; the recordings do not tell yet where, so the model lets all joints and the "
+            f"floor tilt. Measure on."
+        )
     more = f" and {len(found) - NAMED} more" if len(found) > NAMED else ""
     named = "; ".join(found[:NAMED])
     if poses < PLACED:
-        measured = "one pose" if poses == 1 else f"{poses} poses"
         return (
-            f"{text}. Where, {measured} cannot tell: so far {named}{more} would do, and so may "
-            f"others. Measure {PLACED} poses before anything is repaired."
+            f"{text}. It may be {named}{more}, but from {counted(poses, 'pose')} it may as well be "
+            f"elsewhere: repair nothing yet, and measure {counted(PLACED - poses, 'more pose')}."
         )
     bolts = " Check the anchor bolts." if FLOOR in named else ""
-    return f"{text}, identified beside what it states: {named}{more}.{bolts}"
+    return (
+        f"{text}: the recordings show {named}{more}, and the model counts on it.{bolts} planner "
+        f"diagnose says how sure that is."
+    )

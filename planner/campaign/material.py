@@ -1,4 +1,4 @@
-"""What a diagnosis is given: a folder of recordings and a robot, or a campaign."""
+"""What recordings of several poses come from: folders and a robot, or a campaign."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -8,7 +8,10 @@ import numpy as np
 from planner.campaign import store
 from planner.campaign.campaign import Campaign
 from planner.dataset.dataset import Dataset, Progress
+from planner.dataset.recordings import recordings_in
+from planner.dataset.visits import Recording
 from planner.errors import InputError
+from planner.recording.folder import TABLE
 from planner.recording.records import PoseRow
 from planner.robot.robot import Robot
 
@@ -36,19 +39,24 @@ class Material:
         own = self.campaign is not None and self.robot == self.campaign.robot_toml
         return self.campaign.cell.robot if self.campaign and own else Robot.load(self.robot)
 
-    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Progress) -> Dataset:
-        """The recordings of the robot; nothing is written. Raises as `Dataset.read` does."""
-        rate = self.window_rate_1_s
+    def listed(self, robot: Robot) -> tuple[Recording, ...]:
+        """Every file with its pose, in the order of recording; a campaign's accepted ones.
+
+        Raises InputError where there are none, or a table is wrong.
+        """
         if self.campaign is None:
-            return Dataset.read(
-                self.recordings,
-                robot.joints,
-                band_hz,
-                window_rate_1_s=rate,
-                progress=progress,
-                points=robot.points,
-            )
-        return self.campaign.dataset(band_hz, window_rate_1_s=rate, progress=progress)
+            return recordings_in(self.recordings, robot.joints, robot.points)
+        return self.campaign.used_recordings
+
+    def read(self, robot: Robot, band_hz: tuple[float, float], progress: Progress) -> Dataset:
+        """What is `listed`, read and screened; nothing is written. Raises as `Dataset.of` does."""
+        return Dataset.of(
+            self.listed(robot),
+            band_hz,
+            window_rate_1_s=self.window_rate_1_s,
+            progress=progress,
+            name=str(self.recordings if self.campaign is None else self.campaign.directory),
+        )
 
     def with_poses(self, rows: tuple[PoseRow, ...]) -> "Material":
         """The same with the poses of a table, unless a campaign offers its own."""
@@ -60,14 +68,17 @@ class Material:
 
 
 def material(folder: Path, robot: Path | None, window_rate_1_s: float) -> Material:
-    """Of a recordings folder, or of a campaign: then robot, window and poses are its own.
+    """Of recordings as `recordings_in` takes them, or of a campaign.
+
+    Robot, window and poses are then its own.
 
     Raises InputError where the robot is missing.
     """
     if not (folder / store.CONFIG).is_file():
         if robot is None:
             raise InputError(f"{folder} is no campaign; name the robot with --robot ROBOT_TOML.")
-        return Material(folder, robot, window_rate_1_s, np.zeros((0, 0)), ())
+        recordings = folder.parent if folder.name == TABLE else folder
+        return Material(recordings, robot, window_rate_1_s, np.zeros((0, 0)), ())
     campaign = Campaign(folder)
     cell = campaign.cell
     chosen = np.flatnonzero(cell.allowed)[:OFFERED]

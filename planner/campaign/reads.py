@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from planner.campaign.cell import Cell
     from planner.campaign.model import Model
     from planner.dataset.dataset import Dataset, Progress
+    from planner.dataset.visits import Recording
     from planner.frf.frf import Frf
     from planner.surrogate.frf_bands import ModalPrediction
 
@@ -162,29 +163,34 @@ class CampaignReads:
         window_rate_1_s: float = 0.0,
         progress: "Progress" = lambda text: None,
     ) -> "Dataset":
-        """The accepted recordings of all poses in use, in the order of import.
+        """Of `used_recordings`, and raises as they do."""
+        from planner.dataset.dataset import Dataset
 
-        Raises InputError where there are none.
-        """
-        from planner.dataset.dataset import Dataset, Recording
-
-        kept = self.recordings
-        found = [
-            Recording(
-                measurement.pose, self.cell.robot.joints.internal(measurement.joints_deg), source
-            )
-            for measurement in self.state.used
-            for source in kept.sources(measurement)
-        ]
-        if not found:
-            raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
         return Dataset.of(
-            found,
+            self.used_recordings,
             band_hz,
             window_rate_1_s=window_rate_1_s,
             progress=progress,
             name=str(self.directory),
         )
+
+    @property
+    def used_recordings(self) -> "tuple[Recording, ...]":
+        """The accepted recordings of all poses in use, in the order of import.
+
+        Raises InputError where there are none.
+        """
+        from planner.dataset.visits import Recording
+
+        kept, joints = self.recordings, self.cell.robot.joints
+        found = tuple(
+            Recording(measurement.pose, joints.internal(measurement.joints_deg), source)
+            for measurement in self.state.used
+            for source in kept.sources(measurement)
+        )
+        if not found:
+            raise InputError(f"{self.directory} holds no hits yet; import recordings first.")
+        return found
 
     def source_of(self, hit: HitRecord) -> Source:
         """The kept copy of a recording; InputError where it is not what was imported."""

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,6 +11,15 @@ if TYPE_CHECKING:
     from planner.report.answer import Answer, RefusedFile
 
 AsJson = Annotated[bool, typer.Option("--json", help="Answer with one JSON document.")]
+
+RECORDED = "Folder with recordings.csv, or with folders that have one; or a campaign"
+
+RobotOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--robot", metavar="ROBOT_TOML", help="The robot's robot.toml (a campaign has its own)."
+    ),
+]
 
 FromNames = Annotated[
     bool,

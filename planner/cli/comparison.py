@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, respond, warn
+from planner.cli.answer import RECORDED, AsJson, RobotOption, respond, warn
 from planner.errors import InputError
 
 SIMULATIONS = ("frozen", "updated", "none")
@@ -15,12 +15,12 @@ SIMULATIONS = ("frozen", "updated", "none")
 
 def compare(
     recordings: Annotated[
-        Path, typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv: the pool.")
+        Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}: the pool.")
     ],
-    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
     strategies: Annotated[
         str, typer.Option(metavar="A,B,…", help="random, sobol, maximin_lhs, default, variance, …")
     ],
+    robot: RobotOption = None,
     repeats: Annotated[int, typer.Option(min=1, max=10_000, help="Seeds.")] = 20,
     initial: Annotated[
         int, typer.Option(min=1, help="First poses, the same for all strategies at a seed.")
@@ -48,23 +48,26 @@ def compare(
 
     Example: planner compare exports --robot robot/robot.toml --strategies random,default
     """
+    from planner.campaign import store
+    from planner.campaign.material import material
     from planner.cli.progress import bars
     from planner.compare.bench import assemble, decide
     from planner.compare.resume import conduct, recorded
     from planner.compare.tasks import Study
-    from planner.recording.folder import read_recordings
     from planner.report.comparison import comparison
-    from planner.robot.robot import Robot
 
     started = time.perf_counter()
     if simulation not in (None, *SIMULATIONS):
         raise InputError(f"--simulation {simulation} is not known; give {', '.join(SIMULATIONS)}.")
-    loaded = Robot.load(robot)
-    rows = read_recordings(recordings, loaded.joints, loaded.points).rows
-    config = decide(loaded, [row.joints_deg for row in rows], campaign, simulation)
+    given = material(recordings, robot, 0.0)
+    loaded = given.nominal
+    listed = given.listed(loaded)
+    if campaign is None and given.campaign is not None:
+        campaign = given.campaign.directory / store.CONFIG
+    config = decide(loaded, listed, campaign, simulation)
     folder = out or _cache_folder()
     with bars(quiet=as_json) as progress:
-        poses = recorded(recordings, loaded, config.modes, workers, progress)
+        poses = recorded(listed, loaded.joints, config.modes, workers, progress)
         bench, remarks = assemble(loaded, config, poses)
         study = Study.plan(bench, strategies, repeats, initial, budget)
         found, damaged = conduct(bench, study, folder, scheduler, workers, progress)

@@ -7,18 +7,12 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, refusals, respond
+from planner.cli.answer import RECORDED, AsJson, RobotOption, refusals, respond
 
 
 def diagnose(
-    recordings: Annotated[
-        Path,
-        typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv, or a campaign."),
-    ],
-    robot: Annotated[
-        Path | None,
-        typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml (a campaign has its own)."),
-    ] = None,
+    recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
+    robot: RobotOption = None,
     predict: Annotated[
         Path | None, typer.Option(metavar="POSES_CSV", help="Poses whose FRFs are wanted.")
     ] = None,
@@ -40,6 +34,7 @@ def diagnose(
     from planner.cli.progress import counting
     from planner.recording.folder import read_poses
     from planner.report.modal_analysis import check_options
+    from planner.report.status import model_beside
 
     started = time.perf_counter()
     check_options(window_rate_1_s=window_rate_1_s)
@@ -54,6 +49,9 @@ def diagnose(
             answer = answer.with_predictions([row.pose for row in wanted], q, npz)
         if out is not None:
             answer = answer.write(out)
+    if given.campaign is not None and robot is None:
+        both = model_beside(given.campaign, answer.to_json())
+        answer = replace(answer, remarks=(*answer.remarks, *filter(None, (both,))))
     answer = replace(answer, seconds=time.perf_counter() - started)
     return respond(answer, as_json, refusals(answer.refused))
 

@@ -7,14 +7,12 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.answer import AsJson, refusals, respond
+from planner.cli.answer import RECORDED, AsJson, RobotOption, refusals, respond
 
 
 def identify(
-    recordings: Annotated[
-        Path, typer.Argument(metavar="RECORDINGS", help="Folder with recordings.csv.")
-    ],
-    robot: Annotated[Path, typer.Option(metavar="ROBOT_TOML", help="The robot's robot.toml.")],
+    recordings: Annotated[Path, typer.Argument(metavar="RECORDINGS", help=f"{RECORDED}.")],
+    robot: RobotOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="ROBOT_TOML", help="Write the identified robot here.")
     ] = None,
@@ -50,28 +48,21 @@ def identify(
     Example: planner identify exports --robot robot/robot.toml --out found/robot.toml
     """
     from planner.api import identify as fit
+    from planner.campaign.material import material
     from planner.cli.progress import reporting
-    from planner.dataset.dataset import Dataset
     from planner.identification.write_robot import check_target
     from planner.report.modal_analysis import check_options
     from planner.report.plot_files import Pictures
-    from planner.robot.robot import Robot
 
     started = time.perf_counter()
     check_options(band_hz, window_rate_1_s=window_rate_1_s)
-    pictures, nominal = Pictures(plot, format_, rrd), Robot.load(robot)
+    pictures, given = Pictures(plot, format_, rrd), material(recordings, robot, window_rate_1_s)
+    nominal = given.nominal
     if out is not None:
         check_target(out, nominal)
     band = band_hz or nominal.config.band_hz
     with reporting("identifying", quiet=as_json) as progress:
-        dataset = Dataset.read(
-            recordings,
-            nominal.joints,
-            band,
-            window_rate_1_s=window_rate_1_s,
-            progress=progress,
-            points=nominal.points,
-        )
+        dataset = given.read(nominal, band, progress)
         answer = fit(
             dataset,
             nominal,

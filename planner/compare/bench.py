@@ -20,6 +20,7 @@ from planner.campaign.config import (
 from planner.campaign.labels import label, observations
 from planner.campaign.state import Measurement
 from planner.compare.pool import PoolPose
+from planner.dataset.visits import Recording
 from planner.errors import InputError
 from planner.frf.frf import Frf
 from planner.robot.robot import Robot
@@ -78,13 +79,17 @@ def cell_of(bench: Bench) -> PoolCell:
 
 
 def decide(
-    robot: Robot, joints_deg: Sequence[Sequence[float]], campaign: Path | None, fidelity: str | None
+    robot: Robot,
+    recordings: Sequence[Recording],
+    campaign: Path | None,
+    fidelity: str | None,
 ) -> CampaignConfig:
     """campaign.toml's decisions, or the box that the recorded poses span; `fidelity` wins."""
     if campaign is not None:
         config = load_campaign_config(campaign)
     else:
-        workspace = WorkspaceTable(joints_deg=_box(robot, np.array(joints_deg)))
+        joints_deg = robot.joints.shown([one.q for one in recordings])
+        workspace = WorkspaceTable(joints_deg=_box(robot, joints_deg))
         config = CampaignConfig(workspace, modes=ModesTable(band_hz=robot.config.band_hz))
     if fidelity is None:
         return config

@@ -1,7 +1,9 @@
 """The pool: every recorded pose with its modes and FRFs, made from its hits once and kept."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+
+import numpy as np
 
 from planner.campaign.config import ModesTable
 from planner.campaign.log_conversion import from_modal
@@ -9,10 +11,9 @@ from planner.campaign.state import Measurement
 from planner.dataset.measure import MeasuredPose
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store, user_store
+from planner.dataset.visits import Recording
 from planner.frf.frf import Frf
-from planner.recording.folder import read_recordings
-from planner.recording.records import PoseRow
-from planner.robot.robot import Robot
+from planner.recording.joints import JointUnits
 
 
 @dataclass(frozen=True)
@@ -39,24 +40,34 @@ class PoolPose:
 
 @dataclass(frozen=True)
 class PoseFiles:
-    """One pose of recordings.csv with its files, and how modes are found."""
+    """One recorded pose with its joints (°, mm) and files, and how modes are found."""
 
-    rows: tuple[PoseRow, ...]
+    pose: str
+    joints_deg: tuple[float, ...]
+    files: tuple[Source, ...]
     table: ModesTable
 
     def measured(self, store: Store) -> MeasuredPose:
         """Its recordings, read when something is asked that `store` does not hold."""
-        files = tuple(Source.of(r) for r in self.rows if r.file)
         rate = self.table.window_rate_1_s
-        return MeasuredPose(files, self.table.band_hz, window_rate_1_s=rate, store=store)
+        return MeasuredPose(self.files, self.table.band_hz, window_rate_1_s=rate, store=store)
 
 
-def poses_of(folder: Path, robot: Robot, table: ModesTable) -> tuple[PoseFiles, ...]:
-    """The poses of a recordings folder in recorded order; InputError where it is wrong."""
-    groups: dict[str, list[PoseRow]] = {}
-    for row in read_recordings(folder, robot.joints, robot.points).rows:
-        groups.setdefault(row.pose, []).append(row)
-    return tuple(PoseFiles(tuple(rows), table) for rows in groups.values())
+def poses_of(
+    recordings: Sequence[Recording], joints: JointUnits, table: ModesTable
+) -> tuple[PoseFiles, ...]:
+    """The poses of recordings in recorded order."""
+    groups: dict[str, list[Recording]] = {}
+    for one in recordings:
+        groups.setdefault(one.pose, []).append(one)
+    return tuple(
+        PoseFiles(pose, _stood(joints, own[0].q), tuple(one.source for one in own), table)
+        for pose, own in groups.items()
+    )
+
+
+def _stood(joints: JointUnits, q: np.ndarray) -> tuple[float, ...]:
+    return tuple(round(float(value), 9) for value in joints.shown(q))
 
 
 def kept(pose: PoseFiles) -> bool:
@@ -66,12 +77,12 @@ def kept(pose: PoseFiles) -> bool:
 
 def make(_: None, pose: PoseFiles) -> PoolPose:
     """Turn the hits of a pose into modes and FRFs, or take those that were kept."""
-    first, found = pose.rows[0], pose.measured(user_store())
+    found = pose.measured(user_store())
     modes = from_modal(found.modal)
     refused = tuple(Refusal(v.source.name, v.reason) for v in found.verdicts if not v.accepted)
     reason = "" if modes else (found.remarks[-1] if found.remarks else "No mode was found.")
     return PoolPose(
-        Measurement(first.pose, first.joints_deg, (), modes, found.remarks),
+        Measurement(pose.pose, pose.joints_deg, (), modes, found.remarks),
         found.frf,
         refused,
         reason,

@@ -1,6 +1,6 @@
 """Conducting a comparison: what was done before is taken up, the rest done and kept at once."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,28 +12,29 @@ from planner.compare.pool import PoolPose
 from planner.compare.processes import Failure
 from planner.compare.run import run
 from planner.compare.tasks import Run, Study, Task
+from planner.dataset.visits import Recording
 from planner.errors import InputError
-from planner.robot.robot import Robot
+from planner.recording.joints import JointUnits
 
 RUNS = "runs"
 Progress = Callable[[str, int, int], None]  # what is counted, done, of how many
 
 
 def recorded(
-    recordings: Path,
-    robot: Robot,
+    recordings: Sequence[Recording],
+    joints: JointUnits,
     table: ModesTable,
     workers: int,
     progress: Progress,
 ) -> tuple[PoolPose, ...]:
-    """All poses of a recordings folder; what was found of them before is taken up."""
-    files = pool.poses_of(recordings, robot, table)
+    """All poses of recordings; what was found of them before is taken up."""
+    files = pool.poses_of(recordings, joints, table)
     found = {i: pool.make(None, f) for i, f in enumerate(files) if pool.kept(f)}
     todo = [i for i in range(len(files)) if i not in found]
     progress("poses", len(found), len(files))
     for k, pose in processes.each(pool.make, None, [files[i] for i in todo], workers):
         if isinstance(pose, Failure):
-            raise InputError(f"Pose {files[todo[k]].rows[0].pose}: {pose.reason}")
+            raise InputError(f"Pose {files[todo[k]].pose}: {pose.reason}")
         found[todo[k]] = pose
         progress("poses", len(found), len(files))
     return tuple(found[i] for i in range(len(files)))

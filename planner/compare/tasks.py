@@ -69,9 +69,10 @@ class Study:
         most = len(bench.measurements) - LEFT
         budget = min(BUDGET, max(most, 1)) if budget is None else budget
         if budget > most:
+            less = f"give {most} at most, or " if most > 0 else ""
             raise InputError(
                 f"--budget {budget} leaves less than {LEFT} of the pool's {most + LEFT} poses to "
-                f"judge by; give {most} at most, or record more poses."
+                f"judge by; {less}record more poses."
             )
         if initial > budget:
             raise InputError(

@@ -10,14 +10,13 @@ import numpy as np
 
 from planner.dataset.level_columns import Column, column
 from planner.dataset.measure import MeasuredPose
-from planner.dataset.screened_files import Source
+from planner.dataset.recordings import recordings_in
 from planner.dataset.store import Store, user_store
 from planner.dataset.visits import PoseEntry, Recording, Stay, Visit, stays_of
 from planner.errors import RefusedError
 from planner.frf.estimator import estimate
 from planner.frf.frf import Frf
 from planner.modal.modes import ModalModel
-from planner.recording.folder import read_recordings
 from planner.recording.force_levels import levels, peak_n
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP, PointNames, together
@@ -60,10 +59,11 @@ class Dataset:
         store: Store | None = None,
         points: PointNames | None = None,
     ) -> "Dataset":
-        """Read and screen all hits of a folder with recordings.csv.
+        """Read and screen all hits of a folder as the analyser wrote it.
 
         Args:
-            folder: Holds recordings.csv and the files that it names.
+            folder: Holds recordings.csv and the files that it names, or subfolders that do; or
+                the table itself.
             joint_names: Of the robot, in the order of the angles; `Robot.joints` where some of
                 them slide.
             band_hz: Which the hits have to excite, and in which FRFs are wanted.
@@ -76,14 +76,8 @@ class Dataset:
             InputError: The table is wrong.
             RefusedError: No pose has a hit that can be used.
         """
-        joints = JointUnits.of(joint_names)
-        found = [
-            Recording(row.pose, joints.internal(row.joints_deg), Source.of(row))
-            for row in read_recordings(folder, joints, points).rows
-            if row.file
-        ]
         return cls.of(
-            found,
+            recordings_in(folder, JointUnits.of(joint_names), points),
             band_hz,
             window_rate_1_s=window_rate_1_s,
             progress=progress,

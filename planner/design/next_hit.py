@@ -12,6 +12,7 @@ from planner.design.odds import as_ratio
 from planner.diagnosis.diagnose import Explained
 from planner.diagnosis.laws.law_at_joints import Laws
 from planner.recording.joints import JointUnits
+from planner.words import probable
 
 
 @dataclass(frozen=True)
@@ -118,4 +119,4 @@ def in_words(places: Sequence[tuple[str, str | None]], probability: float) -> st
         else f"{name.replace('_', ' ')} at {at}"
         for name, at in places
     ]
-    return f"{' and '.join(said)} ({100 * probability:.0f} %)"
+    return f"{' and '.join(said)} ({probable(probability)})"

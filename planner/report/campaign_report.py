@@ -33,8 +33,8 @@ def write_report(campaign: Campaign, out: Path | None, diagnosis: Path | None) -
     `diagnosis` names what `planner diagnose --out` has written. Raises InputError where the file
     cannot be written.
     """
+    from planner.report.kept_diagnosis import diagnosis_of
     from planner.report.page.build import page
-    from planner.report.page.explained import diagnosis_of
 
     started = time.perf_counter()
     kept = diagnosis_of(campaign.directory, diagnosis)

@@ -18,6 +18,7 @@ from planner.report.established_effects import EstablishedEffect, drift_of, esta
 from planner.report.mismatch import MismatchPlaces, MismatchShares, TwoMisfits
 from planner.report.place_names import place_names, with_names
 from planner.report.text import SIMULATED, SIMULATED_TITLE, drawn, remarks, table
+from planner.words import probable
 
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Explained
@@ -26,11 +27,11 @@ if TYPE_CHECKING:
     from planner.diagnosis.verdict import Ranked
 
 SHOWN = 6  # candidates in the table
-LEAST_SAID = 1e-3  # of a probability in the table
 VERDICTS = {
     "consistent": "The simulation explains the recordings once its own parameters are refitted.",
     "explained": "The simulation lacks something, and this explains the recordings:",
-    "unexplained": "Something is there that no effect of the library describes.",
+    "unexplained": "Something makes the robot differ from the simulation, and none of the effects "
+    "that planner knows describes it.",
 }
 
 
@@ -164,7 +165,7 @@ class DiagnosisReport(Answer):
         made = table("What was considered", "effect", "at", "probability")
         for c in self.candidates[:SHOWN]:
             at = with_names(c.at or "–", self.place_names)
-            made.add_row(c.effect.replace("_", " "), at, _percent(c.probability))
+            made.add_row(c.effect.replace("_", " "), at, probable(c.probability))
         parts += [made, self._agreement(), Text(self.shares.sentence)]
         more = (self.next, self.next_sensor)
         parts += [Text(one.sentence, style="bold") for one in more if one]
@@ -192,10 +193,12 @@ class DiagnosisReport(Answer):
         near = with_names(near, self.place_names)
         agrees = self.fit.explained.frac
         return (
-            f"With {100 * first.probability:.0f} % probability no effect known here explains the "
-            f"recordings to within the noise. The closest is {near}; the best fit has FRAC "
-            f"{agrees:.4f}. It may be the larger part of the cause, with something unknown beside "
-            f"it."
+            f"None of the effects that planner knows explains the recordings (probability "
+            f"{probable(first.probability)}). Closest comes {near}: with it, simulated and "
+            f"measured FRFs agree to {agrees:.4f} (FRAC; 1 is fully). That may be the larger part "
+            f"of the cause, with something unknown beside it. Before you repair anything, check "
+            f"sensor, hammer and the stated poses, and look for what else touched or hung on the "
+            f"robot."
         )
 
     def _agreement(self) -> RenderableType:
@@ -266,7 +269,3 @@ def alternatives(candidates: Sequence["Ranked"]) -> tuple[tuple[EffectAtPlace, .
         if instead and place[0] not in ("none", UNKNOWN):
             out.append(tuple(EffectAtPlace(*one) for one in (place, *instead)))
     return tuple(out)
-
-
-def _percent(probability: float) -> str:
-    return f"{100 * probability:.1f} %" if probability >= LEAST_SAID else "below 0.1 %"

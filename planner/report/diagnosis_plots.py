@@ -113,6 +113,6 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
     figure.colorbar(
         image, ax=[left, right], label="mean square residual (1: just matters)", shrink=0.9
     )
-    what = "Residuals without the errors of hits and sensors; 1: noise and matters_percent of FRFs"
+    what = "What is left unexplained, errors of hits and sensor taken out (1: just matters)"
     figure.suptitle(f"{mark}{what}", fontsize=10)
     return figure

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from planner.design.next_hit import in_words
 from planner.report.place_names import with_names
+from planner.words import probable
 
 if TYPE_CHECKING:
     from planner.diagnosis.diagnose import Explained
@@ -70,7 +71,7 @@ def _of_fits(found: "Diagnosis") -> tuple[EstablishedEffect, ...]:
 
 
 def _of_screen(finding: "Finding", probability: float) -> EstablishedEffect:
-    text = f"{finding.text} ({100 * probability:.0f} %)"
+    text = f"{finding.text} ({probable(probability)})"
     values = _parameters(finding.parameters)
     return EstablishedEffect(finding.effect, finding.at, probability, values, text)
 
@@ -81,7 +82,7 @@ def _parameters(values: Mapping[str, tuple[float, float, str]]) -> dict[str, Par
 
 def _text(found: "Diagnosis", first: "Candidate", text: str) -> str:
     others = [c for c in found.undecided if c is not first]
-    said = f"{text} ({100 * first.probability:.0f} %)"
+    said = f"{text} ({probable(first.probability)})"
     if not others:
         return said
     names = "; ".join(in_words(c.places, c.probability) for c in others)

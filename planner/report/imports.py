@@ -52,7 +52,7 @@ class ImportedMode:
         """A row of the table."""
         expected = self.expected
         return (
-            "–" if self.label is None else str(self.label),
+            "other" if self.label is None else str(self.label),
             with_sd(self.frequency_hz, self.frequency_sd_hz, ".3f"),
             with_sd(expected.frequency_hz, expected.sd_hz) if expected else with_sd(None, None),
             with_sd(100 * self.damping_ratio, 100 * self.damping_sd),
@@ -138,7 +138,13 @@ class PoseImport(Answer):
         )
         said = Text(f"  sd of frequencies: {change} (refit {self.refit_seconds:.2f} s)")
         asked = [Text(f"  {self.question.text}", style="bold red")] if self.question else []
-        return [made, *remarks(self.remarks), said, *asked]
+        return [made, *self._others(), *remarks(self.remarks), said, *asked]
+
+    def _others(self) -> list[Text]:
+        counted_on = len(self.frequency_sd_percent)
+        if all(mode.label for mode in self.modes):
+            return []
+        return [Text(f"  other: measured too, none of the {counted_on} modes that are predicted")]
 
     @property
     def unhit(self) -> bool:

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from planner.words import significant
+
 if TYPE_CHECKING:
     from planner.diagnosis.linear.drift_fit import DriftFits
     from planner.diagnosis.linear_diagnosis import Diagnosis
@@ -27,7 +29,7 @@ class MismatchPlaces:
         where = f", at poses {', '.join(self.poses)}" if self.poses else ""
         along = f", along {', '.join(self.directions)}" if self.directions else ""
         off = f"the simulation is clearly off at {bands} Hz{where}{along}"
-        return f"Refitted without any effect, {off}."
+        return f"With its own springs refitted and nothing added, {off}."
 
 
 @dataclass(frozen=True)
@@ -69,14 +71,17 @@ class MismatchShares:
     @property
     def sentence(self) -> str:
         """For the engineer."""
+        sides = self.stated, self.refitted, self.explained, self.left
+        stated, refitted, explained, left = (significant(100 * 10 ** (db / 20)) for db in sides)
         text = (
-            f"Mismatch to the recordings: {self.stated:.1f} dB as stated, {self.refitted:.1f} "
-            f"refitted, {self.explained:.1f} explained; {self.left:.1f} without the errors of hits "
-            f"and sensor."
+            f"The simulation is off from the measured FRFs by {stated} % (root mean square) as "
+            f"robot.toml states it, by {refitted} % once its own springs and dampers are refitted, "
+            f"and by {explained} % with what was found. Once the likeliest errors of hits "
+            f"and sensor are taken out too, {left} % remains."
         )
         if self.refitted <= self.stated:
             return text
         return (
-            f"{text} Refitted, peaks are farther off than as stated: without the physics that is "
-            f"missing, a fit to all lines alike gives them up."
+            f"{text} Refitted alone, peaks are farther off than as stated: no values of its own "
+            f"springs bring it to the recordings, so that the fit gives up the peaks."
         )

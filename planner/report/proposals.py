@@ -14,6 +14,7 @@ from planner.recording.joints import JointUnits
 from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import table
+from planner.words import significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -63,8 +64,12 @@ class RepeatedPose:
         found = model.repeat()
         if found is None or found[1] <= found[2]:
             return None
+        pose, gain, new = found
+        often = f", {significant(gain / new)} times as much" if new > 0 else ""
         return cls(
-            *found, f"Noise dominates: hitting {found[0]} again tells more than any new pose."
+            *found,
+            f"Better than a new pose: hit {pose} again, with as many hits as before. That lowers "
+            f"the uncertainty more{often}, for the noise of its hits is now the largest part.",
         )
 
 

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 COLUMNS = "joint and axis", "stated", "refitted ± sd", "unit", "known"
 NOT_KNOWN = (
-    "known: the recordings at least halved what was unsure of it; of others they tell little."
+    "Known, yes: the recordings tell this stiffness; its sd is half of what was assumed before, or "
+    "less. No: they tell little of it, and the value is mostly what was assumed."
 )
 
 

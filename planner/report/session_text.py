@@ -20,7 +20,7 @@ a, Enter  import the hits that wait          r  set bad hits aside, do not impor
 R         set all waiting hits aside
 k         skip this pose; asks why           n  another pose, never this one
 b, h      late hits: of the pose before, or of this one; h: unsure hits are right too
-s         star this pose                     u  take back the last act
+s         mark this pose with a star (★)     u  take back the last act
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
@@ -37,7 +37,7 @@ def _table(*columns: str) -> Table:
 def import_panel(report: ImportReport, simulated: bool) -> RenderableType:
     """What came out against what was expected."""
     table = _table(
-        "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "label (%)"
+        "mode", "measured (Hz)", "expected (Hz)", "off by (sd)", "damping (%)", "is this mode (%)"
     )
     labelled = next((p for p in report.model.labelled if p.pose == report.pose), None)
     if labelled is not None:

@@ -1,6 +1,6 @@
 """Answer of `status`: what was measured, what is open, how sure the model is."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from planner.design.stopping import Forecast
 from planner.report.answer import NOT_IN_JSON, Answer, plain
 from planner.report.decision_status import DecisionStatus
 from planner.report.imports import AskedOfPose
+from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
 from planner.report.proposals import forecast_json
@@ -255,7 +256,7 @@ def status(campaign: Campaign) -> StatusReport:
         target_frequency_sd_percent=believed.target_frequency_sd_percent,
         done=believed.done,
         forecast=believed.forecast,
-        remarks=believed.remarks,
+        remarks=(*believed.remarks, *_beside_diagnosis(campaign, believed.springs)),
         log=LogStatus(state.events, campaign.torn_bytes),
         joint_names=believed.joint_names,
         stored_but_not_imported=tuple(campaign.orphans()),
@@ -267,3 +268,14 @@ def status(campaign: Campaign) -> StatusReport:
         springs=believed.springs,
         model=lambda: campaign.model,
     )
+
+
+def model_beside(campaign: Campaign, found: Mapping[str, Any]) -> str:
+    """What to say where the campaign's model and a diagnosis of it, as JSON, give two answers."""
+    return two_answers(campaign.of_model("status", ModelStatus, ModelStatus.of).springs, found)
+
+
+def _beside_diagnosis(campaign: Campaign, springs: Sequence[RefittedSpring]) -> tuple[str, ...]:
+    kept = diagnosis_of(campaign.directory)
+    said = two_answers(springs, read_diagnosis(kept)) if kept else ""
+    return (said,) if said else ()

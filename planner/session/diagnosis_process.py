@@ -15,7 +15,9 @@ from planner.report.diagnosis import DiagnosisReport
 LEAST = 3  # measured poses from which a diagnosis is asked for
 NICE = 10  # the session goes first
 CONSISTENT = "The simulation, once refitted, explains the recordings to within their noise."
-UNEXPLAINED = "Simulation and recordings differ, and no effect known here explains it."
+UNEXPLAINED = (
+    "The robot differs from the simulation, and none of the effects that planner knows explains it."
+)
 FAILED = "The diagnosis did not end; ask planner diagnose for its reason."
 
 

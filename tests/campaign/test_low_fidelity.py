@@ -144,7 +144,7 @@ def test_springs_that_the_description_lacks_are_found_and_named(tmp_path):
     after = learn(before, frfs, q, BAND_HZ)
     assert rmse(before, other, true_hz) > 0.1
     assert rmse(after, other, true_hz) < 0.01
-    assert "robot.toml lacks compliance" in after.remark
+    assert "gives way where robot.toml has no spring" in after.remark
     assert " about x " in after.remark
     assert after.left_out is None
 

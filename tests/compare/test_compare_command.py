@@ -18,6 +18,7 @@ from planner.compare.bench import assemble, cell_of, decide
 from planner.compare.resume import recorded
 from planner.compare.run import run
 from planner.compare.tasks import Task
+from planner.dataset.recordings import recordings_in
 from planner.robot.robot import Robot
 from tests.support.outside import PLANNER, planner
 from tests.support.pools import make_pool
@@ -35,8 +36,9 @@ def pool(tmp_path_factory):
 def bench(pool):
     recordings, robot_toml, campaign = pool
     robot = Robot.load(robot_toml)
-    config = decide(robot, [], campaign, "frozen")
-    poses = recorded(recordings, robot, config.modes, 1, lambda *_: None)
+    listed = recordings_in(recordings, robot.joints, robot.points)
+    config = decide(robot, listed, campaign, "frozen")
+    poses = recorded(listed, robot.joints, config.modes, 1, lambda *_: None)
     return assemble(robot, config, poses)[0]
 
 

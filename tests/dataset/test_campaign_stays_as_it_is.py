@@ -60,6 +60,18 @@ def test_recordings_in_use_and_nothing_else(campaign):
     assert content(campaign.directory) == before
 
 
+def test_identify_takes_a_campaign(campaign, capsys):
+    before = content(campaign.directory)
+    assert run(["identify", str(campaign.directory), "--starts", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["parameters"]
+    assert content(campaign.directory) == before
+
+
+def test_compare_takes_a_campaign_with_its_own_workspace(campaign, capsys):
+    assert run(["compare", str(campaign.directory), "--strategies", "random"]) == 2
+    assert "of the pool's 2 poses to judge by; record more" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_diagnose_leaves_the_folder_byte_for_byte(campaign, capsys):

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from planner.dataset.dataset import LAID, Dataset, Recording, Visit
+from planner.dataset.recordings import recordings_in
 from planner.dataset.screened_files import Source
 from planner.dataset.store import Store
 from planner.errors import InputError, RefusedError
 from planner.frf.estimator import estimate
+from planner.recording.joints import JointUnits
 from tests.support.simulated_hits import make_hit
 
 BAND_HZ = (4.0, 60.0)
@@ -156,6 +158,37 @@ def test_nothing_usable_is_said_with_its_reason(tmp_path):
         Dataset.read(tmp_path, ("J1",), BAND_HZ, store=NOTHING_KEPT)
     with pytest.raises(InputError, match="no column J2_deg"):
         Dataset.read(tmp_path, ("J2",), BAND_HZ, store=NOTHING_KEPT)
+
+
+def listed(folder: Path, pose: str, angle: float) -> None:
+    """A folder as an analyser writes it, with one pose; nothing here reads its file."""
+    folder.mkdir(parents=True)
+    (folder / "hit.csv").write_text("hello\n")
+    (folder / "recordings.csv").write_text(f"pose,J1_deg,hit,file\n{pose},{angle},+x,hit.csv\n")
+
+
+def test_a_table_its_folder_and_a_folder_of_folders_say_the_same(tmp_path):
+    joints = JointUnits.of(["J1"])
+    for number in (10, 9, 2):
+        listed(tmp_path / f"export {number}", f"P{number}", 5.0 * number)
+    listed(tmp_path / ".trash", "P2", 0.0)
+    (tmp_path / "pictures").mkdir()
+    every = recordings_in(tmp_path, joints)
+    assert [one.pose for one in every] == ["P2", "P9", "P10"]
+    np.testing.assert_allclose(np.rad2deg([one.q[0] for one in every]), [10.0, 45.0, 50.0])
+    for own in (tmp_path / "export 9", tmp_path / "export 9" / "recordings.csv"):
+        assert [one.source for one in recordings_in(own, joints)] == [every[1].source]
+
+
+def test_tables_that_differ_on_a_pose_and_folders_without_one_are_told(tmp_path):
+    joints = JointUnits.of(["J1"])
+    (tmp_path / "none").mkdir()
+    with pytest.raises(InputError, match=r"none has no recordings\.csv.*add one"):
+        recordings_in(tmp_path / "none", joints)
+    listed(tmp_path / "one", "P1", 10.0)
+    listed(tmp_path / "two", "P1", 30.0)
+    with pytest.raises(InputError, match=r"two/recordings\.csv, row 2: pose P1 .*20\.00° away"):
+        recordings_in(tmp_path, joints)
 
 
 def test_a_stream_is_a_file_of_several_hits_and_its_bad_ones_are_named(tmp_path):

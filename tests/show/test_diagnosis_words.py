@@ -13,8 +13,10 @@ from planner.diagnosis.residual_location import Where
 from planner.report.agreement import FrfSimilarity, ThreeSimilarities
 from planner.report.diagnosis import DiagnosisReport, RankedExplanation
 from planner.report.diagnosis_plots import _overlay, _residuals
+from planner.report.kept_diagnosis import two_answers
 from planner.report.mismatch import MismatchShares
 from planner.report.place_names import place_names, with_names
+from planner.report.refitted_springs import RefittedSpring
 from planner.robot.robot import Robot
 from tests.support.plain_arm import make_plain_arm
 
@@ -36,7 +38,8 @@ def report(verdict: str, *ranked) -> DiagnosisReport:
 
 def test_what_comes_nearest_is_named_beside_the_unknown():
     said = report("unexplained", (UNKNOWN, 0.92), (BASE, 0.08)).verdict_text
-    assert "92 % probability no effect known here" in said
+    assert said.startswith("None of the effects that planner knows explains")
+    assert "(probability 92 %)" in said
     assert "base compliance at base and transverse compliance at joint_1 (8 %)" in said
     assert "0.9999" in said
 
@@ -55,9 +58,31 @@ def test_joints_have_the_names_that_the_robot_has_for_them(tmp_path):
 
 def test_where_nothing_is_near_nothing_is_named():
     said = report("unexplained", (UNKNOWN, 1.0), ((("none", None),), 0.0)).verdict_text
-    assert said == "Something is there that no effect of the library describes."
+    assert "none of the effects that planner knows describes it" in said
     assert "explains" in report("explained", (BASE, 1.0)).verdict_text
     assert report("explained", (BASE, 1.0)).to_json()["verdict_text"]
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (["base_compliance base"], "adds springs at A5 and base, the diagnosis names base."),
+        (["base_compliance base", "transverse_compliance joint_5"], ""),
+        (["joint_stiffness joint_2"], ""),
+        ([], ""),
+    ],
+)
+def test_a_model_and_a_diagnosis_that_differ_are_one_answer(found, said):
+    axis = (1.0, 0.0, 0.0)
+    springs = [
+        RefittedSpring(joint, axis, stated, 1e6, 1e4, "N·m/rad", True)
+        for joint, stated in (("A2", 2e6), ("A5", None), ("base", None))
+    ]
+    each = [dict(zip(("effect", "at"), one.split(), strict=True)) for one in found]
+    answer = {"findings": each, "place_names": {"joint_2": "A2", "joint_5": "A5"}}
+    both = two_answers(springs, answer)
+    assert said in both
+    assert bool(said) == bool(both)
 
 
 def test_small_probabilities_are_not_called_none():
@@ -66,7 +91,7 @@ def test_small_probabilities_are_not_called_none():
     made = Console(file=out, width=120)
     made.print(_table_of(answer))
     assert "below 0.1 %" in out.getvalue()
-    assert "99.0 %" in out.getvalue()
+    assert "99 %" in out.getvalue()
 
 
 def _table_of(answer: DiagnosisReport):

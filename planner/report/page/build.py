@@ -26,7 +26,7 @@ def page(campaign: Campaign, kept_diagnosis: Path | None = None) -> str:
     facts = Facts.of(campaign)
     parts = [asked(facts), measured(facts), quality(facts), maps(facts), frfs(facts)]
     parts.append(learned(facts))
-    parts += [diagnosis(kept_diagnosis)] if kept_diagnosis else []
+    parts += [diagnosis(kept_diagnosis, facts.status.springs)] if kept_diagnosis else []
     parts += [decisions(facts), reproduce(facts), meaning()]
     name = campaign.directory.name
     without = {"diagnosis"} if kept_diagnosis is None else set()

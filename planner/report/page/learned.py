@@ -12,5 +12,5 @@ def learned(facts: Facts) -> Markup:
         return Markup("")
     rows = [spring.cells for spring in springs]
     said = "Stiffnesses of the simulation, refitted to all recordings"
-    parts = table(COLUMNS, rows, said), paragraphs(NOT_KNOWN.capitalize())
+    parts = table(COLUMNS, rows, said), paragraphs(NOT_KNOWN)
     return section("What the simulation learned", *parts, id_="learned")

@@ -1,0 +1,41 @@
+"""Recordings as an analyser wrote them: a table, its folder, or a folder of such folders."""
+
+from pathlib import Path
+
+from planner.dataset.screened_files import Source
+from planner.dataset.visits import Recording
+from planner.errors import InputError
+from planner.recording.folder import TABLE, read_recordings, table_folders
+from planner.recording.joints import JointUnits
+from planner.recording.points import PointNames
+
+
+def recordings_in(
+    path: Path, joints: JointUnits, points: PointNames | None = None
+) -> tuple[Recording, ...]:
+    """Every file that the tables at a path list, in the order of recording.
+
+    `path` is a folder with recordings.csv, the table itself, or a folder whose subfolders have one
+    each, whose order is then that of their names.
+    Raises InputError where there is no table, one is wrong, or two differ on where a pose was.
+    """
+    folders = table_folders(path) if path.exists() else (path,)
+    if not folders:
+        raise InputError(
+            f"{path} has no {TABLE}, nor has a folder in it; add one that says of each file at "
+            f"which pose it was recorded and how the joints stood."
+        )
+    found: list[Recording] = []
+    first: dict[str, tuple[Path, tuple[float, ...]]] = {}
+    for folder in folders:
+        for row in read_recordings(folder, joints, points).rows:
+            where, stood = first.setdefault(row.pose, (folder / TABLE, row.joints_deg))
+            if off := joints.apart(stood, row.joints_deg):
+                raise InputError(
+                    f"{folder / TABLE}, row {row.row}: pose {row.pose} has a joint {off} away from "
+                    f"where {where} has it; give another pose another name."
+                )
+            if row.file:
+                q = joints.internal(row.joints_deg)
+                found.append(Recording(row.pose, q, Source.of(row)))
+    return tuple(found)

@@ -1,0 +1,57 @@
+"""A diagnosis that was kept, and what it says beside the campaign's own model."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from planner.errors import InputError
+from planner.report.refitted_springs import RefittedSpring
+
+KEPT = "diagnosis.json"  # as `diagnose --out` writes it
+
+
+def diagnosis_of(directory: Path, given: Path | None = None) -> Path | None:
+    """Where the kept diagnosis is: the folder or file that was named, else the campaign's own."""
+    if given is None:
+        own = directory / "diagnosis" / KEPT
+        return own if own.is_file() else None
+    file = given / KEPT if given.is_dir() else given
+    if not file.is_file():
+        raise InputError(f"{file} does not exist; name what planner diagnose --out has written.")
+    return file
+
+
+def read_diagnosis(file: Path) -> dict[str, Any]:
+    """The answer in JSON. Raises InputError where it is none."""
+    try:
+        found = json.loads(file.read_bytes())
+        _ = found["verdict"], found["findings"], found["candidates"]
+    except (ValueError, KeyError, TypeError, OSError):
+        raise InputError(f"{file} is no answer of planner diagnose; name another.") from None
+    return found
+
+
+def two_answers(springs: Sequence[RefittedSpring], found: Mapping[str, Any]) -> str:
+    """Why the campaign's model has other springs than a diagnosis names; "" where it has not.
+
+    `springs` are those of the model, `found` is the diagnosis' answer as JSON.
+    """
+    names = found.get("place_names") or {}
+    # Springs that robot.toml states the model refits, too: they tell nothing apart.
+    said = [one["at"] for one in found["findings"] if one["effect"] != "joint_stiffness"]
+    told = {names.get(at, at) for at in said if at}
+    added = {spring.joint for spring in springs if spring.stated is None}
+    if not added or not told or added == told:
+        return ""
+    return (
+        f"Two answers: the campaign's model adds springs at {_listed(added)}, the diagnosis names "
+        f"{_listed(told)}. The model predicts, and so lets every joint and the floor tilt at once; "
+        f"the diagnosis adds only what the recordings cannot do without, and is what to go by for "
+        f"repairs."
+    )
+
+
+def _listed(places: set[str]) -> str:
+    *others, last = sorted(places)
+    return f"{', '.join(others)} and {last}" if others else last
