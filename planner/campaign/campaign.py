@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,22 +18,25 @@ from planner.campaign.events import (
     Confirmed,
     Entry,
     Imported,
+    Placed,
     Proposal,
     Proposed,
     Refused,
+    Shown,
     Skipped,
     Starred,
     Undone,
     Withdrawn,
 )
 from planner.campaign.reads import CampaignReads, as_logged
-from planner.campaign.state import last_acts
+from planner.campaign.taking_back import last_acts, last_undone
 from planner.errors import InputError
 from planner.version import __version__
 
 if TYPE_CHECKING:
     from planner.campaign.deliveries import Delivery
     from planner.campaign.importing import ImportReport
+    from planner.dataset.screened_files import Source
 
 
 class Campaign(CampaignReads):
@@ -85,6 +89,7 @@ class Campaign(CampaignReads):
         """
         from threadpoolctl import threadpool_limits
 
+        from planner.campaign.arrivals import at_their_poses
         from planner.campaign.deliveries import sort_paths
         from planner.campaign.importing import place
 
@@ -95,6 +100,7 @@ class Campaign(CampaignReads):
             deliveries = sort_paths(
                 given, self.cell.robot.joints, self.cell.robot.points, pose, default
             )
+            deliveries = at_their_poses(deliveries, self.state)
             if from_names:
                 deliveries = tuple(delivery.placed_by_names() for delivery in deliveries)
             placed = [(d, place(self.cell, self.state, d)) for d in deliveries]
@@ -107,17 +113,23 @@ class Campaign(CampaignReads):
             return tuple(reports)
 
     def refuse(
-        self, pose: str, paths: tuple[Path, ...], reasons: Mapping[Path, str] | None = None
+        self,
+        pose: str,
+        paths: tuple[Path, ...],
+        reasons: Mapping[Path, str] | None = None,
+        stated: "Mapping[Path, Source] | None" = None,
     ) -> None:
         """Refuse files that wait at a pose: they are kept, and not imported unless named.
 
-        `reasons` are what was found wrong with some of them.
+        `reasons` are what was found wrong with some of them, `stated` what a table says of some:
+        those are judged again once it says something else.
         """
         from planner.campaign.importing import refusals
 
         with self._acting():
             if paths:
-                self._append(Refused(pose, refusals(self.directory, paths, reasons or {})))
+                hits = refusals(self.directory, paths, reasons or {}, stated or {})
+                self._append(Refused(pose, hits))
 
     def confirm(self, pose: str) -> None:
         """The held hits of a pose are from there indeed: the model uses them."""
@@ -138,7 +150,7 @@ class Campaign(CampaignReads):
             if other in self.state.held:
                 raise InputError(f"Hits of {other} wait for an answer too; answer that first.")
             self._append(Undone(entry.seq))
-            return self._import_pose(delivery, joints_deg, frozenset())
+            return self._import_pose(delivery, joints_deg, frozenset(s.path for s in sources))
 
     def refuse_held(self, pose: str, reason: str = REFUSED) -> None:
         """The held hits of a pose are set aside, as if they had been refused when they came."""
@@ -190,6 +202,37 @@ class Campaign(CampaignReads):
                 self._append(Undone(entry.seq))
             return acts
 
+    def redo(self) -> tuple[Entry, ...]:
+        """Let hold again what `undo` took back last, while nothing else was decided since.
+
+        The entries that hold again; proposals made since are taken back, as they followed.
+        """
+        with self._acting():
+            undone, since = last_undone(self.entries)
+            if not undone:
+                raise InputError(
+                    f"{self.directory} holds no act that was taken back last; only what no other "
+                    f"act followed can be done again."
+                )
+            for entry in (*since, *undone):
+                self._append(Undone(entry.seq))
+            acts = (e.event.act for e in undone if isinstance(e.event, Undone))
+            return tuple(self.entries[act - 1] for act in acts)
+
+    def show(self, pose: str, files: Sequence[str]) -> None:
+        """Files (sha256) are of a pose, as they were shown there: they never move on by themselves.
+
+        What was said of a file before holds.
+        """
+        with self._acting():
+            if new := tuple(file for file in files if file not in self.state.shown):
+                self._append(Shown(pose, new))
+
+    def place(self, pose: str, files: Sequence[str]) -> None:
+        """The engineer says that files (sha256) shown elsewhere were hit at this pose."""
+        with self._acting():
+            self._append(Placed(pose, tuple(files)))
+
     def holding(self):
         """A context in which nobody else can act in this campaign; InputError names who does."""
         return self._journal.holding(wait_s=1.0, session=True)
@@ -224,15 +267,32 @@ class Campaign(CampaignReads):
         ]
         return found[-1]
 
+    def _let_go(self, delivery: "Delivery") -> "Delivery":
+        """Take back a held import of which a delivery says something else now; all is judged anew.
+
+        The delivery with the held files of its pose that it lacks.
+        """
+        from planner.campaign.arrivals import let_go
+
+        for held_at in tuple(self.state.held):
+            entry, event = self._held(held_at)
+            lacking = let_go(delivery, event.hits, held_at)
+            if lacking is not None:
+                self._append(Undone(entry.seq))
+                more = tuple(self.source_of(hit) for hit in lacking)
+                delivery = replace(delivery, sources=(*delivery.sources, *more))
+        return delivery
+
     def _import_pose(
         self, delivery: "Delivery", joints_deg: tuple[float, ...], named: frozenset[Path]
     ) -> "ImportReport":
         from planner.campaign.alerts import alerts
+        from planner.campaign.arrivals import keep_files
         from planner.campaign.contradictions import contradiction
         from planner.campaign.importing import (
             ImportReport,
+            JudgedFiles,
             displacement,
-            keep_files,
             lacking,
             measure_files,
             not_used,
@@ -243,22 +303,24 @@ class Campaign(CampaignReads):
         from planner.campaign.revisits import suspected
         from planner.dataset.screened_files import hits_of_files
 
+        started, delivery = time.perf_counter(), self._let_go(delivery)
         before, state, pose = self.model, self.state, delivery.pose
         known = state.hit_at(pose)
         kept = keep_files(self.directory, delivery, state, named)
-        if not kept.fresh:
+        old, table = self.recordings.sources(known) if known else (), self.cell.config.modes
+        judged = JudgedFiles.of(pose, state, old, kept.fresh, table) if kept.fresh else None
+        left_out = (*kept.left_out, *(judged.still if judged else ()))
+        if judged is None or not judged.fresh:
             held, known = state.held.get(pose), state.measurements.get(pose)
             return ImportReport(
                 pose, (), (), kept.already, held or known, None, before, before, 0.0,
-                left_out=kept.left_out, question=held.question if held else None,
+                left_out=left_out, question=held.question if held else None,
             )  # fmt: skip
-        started = time.perf_counter()
-        old = self.recordings.sources(known) if known else ()
-        hits, measured = measure_files(old, kept.fresh, self.cell.config.modes)
+        fresh, hits, measured = judged.fresh, judged.hits, judged.measured
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
         modes = new_modes = from_modal(measured.modal)
         if old:  # among earlier hits, wrong ones would not stand out
-            alone = measure_files((), kept.fresh, self.cell.config.modes)[1]
+            alone = measure_files((), fresh, table)[1]
             new_modes = from_modal(alone.modal)
         asked = contradiction(pose, measured, len(old))
         asked = asked or question(before, state, pose, joints_deg, new_modes)
@@ -279,7 +341,7 @@ class Campaign(CampaignReads):
         # Beside new hits earlier ones may look wrong; they stay accepted all the same.
         agreed = all(verdict.accepted for verdict in measured.verdicts[: len(old)])
         if measured.frf is not None and agreed:
-            self.recordings.keep_frf(measured.frf, measurement, self.cell.config.modes)
+            self.recordings.keep_frf(measured.frf, measurement, table)
         model = self.model
         return ImportReport(
             pose=pose,
@@ -295,12 +357,12 @@ class Campaign(CampaignReads):
                 *hits_of_files(measured.verdicts[len(old) :]),
                 *measured.remarks,
                 *told,
-                *taken_after_all(state, kept.fresh),
+                *taken_after_all(state, fresh),
                 *displacement(self.cell.robot.joints, state, delivery, stood),
                 *lacking(state, measurement),
                 *model.remarks,
             ),
-            left_out=kept.left_out,
+            left_out=left_out,
             question=event.question,
             alerts=told,
         )

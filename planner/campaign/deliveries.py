@@ -14,12 +14,21 @@ from planner.recording.records import PoseRow
 
 @dataclass(frozen=True)
 class Delivery:
-    """Files of one pose; `joints_deg` is the readback, None where no table states it."""
+    """Files of one pose; `joints_deg` is the readback, None where no table states it.
+
+    `said`: somebody stated the pose, a table of recordings (`by_table`) or who imports them.
+    """
 
     pose: str
     joints_deg: tuple[float, ...] | None
     sources: tuple[Source, ...]
     row: str = ""  # "file, row n" for messages
+    said: bool = True
+
+    @property
+    def by_table(self) -> bool:
+        """Whether a table states the pose, file by file."""
+        return bool(self.row)
 
     def placed_by_names(self) -> "Delivery":
         """Files whose names say where their FRFs were felt and hit."""
@@ -37,7 +46,7 @@ def sort_paths(
 
     A folder with recordings.csv says itself which pose a file belongs to (`pose` then picks one,
     or renames the only one), and so do its subfolders; bare files belong to `pose` or, without it,
-    to `default_pose`. A table without joints is one of proposed poses.
+    to `default_pose`, "" where there is none. A table without joints is one of proposed poses.
     """
     deliveries: list[Delivery] = []
     bare: list[Path] = []
@@ -51,14 +60,10 @@ def sort_paths(
         else:
             raise InputError(f"{path} does not exist; name recordings or a recordings folder.")
     if bare:
-        name = pose or default_pose
-        if name is None:
-            raise InputError(
-                f"{bare[0]}: it is not clear at which pose it was recorded; say --pose ID."
-            )
         stated = StatedPoints() if points == PointNames() else StatedPoints(names=points)
         sources = tuple(Source(path, str(path), stated=stated) for path in bare)
-        deliveries.append(Delivery(name, None, sources))
+        name = pose or default_pose or ""
+        deliveries.append(Delivery(name, None, sources, said=pose is not None))
     return tuple(deliveries)
 
 

@@ -187,6 +187,24 @@ class Skipped(Event, frozen=True, tag="skipped"):
     neighbours: bool = False
 
 
+class Shown(Event, frozen=True, tag="shown"):
+    """Files, by content (sha256), that are of a pose: they were shown while the robot was there.
+
+    Or they came right after, and answer as that pose did. It is logged before anything can become
+    of them, so that they never move on by themselves; the first entry that names a file holds.
+    """
+
+    pose: str
+    files: tuple[str, ...]
+
+
+class Placed(Event, frozen=True, tag="placed"):
+    """The engineer said that files shown at another pose are of this one."""
+
+    pose: str
+    files: tuple[str, ...]
+
+
 class Starred(Event, frozen=True, tag="starred"):
     """The engineer marked a pose as worth a second look."""
 
@@ -194,13 +212,23 @@ class Starred(Event, frozen=True, tag="starred"):
 
 
 class Undone(Event, frozen=True, tag="undone"):
-    """The act with sequence number `act` was taken back."""
+    """The act with sequence number `act` was taken back; of an Undone: it holds again."""
 
     act: int
 
 
 AnyEvent = (
-    Configured | Proposed | Imported | Confirmed | Refused | Withdrawn | Skipped | Starred | Undone
+    Configured
+    | Proposed
+    | Imported
+    | Confirmed
+    | Refused
+    | Withdrawn
+    | Skipped
+    | Shown
+    | Placed
+    | Starred
+    | Undone
 )
 
 

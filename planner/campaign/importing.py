@@ -1,4 +1,4 @@
-"""Importing the hits of one pose: where they belong, which are new, what they give."""
+"""Importing the hits of one pose: where they belong and what they give."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -9,6 +9,7 @@ from pathlib import Path
 from msgspec.structs import replace
 
 from planner.campaign import store
+from planner.campaign.arrivals import Kept, still_refused, without
 from planner.campaign.cell import Cell
 from planner.campaign.config import ModesTable
 from planner.campaign.deliveries import Delivery
@@ -20,17 +21,6 @@ from planner.dataset.measure import MeasuredPose, measure
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
 from planner.recording.joints import JointUnits
-
-Kept = tuple[Source, str, str]  # a file with its sha256 and suffix
-
-
-@dataclass(frozen=True)
-class KeptFiles:
-    """Files of one delivery: new ones, names of those imported before, and those left out."""
-
-    fresh: tuple[Kept, ...]
-    already: tuple[str, ...]
-    left_out: tuple[HitRecord, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,69 +75,27 @@ def place(cell: Cell, state: CampaignState, delivery: Delivery) -> tuple[float, 
     return delivery.joints_deg
 
 
-def keep_files(
-    directory: Path, delivery: Delivery, state: CampaignState, named: frozenset[Path]
-) -> KeptFiles:
-    """Keep the raw files; those imported before at this pose are only named.
-
-    A file that the engineer refused is new only where it is itself among the `named` paths; one
-    that cannot be read is left out.
-    Raises InputError for a recording that belongs to another pose already.
-    """
-    owner = {h.sha256: m.pose for m in state.recorded for h in m.hits}
-    fresh: list[Kept] = []
-    already, left_out = [], []
-    seen: set[str] = set()
-    for source in delivery.sources:
-        try:
-            digest = store.sha256(store.read_recording(source.path))
-        except InputError as error:  # one bad file does not keep the others out
-            left_out.append(_left(source, "", str(error)))
-            continue
-        if owner.get(digest, delivery.pose) != delivery.pose:
-            raise InputError(
-                f"{source.path} was imported before as a recording of pose {owner[digest]}; "
-                f"it cannot belong to {delivery.pose} too."
-            )
-        if digest in owner or (digest in seen and not source.part):
-            already.append(source.name)
-        elif reason := _reason_against(delivery.pose, digest, source.path in named, state):
-            left_out.append(_left(source, digest, reason))
-        else:
-            seen.add(digest)
-            digest, suffix = store.store_recording(directory, source.path)
-            kept = replaced(source, path=store.recording_path(directory, digest, suffix))
-            fresh += [(part, digest, suffix) for part in kept.parts()]
-    return KeptFiles(tuple(fresh), tuple(already), tuple(left_out))
-
-
-def _left(source: Source, digest: str, reason: str) -> HitRecord:
-    return HitRecord(source.name, digest, "", source.hit, source.repeat, False, reason)
-
-
-def _reason_against(pose: str, digest: str, named: bool, state: CampaignState) -> str:
-    """Why a new file is not imported; empty: it is."""
-    if pose in state.held:
-        return f"hits of {pose} wait for an answer: {_asked_of(state.held[pose])}"
-    if digest in state.refused and not named:
-        return f"{REFUSED} before; to import it all the same, name the file itself"
-    return ""
-
-
-def _asked_of(held: Measurement) -> str:
-    return held.question.text if held.question else ""
-
-
 def refusals(
-    directory: Path, paths: tuple[Path, ...], reasons: Mapping[Path, str]
+    directory: Path,
+    paths: tuple[Path, ...],
+    reasons: Mapping[Path, str],
+    stated: Mapping[Path, Source],
 ) -> tuple[HitRecord, ...]:
-    """The engineer's refusal of each of these files, which are kept like any other."""
+    """The engineer's refusal of each of these files, which are kept like any other.
+
+    `stated` is what a table said of some of them.
+    """
     said = {path: f"{text} ({REFUSED})" for path, text in reasons.items() if text}
-    kept = [(path, *store.store_recording(directory, path)) for path in paths]
-    return tuple(
-        HitRecord(str(path), digest, suffix, accepted=False, reason=said.get(path, REFUSED))
-        for path, digest, suffix in kept
-    )
+    found = []
+    for path in paths:
+        digest, suffix = store.store_recording(directory, path)
+        row = stated.get(path, Source(path, str(path)))
+        found.append(HitRecord(
+            str(path), digest, suffix, row.hit, row.repeat, False, said.get(path, REFUSED),
+            hit_point=row.stated.hit_point, response_points=row.stated.response_points,
+            response=row.response,
+        ))  # fmt: skip
+    return tuple(found)
 
 
 def not_used(hits: tuple[HitRecord, ...], asked: Question | None) -> tuple[HitRecord, ...]:
@@ -165,6 +113,33 @@ def taken_after_all(state: CampaignState, fresh: tuple[Kept, ...]) -> tuple[str,
         for source, digest, _ in fresh
         if digest in state.refused
     )
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedFiles:
+    """New files of a pose, judged; `still` are those refused as before, which nothing rests on."""
+
+    fresh: tuple[Kept, ...]
+    hits: tuple[HitRecord, ...]
+    measured: MeasuredPose
+    still: tuple[HitRecord, ...]
+
+    @classmethod
+    def of(
+        cls,
+        pose: str,
+        state: CampaignState,
+        old: tuple[Source, ...],
+        fresh: tuple[Kept, ...],
+        table: ModesTable,
+    ) -> "JudgedFiles":
+        """Verdicts on the new files, and the modes of all good hits of the pose, old and new."""
+        hits, measured = measure_files(old, fresh, table)
+        still = still_refused(hits, pose, state)
+        left = without(fresh, still)
+        if still and left:
+            return replaced(cls.of(pose, state, old, left, table), still=still)
+        return cls(left, hits if left else (), measured, still)
 
 
 def measure_files(

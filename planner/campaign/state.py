@@ -1,8 +1,7 @@
 """The state of a campaign: a pure fold over its events."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import takewhile
 
 from planner.campaign.events import (
     Amplitude,
@@ -13,17 +12,17 @@ from planner.campaign.events import (
     HitRecord,
     Imported,
     MeasuredMode,
+    Placed,
     Proposal,
     Proposed,
     Question,
     Refused,
+    Shown,
     Skipped,
     Starred,
     Undone,
     Withdrawn,
 )
-
-ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, Starred)
 
 
 @dataclass(frozen=True)
@@ -61,13 +60,14 @@ class CampaignState:
     """Everything the log says; a value."""
 
     configured: Configured | None = None
-    proposals: dict[str, Proposal] = field(default_factory=dict)  # every one ever made, by pose
+    proposals: dict[str, Proposal] = field(default_factory=dict)  # all ever made, undone ones too
     open: tuple[str, ...] = ()  # proposed and not yet measured, skipped or superseded
     proposed_by: str = ""  # acquisition that made the open proposals
     stale: bool = True  # the model changed since the open proposals were made
     measurements: dict[str, Measurement] = field(default_factory=dict)
     held: dict[str, Measurement] = field(default_factory=dict)  # until their question is answered
     refused: dict[str, tuple[str, HitRecord]] = field(default_factory=dict)  # by sha256: pose, hit
+    shown: dict[str, str] = field(default_factory=dict)  # by sha256: the pose that it is of
     skipped: dict[str, str] = field(default_factory=dict)
     avoided: frozenset[str] = frozenset()  # of these, those whose neighbours are not offered either
     starred: frozenset[str] = frozenset()
@@ -104,7 +104,7 @@ class CampaignState:
         """Whether an act changes neither the model nor what is proposed."""
         if isinstance(event, Imported):
             return event.question is not None or (event.unhit and self._unhit_stay_open)
-        return isinstance(event, Starred | Refused)
+        return isinstance(event, Starred | Refused | Shown | Placed)
 
     @property
     def simulated(self) -> bool:
@@ -120,13 +120,16 @@ class CampaignState:
 def fold(entries: Iterable[Entry]) -> CampaignState:
     """The state after the given entries (seq 1, 2, …)."""
     entries = tuple(entries)
-    undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
+    undone = taken_back(entries)
     state = CampaignState()
     for entry in entries:
         if isinstance(entry.event, Proposed):
-            state = replace(state, proposals_made=_made(state, entry.event))
+            made = {p.pose: p for p in entry.event.proposals}
+            state = replace(
+                state, proposals_made=_made(state, entry.event), proposals=state.proposals | made
+            )
         if isinstance(entry.event, Undone):
-            if not state.unchanged_by(entries[entry.event.act - 1].event):
+            if not state.unchanged_by(_act_of(entries, entry.event)):
                 state = replace(state, stale=True, model_version=entry.seq)
         elif entry.seq not in undone:
             state = _apply(state, entry.event, entry)
@@ -134,29 +137,26 @@ def fold(entries: Iterable[Entry]) -> CampaignState:
     return state
 
 
+def taken_back(entries: Sequence[Entry]) -> frozenset[int]:
+    """Numbers of the entries that do not hold; an Undone that was itself undone takes nothing."""
+    found = set()
+    for entry in reversed(entries):
+        if isinstance(entry.event, Undone) and entry.seq not in found:
+            found.add(entry.event.act)
+    return frozenset(found)
+
+
+def _act_of(entries: Sequence[Entry], event: AnyEvent) -> AnyEvent:
+    """What an Undone is about in the end, an undo of an undo too."""
+    while isinstance(event, Undone):
+        event = entries[event.act - 1].event
+    return event
+
+
 def _made(state: CampaignState, event: Proposed) -> int:
     """How many names were given; a pose that is proposed again keeps its own."""
     numbers = [p.pose[1:] for p in event.proposals if p.pose[1:].isdecimal()]
     return max([state.proposals_made, *map(int, numbers)])
-
-
-def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
-    """What `undo` would take back: the last act; a proposal is one, too.
-
-    With `decisions_only` the last decision, and the proposals that followed it: in a session they
-    follow of themselves, also after an act that was interrupted.
-    """
-    entries = tuple(entries)
-    undone = {e.event.act for e in entries if isinstance(e.event, Undone)}
-    acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
-    if not decisions_only:
-        return tuple(acts[-1:])
-    proposals = list(takewhile(lambda e: isinstance(e.event, Proposed), reversed(acts)))
-    if len(proposals) == len(acts):
-        return ()
-    decision = acts[-1 - len(proposals)]
-    before = fold(entries[: decision.seq - 1])
-    return (decision, *(() if before.unchanged_by(decision.event) else proposals))
 
 
 def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState:
@@ -167,7 +167,6 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
         case Proposed():
             return replace(
                 state,
-                proposals={**state.proposals, **{p.pose: p for p in event.proposals}},
                 open=tuple(p.pose for p in event.proposals),
                 proposed_by=event.acquisition,
                 stale=False,
@@ -191,6 +190,10 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             skipped = {**state.skipped, event.pose: event.reason}
             doubt = _doubt(state, event.pose)
             return replace(changed, open=left, skipped=skipped, avoided=avoided, doubt=doubt)
+        case Shown():
+            return replace(state, shown={**dict.fromkeys(event.files, event.pose), **state.shown})
+        case Placed():
+            return replace(state, shown=state.shown | dict.fromkeys(event.files, event.pose))
         case Starred():
             return replace(state, starred=state.starred | {event.pose})
     return state
@@ -199,7 +202,8 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
 def _imported(
     state: CampaignState, changed: CampaignState, event: Imported, entry: Entry
 ) -> CampaignState:
-    before = state.measurements.get(event.pose)
+    came = {hit.sha256 for hit in event.hits}
+    before = _judged_before(state, came).get(event.pose)
     measurement = Measurement(
         pose=event.pose,
         joints_deg=event.joints_deg,
@@ -213,16 +217,25 @@ def _imported(
     left = state.open
     if measurement.modes:
         left = tuple(pose for pose in state.open if pose != event.pose)
-    came = {hit.sha256 for hit in event.hits}
     refused = {digest: hit for digest, hit in state.refused.items() if digest not in came}
     if event.question is not None:
         held = {**state.held, event.pose: measurement}
         return replace(state, open=left, refused=refused, held=held)
-    measurements = {**state.measurements, event.pose: measurement}
+    measurements = {**_judged_before(state, came), event.pose: measurement}
     if state.unchanged_by(event):
         return replace(state, refused=refused, measurements=measurements)
     doubt = (event.again, event.pose) if event.again else _doubt(state, event.pose)
     return replace(changed, open=left, refused=refused, measurements=measurements, doubt=doubt)
+
+
+def _judged_before(state: CampaignState, came: set[str]) -> dict[str, Measurement]:
+    """The measurements without refused hits of files that came again, and were judged again."""
+    found = {}
+    for pose, measurement in state.measurements.items():
+        hits = tuple(h for h in measurement.hits if h.accepted or h.sha256 not in came)
+        same = len(hits) == len(measurement.hits)
+        found[pose] = measurement if same else replace(measurement, hits=hits)
+    return found
 
 
 def _doubt(state: CampaignState, pose: str) -> tuple[str, str] | None:

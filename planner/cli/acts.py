@@ -1,4 +1,4 @@
-"""What an engineer says of a campaign's poses: confirm, withdraw, skip, undo."""
+"""What an engineer says of a campaign's poses: confirm, withdraw, skip, undo, redo."""
 
 from pathlib import Path
 from typing import Annotated
@@ -44,6 +44,17 @@ def undo(directory: Directory, as_json: AsJson = False) -> int:
     from planner.report.campaign_acts import UndoneAct
 
     return respond(UndoneAct.of(Campaign(directory).undo()), as_json)
+
+
+def redo(directory: Directory, as_json: AsJson = False) -> int:
+    """Let the act hold again that undo took back last, while nothing else was decided since.
+
+    Example: planner redo cell7
+    """
+    from planner.campaign.campaign import Campaign
+    from planner.report.campaign_acts import RedoneAct
+
+    return respond(RedoneAct.of(Campaign(directory).redo()), as_json)
 
 
 def withdraw(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from planner.cli.acts import Directory, confirm, skip, undo, withdraw
+from planner.cli.acts import Directory, confirm, redo, skip, undo, withdraw
 from planner.cli.answer import AsJson, FromNames, refusals, respond, warn
 from planner.cli.checking import check
 from planner.cli.comparison import compare
@@ -204,8 +204,8 @@ def replay(
 
 
 for _command in (
-    new, undo, confirm, skip, withdraw, check, report, export, modes, identify, diagnose, prove,
-    compare, study, schema, manual, couple, stability,
+    new, undo, redo, confirm, skip, withdraw, check, report, export, modes, identify, diagnose,
+    prove, compare, study, schema, manual, couple, stability,
 ):  # fmt: skip
     app.command()(_command)
 

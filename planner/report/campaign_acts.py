@@ -124,6 +124,27 @@ class UndoneAct(Answer):
 
 
 @dataclass(frozen=True)
+class RedoneAct(Answer):
+    """Answer of `redo`: number and kind of the log's entry that holds again, and its words."""
+
+    redone: int
+    event: str
+    what: str
+    with_it: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, entries: Sequence[Entry]) -> "RedoneAct":
+        """Of the entry that holds again and those that came with it."""
+        told = UndoneAct.of(entries)
+        return cls(told.undone, told.event, told.what, told.with_it)
+
+    def text(self) -> str:
+        """One sentence."""
+        follow = f"; with it: {', '.join(self.with_it)}" if self.with_it else ""
+        return f"Entry {self.redone} holds again: {self.what}{follow}."
+
+
+@dataclass(frozen=True)
 class WithdrawnPose(Answer):
     """Answer of `withdraw`."""
 

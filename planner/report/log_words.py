@@ -2,7 +2,16 @@
 
 import msgspec
 
-from planner.campaign.events import Configured, Entry, Imported, Proposed, Refused, Undone
+from planner.campaign.events import (
+    Configured,
+    Entry,
+    Imported,
+    Placed,
+    Proposed,
+    Refused,
+    Shown,
+    Undone,
+)
 from planner.words import counted
 
 
@@ -24,6 +33,9 @@ def act(entry: Entry) -> str:
         return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
     if isinstance(event, Undone):
         return f"took back entry {event.act}"
+    if isinstance(event, Shown | Placed):
+        said = "shown at" if isinstance(event, Shown) else "said to be of"
+        return f"{counted(len(event.files), 'file')} {said} {event.pose}"
     told = msgspec.to_builtins(event)
     reason = f": {told['reason']}" if told.get("reason") else ""
     return f"{told['kind']} {told['pose']}{reason}"

@@ -78,7 +78,6 @@ class PosePage:
     unfinished: tuple[tuple[str, str], ...] = ()
     progress: str = ""
     keys: str = ""
-    pose_before: str = ""
 
     @property
     def counts(self) -> Counter[str]:

@@ -7,8 +7,10 @@ from planner.campaign.events import (
     Confirmed,
     Entry,
     Imported,
+    Placed,
     Proposed,
     Refused,
+    Shown,
     Skipped,
     Starred,
     Undone,
@@ -64,6 +66,8 @@ class Story:
                 view.text(number, f"Starred {event.pose}", "INFO")
             case Undone():
                 view.text(number, f"Took back entry {event.act} of the log", "WARN")
+            case Shown() | Placed():
+                return
             case _:
                 view.text(number, f"Configured {model.cell.robot.name}", "INFO")
         if not isinstance(event, Proposed | Refused | Starred):

@@ -1,5 +1,8 @@
 """What the session shows, as rich renderables; units in every column."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import numpy as np
 from rich.console import Group, RenderableType
 from rich.panel import Panel
@@ -19,8 +22,8 @@ HELP = """\
 a, Enter  import the hits that wait          r  set bad hits aside, do not import them
 R         set all waiting hits aside
 k         skip this pose; asks why           n  another pose, never this one
-b, h      late hits: of the pose before, or of this one; h: unsure hits are right too
-s         mark this pose with a star (★)     u  take back the last act
+b, h      late hits: of the pose named, or of this one; h: unsure hits are right too
+s         mark this pose with a star (★)     u, U  take back the last act; redo it
 q         quit; everything is on disk, and planner watch goes on from here"""
 NONE_BAD = "No hit is to be repeated: press r again, or R, to set all that wait aside."
 FULLY, SHORTLY = 2, 4  # refusals that are said in full, and those of which is said what to do
@@ -105,6 +108,12 @@ def question_panel(question: Question, pose: str, other: str) -> RenderableType:
     more = Text("They are kept, and not used until you answer.")
     parts = Group(text, more, Text(f"{keys}[u] undo  [q] quit", style="dim"))
     return Panel(parts, title=f"Pose {pose}: a question", title_align="left", expand=False)
+
+
+def held_of(pose: str, files: Sequence[Path]) -> str:
+    """What is said of files that are of another pose, where nobody can be asked."""
+    names = ", ".join(short_name(path) for path in files)
+    return f"Held, not used: {names} of {pose}; import --pose {pose} takes them there."
 
 
 def _in(report: ImportReport) -> str:

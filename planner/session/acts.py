@@ -8,15 +8,24 @@ from typing import Any
 
 from rich.text import Text
 
-from planner.campaign.events import Confirmed, Imported, Refused, Skipped, Starred, Undone
+from planner.campaign.events import (
+    Confirmed,
+    Imported,
+    Placed,
+    Refused,
+    Skipped,
+    Starred,
+    Undone,
+)
 from planner.campaign.importing import ImportReport
-from planner.campaign.state import fold, last_acts
+from planner.campaign.state import fold
+from planner.campaign.taking_back import last_acts
+from planner.dataset.screened_files import Source
 from planner.errors import NoPoseLeftError, PlannerError
 from planner.report import session_text
-from planner.report.campaign_acts import UndoneAct
+from planner.report.campaign_acts import RedoneAct, UndoneAct
 from planner.session.course import BAD, Course, PoseInProgress
-from planner.session.hit_verdicts import PoseBefore
-from planner.session.page import page_with_hits, page_without_hits
+from planner.session.page import TakingBack, page_with_hits, page_without_hits
 from planner.session.skipping import ask_why, on_reason_key
 from planner.session.station import Station
 from planner.words import counted
@@ -28,6 +37,7 @@ ACTS: dict[type, Callable[[Any], str]] = {  # in words, where an interruption ha
     Confirmed: lambda event: f"the answer about {event.pose}",
     Refused: lambda event: f"the refusal of hits at {event.pose}",
     Skipped: lambda event: f"the skip of {event.pose}",
+    Placed: lambda event: f"that late hits are of {event.pose}",
     Starred: lambda event: f"the star of {event.pose}",
     Undone: lambda event: f"that entry {event.act} is taken back",
 }
@@ -46,10 +56,11 @@ def arrive(station: Station, course: Course) -> Course:
     page = page_without_hits(
         campaign, proposal, station.hits_at(proposal), station.inbox.folder, course
     )
-    page = page_with_hits(page, (), (), undoable(station), station.auto, course)
+    page = page_with_hits(page, (), (), TakingBack.of(campaign), station.auto, course)
     station.screen.show(page.page)
     station.teller.tell()
-    return replace(course, visit=PoseInProgress(proposal, page, time.monotonic()))
+    before = station.pose_before(proposal.pose)
+    return replace(course, visit=PoseInProgress(proposal, page, time.monotonic(), before))
 
 
 def say_last_import(station: Station) -> None:
@@ -61,12 +72,6 @@ def say_last_import(station: Station) -> None:
         before = campaign.kept_model(fold(campaign.entries[: acts[0].seq - 1]))
         told = session_text.against_expected(event.pose, campaign.model, before)
         station.say(f"The last import, {event.pose}: {told}", "bold")
-
-
-def undoable(station: Station) -> bool:
-    """Whether there is an act to take back."""
-    state = station.campaign.state
-    return bool(state.recorded or state.events > 2)  # the campaign's start and a first proposal
 
 
 def on_key(station: Station, course: Course, visit: PoseInProgress, key: str | None) -> Course:
@@ -91,9 +96,9 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             files = [path for path in visit.whole if path not in out]
             return import_waiting(station, course, visit, files)
         case "b" if visit.late:
-            return _to_before(station, course, sorted(visit.late))
+            return _to_their_poses(station, course, visit)
         case "h" if visit.late | visit.unsure:
-            return replace(course, here=course.here | visit.late | visit.unsure)
+            return _right_here(station, course, visit)
         case "r" if visit.whole:
             bad = visit.paths("repeat") or visit.paths(*BAD)
             if not bad and not visit.refusing:
@@ -109,6 +114,8 @@ def _act(station: Station, course: Course, visit: PoseInProgress, key: str | Non
             return replace(course, visit=ask_why(station, visit))
         case "u":
             return undo(station, over)
+        case "U":
+            return _redo(station, over)
         case "n":
             campaign.skip(pose, "another was asked for")
             station.say(f"{pose} will not be offered again.")
@@ -127,7 +134,9 @@ def _refuse(station: Station, visit: PoseInProgress, files: Collection[Path]) ->
     chosen = tuple(path for path in visit.whole if path in files)
     if not chosen:
         return
-    station.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen))
+    rows = ((path, station.verdicts.table.row(path)) for path in chosen)
+    stated = {path: Source.of(row) for path, row in rows if row is not None}
+    station.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen), stated)
     station.teller.note()
     numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
     said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
@@ -149,20 +158,19 @@ def import_waiting(
             reports = _imported_files(station, files, visit.proposal.pose)
     except PlannerError as error:
         station.say(str(error), "red")
-        bad = {station.inbox.digest(path) for path in files} if station.auto else set()
+        bad = {station.mark(path) for path in files} if station.auto else set()
         return replace(course, aside=course.aside | bad)
     station.teller.note(reports)
     for report in reports:
         if report.question is not None and report.question.disagree and course.here:
             return _right(station, course, report)
-        course = replace(course, aside=course.aside | {hit.sha256 for hit in report.left_out})
+        left = {station.mark(Path(hit.file), hit.sha256) for hit in report.left_out}
+        course = replace(course, aside=course.aside | left)
         course = _imported(station, course, report)
     if not any(report.measurement and report.measurement.modes for report in reports):
         station.teller.tell()
         return course
-    hits = tuple(hit for verdict in visit.verdicts for hit in verdict.hits)
-    before = PoseBefore(visit.proposal.pose, hits)
-    return replace(course, visit=None, before=before, here=frozenset())
+    return replace(course, visit=None, here=frozenset())
 
 
 def _imported_files(station: Station, files: Sequence[Path], pose: str) -> tuple[ImportReport, ...]:
@@ -190,6 +198,18 @@ def undo(station: Station, course: Course) -> Course:
     station.screen.forget()
     station.say(UndoneAct.of(taken).text())
     return course.undone(station.campaign.state)
+
+
+def _redo(station: Station, course: Course) -> Course:
+    """Let hold again what was taken back last."""
+    again = station.campaign.redo()
+    station.teller.note()
+    station.screen.forget()
+    station.say(RedoneAct.of(again).text())
+    event = again[0].event
+    if isinstance(event, Imported | Confirmed):
+        return measured(station, course, event.pose)
+    return course
 
 
 def answer(station: Station, course: Course, key: str | None, other: str) -> Course:
@@ -236,16 +256,26 @@ def measured(station: Station, course: Course, pose: str) -> Course:
     return further
 
 
-def _to_before(station: Station, course: Course, late: Sequence[Path]) -> Course:
-    """Import hits that came late to the pose that they are of."""
-    with station.screen.working(IMPORTING):
-        reports = station.campaign.import_paths(tuple(late), course.before.pose)
-    station.teller.note(reports)
-    names = ", ".join(path.name for path in late)
-    station.say(f"{counted(len(late), 'file')} moved to {course.before.pose}: {names}.")
-    for report in reports:
-        station.say(session_text.result_line(report), "bold")
+def _to_their_poses(station: Station, course: Course, visit: PoseInProgress) -> Course:
+    """Import hits that came late to the poses that they are of."""
+    for pose, late in visit.late_by_pose.items():
+        with station.screen.working(IMPORTING):
+            reports = station.campaign.import_paths(late, pose)
+        station.teller.note(reports)
+        names = ", ".join(path.name for path in late)
+        station.say(f"{counted(len(late), 'file')} moved to {pose}: {names}.")
+        for report in reports:
+            station.say(session_text.result_line(report), "bold")
     return course
+
+
+def _right_here(station: Station, course: Course, visit: PoseInProgress) -> Course:
+    """The engineer says that late hits are of this pose, and unsure ones right."""
+    if visit.late:
+        files = [station.inbox.digest(path) for path in sorted(visit.late)]
+        station.campaign.place(visit.proposal.pose, files)
+        station.teller.note()
+    return replace(course, here=course.here | visit.unsure)
 
 
 def interrupted(station: Station) -> str:

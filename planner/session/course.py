@@ -24,12 +24,13 @@ class PoseInProgress:
     `since` is when (monotonic, s) the files were last seen to change; `pressed`: accept was
     pressed though hits are missing; `refusing`: refuse was, though no hit is bad. `numbers` are
     those of its hits, as they came; `typed` is the reason for a skip as far as it is typed, None
-    where none is asked for.
+    where none is asked for; `before` is the pose measured last.
     """
 
     proposal: Proposal
     page: PosePage
     since: float
+    before: PoseBefore = field(default_factory=PoseBefore)
     whole: tuple[Path, ...] = ()
     verdicts: tuple[HitVerdict, ...] = ()
     shown: tuple | None = None
@@ -67,8 +68,17 @@ class PoseInProgress:
 
     @property
     def late(self) -> frozenset[Path]:
-        """Files with hits that answer as the pose before did."""
+        """Files that are of another pose until the engineer says otherwise."""
         return frozenset(verdict.path for verdict in self.verdicts if verdict.kind == "late")
+
+    @property
+    def late_by_pose(self) -> dict[str, tuple[Path, ...]]:
+        """The late ones by the pose that they are of."""
+        found: dict[str, dict[Path, None]] = {}
+        for verdict in self.verdicts:
+            if verdict.kind == "late":
+                found.setdefault(verdict.came, {})[verdict.path] = None
+        return {pose: tuple(paths) for pose, paths in found.items()}
 
     @property
     def good(self) -> bool:
@@ -80,16 +90,15 @@ class PoseInProgress:
 class Course:
     """How far a session is. All else is the campaign's, so that it may end anywhere.
 
-    `asking` is the pose whose question is on the page; `here` are files that looked late or
-    unsure and are right; `aside`, by content, what could not be imported without the engineer;
+    `asking` is the pose whose question is on the page; `here` are files that looked unsure and are
+    right; `aside`, by content and row, what could not be imported without the engineer;
     `history` the overall sd (%) after each measurement; `announced`: the target was.
     """
 
     visit: PoseInProgress | None = None
     asking: str = ""
-    before: PoseBefore = field(default_factory=PoseBefore)
     here: frozenset[Path] = frozenset()
-    aside: frozenset[str] = frozenset()
+    aside: frozenset[tuple[str, str]] = frozenset()
     measured: tuple[str, ...] = ()
     history: tuple[float, ...] = ()
     progress: str = ""
@@ -97,18 +106,14 @@ class Course:
     stop: str = ""
     ended: str = ""
 
-    def known(self, state: CampaignState) -> set[str]:
-        """Content hashes of files that are not to be offered: used, refused or set aside."""
-        hits = {hit.sha256 for pose in state.recorded for hit in pose.hits}
-        return {*self.aside, *state.refused, *hits}
-
     def undone(self, state: CampaignState) -> "Course":
         """After an act was taken back: what was measured may be gone with it."""
-        before = self.before if self.before.pose in state.measurements else PoseBefore()
         kept = [k for k, pose in enumerate(self.measured) if pose in state.measurements]
         measured = tuple(self.measured[k] for k in kept)
         history = tuple(self.history[k] for k in kept)
-        return replace(self, before=before, measured=measured, history=history, progress="")
+        return replace(
+            self, measured=measured, history=history, progress="", here=frozenset()
+        )  # fmt: skip
 
     def after(
         self, pose: str, model: Model, state: CampaignState, seconds: float, auto: bool

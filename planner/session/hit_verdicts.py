@@ -26,7 +26,8 @@ class HitVerdict:
 
     Of one to be repeated `text` says why; nothing says along which axis an unstated one is. The
     `text` of a good one says what is to be known of it, if anything is. A late one answers as
-    the pose before did; an unsure one contradicts others, and nothing tells which is right. `axis`
+    another pose did, the one before as a rule, or was shown there: `came` names that pose. An
+    unsure one contradicts others, and nothing tells which is right. `axis`
     is "" where the file does not say it; `hits` is what of it can be used. `number` counts hits as
     they came to the pose. `weak`: it is to be repeated only because it is; an import would take it.
     """
@@ -39,6 +40,8 @@ class HitVerdict:
     number: int = 0
     weak: bool = False
     at_s: float | None = None
+    came: str = ""
+    alike: bool = False  # a late one answers as what was hit there before
 
     @property
     def name(self) -> str:
@@ -82,35 +85,36 @@ class Verdicts:
     def of(
         self,
         files: Sequence[Path],
-        before: tuple[Hit, ...] = (),
+        before: PoseBefore | None = None,
         here: frozenset[Path] = frozenset(),
         numbers: Mapping[Part, int] | None = None,
+        shown: Mapping[Path, str] | None = None,
+        pose: str = "",
     ) -> tuple[HitVerdict, ...]:
         """Each hit by itself and beside the others that wait, by number.
 
-        Hits like those of the pose `before` are late, and hits that contradict others unsure,
-        unless their files are said to be right and of `here`.
+        Files that were `shown` at another pose than this one are late, and new ones with hits like
+        those of the pose `before`, or like late ones. Hits that contradict others are unsure unless
+        their files are said to be right, of `here`. What is late stands beside no other hit.
         """
-        numbers = self.numbered(files, numbers)
+        numbers, before = self.numbered(files, numbers), before or PoseBefore()
         found = [
             (self._alone(path, *one, numbers[path, part]), len(parts))
             for path in files for parts in (self._hits_of(path),)
             for part, one in enumerate(parts, 1)
         ]  # fmt: skip
         found.sort(key=lambda one: one[0].number)
+        late = self._late([verdict for verdict, _ in found], before, shown or {}, pose)
+        found = [one for one in found if one[0].path not in {v.path for v in late}]
         judged = self._beside_repeats([verdict for verdict, _ in found])
         usable = [hit for verdict in judged if verdict.kind == "good" for hit in verdict.hits]
         judged = [
-            _weak(verdict, usable, before) if count == 1 else verdict
+            _weak(verdict, usable, before.hits) if count == 1 else verdict
             for verdict, (_, count) in zip(judged, found, strict=True)
         ]
         asked = self._unsure(judged, here)
-        late = (
-            replace(verdict, kind="late", text="")
-            if verdict.kind == "good" and self._late(verdict, before, here) else verdict
-            for verdict in judged
-        )  # fmt: skip
-        return tuple(asked.get(verdict.number, verdict) for verdict in late)
+        told = [*(asked.get(verdict.number, verdict) for verdict in judged), *late]
+        return tuple(sorted(told, key=lambda verdict: verdict.number))
 
     def _alone(
         self, path: Path, verdict: FileVerdict, own: tuple[Hit, ...], number: int
@@ -135,10 +139,32 @@ class Verdicts:
             out.append(replace(verdict, kind="repeat", text=" ".join(told)) if told else verdict)
         return out
 
-    def _late(self, verdict: HitVerdict, before: tuple[Hit, ...], here: frozenset[Path]) -> bool:
-        return verdict.path not in here and any(
-            likeness_to(hit, before, self._band) >= SAME_POSE for hit in verdict.hits
-        )
+    def _late(
+        self, every: list[HitVerdict], before: PoseBefore, shown: Mapping[Path, str], pose: str
+    ) -> list[HitVerdict]:
+        """The hits in files that are of another pose: shown there, or, where new, answered so."""
+        hits = {before.pose: before.hits} if before.pose else {}
+        came = {path: at for path, at in shown.items() if at != pose}
+        waiting = dict(hits)
+        for verdict in every:
+            if at := came.get(verdict.path):
+                waiting[at] = (*waiting.get(at, ()), *verdict.hits)
+        for verdict in every:
+            if verdict.path not in shown and (at := self._alike(verdict, waiting)):
+                came[verdict.path] = at
+        late = [(v, at) for v in every if (at := came.get(v.path))]
+        alike = [bool(self._alike(v, {at: hits.get(at, ())})) for v, at in late]
+        return [
+            replace(v, kind="late", text="", came=at, alike=like)
+            for (v, at), like in zip(late, alike, strict=True)
+        ]
+
+    def _alike(self, verdict: HitVerdict, hits: Mapping[str, tuple[Hit, ...]]) -> str:
+        """The pose of which hits are answered like one of these; "": none is."""
+        for pose, theirs in hits.items():
+            if any(likeness_to(hit, theirs, self._band) >= SAME_POSE for hit in verdict.hits):
+                return pose
+        return ""
 
     def _unsure(self, judged: Sequence[HitVerdict], here: frozenset[Path]) -> dict[int, HitVerdict]:
         """By number, good hits that contradict others or are answered against their direction."""

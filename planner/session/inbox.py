@@ -41,8 +41,11 @@ class Inbox:
     _contents: dict[Path, tuple[tuple[int, ...], Content]] = field(default_factory=dict)
     _ignored: set[Path] = field(default_factory=set)
 
-    def scan(self, done: set[str]) -> tuple[list[Path], list[tuple[Path, str]]]:
-        """Whole new files, oldest first, and those not whole yet, with what is the matter."""
+    def scan(self, done: Callable[[Path, str], bool]) -> tuple[list[Path], list[tuple[Path, str]]]:
+        """Whole new files, oldest first, and those not whole yet, with what is the matter.
+
+        Files of which `done` says so, by their hash, are left out.
+        """
         whole, waiting = [], []
         for path in self._candidates():
             try:
@@ -54,7 +57,7 @@ class Inbox:
                 continue
             found = self._content(path, mark)
             settled = self._settled(path)
-            if found.digest in done:
+            if found.digest and done(path, found.digest):
                 continue
             if not settled and (found.fault or self.unfit(path)):
                 waiting.append((path, WRITING))
@@ -114,8 +117,11 @@ class Inbox:
         return found
 
     def digest(self, path: Path) -> str:
-        """Content hash of a whole file."""
-        return sha256(read_recording(path))
+        """Content hash of a whole file; "" where it cannot be read."""
+        try:
+            return self._content(path, version(path)).digest
+        except OSError:  # it was taken away meanwhile
+            return ""
 
 
 def _old(modified: float) -> bool:

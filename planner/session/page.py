@@ -1,16 +1,31 @@
 """The page of a pose, made of what the campaign expects there and of the hits that wait."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.events import Proposal
+from planner.campaign.taking_back import last_acts, last_undone
 from planner.dataset.screened_files import when
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
 from planner.session.course import BAD, Course
 from planner.session.hit_verdicts import HitVerdict
 from planner.words import counted, short_name
+
+
+@dataclass(frozen=True)
+class TakingBack:
+    """Whether there is an act to take back, and one that was and can hold again."""
+
+    undo: bool
+    redo: bool
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> "TakingBack":
+        """Of a campaign as it is now."""
+        entries = campaign.entries
+        return cls(bool(last_acts(entries, decisions_only=True)), bool(last_undone(entries)[0]))
 
 
 def page_without_hits(
@@ -23,7 +38,7 @@ def page_without_hits(
         proposal, len(model.labelled) + 1, robot.joints, robot.config.tcp_frame,
         max(1, hits_per_pose // len(proposal.hits)), (),
         tuple(expected.frequency_hz[0].tolist()), tuple(expected.frequency_sd_hz[0].tolist()),
-        folder, progress=course.progress, pose_before=course.before.pose,
+        folder, progress=course.progress,
     )  # fmt: skip
 
 
@@ -31,22 +46,23 @@ def page_with_hits(
     page: PosePage,
     verdicts: Sequence[HitVerdict],
     waiting: Sequence[tuple[Path, str]],
-    undoable: bool,
+    can: TakingBack,
     auto: bool,
     course: Course,
 ) -> PosePage:
     """The page with the hits that wait, the files that are not whole yet, and keys that do."""
-    before = course.before.pose
     names = [one.path.name for one in verdicts]
-    hits = tuple(_judged(one, before, names) for one in verdicts)
+    hits = tuple(_judged(one, names) for one in verdicts)
     unfinished = tuple((short_name(path), _named(path, why)) for path, why in waiting)
     page = replace(page, hits=hits, unfinished=unfinished, progress=course.progress)
     page = replace(page, streams=_streams(verdicts))
-    return replace(page, keys="" if auto else _keys(page, before, undoable))
+    poses = {one.came for one in verdicts if one.kind == "late"}
+    return replace(page, keys="" if auto else _keys(page, poses, can))
 
 
-def _judged(verdict: HitVerdict, before: str, names: Sequence[str]) -> JudgedHit:
-    late = f"answers as {before} did: [b] it is from there, [h] from here"
+def _judged(verdict: HitVerdict, names: Sequence[str]) -> JudgedHit:
+    said = f"answers as {verdict.came} did" if verdict.alike else f"came at {verdict.came}"
+    late = f"{said}: [b] it is from there, [h] from here"
     text = late if verdict.kind == "late" else verdict.text
     if verdict.kind == "unsure":
         text = f"{text}, or [h]: it is right"
@@ -67,16 +83,16 @@ def _streams(verdicts: Sequence[HitVerdict]) -> tuple[str, ...]:
     )
 
 
-def _keys(page: PosePage, before: str, undoable: bool) -> str:
+def _keys(page: PosePage, late: set[str], can: TakingBack) -> str:
     kinds = {hit.kind for hit in page.hits}
     return keys_that_do([
         ("a", "accept" if page.complete else "accept as it is", "good" in kinds),
         ("r", "refuse bad hits", bool(kinds & {*BAD})),
         ("R", "refuse all", bool(page.hits)),
-        ("b", f"late ones to {before}", "late" in kinds),
+        ("b", f"late ones to {' and '.join(sorted(late))}", "late" in kinds),
         ("h", _right_here(kinds), bool(kinds & {"late", "unsure"})),
         ("s", "star", True), ("k", "skip, say why", True), ("n", "never this pose", True),
-        ("u", "undo", undoable), ("q", "quit", True), ("?", "help", True),
+        ("u", "undo", can.undo), ("U", "redo", can.redo), ("q", "quit", True), ("?", "help", True),
     ])  # fmt: skip
 
 

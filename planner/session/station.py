@@ -2,13 +2,18 @@
 
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 from rich.text import Text
 
+from planner.campaign.arrivals import stated_otherwise
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import Proposal
+from planner.campaign.events import Confirmed, Imported, Proposal
+from planner.campaign.state import taken_back
+from planner.dataset.screened_files import Source
+from planner.session.course import Course
 from planner.session.diagnosis_process import DiagnosisProcess
-from planner.session.hit_verdicts import Verdicts
+from planner.session.hit_verdicts import PoseBefore, Verdicts
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys
 from planner.session.screen import Screen
@@ -42,6 +47,35 @@ class Station:
         """How many hits make this pose."""
         each = self.campaign.cell.config.cost.hits_per_axis
         return self.hits_per_pose or each * len(proposal.hits)
+
+    def mark(self, path: Path, digest: str = "") -> tuple[str, str]:
+        """A file's content hash and what a table says of it."""
+        return digest or self.inbox.digest(path), str(self.verdicts.table.row(path) or "")
+
+    def known(self, path: Path, digest: str, course: Course) -> bool:
+        """Whether a file is not to be offered: it is in use, or refused as it is stated now."""
+        state, row = self.campaign.state, self.verdicts.table.row(path)
+        if self.mark(path, digest) in course.aside:
+            return True
+        hits = [hit for m in state.recorded for hit in m.hits if hit.sha256 == digest]
+        hits += [state.refused[digest][1]] if digest in state.refused else []
+        if row is None or any(hit.accepted for hit in hits):
+            return bool(hits)
+        return any(not stated_otherwise(Source.of(row), hit) for hit in hits)
+
+    def pose_before(self, pose: str) -> PoseBefore:
+        """The pose measured last, other than this one, and what was hit there."""
+        entries, state = self.campaign.entries, self.campaign.state
+        undone = taken_back(entries)
+        for entry in reversed(entries):
+            event = entry.event
+            if entry.seq in undone or not isinstance(event, Imported | Confirmed):
+                continue
+            known = state.hit_at(event.pose)
+            if known is not None and event.pose != pose:
+                sources = self.campaign.recordings.sources(known)
+                return PoseBefore(event.pose, tuple(h for s in sources for h in s.read()[0]))
+        return PoseBefore()
 
     def key(self) -> str | None:
         """The next key, or None after POLL_S."""

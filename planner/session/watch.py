@@ -1,6 +1,7 @@
 """The session's loop. All state is the campaign's: quit or kill it anywhere, and start it again."""
 
 import time
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,14 +22,13 @@ from planner.session.acts import (
     interrupted,
     on_key,
     say_last_import,
-    undoable,
 )
 from planner.session.course import Course, PoseInProgress
 from planner.session.diagnosis_process import LEAST, DiagnosisProcess
-from planner.session.hit_verdicts import Verdicts
+from planner.session.hit_verdicts import HitVerdict, Part, Verdicts
 from planner.session.inbox import Inbox
 from planner.session.keys import Keys, NoKeys, terminal_keys
-from planner.session.page import page_with_hits
+from planner.session.page import TakingBack, page_with_hits
 from planner.session.screen import Screen
 from planner.session.station import Station
 from planner.session.table import FolderTable
@@ -158,7 +158,7 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
     visit = _looked(station, course, visit)
     course = replace(course, visit=visit)
     waited = time.monotonic() - visit.since > 3 * station.inbox.quiet_s
-    ready = [path for path in visit.whole if path not in visit.unstated]
+    ready = [path for path in visit.whole if path not in visit.unstated | visit.late]
     hits = sum(verdict.path in ready for verdict in visit.verdicts)
     if station.auto and ready and (hits >= station.hits_at(visit.proposal) or waited):
         return import_waiting(station, course, visit, ready)
@@ -169,22 +169,53 @@ def _at_pose(station: Station, course: Course, visit: PoseInProgress) -> Course:
 def _looked(station: Station, course: Course, visit: PoseInProgress) -> PoseInProgress:
     """The visit with what the folder holds now; what changed is drawn, and rung for."""
     station.verdicts.table.follow()
-    whole, waiting = station.inbox.scan(course.known(station.campaign.state))
+    whole, waiting = station.inbox.scan(lambda path, digest: station.known(path, digest, course))
     waiting += station.verdicts.table.waiting
     for path in station.inbox.ignored():
         station.say(f"{path.name} is no recording; ignored.", "dim")
     numbers = station.verdicts.numbered(whole, visit.numbers)
-    verdicts = station.verdicts.of(whole, course.before.hits, course.here, numbers)
+    verdicts = _shown(station, visit, whole, course.here, numbers)
     now = (tuple(whole), tuple(waiting), tuple((v.kind, v.text) for v in verdicts))
     if now == visit.shown:
         return visit
-    page = page_with_hits(visit.page, verdicts, waiting, undoable(station), station.auto, course)
+    can = TakingBack.of(station.campaign)
+    page = page_with_hits(visit.page, verdicts, waiting, can, station.auto, course)
     station.screen.ring({(str(v.path), v.number): v.kind for v in verdicts})
     station.screen.show(page.page)
-    return replace(
+    seen = replace(
         visit, page=page, whole=tuple(whole), verdicts=verdicts, shown=now, since=time.monotonic(),
         numbers=numbers, refusing=False,
     )  # fmt: skip
+    for at, files in seen.late_by_pose.items() if station.auto else ():
+        station.say(session_text.held_of(at, files), "yellow")
+    return seen
+
+
+def _shown(
+    station: Station,
+    visit: PoseInProgress,
+    whole: Sequence[Path],
+    here: frozenset[Path],
+    numbers: Mapping[Part, int],
+) -> tuple[HitVerdict, ...]:
+    """Verdicts on what the folder holds, with the pose of each file in the log before they show.
+
+    Of files that a table lists it says the pose.
+    """
+    pose, known = visit.proposal.pose, station.campaign.state.shown
+    digests = {path: station.inbox.digest(path) for path in whole}
+    shown = {path: known[digest] for path, digest in digests.items() if digest in known}
+    shown |= {path: pose for path in whole if station.verdicts.table.row(path) is not None}
+    verdicts = station.verdicts.of(whole, visit.before, here, numbers, shown, pose)
+    new: dict[str, dict[str, None]] = {}
+    for verdict in verdicts:
+        if verdict.path not in shown and digests[verdict.path]:
+            new.setdefault(verdict.came or pose, {})[digests[verdict.path]] = None
+    for at, files in new.items():
+        station.campaign.show(at, tuple(files))
+    if new:
+        station.teller.note()
+    return verdicts
 
 
 def _unless_late(station: Station, course: Course) -> Course:

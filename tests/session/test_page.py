@@ -16,7 +16,7 @@ from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do, remedy
 from planner.report.session_text import refusals
 from planner.session.course import Course
 from planner.session.hit_verdicts import HitVerdict
-from planner.session.page import page_with_hits
+from planner.session.page import TakingBack, page_with_hits
 from planner.session.screen import Screen
 from planner.words import short_name
 
@@ -148,7 +148,9 @@ def test_names_of_files_leave_room_for_what_is_said_of_them(page):
     said = f"disagrees with hit 2 ({name}) (likeness 0.42): hit along x once more"
     verdict = HitVerdict(Path("exports") / name, "+x", "unsure", said, number=1)
     why = f"exports/{name} holds no force; export it again."
-    made = page_with_hits(page, [verdict], [(verdict.path, why)], True, False, Course())
+    made = page_with_hits(
+        page, [verdict], [(verdict.path, why)], TakingBack(True, False), False, Course()
+    )
     text = whole(lines(made, height=40))
     assert name not in text
     assert "disagrees with hit 2 (measurem…n_hit_x_003.uff) (likeness 0.42)" in text

@@ -20,6 +20,11 @@ from tests.support.robots import BAND_HZ
 Q = np.deg2rad([10.0, -80.0, 90.0, 5.0, 40.0, -10.0])
 
 
+def none_known(path, digest):
+    """No file is known."""
+    return False
+
+
 @pytest.fixture(scope="module")
 def truth(tmp_path_factory):
     return make_cell(tmp_path_factory.mktemp("truth"))[2]
@@ -43,9 +48,8 @@ class Bench:
         return path
 
     def of(self, before: PoseBefore | None = None, here: frozenset[Path] = frozenset()):
-        hits = before.hits if before else ()
         self.numbers = self.verdicts.numbered(self.files, self.numbers)
-        return {v.path.stem: v for v in self.verdicts.of(self.files, hits, here, self.numbers)}
+        return {v.path.stem: v for v in self.verdicts.of(self.files, before, here, self.numbers)}
 
 
 @pytest.fixture
@@ -139,16 +143,16 @@ def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(benc
     marks = [m for m in range(len(data)) if data[m : m + 6] == b"    -1"]
     (inbox / "force.uff").write_bytes(data[: marks[1] + 6] + b"\n")  # ends with a whole dataset
     box = Inbox(inbox, 0.02, bench.verdicts.unfit)
-    box.scan(set())
+    box.scan(none_known)
     time.sleep(0.08)  # text is given three times as long
-    found, waiting = box.scan(set())
+    found, waiting = box.scan(none_known)
     assert found == []
     assert {path.name: why for path, why in waiting} == dict.fromkeys(
         ["notes.txt", "half.uff", "force.uff"], "is still being written"
     )
     assert box.ignored() == []
     time.sleep(0.2)
-    found, waiting = box.scan(set())
+    found, waiting = box.scan(none_known)
     assert [path.name for path in found] == ["force.uff"]  # read, and to be refused
     assert [path.name for path, _ in waiting] == ["half.uff"]
     assert "export it again" in waiting[0][1]
@@ -156,9 +160,9 @@ def test_what_is_no_recording_is_ignored_once_and_half_a_file_is_waited_for(benc
     assert box.ignored() == []
     (inbox / "half.uff").write_bytes(data)
     os.utime(inbox / "half.uff")
-    box.scan(set())
+    box.scan(none_known)
     time.sleep(0.05)
-    assert "half.uff" in [path.name for path in box.scan(set())[0]]
+    assert "half.uff" in [path.name for path in box.scan(none_known)[0]]
 
 
 def test_a_hit_sampled_at_another_rate_alone_is_not_taken(bench):
@@ -187,7 +191,7 @@ def test_a_foreign_file_of_long_ago_is_not_said_to_be_written(tmp_path):
     old.write_text("time,°C\n" + "12:00,21\n" * 20)
     os.utime(old, (time.time() - 600,) * 2)
     box = Inbox(tmp_path, 0.02)
-    assert box.scan(set()) == ([], [])
+    assert box.scan(none_known) == ([], [])
     time.sleep(0.1)  # the size stood still, though not for as long as a new file has to
-    assert box.scan(set()) == ([], [])
+    assert box.scan(none_known) == ([], [])
     assert box.ignored() == [old]

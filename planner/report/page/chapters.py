@@ -5,8 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from planner.campaign.config import CampaignConfig
-from planner.campaign.events import Undone
-from planner.campaign.state import Measurement
+from planner.campaign.state import Measurement, taken_back
 from planner.check.remark import CheckRemark
 from planner.recording.joints import JointUnits
 from planner.recording.points import SENSOR, TCP
@@ -160,7 +159,7 @@ def _pose(m: Measurement, starred: bool) -> list[object]:
 
 def decisions(facts: Facts) -> Markup:
     """The log, entry by entry."""
-    undone = {e.event.act for e in facts.campaign.entries if isinstance(e.event, Undone)}
+    undone = taken_back(facts.campaign.entries)
     rows = []
     for entry in facts.campaign.entries:
         mark = " (taken back)" if entry.seq in undone else ""

@@ -1,0 +1,72 @@
+"""What `undo` takes back, and what `redo` lets hold again; the log only ever grows."""
+
+from collections.abc import Iterable
+from itertools import takewhile
+
+from planner.campaign.events import (
+    Confirmed,
+    Entry,
+    Imported,
+    Placed,
+    Proposed,
+    Refused,
+    Skipped,
+    Starred,
+    Undone,
+    Withdrawn,
+)
+from planner.campaign.state import fold, taken_back
+
+ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, Placed, Starred)
+
+
+def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
+    """What `undo` would take back: the last act; a proposal is one, too.
+
+    With `decisions_only` the last decision, and the proposals that followed it: in a session they
+    follow of themselves, also after an act that was interrupted.
+    """
+    entries = tuple(entries)
+    undone = taken_back(entries)
+    acts = [e for e in entries if isinstance(e.event, ACTS) and e.seq not in undone]
+    if not decisions_only:
+        return tuple(acts[-1:])
+    proposals = [*takewhile(lambda e: isinstance(e.event, Proposed), reversed(acts))][::-1]
+    if len(proposals) == len(acts):
+        return ()
+    decision = acts[-1 - len(proposals)]
+    before = fold(entries[: decision.seq - 1])
+    return (decision, *(() if before.unchanged_by(decision.event) else proposals))
+
+
+def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
+    """What `redo` would let hold again, and the proposals made since, which it takes back.
+
+    These are the Undone entries of the last `undo`, one right after the other: each takes a later
+    act than the one before, the proposals that followed. Nothing where a decision was made since.
+    """
+    entries = tuple(entries)
+    undone = taken_back(entries)
+    group: list[Entry] = []
+    since: list[Entry] = []
+    for entry in reversed(entries):
+        event = entry.event
+        if entry.seq in undone or not isinstance(event, (*ACTS, Undone)):
+            continue
+        if not isinstance(event, Undone):
+            if group or not isinstance(event, Proposed):
+                break
+            since.append(entry)
+        elif isinstance(entries[event.act - 1].event, Undone):
+            if group:
+                break
+        elif not group or (entry.seq == group[0].seq - 1 and event.act < _act(group[0])):
+            group.insert(0, entry)
+        else:
+            break
+    return tuple(group), (tuple(since) if group else ())
+
+
+def _act(entry: Entry) -> int:
+    assert isinstance(entry.event, Undone)
+    return entry.event.act
