@@ -170,9 +170,7 @@ def question(
 
     `modes` are those of the new hits alone; `model` and `state` are those before the import.
     """
-    known = state.measurements.get(pose)
-    answered = known is not None and known.question is not None
-    if answered or not model.labelled or not any(m.likely for m in modes):
+    if not model.labelled or not any(m.likely for m in modes):
         return None
     here, sure = compared(model, joints_deg, modes), model.low.taught
     if measured := _measured_elsewhere(model, pose, joints_deg, modes):
