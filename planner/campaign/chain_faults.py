@@ -11,7 +11,7 @@ from planner.recording.points import AXES
 # Factors that are looked for, or their inverses: less is what springs and inertias leave open.
 LEAST, MOST, STEP = np.log(1.5), np.log(3e6), 0.12
 SCALE_SD = np.log(30.0)  # of the logarithm of a wrong factor
-UNITS = {4.448: "lbf and N", 9.81: "g and m/s²", 39.37: "in/s² and m/s²", 1000.0: "mm and m"}
+UNITS = {4.448: "lbf or N", 9.81: "g or m/s²", 39.37: "in/s² or m/s²", 1000.0: "mm or m"}
 AS_UNIT = 0.2  # of the logarithm: as near a factor is told
 
 
@@ -40,8 +40,8 @@ class Fault:
         times = times.replace("1e+03", "1000")
         way = "large" if self.factor > 1 else "small"
         whole = len(self.scaled) == len(AXES)
-        what = "accelerations over force are" if whole else f"channel {AXES[self.scaled[0]]} is"
-        known = f" ({UNITS[unit]}?)" if near else ""
+        what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"
+        known = f" ({UNITS[unit]})" if near else ""
         return f"{what} {times} too {way}: units or sensitivity{known}?"
 
     @property
@@ -62,9 +62,9 @@ class Fault:
                 f"were they hit the other way?"
             )
         if np.linalg.det(self.matrix) < 0:
-            return f"the sensor's axes look swapped, {reads}: were cables exchanged?"
+            return f"the sensor's axes look exchanged: {reads}?"
         turn = Rotation.from_matrix(self.matrix).magnitude()
-        return f"the sensor looks turned by {np.rad2deg(turn):.0f}°: {reads}; is it?"
+        return f"the sensor looks turned by {np.rad2deg(turn):.0f}°: {reads}?"
 
 
 NONE = Fault(np.eye(3))

@@ -188,7 +188,8 @@ def question(
     others |= {name: state.proposals[name].joints_deg for name in state.open}
     others.pop(pose, None)
     same = [modes] * len(others)
-    elsewhere = zip(others, _compared(model, [*others.values()], same, limit), strict=True)
+    found = _compared(model, [*others.values()], same, limit) if others else []
+    elsewhere = zip(others, found, strict=True)
     fitting = {name: c.log_density for name, c in elsewhere if c.fits}
     fits = max(fitting, key=lambda name: fitting[name]) if fitting else ""
     return _asked(pose, here, fits)

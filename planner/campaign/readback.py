@@ -38,6 +38,6 @@ def readback_question(
     )
     text = (
         f"These hits fit the setpoint of {pose} better than its readback, where mode {k + 1} is "
-        f"{percent:+.1f} % off: is {which}? Or is the readback right as it is?"
+        f"{percent:+.1f} % off: is {which}? Is the readback right as it is?"
     )
     return Question(text, k + 1, float(far[k]), percent, about="readback")
