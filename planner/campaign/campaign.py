@@ -288,6 +288,7 @@ class Campaign(CampaignReads):
     ) -> "ImportReport":
         from planner.campaign.alerts import alerts
         from planner.campaign.arrivals import keep_files
+        from planner.campaign.asking import NewHits, asked_of
         from planner.campaign.contradictions import contradiction
         from planner.campaign.importing import (
             ImportReport,
@@ -299,7 +300,6 @@ class Campaign(CampaignReads):
             taken_after_all,
         )
         from planner.campaign.log_conversion import from_homogeneity, from_modal
-        from planner.campaign.question import question
         from planner.campaign.revisits import suspected
         from planner.dataset.screened_files import hits_of_files
 
@@ -318,12 +318,12 @@ class Campaign(CampaignReads):
             )  # fmt: skip
         fresh, hits, measured = judged.fresh, judged.hits, judged.measured
         joints_deg, stood = known.joints_deg if known else joints_deg, joints_deg
-        modes = new_modes = from_modal(measured.modal)
+        alone = measured
         if old:  # among earlier hits, wrong ones would not stand out
             alone = measure_files((), fresh, table)[1]
-            new_modes = from_modal(alone.modal)
-        asked = contradiction(pose, measured, len(old))
-        asked = asked or question(before, state, pose, joints_deg, new_modes)
+        modes, new_modes = from_modal(measured.modal), from_modal(alone.modal)
+        new = NewHits(pose, joints_deg, alone.frf, new_modes)
+        asked = contradiction(pose, measured, len(old)) or asked_of(before, state, new)
         drift = None if asked else suspected(before, state, pose, joints_deg, new_modes)
         event = Imported(
             pose=pose,

@@ -123,7 +123,9 @@ class Question(msgspec.Struct, frozen=True):
 
     The `mode` that is furthest off is so by `off_sd` standard deviations; `fits` names the pose
     whose modes these are instead, if there is one. Where hits contradict each other instead,
-    `disagree` are their files, and no mode is named (0).
+    `disagree` are their files, and no mode is named (0). `about` is "chain" where units, signs or
+    axes of the measuring chain look wrong (no mode is named then, either), "readback" where the
+    modes are those of the proposed joint angles and not of the stated ones; "" else.
     """
 
     text: str
@@ -132,6 +134,7 @@ class Question(msgspec.Struct, frozen=True):
     off_percent: float = 0.0
     fits: str = ""
     disagree: tuple[str, ...] = ()
+    about: str = ""
 
 
 class Imported(Event, frozen=True, tag="imported"):

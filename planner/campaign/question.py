@@ -170,9 +170,7 @@ def question(
 
     `modes` are those of the new hits alone; `model` and `state` are those before the import.
     """
-    known = state.measurements.get(pose)
-    answered = known is not None and known.question is not None
-    if answered or not model.labelled or not any(m.likely for m in modes):
+    if not model.labelled or not any(m.likely for m in modes):
         return None
     here, sure = compared(model, joints_deg, modes), model.low.taught
     if measured := _measured_elsewhere(model, pose, joints_deg, modes):
@@ -190,7 +188,8 @@ def question(
     others |= {name: state.proposals[name].joints_deg for name in state.open}
     others.pop(pose, None)
     same = [modes] * len(others)
-    elsewhere = zip(others, _compared(model, [*others.values()], same, limit), strict=True)
+    found = _compared(model, [*others.values()], same, limit) if others else []
+    elsewhere = zip(others, found, strict=True)
     fitting = {name: c.log_density for name, c in elsewhere if c.fits}
     fits = max(fitting, key=lambda name: fitting[name]) if fitting else ""
     return _asked(pose, here, fits)

@@ -10,7 +10,7 @@ from planner.errors import AxisNotStatedError, InputError
 from planner.recording.column_names import hit_direction
 from planner.recording.dof import Dof
 from planner.recording.points import SENSOR, UNTOLD, StatedPoints
-from planner.recording.records import AXES, Channel, FrfRecord, Hit, Record, TimeRecord
+from planner.recording.records import AXES, Channel, Fault, FrfRecord, Hit, Record, TimeRecord
 
 
 def hits_from(
@@ -86,6 +86,7 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
             f"export force and accelerations together."
         )
     accelerations = [c for c in record.channels if c.quantity == "acceleration"]
+    accelerations, left_out = _at_points(accelerations, stated)
     responses = _responses(record, accelerations, stated)
     force, remarks = forces[0], list(record.remarks)
     for channel in (force, *accelerations):
@@ -110,7 +111,33 @@ def _hit(record: TimeRecord, axis: str | None, stated: StatedPoints) -> Hit:
         simulated=record.simulated,
         hit_point=hit_point,
         responses=tuple(order),
-        faults=record.faults,
+        faults=(*record.faults, *left_out),
+    )
+
+
+def _at_points(
+    accelerations: list[Channel], stated: StatedPoints
+) -> tuple[list[Channel], tuple[Fault, ...]]:
+    """Those at points of the robot, and remarks on the others; all where that leaves no sensor.
+
+    Where robot.toml names no nodes, the tool's sensor is at the one node that has all its axes.
+    """
+    names, axes = stated.names, dict[str, set[str]]()
+    for c in accelerations:
+        along = AXES[abs(c.direction) - 1] if 1 <= abs(c.direction) <= 3 else ""
+        axes.setdefault(c.node, set()).add(along)
+    whole = [node for node, own in axes.items() if own >= set(names.axes_of(SENSOR))]
+    known = [node for node in axes if stated.knows_response(node)]
+    if not names.nodes:
+        named = [node for node in axes if node in names.known]
+        known = [*named, *whole] if not named and len(whole) == 1 else named
+    of_tool = any(node in known and stated.response_at("", node) == SENSOR for node in whole)
+    if names.anywhere or not of_tool:
+        return accelerations, ()
+    return [c for c in accelerations if c.node in known], tuple(
+        Fault("left_out", f"{c.name} is left out: node {c.node} is no [[point]].", refuse=False)
+        for c in accelerations
+        if c.node not in known
     )
 
 

@@ -142,6 +142,14 @@ class StatedPoints:
             )
         return self.names.hit(own or self.hit_point or TCP)
 
+    def knows_response(self, node: str) -> bool:
+        """Whether a response at a node is at a point of the robot, or of the table's row."""
+        try:
+            self.response_at("", node)
+        except InputError:
+            return False
+        return True
+
     def response_at(self, source: object, node: str) -> str:
         """The same of the point where a response was measured."""
         stated = self.response_points

@@ -207,10 +207,11 @@ class ImportedPoses(Answer):
 
 def how_to_answer(directory: Path, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
-    if asked.disagree:
+    if asked.disagree or asked.about:
+        right = "they are" if asked.about else "each is"
         return (
             f"{asked.text} They are held, not used. To take the import back: planner undo "
-            f"{directory}; if each is right: planner confirm {directory} {pose}; to set all "
+            f"{directory}; if {right} right: planner confirm {directory} {pose}; to set all "
             f"aside: planner withdraw {directory} {pose}."
         )
     return (

@@ -43,8 +43,14 @@ class Cell:
     rng: np.random.Generator
 
     @classmethod
-    def of(cls, robot: Robot, secret: Secret, rng: np.random.Generator) -> "Cell":
-        truth, handling = load_truth(robot.toml, secret.deviation), EVERYDAY
+    def of(
+        cls,
+        robot: Robot,
+        secret: Secret,
+        rng: np.random.Generator,
+        handling: Handling = EVERYDAY,
+    ) -> "Cell":
+        truth = load_truth(robot.toml, secret.deviation)
         hammer = replace(robot.hammer, noise=float(rng.uniform(0.005, 0.03)), oversampling=8)
         secret = replace(secret, chain=handling.chain(rng))
         middle = np.mean([truth.lower_rad, truth.upper_rad], axis=0)

@@ -1,0 +1,96 @@
+"""What a measuring chain may do wrong, and how that is asked: signed axes, and factors."""
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from planner.recording.points import AXES
+
+# Factors that are looked for, or their inverses: less is what springs and inertias leave open.
+LEAST, MOST, STEP = np.log(1.5), np.log(3e6), 0.12
+SCALE_SD = np.log(30.0)  # of the logarithm of a wrong factor
+UNITS = {4.448: "lbf or N", 9.81: "g or m/s²", 39.37: "in/s² or m/s²", 1000.0: "mm or m"}
+AS_UNIT = 0.2  # of the logarithm: as near a factor is told
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """What a chain shows is `matrix` (3, 3) times what it should, x, y, z being its channels.
+
+    `scaled` are the channels that `factor` multiplies; () where axes or signs are exchanged.
+    """
+
+    matrix: np.ndarray
+    scaled: tuple[int, ...] = ()
+    factor: float = 1.0
+
+    @property
+    def asked(self) -> str:
+        """What looks wrong, as a question."""
+        return self._of_scale if self.scaled else self._of_axes
+
+    @property
+    def _of_scale(self) -> str:
+        size = float(np.exp(abs(np.log(self.factor))))
+        unit = min(UNITS, key=lambda known: abs(np.log(size / known)))
+        near = abs(np.log(size / unit)) < AS_UNIT
+        times = f"{unit:.3g} times" if near else f"about {size:.1g} times"
+        times = times.replace("1e+03", "1000")
+        way = "large" if self.factor > 1 else "small"
+        whole = len(self.scaled) == len(AXES)
+        what = "accelerations are" if whole else f"channel {AXES[self.scaled[0]]} is"
+        known = f" ({UNITS[unit]})" if near else ""
+        return f"{what} {times} too {way}: units or sensitivity{known}?"
+
+    @property
+    def _of_axes(self) -> str:
+        order, signs = np.argmax(np.abs(self.matrix), axis=1), self.matrix.sum(axis=1)
+        wrong = [i for i in range(3) if order[i] != i or signs[i] < 0]
+        reads = " and ".join(
+            f"{AXES[i]} reads what {'−' if signs[i] < 0 else ''}{AXES[order[i]]} should"
+            for i in wrong
+        )
+        straight = bool(np.all(order == np.arange(3)))
+        if straight and len(wrong) == len(AXES):
+            return "the tool answers against every hit: has the force, or all axes, a wrong sign?"
+        if straight and len(wrong) == 1:
+            axis = AXES[wrong[0]]
+            return (
+                f"{axis} answers against hits along {axis}: has channel {axis} a wrong sign, or "
+                f"were they hit the other way?"
+            )
+        if np.linalg.det(self.matrix) < 0:
+            return f"the sensor's axes look exchanged: {reads}?"
+        turn = Rotation.from_matrix(self.matrix).magnitude()
+        return f"the sensor looks turned by {np.rad2deg(turn):.0f}°: {reads}?"
+
+
+NONE = Fault(np.eye(3))
+
+
+def _turned() -> tuple[Fault, ...]:
+    signed = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
+    every = [np.diag(signs) @ np.eye(3)[list(order)] for order, signs in signed]
+    return tuple(Fault(a) for a in every if not np.array_equal(a, np.eye(3)))
+
+
+def _scaled(channels: tuple[int, ...]) -> tuple[Fault, ...]:
+    large = np.exp(np.arange(LEAST, MOST, STEP))
+    found = []
+    for factor in (*(1 / large), *large):
+        diagonal = np.ones(3)
+        diagonal[list(channels)] = factor
+        found.append(Fault(np.diag(diagonal), channels, float(factor)))
+    return tuple(found)
+
+
+TURNED = _turned()  # all 47 ways to exchange axes and signs
+SCALED = tuple(_scaled(channels) for channels in ((0, 1, 2), (0,), (1,), (2,)))
+
+
+def log_prior(family: tuple[Fault, ...]) -> np.ndarray:
+    """Of the factors (n,) of one family, which have probability 1 together but for the least."""
+    off = np.log([fault.factor for fault in family]) / SCALE_SD
+    return np.log(STEP / (SCALE_SD * np.sqrt(2 * np.pi))) - off**2 / 2

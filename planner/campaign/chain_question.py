@@ -1,0 +1,166 @@
+"""Whether a measuring chain shows what it should, by the simulation, from the first pose on.
+
+The imaginary part of an accelerance over frequency, added up over a band, is Σ φ φᵀ of the modes in
+it but for a factor: neither damping nor where exactly modes lie matter, so that a simulation tells
+it whose springs are known to a factor. It is simulated for many draws of them; what was measured is
+held against all of these as it is, and as it would be without a wrong scale, sign or axis.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.special import logsumexp
+
+from planner.campaign.chain_faults import NONE, SCALED, TURNED, Fault, log_prior
+from planner.campaign.events import Question
+from planner.campaign.model import Model
+from planner.campaign.state import CampaignState
+from planner.dynamics.simulation import Simulation
+from planner.dynamics.vibration import solve_poles
+from planner.frf.frf import Frf
+from planner.identification.measurement_model import Tolerances
+
+DRAWS, SEED = 400, 53
+SPRINGS, DAMPING = np.log(1.6), np.log(2.0)  # sds of logarithms: of each spring, and of damping
+# Another mode, relative to what the simulation says of all: bearings, links and floors give way.
+MORE = 0.5
+RATE_1_S, LINES = 2.0, 120  # modes are widened by that much, so that few lines tell their sum
+# Of what is simulated, relative: what physics that is lacking does to modal shapes. Student's t
+# of so many degrees forgives a simulation that is farther off.
+DISCREPANCY, DEGREES = 0.12, 4
+LOG_ODDS = np.log(1000.0)  # against a wrong chain, before anything is measured
+BY = 8  # poses, the last ones, that tell which draws are likely
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Of one pose: `measured` (3, c) with the sd of its noise, and `drawn` (n, 3, c) of n draws.
+
+    Columns are the c axes that were hit.
+    """
+
+    measured: np.ndarray
+    noise: np.ndarray
+    drawn: np.ndarray
+    tolerances: Tolerances
+
+    @cached_property
+    def variance(self) -> np.ndarray:
+        """(n, 3, c): of what each draw leaves open; of hits and chain, and of the simulation."""
+        t, square = self.tolerances, self.drawn**2
+        rows, columns = square.sum(axis=2, keepdims=True), square.sum(axis=1, keepdims=True)
+        lacking = DISCREPANCY**2 * rows * columns / rows.sum(axis=1, keepdims=True)
+        channels = t.gain**2 * square + t.across**2 * (columns - square)
+        return lacking + channels + t.angle_rad**2 * (rows - square) + t.force_gain**2 * square
+
+    def log_density(self, faults: Sequence[Fault]) -> np.ndarray:
+        """(faults, n): of what was measured, if the chain has that fault, for each draw."""
+        inverse = np.array([np.linalg.inv(fault.matrix) for fault in faults])
+        noise = inverse**2 @ self.noise**2
+        variance = self.variance + noise[:, None]
+        off = ((inverse @ self.measured)[:, None] - self.drawn) ** 2 / variance
+        rows, columns = self.measured.shape
+        count = rows * columns
+        volume = columns * np.log(np.abs(np.linalg.det(inverse)))[:, None]
+        far = (DEGREES + count) / 2 * np.log1p(off.sum(axis=(2, 3)) / DEGREES)
+        return volume - np.log(variance).sum(axis=(2, 3)) / 2 - far
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """A simulation's springs drawn at random, and what a chain within `tolerances` shows then."""
+
+    simulation: Simulation
+    tolerances: Tolerances
+
+    @cached_property
+    def springs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Stiffness, complex where damping is structural, and damping, (n, e, e) each."""
+        own, rng = self.simulation.elasticity, np.random.default_rng(SEED)
+        factor = np.exp(SPRINGS * rng.standard_normal((DRAWS, len(own.stiffness))))
+        damped = np.exp(DAMPING * rng.standard_normal((DRAWS, 1)))
+        k = own.stiffness * factor
+        if own.loss_factor.any():
+            k = k * (1 + 1j * own.loss_factor * damped)
+        one = np.eye(len(own.stiffness))
+        return k[:, :, None] * one, (own.damping * factor * damped)[:, :, None] * one
+
+    def sums(self, q: np.ndarray, frf: Frf) -> Sums | None:
+        """At a pose q (dof,) in rad; None where no axis was heard by all of the sensor."""
+        known = np.flatnonzero(np.isfinite(frf.accelerance).all(axis=(0, 2)))
+        if not known.size:
+            return None
+        at = np.linspace(*frf.frequency_hz[[0, -1]], min(LINES, len(frf.frequency_hz)))
+        s, (k, c) = 2j * np.pi * at + RATE_1_S, self.springs
+        m = self.simulation.elastic.matrices(q[None])
+        many = [np.repeat(one, DRAWS, axis=0) for one in (m.mass, m.hit, m.sensor)]
+        solved = solve_poles(many[0], c, k + m.geometric, many[1], many[2])
+        each = (s**2 / (s - solved.poles[..., None])) @ _width(at)
+        drawn = self._with_more(np.imag(np.einsum("nmij,nm->nij", solved.residues, each)))
+        width = _width(frf.frequency_hz)
+        noise = np.sqrt(np.nan_to_num(frf.variance[:, known]) @ width**2 / 2)
+        measured = np.imag(frf.accelerance[:, known]) @ width
+        return Sums(measured, noise, drawn[:, :, known], self.tolerances)
+
+
+    @staticmethod
+    def _with_more(drawn: np.ndarray) -> np.ndarray:
+        """Sums (n, 3, 3) with a mode more, of which the simulation knows nothing."""
+        rng = np.random.default_rng(SEED + 1)
+        size = np.sqrt(np.abs(np.diagonal(drawn, axis1=1, axis2=2)))
+        shape = MORE * rng.standard_normal((len(drawn), 3)) * size
+        return drawn + shape[:, :, None] * shape[:, None]
+
+
+def _width(frequency_hz: np.ndarray) -> np.ndarray:
+    return np.gradient(frequency_hz) / frequency_hz
+
+
+def likeliest(sums: Sums, before: Sequence[Sums]) -> tuple[Fault, float]:
+    """The likeliest fault of a pose's chain, and by how much log likelihood it beats none.
+
+    Poses measured `before`, whose chain is believed, tell which draws are likely. All together
+    count as one: a simulation that lacks physics errs alike at all of them.
+    """
+    known = [one.log_density([NONE])[0] for one in before]
+    weight = np.mean(known, axis=0) if known else np.zeros(len(sums.drawn))
+    none = logsumexp(sums.log_density([NONE])[0] + weight)
+    of_axes = logsumexp(sums.log_density(TURNED) + weight, axis=1)
+    best = int(np.argmax(of_axes))
+    found = [(of_axes[best], TURNED[best])]
+    for family in SCALED:
+        own = logsumexp(sums.log_density(family) + weight, axis=1) + log_prior(family)
+        found.append((logsumexp(own), family[int(np.argmax(own))]))
+    likelihood, fault = max(found, key=lambda one: one[0])
+    return fault, float(likelihood - none)
+
+
+def chain_question(
+    model: Model,
+    state: CampaignState,
+    pose: str,
+    joints_deg: tuple[float, ...],
+    frf: Frf | None,
+) -> Question | None:
+    """What to ask of the chain behind a pose's new hits, before they are believed; None: nothing.
+
+    `frf` is the tool's by the new hits alone; `model` and `state` are those before the import.
+    Once the engineer has said that such hits are right, nothing is asked of the chain any more.
+    """
+    simulation, earlier = model.cell.simulation, state.measurements.values()
+    answered = any(m.question is not None and m.question.about == "chain" for m in earlier)
+    if frf is None or simulation is None or answered:
+        return None
+    draws, band = Draws(simulation, model.cell.tolerances), model.cell.config.modes.band_hz
+    here = draws.sums(model.cell.robot.joints.internal([joints_deg])[0], frf.within(band))
+    if here is None:
+        return None
+    both = [*zip(model.labelled, model.frfs, strict=True)][-BY:]
+    before = [draws.sums(one.q, own) for one, own in both if one.pose != pose]
+    fault, gain = likeliest(here, [one for one in before if one is not None])
+    if gain < LOG_ODDS:
+        return None
+    text = f"At {pose}, by the simulation, {fault.asked} Are these hits right as they are?"
+    return Question(text, about="chain")

@@ -1,0 +1,43 @@
+"""Whether the robot stood where it was sent, and not where the readback says: one was mistyped."""
+
+import numpy as np
+
+from planner.campaign.events import MeasuredMode, Question
+from planner.campaign.model import Model
+from planner.campaign.question import FAR_SD, compared
+from planner.campaign.state import CampaignState
+
+
+def readback_question(
+    model: Model,
+    state: CampaignState,
+    pose: str,
+    joints_deg: tuple[float, ...],
+    modes: tuple[MeasuredMode, ...],
+) -> Question | None:
+    """What to ask where modes are far from those expected at the readback, and fit the setpoint.
+
+    `modes` are those of the new hits alone; `model` and `state` are those before the import.
+    """
+    proposed, joints = state.proposals.get(pose), model.cell.robot.joints
+    if proposed is None or not model.labelled or not any(m.likely for m in modes):
+        return None
+    sent = proposed.joints_deg
+    typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
+    if not typed:
+        return None
+    here = compared(model, joints_deg, modes)
+    far = np.nan_to_num(here.in_sd)
+    if np.max(far) < FAR_SD or not compared(model, sent, modes).fits:
+        return None
+    k = int(np.argmax(far))
+    percent = float(100 * np.expm1(here.off[k]))
+    which = ", ".join(
+        f"{joints.names[i]} {joints.text(i, sent[i], 2)} or {joints.text(i, joints_deg[i], 2)}"
+        for i in typed
+    )
+    text = (
+        f"These hits fit the setpoint of {pose} better than its readback, where mode {k + 1} is "
+        f"{percent:+.1f} % off: is {which}? Is the readback right as it is?"
+    )
+    return Question(text, k + 1, float(far[k]), percent, about="readback")

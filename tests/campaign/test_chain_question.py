@@ -1,0 +1,121 @@
+"""Wrong units, signs and axes are asked about from the first pose on, good imports are not."""
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+import pyuff
+
+from planner.campaign.campaign import Campaign
+from planner.campaign.chain_faults import SCALED, TURNED, Fault
+from planner.demo import NAME, Pool, shipped
+from planner.recording.folder import TABLE
+from planner.replay import replay
+from tests.support.chain_cases import FAULTS, cases, fault, judged, shown_by
+from tests.support.outside import planner
+
+POSES = 5
+
+
+def counted(folder, seeds: range, rough: bool) -> tuple[dict[str, np.ndarray], int, int]:
+    """By fault, how often each pose (5,) was asked about; of good imports: how many, and asked."""
+    asked = {name: np.zeros(POSES, dtype=int) for name in FAULTS}
+    good = false = 0
+    for seed, case in zip(seeds, cases(folder, seeds, POSES, rough), strict=True):
+        rng = np.random.default_rng(seed)
+        for number, sums in enumerate(case.sums):
+            before = case.sums[:number]
+            good, false = good + 1, false + (judged(sums, before) is not None)
+            for name in FAULTS:
+                found = judged(shown_by(sums, fault(name, rng)), before)
+                asked[name][number] += found is not None
+    return asked, good, false
+
+
+def test_faults_of_a_chain_are_asked_about_and_named(tmp_path):
+    seeds = range(700, 705)
+    for seed, case in zip(seeds, cases(tmp_path, seeds, 2, rough=False), strict=True):
+        rng = np.random.default_rng(seed)
+        for number, sums in enumerate(case.sums):
+            assert judged(sums, case.sums[:number]) is None
+            for name in FAULTS:
+                if name in ("× 2", "÷ 2"):  # the slightest: told at most poses
+                    continue
+                true = fault(name, rng)
+                found = judged(shown_by(sums, true), case.sums[:number])
+                assert found is not None, (case.robot, name)
+                np.testing.assert_allclose(found.matrix, true, rtol=0.6)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(("rough", "first"), [(False, 800), (True, 1800)])
+def test_how_often_chains_are_asked_about(tmp_path, rough, first):
+    count = 50
+    asked, good, false = counted(tmp_path, range(first, first + count), rough)
+    print(f"\n{'rough' if rough else 'everyday'}: {count} robots, asked of {false} of {good} good")
+    for name, each in asked.items():
+        print(f"{name:>14} {' '.join(f'{100 * n / count:4.0f} %' for n in each)}")
+    assert false <= 0.01 * good
+    if not rough:
+        assert min(each.sum() for each in asked.values()) >= 0.95 * good
+
+
+@pytest.mark.parametrize(
+    ("one", "said"),
+    [
+        (Fault(1e3 * np.eye(3), (0, 1, 2), 1030.0), "1000 times too large: units or sensitivity"),
+        (Fault(np.eye(3), (1,), 0.104), "channel y is 9.81 times too small"),
+        (Fault(np.eye(3), (0, 1, 2), 2.1), "about 2 times too large"),
+        (Fault(-np.eye(3)), "answers against every hit"),
+        (Fault(np.diag([1.0, -1, 1])), "channel y a wrong sign"),
+        (Fault(np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])), "turned by 90°: x reads what −y"),
+        (Fault(np.eye(3)[[1, 0, 2]]), "axes look exchanged: x reads what y should"),
+    ],
+)
+def test_faults_in_words(one, said):
+    assert said in one.asked
+
+
+def test_every_fault_can_be_told_in_words():
+    assert all(one.asked.endswith("?") for one in (*TURNED, *(f for own in SCALED for f in own)))
+
+
+def scaled(row, folder, factor: float):
+    """The file of a row with accelerations too large by a factor."""
+    path = folder / row.file.name
+    sets = pyuff.UFF(str(row.file)).read_sets()
+    for one in sets:
+        if one["ordinate_spec_data_type"] == 12:
+            one["data"] = factor * np.array(one["data"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        pyuff.UFF(str(path)).write_sets(sets, "add")
+    return path
+
+
+def test_the_commands_ask_about_units_and_take_the_answer(tmp_path):
+    robot, config = (shipped(NAME) / name for name in ("robot/robot.toml", "campaign.toml"))
+    campaign = Campaign.new(tmp_path / "campaign", robot, config)
+    pool = Pool.load(shipped(NAME) / "recordings", tuple(f"joint_{i}" for i in range(1, 7)))
+    paths = [scaled(row, tmp_path, 1e3) for row in pool.rows["A11"]]
+    names = [row.file.name for row in pool.rows["A11"]]
+    lines = (shipped(NAME) / "recordings" / TABLE).read_text().splitlines()
+    own = [line for line in lines[1:] if any(line.endswith(name) for name in names)]
+    (tmp_path / TABLE).write_text("\n".join([lines[0], *own]).replace("data/", "") + "\n")
+    done = planner("import", campaign.directory, tmp_path / TABLE, "--json", check=False)
+    assert done.returncode == 3
+    answer = json.loads(done.stdout)
+    assert answer["question"]["about"] == "chain"
+    assert "1000 times too large: units or sensitivity" in done.stderr
+    assert f"planner undo {campaign.directory}" in done.stderr
+    assert f"planner confirm {campaign.directory} A11" in done.stderr
+    held = Campaign(campaign.directory)
+    assert len(held.state.held["A11"].hits) == len(paths)
+    held.confirm("A11")
+    assert [m.pose for m in held.state.used] == ["A11"]
+    assert all(step.check in ("identical", "kept") for step in replay(held))
+    # Of a chain that the engineer called right nothing is asked again.
+    (report,) = held.import_paths((shipped(NAME) / "recordings",), "A57")
+    assert report.question is None or report.question.about != "chain"

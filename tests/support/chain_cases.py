@@ -1,0 +1,98 @@
+"""Cells hit as people hit, on true robots (MuJoCo), and what a measuring chain may do wrong."""
+
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from planner.campaign.cell import Cell as CampaignCell
+from planner.campaign.chain_faults import Fault
+from planner.campaign.chain_question import LOG_ODDS, Draws, Sums, likeliest
+from planner.campaign.config import load_campaign_config
+from planner.campaign.deliveries import sort_paths
+from planner.dataset.measure import MeasuredPose
+from planner.truth.handling import EVERYDAY, Handling
+from planner.truth.secret import Secret
+from tests.support.everyday_campaigns import Cell
+from tests.support.lacking_robots import KINDS, ROBOTS, lacking
+
+# As much as is still a good import: hits 3° beside, gains 3 % off, springs 40 % and all alike too.
+ROUGH = replace(EVERYDAY, angle_deg=3.0, gain=0.03, force_gain=0.03)
+FACTORS = {"× 1000": 1e3, "÷ 1000": 1e-3, "× 9.81": 9.81, "÷ 9.81": 1 / 9.81, "× 2": 2.0, "÷ 2": 0.5}
+FAULTS = (*FACTORS, "turned by 90°", "swapped axes", "wrong sign", "force's sign")
+
+
+@dataclass(frozen=True, eq=False)
+class Struck:
+    """A robot's poses in the order of measuring; `kind` is what its simulation lacks."""
+
+    robot: str
+    kind: str
+    sums: tuple[Sums, ...]
+
+
+def struck(folder: Path, seed: int, poses: int, rough: bool) -> Struck:
+    """A robot of those for everyday campaigns in turn, hit at poses of its workspace."""
+    name, kind = [*ROBOTS][seed % len(ROBOTS)], KINDS[(seed + seed // len(ROBOTS)) % len(KINDS)]
+    rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
+    robot = ROBOTS[name](folder, rng)
+    secret, _ = lacking(kind, robot, rng)
+    handling: Handling = ROUGH if rough else EVERYDAY
+    if rough:
+        common, off = float(np.exp(rng.uniform(-0.3, 0.3))), secret.deviation
+        secret = Secret(replace(off, stiffness=0.3, common=common, damping=0.4))
+    true = Cell.of(robot, secret, rng, handling)
+    config = folder / "campaign.toml"
+    config.write_text(
+        f"[workspace]\n{robot.workspace}\n[modes]\ncount = 3\nband_hz = {list(robot.band_hz)}\n"
+        f"[acquisition]\ncandidates = 30\n"
+    )
+    cell = CampaignCell.load(robot.toml, load_campaign_config(config))
+    assert cell.simulation is not None
+    draws, joints = Draws(cell.simulation, cell.tolerances), cell.robot.joints
+    found = []
+    for number, q in enumerate(rng.permutation(cell.candidates.q)[:poses]):
+        stated = tuple(np.round(joints.shown(q), 4).tolist())
+        said = true.record(folder / f"hits{number}", f"P{number}", stated)
+        [delivery] = sort_paths((said,), joints, cell.robot.points, None, None)
+        frf = MeasuredPose(delivery.sources, robot.band_hz).frf
+        assert frf is not None
+        one = draws.sums(joints.internal(stated), frf.within(robot.band_hz))
+        assert one is not None
+        found.append(one)
+    return Struck(name, kind, tuple(found))
+
+
+def shown_by(sums: Sums, matrix: np.ndarray) -> Sums:
+    """What a chain shows that is wrong by A (3, 3)."""
+    noise = np.sqrt(matrix**2 @ sums.noise**2)
+    return replace(sums, measured=matrix @ sums.measured, noise=noise)
+
+
+def fault(name: str, rng: np.random.Generator) -> np.ndarray:
+    """A (3, 3) of one of FAULTS, about some axis or of some channels."""
+    one, axis = np.eye(3), int(rng.integers(3))
+    if name in FACTORS:
+        return FACTORS[name] * one
+    if name == "turned by 90°":
+        sign = rng.choice([-1.0, 1.0])
+        return np.round(Rotation.from_rotvec(sign * np.pi / 2 * one[axis]).as_matrix())
+    if name == "swapped axes":
+        return one[[i if i == axis else 3 - axis - i for i in range(3)]]
+    return -one if name == "force's sign" else one - 2 * np.outer(one[axis], one[axis])
+
+
+def judged(sums: Sums, before: tuple[Sums, ...]) -> Fault | None:
+    """What is asked about; None: nothing."""
+    found, gain = likeliest(sums, before)
+    return found if gain >= LOG_ODDS else None
+
+
+def cases(folder: Path, seeds: range, poses: int, rough: bool) -> Iterator[Struck]:
+    """Of all seeds."""
+    for seed in seeds:
+        (folder / str(seed)).mkdir(parents=True)
+        yield struck(folder / str(seed), seed, poses, rough)
