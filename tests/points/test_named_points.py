@@ -63,8 +63,8 @@ def test_channels_at_nodes_of_no_point_are_left_out(names: PointNames) -> None:
     assert hit.responses == tuple(Dof("sensor", a) for a in "xyz")
     assert hit.acceleration_m_s2[:, 0].tolist() == [1.0, 2.0, 3.0]
     assert [fault.text for fault in hit.faults] == [
-        "77 3 is left out: node 77 is no [[point]].",
-        "78 0 is left out: node 78 is no [[point]].",
+        "77 3 at node 77 is left out: that is no [[point]].",
+        "78 0 at node 78 is left out: that is no [[point]].",
     ]
     assert not any(fault.refuse for fault in hit.faults)
 
