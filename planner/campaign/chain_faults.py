@@ -16,7 +16,7 @@ AS_UNIT = 0.2  # of the logarithm: as near a factor is told
 
 
 @dataclass(frozen=True, eq=False)
-class Fault:
+class ChainFault:
     """What a chain shows is `matrix` (3, 3) times what it should, x, y, z being its channels.
 
     `scaled` are the channels that `factor` multiplies; () where axes or signs are exchanged.
@@ -67,22 +67,22 @@ class Fault:
         return f"the sensor looks turned by {np.rad2deg(turn):.0f}°: {reads}?"
 
 
-NONE = Fault(np.eye(3))
+NONE = ChainFault(np.eye(3))
 
 
-def _turned() -> tuple[Fault, ...]:
+def _turned() -> tuple[ChainFault, ...]:
     signed = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
     every = [np.diag(signs) @ np.eye(3)[list(order)] for order, signs in signed]
-    return tuple(Fault(a) for a in every if not np.array_equal(a, np.eye(3)))
+    return tuple(ChainFault(a) for a in every if not np.array_equal(a, np.eye(3)))
 
 
-def _scaled(channels: tuple[int, ...]) -> tuple[Fault, ...]:
+def _scaled(channels: tuple[int, ...]) -> tuple[ChainFault, ...]:
     large = np.exp(np.arange(LEAST, MOST, STEP))
     found = []
     for factor in (*(1 / large), *large):
         diagonal = np.ones(3)
         diagonal[list(channels)] = factor
-        found.append(Fault(np.diag(diagonal), channels, float(factor)))
+        found.append(ChainFault(np.diag(diagonal), channels, float(factor)))
     return tuple(found)
 
 
@@ -90,7 +90,7 @@ TURNED = _turned()  # all 47 ways to exchange axes and signs
 SCALED = tuple(_scaled(channels) for channels in ((0, 1, 2), (0,), (1,), (2,)))
 
 
-def log_prior(family: tuple[Fault, ...]) -> np.ndarray:
+def log_prior(family: tuple[ChainFault, ...]) -> np.ndarray:
     """Of the factors (n,) of one family, which have probability 1 together but for the least."""
     off = np.log([fault.factor for fault in family]) / SCALE_SD
     return np.log(STEP / (SCALE_SD * np.sqrt(2 * np.pi))) - off**2 / 2

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import logsumexp
 
-from planner.campaign.chain_faults import NONE, SCALED, TURNED, Fault, log_prior
+from planner.campaign.chain_faults import NONE, SCALED, TURNED, ChainFault, log_prior
 from planner.campaign.events import Question
 from planner.campaign.model import Model
 from planner.campaign.state import CampaignState
@@ -55,7 +54,7 @@ class Sums:
         channels = t.gain**2 * square + t.across**2 * (columns - square)
         return lacking + channels + t.angle_rad**2 * (rows - square) + t.force_gain**2 * square
 
-    def log_density(self, faults: Sequence[Fault]) -> np.ndarray:
+    def log_density(self, faults: Sequence[ChainFault]) -> np.ndarray:
         """(faults, n): of what was measured, if the chain has that fault, for each draw."""
         inverse = np.array([np.linalg.inv(fault.matrix) for fault in faults])
         noise = inverse**2 @ self.noise**2
@@ -92,7 +91,8 @@ class Draws:
         known = np.flatnonzero(np.isfinite(frf.accelerance).all(axis=(0, 2)))
         if not known.size:
             return None
-        at = np.linspace(*frf.frequency_hz[[0, -1]], min(LINES, len(frf.frequency_hz)))
+        low, *_, high = frf.frequency_hz.tolist()
+        at = np.linspace(low, high, min(LINES, len(frf.frequency_hz)))
         s, (k, c) = 2j * np.pi * at + RATE_1_S, self.springs
         m = self.simulation.elastic.matrices(q[None])
         many = [np.repeat(one, DRAWS, axis=0) for one in (m.mass, m.hit, m.sensor)]
@@ -103,7 +103,6 @@ class Draws:
         noise = np.sqrt(np.nan_to_num(frf.variance[:, known]) @ width**2 / 2)
         measured = np.imag(frf.accelerance[:, known]) @ width
         return Sums(measured, noise, drawn[:, :, known], self.tolerances)
-
 
     @staticmethod
     def _with_more(drawn: np.ndarray) -> np.ndarray:
@@ -118,23 +117,25 @@ def _width(frequency_hz: np.ndarray) -> np.ndarray:
     return np.gradient(frequency_hz) / frequency_hz
 
 
-def likeliest(sums: Sums, before: Sequence[Sums]) -> tuple[Fault, float]:
+def likeliest(sums: Sums, before: Sequence[Sums]) -> tuple[ChainFault, float]:
     """The likeliest fault of a pose's chain, and by how much log likelihood it beats none.
 
     Poses measured `before`, whose chain is believed, tell which draws are likely. All together
     count as one: a simulation that lacks physics errs alike at all of them.
     """
-    known = [one.log_density([NONE])[0] for one in before]
-    weight = np.mean(known, axis=0) if known else np.zeros(len(sums.drawn))
-    none = logsumexp(sums.log_density([NONE])[0] + weight)
-    of_axes = logsumexp(sums.log_density(TURNED) + weight, axis=1)
-    best = int(np.argmax(of_axes))
-    found = [(of_axes[best], TURNED[best])]
+    weight = np.zeros(len(sums.drawn))
+    if before:
+        weight = np.mean([one.log_density([NONE])[0] for one in before], axis=0)
+
+    def likelihood(faults: Sequence[ChainFault]) -> np.ndarray:
+        return np.logaddexp.reduce(sums.log_density(faults) + weight, axis=1)
+
+    found = [(float(value), one) for value, one in zip(likelihood(TURNED), TURNED, strict=True)]
     for family in SCALED:
-        own = logsumexp(sums.log_density(family) + weight, axis=1) + log_prior(family)
-        found.append((logsumexp(own), family[int(np.argmax(own))]))
-    likelihood, fault = max(found, key=lambda one: one[0])
-    return fault, float(likelihood - none)
+        each = likelihood(family) + log_prior(family)
+        found.append((float(np.logaddexp.reduce(each)), family[int(np.argmax(each))]))
+    most, fault = max(found, key=lambda one: one[0])
+    return fault, most - float(likelihood([NONE])[0])
 
 
 def chain_question(

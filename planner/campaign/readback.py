@@ -4,8 +4,10 @@ import numpy as np
 
 from planner.campaign.events import MeasuredMode, Question
 from planner.campaign.model import Model
-from planner.campaign.question import FAR_SD, compared
+from planner.campaign.question import compared
 from planner.campaign.state import CampaignState
+
+LOG_ODDS = np.log(1000.0)  # against a mistyped readback, before anything is measured
 
 
 def readback_question(
@@ -26,10 +28,10 @@ def readback_question(
     typed = np.flatnonzero(np.abs(np.subtract(sent, joints_deg)) > joints.same()).tolist()
     if not typed:
         return None
-    here = compared(model, joints_deg, modes)
-    far = np.nan_to_num(here.in_sd)
-    if np.max(far) < FAR_SD or not compared(model, sent, modes).fits:
+    here, there = compared(model, joints_deg, modes), compared(model, sent, modes)
+    if not there.fits or there.log_density - here.log_density < LOG_ODDS:
         return None
+    far = np.nan_to_num(here.in_sd)
     k = int(np.argmax(far))
     percent = float(100 * np.expm1(here.off[k]))
     which = ", ".join(

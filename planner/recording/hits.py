@@ -135,7 +135,11 @@ def _at_points(
     if names.anywhere or not of_tool:
         return accelerations, ()
     return [c for c in accelerations if c.node in known], tuple(
-        Fault("left_out", f"{c.name} is left out: node {c.node} is no [[point]].", refuse=False)
+        Fault(
+            "left_out",
+            f"{c.name} at node {c.node} is left out: that is no [[point]].",
+            refuse=False,
+        )
         for c in accelerations
         if c.node not in known
     )

@@ -8,7 +8,7 @@ import pytest
 import pyuff
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.chain_faults import SCALED, TURNED, Fault
+from planner.campaign.chain_faults import SCALED, TURNED, ChainFault
 from planner.demo import NAME, Pool, shipped
 from planner.recording.folder import TABLE
 from planner.replay import replay
@@ -65,13 +65,19 @@ def test_how_often_chains_are_asked_about(tmp_path, rough, first):
 @pytest.mark.parametrize(
     ("one", "said"),
     [
-        (Fault(1e3 * np.eye(3), (0, 1, 2), 1030.0), "1000 times too large: units or sensitivity"),
-        (Fault(np.eye(3), (1,), 0.104), "channel y is 9.81 times too small"),
-        (Fault(np.eye(3), (0, 1, 2), 2.1), "about 2 times too large"),
-        (Fault(-np.eye(3)), "answers against every hit"),
-        (Fault(np.diag([1.0, -1, 1])), "channel y a wrong sign"),
-        (Fault(np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])), "turned by 90°: x reads what −y"),
-        (Fault(np.eye(3)[[1, 0, 2]]), "axes look exchanged: x reads what y should"),
+        (
+            ChainFault(1e3 * np.eye(3), (0, 1, 2), 1030.0),
+            "1000 times too large: units or sensitivity",
+        ),
+        (ChainFault(np.eye(3), (1,), 0.104), "channel y is 9.81 times too small"),
+        (ChainFault(np.eye(3), (0, 1, 2), 2.1), "about 2 times too large"),
+        (ChainFault(-np.eye(3)), "answers against every hit"),
+        (ChainFault(np.diag([1.0, -1, 1])), "channel y a wrong sign"),
+        (
+            ChainFault(np.array([[0, -1.0, 0], [1, 0, 0], [0, 0, 1]])),
+            "turned by 90°: x reads what −y",
+        ),
+        (ChainFault(np.eye(3)[[1, 0, 2]]), "axes look exchanged: x reads what y should"),
     ],
 )
 def test_faults_in_words(one, said):

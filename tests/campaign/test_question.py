@@ -122,6 +122,27 @@ def test_hits_of_a_pose_left_unmoved_are_told_and_moved(campaign, pool, tmp_path
     assert joints[stated] == campaign.state.proposals[stated].joints_deg
 
 
+@pytest.mark.parametrize("typed_deg", [0.0, 3.0, 30.0])
+def test_a_mistyped_readback_is_asked_about(campaign, pool, tmp_path, typed_deg):
+    proposal = campaign.next()[0]
+    hits = _nearest(campaign, pool, proposal)
+    angles = pool.rows[hits][0].joints_deg
+    _put(campaign, {proposal.pose: angles})
+    folder = claim(tmp_path / "typed", pool, hits, hits, proposal.pose)
+    wrong = (*angles[:2], angles[2] - typed_deg, *angles[3:])
+    text = (folder / TABLE).read_text()
+    said = ",".join(map(str, angles))
+    assert said in text
+    (folder / TABLE).write_text(text.replace(said, ",".join(map(str, wrong))))
+    (report,) = campaign.import_paths((folder,))
+    if not typed_deg:
+        assert report.question is None
+        return
+    assert report.question is not None
+    assert report.question.about == "readback"
+    assert f"is joint_3 {angles[2]:.2f}° or {wrong[2]:.2f}°" in report.question.text
+
+
 def _nearest(campaign, pool, proposal):
     return pool.nearest(campaign.cell, proposal, list(MEASURED))
 

@@ -1,5 +1,6 @@
 """Points that recordings name: by node, by column, by the table; and what is refused."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,28 @@ def test_a_file_of_one_sensor_is_the_tools_whatever_its_node() -> None:
     hit = hits_from([record(("7", 1), ("7", 2), ("7", 3), hit_node="9")])[0]
     assert hit.hit_point == "tcp"
     assert hit.responses == tuple(Dof("sensor", a) for a in "xyz")
+
+
+TOOL_AT_2 = replace(NAMES, nodes={**NAMES.nodes, "2": "sensor"})
+
+
+@pytest.mark.parametrize("names", [PointNames(), TOOL_AT_2])
+def test_channels_at_nodes_of_no_point_are_left_out(names: PointNames) -> None:
+    given = record(("2", 1), ("2", 2), ("2", 3), ("77", 3), ("78", 0))
+    hit = hits_from([given], "+x", StatedPoints(names=names))[0]
+    assert hit.responses == tuple(Dof("sensor", a) for a in "xyz")
+    assert hit.acceleration_m_s2[:, 0].tolist() == [1.0, 2.0, 3.0]
+    assert [fault.text for fault in hit.faults] == [
+        "77 3 at node 77 is left out: that is no [[point]].",
+        "78 0 at node 78 is left out: that is no [[point]].",
+    ]
+    assert not any(fault.refuse for fault in hit.faults)
+
+
+def test_of_two_whole_sensors_none_is_left_out() -> None:
+    given = record(*((node, axis) for node in ("2", "77") for axis in (1, 2, 3)))
+    with pytest.raises(InputError, match="one acceleration in each"):
+        hits_from([given], "+x")
 
 
 def test_a_point_where_the_tool_is_hit_is_the_tcp() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from planner.campaign.cell import Cell as CampaignCell
-from planner.campaign.chain_faults import Fault
+from planner.campaign.chain_faults import ChainFault
 from planner.campaign.chain_question import LOG_ODDS, Draws, Sums, likeliest
 from planner.campaign.config import load_campaign_config
 from planner.campaign.deliveries import sort_paths
@@ -21,7 +21,14 @@ from tests.support.lacking_robots import KINDS, ROBOTS, lacking
 
 # As much as is still a good import: hits 3° beside, gains 3 % off, springs 40 % and all alike too.
 ROUGH = replace(EVERYDAY, angle_deg=3.0, gain=0.03, force_gain=0.03)
-FACTORS = {"× 1000": 1e3, "÷ 1000": 1e-3, "× 9.81": 9.81, "÷ 9.81": 1 / 9.81, "× 2": 2.0, "÷ 2": 0.5}
+FACTORS = {
+    "× 1000": 1e3,
+    "÷ 1000": 1e-3,
+    "× 9.81": 9.81,
+    "÷ 9.81": 1 / 9.81,
+    "× 2": 2.0,
+    "÷ 2": 0.5,
+}
 FAULTS = (*FACTORS, "turned by 90°", "swapped axes", "wrong sign", "force's sign")
 
 
@@ -85,7 +92,7 @@ def fault(name: str, rng: np.random.Generator) -> np.ndarray:
     return -one if name == "force's sign" else one - 2 * np.outer(one[axis], one[axis])
 
 
-def judged(sums: Sums, before: tuple[Sums, ...]) -> Fault | None:
+def judged(sums: Sums, before: tuple[Sums, ...]) -> ChainFault | None:
     """What is asked about; None: nothing."""
     found, gain = likeliest(sums, before)
     return found if gain >= LOG_ODDS else None
