@@ -6,8 +6,8 @@ from itertools import takewhile
 from planner.campaign.events import (
     Confirmed,
     Entry,
+    FilesPlaced,
     Imported,
-    Placed,
     Proposed,
     Refused,
     Skipped,
@@ -17,7 +17,7 @@ from planner.campaign.events import (
 )
 from planner.campaign.state import fold, taken_back
 
-ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, Placed, Starred)
+ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, FilesPlaced, Starred)
 
 
 def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
