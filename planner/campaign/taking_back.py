@@ -49,6 +49,7 @@ def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entr
     undone = taken_back(entries)
     group: list[Entry] = []
     since: list[Entry] = []
+    redone = 0
     for entry in reversed(entries):
         event = entry.event
         if entry.seq in undone or not isinstance(event, (*ACTS, Undone)):
@@ -57,9 +58,10 @@ def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entr
             if group or not isinstance(event, Proposed):
                 break
             since.append(entry)
-        elif isinstance(entries[event.act - 1].event, Undone):
+        elif isinstance(entries[event.act - 1].event, Undone) or entry.seq == redone - 1:
             if group:
                 break
+            redone = entry.seq  # a redo, and right before it what that took back itself
         elif not group or (entry.seq == group[0].seq - 1 and event.act < _act(group[0])):
             group.insert(0, entry)
         else:

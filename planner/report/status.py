@@ -18,7 +18,7 @@ from planner.report.decision_status import DecisionStatus
 from planner.report.imports import AskedOfPose
 from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
-from planner.report.proposals import forecast_json
+from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (
     NOT_KNOWN,
     RefittedSpring,
@@ -115,6 +115,7 @@ class ModelStatus:
     decision: DecisionStatus | None = None
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     springs: tuple[RefittedSpring, ...] = ()
+    waits_for: str = ""
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -132,6 +133,7 @@ class ModelStatus:
             decision=DecisionStatus.of(model),
             joint_units=cell.robot.joints.declared,
             springs=refitted_springs(model),
+            waits_for=model.waits_for,
         )
 
 
@@ -170,6 +172,7 @@ class StatusReport(Answer):
     joint_units: Any = msgspec.UNSET
     used: int = 0  # of the measured poses, those that the model rests on
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
+    waits_for: str = ""  # what lacks until the target is reached
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -215,7 +218,7 @@ class StatusReport(Answer):
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (target {self.target_frequency_sd_percent:g} %)",
-            self.forecast.text + (" The target is reached." if self.done else ""),
+            f"{self.forecast.text} {target_sentence(self.waits_for)}",
             f"log: {counted(self.log.entries, 'entry', 'entries')}",
         ]
         if self.log.torn_bytes:
@@ -265,5 +268,6 @@ def status(campaign: Campaign) -> StatusReport:
         joint_units=believed.joint_units,
         used=len(state.used),
         springs=believed.springs,
+        waits_for=believed.waits_for,
         model=lambda: campaign.model,
     )

@@ -23,4 +23,5 @@ def test_no_hit_gets_in_at_a_pose_where_it_was_not_hit(tmp_path):
             faulty[seed] = sorted(set(engineer.faults))
     print(f"{COUNT} campaigns, {len(faulty)} faulty: {faulty}\n{dict(done)}")
     assert not faulty
-    assert done["late"] and done["killed"] and done["answered"] and done["measured"] > 2 * COUNT
+    assert min(done[act] for act in ("late", "killed", "answered", "u", "U")) > COUNT / 10
+    assert done["measured"] > 2 * COUNT

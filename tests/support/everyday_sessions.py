@@ -1,4 +1,4 @@
-"""Everyday sessions in `watch`'s own loop: an engineer by script, who answers rightly or not at all.
+"""Everyday sessions in `watch`'s own loop: an engineer by script answers rightly or not at all.
 
 Hits come late, bad, without an axis, or before the robot has moved; questions stay unanswered; the
 program is killed anywhere; acts are taken back and done again, in the session and by command. Of
@@ -8,6 +8,7 @@ each file it is kept where the robot stood: what the campaign uses is held again
 import io
 import shutil
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from rich.console import Console
 
 from planner.campaign.campaign import Campaign
 from planner.campaign.store import sha256
+from planner.dataset.screened_files import Source
 from planner.errors import PlannerError
 from planner.replay import replay
 from planner.session.watch import watch
@@ -81,8 +83,6 @@ class Engineer:
             made = SimulatedHit(made.axis, force, made.acceleration_m_s2)
         write_uff(path, made, HAMMER)
         if kind == "unstated":
-            from planner.dataset.screened_files import Source
-
             (read,), _ = Source(path, path.name).read()
             path.unlink()
             path = write_csv(path.with_suffix(".csv"), read, stated=False)
@@ -113,7 +113,7 @@ class Engineer:
 
     def on_question(self) -> str | None:
         """Right, wrong or nothing; what was hit elsewhere is never confirmed."""
-        pose, held = next(iter(self.campaign.state.held.items()))
+        held = next(iter(self.campaign.state.held.values()))
         right = all(self.from_there(hit.sha256, held.joints_deg) for hit in held.hits)
         self.done["questions"] += 1
         return str(self.rng.choice(["a", "u", "r"] if right else ["r", "u"]))
@@ -201,10 +201,8 @@ class Engineer:
             return entry
 
         self.campaign._journal.append = killed_after
-        try:
+        with suppress(Killed):
             watch(self.campaign, self.inbox, console=console, keys=self, quiet_s=0.0, limit_s=120)
-        except Killed:
-            pass
         self.campaign = Campaign(self.campaign.directory)
         self.check()
 
