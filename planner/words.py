@@ -1,6 +1,7 @@
 """Small words that every sentence needs: counts, standard deviations, times."""
 
 import math
+import shlex
 from datetime import datetime
 from pathlib import Path
 
@@ -42,6 +43,11 @@ def short_name(path: str | Path, most: int = 24) -> str:
     name = Path(path).name
     begin = most // 3
     return name if len(name) <= most else f"{name[:begin]}…{name[begin + 1 - most :]}"
+
+
+def command(*words: object) -> str:
+    """A command line as a shell takes it: words with blanks in them quoted."""
+    return shlex.join(map(str, words))
 
 
 def local_time(utc: str) -> str:

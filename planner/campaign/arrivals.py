@@ -90,10 +90,9 @@ def keep_files(
 
 def stated_otherwise(source: Source, record: HitRecord) -> bool:
     """Whether a table says something else of a file now than when it was judged."""
-    said = (source.hit, record.hit), (source.repeat, record.repeat)
     points = source.stated.hit_point, source.stated.response_points, source.response
     known = record.hit_point, record.response_points, record.response
-    return points != known or any(now is not None and now != then for now, then in said)
+    return points != known or (source.hit is not None and source.hit != (record.hit or ""))
 
 
 def let_go(
@@ -175,7 +174,9 @@ def _reason_against(
     if digest in state.refused:
         at, record = state.refused[digest]
         elsewhere = delivery.said and at != pose
-        if not (named or elsewhere or stated_otherwise(source, record)):
+        # Where the record has no axis, not even "", nobody kept what was said of the file then.
+        otherwise = record.hit is not None and stated_otherwise(source, record)
+        if not (named or elsewhere or otherwise):
             return f"{REFUSED} before; to import it all the same, name the file itself"
     return "" if delivery.said else _refused_elsewhere(pose, digest, state)
 

@@ -17,12 +17,12 @@ from planner.campaign.events import (
     Configured,
     Confirmed,
     Entry,
+    FilesPlaced,
+    FilesShown,
     Imported,
-    Placed,
     Proposal,
     Proposed,
     Refused,
-    Shown,
     Skipped,
     Starred,
     Undone,
@@ -226,12 +226,12 @@ class Campaign(CampaignReads):
         """
         with self._acting():
             if new := tuple(file for file in files if file not in self.state.shown):
-                self._append(Shown(pose, new))
+                self._append(FilesShown(pose, new))
 
     def place(self, pose: str, files: Sequence[str]) -> None:
         """The engineer says that files (sha256) shown elsewhere were hit at this pose."""
         with self._acting():
-            self._append(Placed(pose, tuple(files)))
+            self._append(FilesPlaced(pose, tuple(files)))
 
     def holding(self):
         """A context in which nobody else can act in this campaign; InputError names who does."""

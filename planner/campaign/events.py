@@ -190,7 +190,7 @@ class Skipped(Event, frozen=True, tag="skipped"):
     neighbours: bool = False
 
 
-class Shown(Event, frozen=True, tag="shown"):
+class FilesShown(Event, frozen=True, tag="shown"):
     """Files, by content (sha256), that are of a pose: they were shown while the robot was there.
 
     Or they came right after, and answer as that pose did. It is logged before anything can become
@@ -201,7 +201,7 @@ class Shown(Event, frozen=True, tag="shown"):
     files: tuple[str, ...]
 
 
-class Placed(Event, frozen=True, tag="placed"):
+class FilesPlaced(Event, frozen=True, tag="placed"):
     """The engineer said that files shown at another pose are of this one."""
 
     pose: str
@@ -228,8 +228,8 @@ AnyEvent = (
     | Refused
     | Withdrawn
     | Skipped
-    | Shown
-    | Placed
+    | FilesShown
+    | FilesPlaced
     | Starred
     | Undone
 )

@@ -27,6 +27,7 @@ from planner.surrogate.modal_surrogate import (
     ModalObservations,
     Surrogate,
 )
+from planner.words import counted
 
 if TYPE_CHECKING:
     from planner.campaign.decision import Decision
@@ -182,10 +183,26 @@ class Model:
         That is the decision about the cut where acquisition "stability" asks for it.
         """
         stop = self.cell.config.stop
-        enough = len(self.labelled) >= stop.measurements_min
+        return len(self.labelled) >= stop.measurements_min and self._sure
+
+    @property
+    def waits_for(self) -> str:
+        """What lacks until the target is reached; "": it is."""
+        stop, decision = self.cell.config.stop, self.cell.config.acquisition.name == "stability"
+        lacking, sure = stop.measurements_min - len(self.labelled), 100 * stop.probability
+        what = "decision about the cut" if decision else "error below the target"
+        waits = [] if self._sure else [f"{what} with {sure:g} % probability"]
+        if lacking > 0:
+            more = counted(lacking, "more pose")
+            waits.append(f"{more}, as {stop.measurements_min} are the least (measurements_min)")
+        return " and ".join(waits)
+
+    @property
+    def _sure(self) -> bool:
+        stop = self.cell.config.stop
         if self.cell.config.acquisition.name == "stability":
-            return enough and self.decision is not None and self.decision.sure(stop.probability)
-        return enough and self.forecast.reached >= stop.probability
+            return self.decision is not None and self.decision.sure(stop.probability)
+        return self.forecast.reached >= stop.probability
 
     def repeat(self) -> tuple[str, float, float] | None:
         """The measured pose that gains most from more hits, its gain, and that of a new pose.

@@ -9,15 +9,15 @@ from planner.campaign.events import (
     Configured,
     Confirmed,
     Entry,
+    FilesPlaced,
+    FilesShown,
     HitRecord,
     Imported,
     MeasuredMode,
-    Placed,
     Proposal,
     Proposed,
     Question,
     Refused,
-    Shown,
     Skipped,
     Starred,
     Undone,
@@ -104,7 +104,7 @@ class CampaignState:
         """Whether an act changes neither the model nor what is proposed."""
         if isinstance(event, Imported):
             return event.question is not None or (event.unhit and self._unhit_stay_open)
-        return isinstance(event, Starred | Refused | Shown | Placed)
+        return isinstance(event, Starred | Refused | FilesShown | FilesPlaced)
 
     @property
     def simulated(self) -> bool:
@@ -190,9 +190,9 @@ def _apply(state: CampaignState, event: AnyEvent, entry: Entry) -> CampaignState
             skipped = {**state.skipped, event.pose: event.reason}
             doubt = _doubt(state, event.pose)
             return replace(changed, open=left, skipped=skipped, avoided=avoided, doubt=doubt)
-        case Shown():
+        case FilesShown():
             return replace(state, shown={**dict.fromkeys(event.files, event.pose), **state.shown})
-        case Placed():
+        case FilesPlaced():
             return replace(state, shown=state.shown | dict.fromkeys(event.files, event.pose))
         case Starred():
             return replace(state, starred=state.starred | {event.pose})

@@ -6,8 +6,8 @@ from itertools import takewhile
 from planner.campaign.events import (
     Confirmed,
     Entry,
+    FilesPlaced,
     Imported,
-    Placed,
     Proposed,
     Refused,
     Skipped,
@@ -17,7 +17,7 @@ from planner.campaign.events import (
 )
 from planner.campaign.state import fold, taken_back
 
-ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, Placed, Starred)
+ACTS = (Proposed, Imported, Confirmed, Refused, Withdrawn, Skipped, FilesPlaced, Starred)
 
 
 def last_acts(entries: Iterable[Entry], decisions_only: bool = False) -> tuple[Entry, ...]:
@@ -49,6 +49,7 @@ def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entr
     undone = taken_back(entries)
     group: list[Entry] = []
     since: list[Entry] = []
+    redone = 0
     for entry in reversed(entries):
         event = entry.event
         if entry.seq in undone or not isinstance(event, (*ACTS, Undone)):
@@ -57,9 +58,10 @@ def last_undone(entries: Iterable[Entry]) -> tuple[tuple[Entry, ...], tuple[Entr
             if group or not isinstance(event, Proposed):
                 break
             since.append(entry)
-        elif isinstance(entries[event.act - 1].event, Undone):
+        elif isinstance(entries[event.act - 1].event, Undone) or entry.seq == redone - 1:
             if group:
                 break
+            redone = entry.seq  # a redo, and right before it what that took back itself
         elif not group or (entry.seq == group[0].seq - 1 and event.act < _act(group[0])):
             group.insert(0, entry)
         else:

@@ -16,7 +16,7 @@ from planner.campaign.from_urdf import Guess, Guessed
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 from planner.report.log_words import act
-from planner.report.text import table
+from planner.report.text import command_line, table
 from planner.words import significant
 
 
@@ -52,16 +52,17 @@ class NewCampaign(Answer):
             guessed.remarks if guessed else (),
         )  # fmt: skip
 
-    def text(self) -> "str | Group":
+    def text(self) -> Group:
         """What was started, and how it goes on."""
         warned = (f"Check: {finding.sentence}" for finding in self.findings)
         remarks = "".join(f"{remark}\n" for remark in (*warned, *self.remarks, *self.told))
         said = (
             f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"
-            f"{remarks}Next: planner next {self.campaign}"
+            f"{remarks}".rstrip()
         )
-        return Group(_guesses(self.guessed), Text(said)) if self.guessed else said
+        parts = [Text(said), command_line("Next: ", "planner", "next", self.campaign)]
+        return Group(*([_guesses(self.guessed)] if self.guessed else []), *parts)
 
 
 def _guesses(guessed: tuple[Guess, ...]) -> Table:
@@ -86,16 +87,17 @@ class ExampleFolder(Answer):
     campaign: str
     files: tuple[str, ...]
 
-    def text(self) -> str:
+    def text(self) -> Group:
         """What to do with it."""
         toml, folder = self.robot, self.example
-        return (
+        cell = f"{folder}/cell"
+        said = (
             f"An example of one's own to change is in {folder}: robot/robot.toml, "
-            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script.\n"
-            f"  planner check {toml}\n"
-            f"  planner new {folder}/cell --robot {toml} --campaign {self.campaign}\n"
-            f"  planner next {folder}/cell"
+            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script."
         )
+        new = "planner", "new", cell, "--robot", toml, "--campaign", self.campaign
+        commands = ("planner", "check", toml), new, ("planner", "next", cell)
+        return Group(Text(said), *(command_line("  ", *words) for words in commands))
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,9 @@ from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
-from planner.words import counted, significant
+from planner.words import command, counted, significant
+
+ANSWERS = "confirm", "withdraw"  # to a question of held hits
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
@@ -123,6 +125,9 @@ class PoseImport(Answer):
 
     def parts(self) -> list[RenderableType]:
         """Modes beside what was expected, remarks, and the change of the model, if there is any."""
+        if self.known:
+            files = counted(len(self.already_imported), "file")
+            return [Text(f"{files} imported before as {self.pose}; nothing changed.")]
         if self.unhit:
             return [Text(self._without_hits()), *remarks(self.remarks)]
         made = table(
@@ -145,6 +150,12 @@ class PoseImport(Answer):
         if all(mode.label for mode in self.modes):
             return []
         return [Text(f"  other: measured too, none of the {counted_on} modes that are predicted")]
+
+    @property
+    def known(self) -> bool:
+        """Whether all of it is in use already."""
+        new = self.accepted or self.refused or self.question
+        return bool(self.already_imported) and not new
 
     @property
     def unhit(self) -> bool:
@@ -207,17 +218,17 @@ class ImportedPoses(Answer):
 
 def how_to_answer(directory: Path, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
+    confirm, withdraw = (command("planner", act, directory, pose) for act in ANSWERS)
     if asked.disagree or asked.about:
         right = "they are" if asked.about else "each is"
         return (
-            f"{asked.text} They are held, not used. To take the import back: planner undo "
-            f"{directory}; if {right} right: planner confirm {directory} {pose}; to set all "
-            f"aside: planner withdraw {directory} {pose}."
+            f"{asked.text} They are held, not used. To take the import back: "
+            f"{command('planner', 'undo', directory)}; if {right} right: {confirm}; to set all "
+            f"aside: {withdraw}."
         )
     return (
-        f"{asked.text} They are held, not used. If it is: planner confirm {directory} {pose}; "
-        f"if it is at OTHER: planner confirm {directory} {pose} --at OTHER; else: planner withdraw "
-        f"{directory} {pose}."
+        f"{asked.text} They are held, not used. If it is: {confirm}; if it is at OTHER: {confirm} "
+        f"--at OTHER; else: {withdraw}."
     )
 
 

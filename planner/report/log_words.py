@@ -5,11 +5,11 @@ import msgspec
 from planner.campaign.events import (
     Configured,
     Entry,
+    FilesPlaced,
+    FilesShown,
     Imported,
-    Placed,
     Proposed,
     Refused,
-    Shown,
     Undone,
 )
 from planner.words import counted
@@ -33,8 +33,8 @@ def act(entry: Entry) -> str:
         return f"refused {counted(len(event.hits), 'hit')} at {event.pose}"
     if isinstance(event, Undone):
         return f"took back entry {event.act}"
-    if isinstance(event, Shown | Placed):
-        said = "shown at" if isinstance(event, Shown) else "said to be of"
+    if isinstance(event, FilesShown | FilesPlaced):
+        said = "shown at" if isinstance(event, FilesShown) else "said to be of"
         return f"{counted(len(event.files), 'file')} {said} {event.pose}"
     told = msgspec.to_builtins(event)
     reason = f": {told['reason']}" if told.get("reason") else ""

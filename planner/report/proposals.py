@@ -84,6 +84,8 @@ class ProposalsReport(Answer):
     remarks: tuple[str, ...] = ()
     places: "BetterPlaces | None" = None
     joint_units: Any = msgspec.UNSET
+    done: bool = False
+    waits_for: str = ""
 
     @property
     def joints(self) -> JointUnits:
@@ -97,10 +99,21 @@ class ProposalsReport(Answer):
     def text(self) -> Group:
         """Each pose, then what one more measurement is worth."""
         parts = [part for one in self.proposals for part in one.parts(self.joints)]
-        said = [self.forecast.text, self.repeat.text if self.repeat else ""]
+        said = [
+            self.forecast.text,
+            target_sentence(self.waits_for),
+            self.repeat.text if self.repeat else "",
+        ]
         said += [self.places.sentence if self.places else ""]
         remarks = [Text(remark, style="yellow") for remark in self.remarks]
         return Group(*parts, Text(" ".join(filter(None, said))), *remarks)
+
+
+def target_sentence(waits_for: str) -> str:
+    """Whether the target is reached, and if not what it waits for."""
+    if not waits_for:
+        return "The target is reached: no more poses are needed."
+    return f"The target is not reached yet; what lacks: {waits_for}."
 
 
 def forecast_json(forecast: Forecast) -> dict[str, Any]:
@@ -122,4 +135,6 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
         tuple(campaign.cell.remarks),
         places=places_for(model, campaign.state, found[0]),
         joint_units=campaign.cell.robot.joints.declared,
+        done=bool(model.done),
+        waits_for=model.waits_for,
     )

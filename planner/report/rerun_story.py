@@ -6,11 +6,11 @@ from planner.campaign.cell import Cell
 from planner.campaign.events import (
     Confirmed,
     Entry,
+    FilesPlaced,
+    FilesShown,
     Imported,
-    Placed,
     Proposed,
     Refused,
-    Shown,
     Skipped,
     Starred,
     Undone,
@@ -66,7 +66,7 @@ class Story:
                 view.text(number, f"Starred {event.pose}", "INFO")
             case Undone():
                 view.text(number, f"Took back entry {event.act} of the log", "WARN")
-            case Shown() | Placed():
+            case FilesShown() | FilesPlaced():
                 return
             case _:
                 view.text(number, f"Configured {model.cell.robot.name}", "INFO")

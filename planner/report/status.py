@@ -19,7 +19,7 @@ from planner.report.imports import AskedOfPose
 from planner.report.kept_diagnosis import diagnosis_of, read_diagnosis, two_answers
 from planner.report.leave_one_out import LeftOutValues, found_without, left_out
 from planner.report.plot_files import Pictures
-from planner.report.proposals import forecast_json
+from planner.report.proposals import forecast_json, target_sentence
 from planner.report.refitted_springs import (
     NOT_KNOWN,
     RefittedSpring,
@@ -116,6 +116,7 @@ class ModelStatus:
     decision: DecisionStatus | None = None
     joint_units: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     springs: tuple[RefittedSpring, ...] = ()
+    waits_for: str = ""
 
     @classmethod
     def of(cls, model: "Model") -> "ModelStatus":
@@ -133,6 +134,7 @@ class ModelStatus:
             decision=DecisionStatus.of(model),
             joint_units=cell.robot.joints.declared,
             springs=refitted_springs(model),
+            waits_for=model.waits_for,
         )
 
 
@@ -171,6 +173,7 @@ class StatusReport(Answer):
     joint_units: Any = msgspec.UNSET
     used: int = 0  # of the measured poses, those that the model rests on
     springs: tuple[RefittedSpring, ...] = ()  # none where the simulation does not learn
+    waits_for: str = ""  # what lacks until the target is reached
     model: "Callable[[], Model] | None" = field(default=None, repr=False, metadata=NOT_IN_JSON)
 
     def to_json(self) -> dict[str, Any]:
@@ -216,7 +219,7 @@ class StatusReport(Answer):
             "sd of frequencies over the workspace: "
             + ", ".join(f"mode {k} {significant(v)} %" for k, v in each)
             + f" (target {self.target_frequency_sd_percent:g} %)",
-            self.forecast.text + (" The target is reached." if self.done else ""),
+            f"{self.forecast.text} {target_sentence(self.waits_for)}",
             f"log: {counted(self.log.entries, 'entry', 'entries')}",
         ]
         if self.log.torn_bytes:
@@ -266,6 +269,7 @@ def status(campaign: Campaign) -> StatusReport:
         joint_units=believed.joint_units,
         used=len(state.used),
         springs=believed.springs,
+        waits_for=believed.waits_for,
         model=lambda: campaign.model,
     )
 

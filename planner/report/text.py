@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from rich.table import Table
 from rich.text import Text
 
-from planner.words import small
+from planner.words import command, small
 
 SIMULATED = Text(
     "SIMULATED RECORDINGS: nothing here was measured on a real robot", style="bold magenta"
@@ -45,3 +45,8 @@ def drawn(plots: Sequence[str], rrd: str | None = None) -> list[Text]:
     """Where pictures and a Rerun recording are, if there are any."""
     lines = [Text("\n  ".join(["Pictures:", *plots]))] if plots else []
     return [*lines, Text(f"Rerun recording: {rrd}")] if rrd else lines
+
+
+def command_line(before: str, *words: object) -> Text:
+    """A command to be copied: quoted as a shell needs it, and on one line however long it is."""
+    return Text(f"{before}{command(*words)}", no_wrap=True, overflow="ignore")

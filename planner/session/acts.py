@@ -10,8 +10,8 @@ from rich.text import Text
 
 from planner.campaign.events import (
     Confirmed,
+    FilesPlaced,
     Imported,
-    Placed,
     Refused,
     Skipped,
     Starred,
@@ -37,7 +37,7 @@ ACTS: dict[type, Callable[[Any], str]] = {  # in words, where an interruption ha
     Confirmed: lambda event: f"the answer about {event.pose}",
     Refused: lambda event: f"the refusal of hits at {event.pose}",
     Skipped: lambda event: f"the skip of {event.pose}",
-    Placed: lambda event: f"that late hits are of {event.pose}",
+    FilesPlaced: lambda event: f"that late hits are of {event.pose}",
     Starred: lambda event: f"the star of {event.pose}",
     Undone: lambda event: f"that entry {event.act} is taken back",
 }
@@ -53,6 +53,8 @@ def arrive(station: Station, course: Course) -> Course:
         station.say(str(error))
         return replace(course, stop="no pose left")
     station.teller.note()
+    if course.left:  # what lies there before the robot can have moved
+        campaign.show(course.left, station.inbox.present())
     page = page_without_hits(
         campaign, proposal, station.hits_at(proposal), station.inbox.folder, course
     )
@@ -60,7 +62,8 @@ def arrive(station: Station, course: Course) -> Course:
     station.screen.show(page.page)
     station.teller.tell()
     before = station.pose_before(proposal.pose)
-    return replace(course, visit=PoseInProgress(proposal, page, time.monotonic(), before))
+    visit = PoseInProgress(proposal, page, time.monotonic(), before)
+    return replace(course, visit=visit, left=proposal.pose)
 
 
 def say_last_import(station: Station) -> None:
@@ -134,13 +137,20 @@ def _refuse(station: Station, visit: PoseInProgress, files: Collection[Path]) ->
     chosen = tuple(path for path in visit.whole if path in files)
     if not chosen:
         return
-    rows = ((path, station.verdicts.table.row(path)) for path in chosen)
-    stated = {path: Source.of(row) for path, row in rows if row is not None}
+    stated = {path: _as_stated(station, visit, path) for path in chosen}
     station.campaign.refuse(visit.proposal.pose, chosen, visit.reasons(chosen), stated)
     station.teller.note()
     numbers = [str(v.number) for v in visit.verdicts if v.path in chosen]
     said = f"{counted(len(numbers), 'hit')} set aside ({', '.join(numbers)})"
     station.say(f"{said}; hit again.")
+
+
+def _as_stated(station: Station, visit: PoseInProgress, path: Path) -> Source:
+    """What is said of a file now, by its table or itself; "" where nothing says an axis."""
+    row = station.verdicts.table.row(path)
+    axes = {verdict.axis for verdict in visit.verdicts if verdict.path == path}
+    said = Source(path, str(path)) if row is None else Source.of(row)
+    return replace(said, hit=axes.pop() if len(axes) == 1 else None)
 
 
 def import_waiting(

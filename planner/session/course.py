@@ -91,12 +91,14 @@ class Course:
     """How far a session is. All else is the campaign's, so that it may end anywhere.
 
     `asking` is the pose whose question is on the page; `here` are files that looked unsure and are
-    right; `aside`, by content and row, what could not be imported without the engineer;
-    `history` the overall sd (%) after each measurement; `announced`: the target was.
+    right; `left` is the pose where the robot was before; `aside`, by content and row, what could
+    not be imported without the engineer; `history` the overall sd (%) after each measurement;
+    `announced`: the target was.
     """
 
     visit: PoseInProgress | None = None
     asking: str = ""
+    left: str = ""
     here: frozenset[Path] = frozenset()
     aside: frozenset[tuple[str, str]] = frozenset()
     measured: tuple[str, ...] = ()

@@ -67,6 +67,10 @@ class Inbox:
                 whole.append(path)
         return whole, waiting
 
+    def present(self) -> list[str]:
+        """Content hashes of all files that can be read, whole or not yet."""
+        return [digest for path in self._candidates() if (digest := self.digest(path))]
+
     def ignored(self) -> list[Path]:
         """Files that are no recordings, each once."""
         found = [

@@ -58,7 +58,9 @@ class Station:
         if self.mark(path, digest) in course.aside:
             return True
         hits = [hit for m in state.recorded for hit in m.hits if hit.sha256 == digest]
-        hits += [state.refused[digest][1]] if digest in state.refused else []
+        if digest in state.refused:
+            hits = [state.refused[digest][1]]
+            row = None if hits[0].hit is None else row
         if row is None or any(hit.accepted for hit in hits):
             return bool(hits)
         return any(not stated_otherwise(Source.of(row), hit) for hit in hits)

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from planner.campaign.campaign import Campaign
-from planner.campaign.events import AnyEvent, Entry, Imported, Placed, Shown
+from planner.campaign.events import AnyEvent, Entry, FilesPlaced, FilesShown, Imported
 from planner.campaign.importing import ImportReport
 from planner.campaign.model import Model
 from planner.dataset.measure import MeasuredPose
@@ -24,7 +24,7 @@ class Teller:
         found = {report.pose: report.measured for report in reports}
         for entry in self._campaign.entries[self._noted :]:
             event = entry.event
-            if isinstance(event, Shown | Placed):  # nothing that pictures show
+            if isinstance(event, FilesShown | FilesPlaced):  # nothing that pictures show
                 continue
             measured = found.get(event.pose) if isinstance(event, Imported) else None
             self._untold.append((entry, self._campaign.model, measured))

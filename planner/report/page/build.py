@@ -54,6 +54,7 @@ def _cards(facts: Facts) -> Markup:
     used, hits = facts.used, sum(len(m.accepted) for m in facts.used)
     known = facts.status.forecast
     rmse = percent(known.rmse_percent) if known.measurements else "–"
+    lacks = f"; what lacks: {facts.status.waits_for}" if facts.status.waits_for else ""
     cards = [
         (str(len(used)), "poses measured and used"),
         (str(hits), "hits used"),
@@ -61,7 +62,7 @@ def _cards(facts: Facts) -> Markup:
         (rmse, "expected RMSE of frequencies over the workspace"),
         (
             "reached" if facts.status.done else "not reached",
-            f"target of {facts.status.target_frequency_sd_percent:g} %",
+            f"target of {facts.status.target_frequency_sd_percent:g} %{lacks}",
         ),
     ]
     made = (tag("div", tag("b", big), tag("span", small), class_="card") for big, small in cards)

@@ -21,11 +21,12 @@ from planner.report.page.html import (
     tag,
     words_table,
 )
+from planner.report.proposals import target_sentence
 from planner.report.text import number
 from planner.report.text import with_sd as pm
 from planner.robot.link_bodies import guessed_masses
 from planner.version import __version__
-from planner.words import local_time, significant
+from planner.words import command, local_time, significant
 
 
 def asked(facts: Facts) -> Markup:
@@ -170,7 +171,7 @@ def decisions(facts: Facts) -> Markup:
 def reproduce(facts: Facts) -> Markup:
     """How to get the same numbers again."""
     campaign = facts.campaign
-    folder = campaign.directory.name
+    folder = command(campaign.directory.name)
     commands = "\n".join(
         (
             f"# with planner {__version__}:",
@@ -225,8 +226,7 @@ def forecast(facts: Facts) -> Markup:
     """Whether the target is reached."""
     if not facts.used:
         return paragraphs("Nothing is measured yet: all that is said is the simulation's.")
-    done = " The target is reached." if facts.status.done else ""
-    return paragraphs(facts.status.forecast.text + done)
+    return paragraphs(f"{facts.status.forecast.text} {target_sentence(facts.status.waits_for)}")
 
 
 def mode_rows(facts: Facts) -> list[tuple[str, ...]]:
