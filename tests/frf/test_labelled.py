@@ -58,7 +58,7 @@ def test_every_use_refuses_another_grid_of_the_same_length(tmp_path, monkeypatch
     path = tmp_path / "a.uff"
     path.touch()
     for module in (tip_files, cutter_frf):
-        monkeypatch.setattr(module, "read", lambda _: records)
+        monkeypatch.setattr(module, "read_frfs", lambda *_: records)
     with pytest.raises(InputError, match="export one grid"):
         tip_files.read_tip(path, TOOL, None, 0.0)
     with pytest.raises(InputError, match="export one grid"):
