@@ -156,9 +156,8 @@ def _reason_against(
 ) -> str:
     """Why a file is not imported; empty: it is, or it is in use."""
     pose, known = delivery.pose, state.measurements.get(delivery.pose)
-    in_use = known is not None and any(h.sha256 == digest for h in known.accepted)
     held = state.held.get(pose)
-    if in_use:
+    if known is not None and any(h.sha256 == digest for h in known.accepted):
         return f"it is of {pose}, which was withdrawn" if known.withdrawn else ""
     if held is not None:
         if any(hit.sha256 == digest for hit in held.hits):

@@ -135,5 +135,6 @@ def test_commands_to_be_copied_are_quoted_and_on_one_line(cell, tmp_path):
     assert code == 0
     assert f"Next: planner next '{long}'" in out
     code, out, _ = call("next", folder)
-    assert "The target is not reached yet; what lacks: " in out
-    assert "3 more poses, as 3 are the least (measurements_min)" in " ".join(out.split())
+    said = " ".join(out.split())
+    assert "The target is not reached yet; what lacks: " in said
+    assert "3 more poses, as 3 are the least (measurements_min)" in said

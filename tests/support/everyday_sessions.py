@@ -60,6 +60,7 @@ class Engineer:
     pending: list[Path] = field(default_factory=list)  # exports that come later
     at_pose: str = ""
     keys: int = 0
+    skipping: bool = False
 
     def __post_init__(self) -> None:
         robot = make_plain_arm(self.root / "robot", softer=float(self.rng.uniform(0.9, 1.2)))
@@ -98,6 +99,9 @@ class Engineer:
         """The next key, after what happens at the robot meanwhile."""
         self.check()
         self.keys += 1
+        if self.skipping:  # with or without a reason
+            self.skipping = False
+            return "\n"
         if self.keys > MOST_KEYS:
             return "q"
         if self.rng.random() < 0.02:
@@ -159,6 +163,7 @@ class Engineer:
         chances = [0.6, 0.1, 0.08, 0.06, 0.02, 0.02, 0.04, 0.02, 0.01, 0.03, 0.02]
         key = str(rng.choice(keys, p=chances))
         self.done[key] += 1
+        self.skipping = key == "k"
         return key
 
     def late_here(self) -> str:
@@ -189,7 +194,7 @@ class Engineer:
     def session(self) -> None:
         """One session, to its end or until it is killed."""
         self.campaign = Campaign(self.campaign.directory)
-        self.page, self.keys = LastPage(), 0
+        self.page, self.keys, self.skipping = LastPage(), 0, False
         console = Console(width=80, file=self.page, force_terminal=False)
         append, rng = self.campaign._journal.append, self.rng
 
