@@ -18,6 +18,7 @@ from planner.modal.operating import OperatingMode
 from planner.modal.pole_identification import PoleIdentification
 from planner.report.frf_plots import AXES
 from planner.report.modal_plots import poles_by_stability
+from planner.report.plot_text import ink
 from planner.report.rerun_chart import (
     BRIGHT,
     GREY,
@@ -93,15 +94,16 @@ def draw_mac(
     cells = (255 * colormaps["viridis"](np.nan_to_num(mac))[..., :3]).astype(np.uint8)
     cells[~np.isfinite(mac)] = 0
     stream.log(f"{path}/cells", rr.Image(cells))
-    words = [
-        (f"{value:.2f}", (j + 0.5, k + 0.42))
-        for (k, j), value in np.ndenumerate(mac)
+    inside = [
+        (at, value) for at, value in np.ndenumerate(mac)
         if np.isfinite(value) and (len(mac) <= MOST_VALUES or value > WORTH_A_VALUE)
     ]  # fmt: skip
+    words = [(f"{value:.2f}", (j + 0.5, k + 0.42)) for (k, j), value in inside]
+    inks = [(0, 0, 0) if ink(cells[k, j] / 255) == "black" else BRIGHT for (k, j), _ in inside]
     words += [(name, (-0.45, k + 0.42)) for k, name in enumerate(rows)]
     words += [(name, (j + 0.5, -0.3)) for j, name in enumerate(columns)]
     words.append((note, (mac.shape[1] / 2, mac.shape[0] + 0.1)))
-    write(stream, f"{path}/words", words, [BRIGHT] * (len(words) - 1) + [GREY])
+    write(stream, f"{path}/words", words, inks + [BRIGHT] * (len(rows) + len(columns)) + [GREY])
 
 
 def mac_view(path: str, name: str, count: int) -> rrb.Spatial2DView:
