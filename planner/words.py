@@ -1,6 +1,7 @@
 """Small words that every sentence needs: counts, standard deviations, times."""
 
 import math
+import shlex
 from datetime import datetime
 from pathlib import Path
 
@@ -24,6 +25,11 @@ def significant(value: float, digits: int = 2) -> str:
         return f"{value:.0f}"
     rounded = float(f"{value:.{digits}g}")
     return f"{rounded:.{max(0, digits - 1 - math.floor(math.log10(abs(rounded))))}f}"
+
+
+def pasted(path: str | Path) -> str:
+    """A path as a shell takes it, for a command to be pasted: in quotes where it needs them."""
+    return shlex.quote(str(path))
 
 
 def probable(probability: float) -> str:

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from planner.prove.curves import CLEARLY_NATS, EDGES_NATS, MEASURES, CurveBin, curve, nameable
 from planner.prove.score import Scored, by_probability
+from planner.report.plot_text import ink
 
 OPEN_DECADES = 10.0  # factor by which the first and last bin are drawn beyond their inner edge
 KNOWN = {"nats": "hits and chain known", "nats_open": "hits and chain open"}
@@ -65,10 +66,11 @@ def confusion(scored: Sequence[Scored]) -> Figure:
     figure = Figure(figsize=(9, 8), layout="constrained")
     FigureCanvasAgg(figure)
     panel = figure.subplots()
-    panel.imshow(counts, cmap="Blues")
+    image = panel.imshow(counts, cmap="Blues")
     for (i, j), count in np.ndenumerate(counts):
         if count:
-            panel.text(j, i, str(count), ha="center", va="center")
+            colour = ink(image.to_rgba(count))
+            panel.text(j, i, str(count), ha="center", va="center", color=colour)
     panel.set_xticks(range(len(names)), names, rotation=90)
     panel.set_yticks(range(len(names)), names)
     panel.set_xlabel("said first")

@@ -16,8 +16,8 @@ from planner.campaign.from_urdf import Guess, Guessed
 from planner.check.remark import CheckRemark
 from planner.report.answer import Answer
 from planner.report.log_words import act
-from planner.report.text import table
-from planner.words import significant
+from planner.report.text import command, table
+from planner.words import pasted, significant
 
 
 @dataclass(frozen=True)
@@ -52,16 +52,17 @@ class NewCampaign(Answer):
             guessed.remarks if guessed else (),
         )  # fmt: skip
 
-    def text(self) -> "str | Group":
+    def text(self) -> Group:
         """What was started, and how it goes on."""
         warned = (f"Check: {finding.sentence}" for finding in self.findings)
         remarks = "".join(f"{remark}\n" for remark in (*warned, *self.remarks, *self.told))
         said = (
             f"Campaign in {self.campaign}: robot {self.robot}, "
             f"{self.modes} modes, chosen by {self.acquisition}.\n"
-            f"{remarks}Next: planner next {self.campaign}"
+            f"{remarks}".rstrip()
         )
-        return Group(_guesses(self.guessed), Text(said)) if self.guessed else said
+        guessed = [_guesses(self.guessed)] if self.guessed else []
+        return Group(*guessed, Text(said), command(f"Next: planner next {pasted(self.campaign)}"))
 
 
 def _guesses(guessed: tuple[Guess, ...]) -> Table:
@@ -86,16 +87,15 @@ class ExampleFolder(Answer):
     campaign: str
     files: tuple[str, ...]
 
-    def text(self) -> str:
+    def text(self) -> Group:
         """What to do with it."""
-        toml, folder = self.robot, self.example
-        return (
-            f"An example of one's own to change is in {folder}: robot/robot.toml, "
-            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script.\n"
-            f"  planner check {toml}\n"
-            f"  planner new {folder}/cell --robot {toml} --campaign {self.campaign}\n"
-            f"  planner next {folder}/cell"
+        toml, cell, campaign = map(pasted, (self.robot, f"{self.example}/cell", self.campaign))
+        said = (
+            f"An example of one's own to change is in {self.example}: robot/robot.toml, "
+            f"robot/robot.urdf and campaign.toml, with comments; ask_tell.py is a script."
         )
+        then = f"check {toml}", f"new {cell} --robot {toml} --campaign {campaign}", f"next {cell}"
+        return Group(Text(said), *(command(f"  planner {one}") for one in then))
 
 
 @dataclass(frozen=True)

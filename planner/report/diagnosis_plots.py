@@ -17,10 +17,10 @@ from planner.diagnosis.residual_location import Where, where
 from planner.recording.points import TOOL
 from planner.report.frf_map import frf_map
 from planner.report.frf_plots import AXES
-from planner.report.plot_text import plain_text
+from planner.report.plot_text import plain_text, write_values
 
 UNIT = "mean square residual (1: just matters)"
-LEAST, DARK, MOST_SHOWN = 1e-3, 50.0, 1000.0  # residuals: of the scale; from which text is white
+LEAST, MOST_SHOWN = 1e-3, 1000.0  # residuals: of the scale
 MOST = 4  # poses whose FRFs are shown, those that differed most
 # Dashes over a wide line: where an explanation changes nothing, both are seen.
 REFITTED = {"label": "refitted", "color": "tab:orange", "ls": "-", "lw": 2.6, "ms": 8.0}
@@ -102,10 +102,7 @@ def _residuals(before: Where, after: Where, names: Sequence[str], mark: str) -> 
     scale, image = LogNorm(LEAST, MOST_SHOWN), ScalarMappable()
     for panel, place, label in ((left, before, "refitted"), (right, after, "explained")):
         image = panel.imshow(np.maximum(place.by_direction, LEAST), cmap="Reds", norm=scale)
-        for i, j in np.ndindex(3, 3):
-            value = place.by_direction[i, j]
-            colour = "white" if value > DARK else "black"
-            panel.text(j, i, f"{value:.3g}", ha="center", va="center", color=colour)
+        write_values(panel, image, ".3g")
         panel.set_xticks(range(3), [f"hit {a}" for a in AXES])
         panel.set_yticks(range(3), [f"response {a}" for a in AXES])
         panel.set_title(f"by direction, {label}", fontsize=9)

@@ -13,7 +13,7 @@ from planner.campaign.hit_habits import HitMiss, habits
 from planner.report.answer import Answer, RefusedFile, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import SIMULATED, remarks, table, with_sd
-from planner.words import counted, significant
+from planner.words import counted, pasted, significant
 
 if TYPE_CHECKING:
     from planner.campaign.importing import ImportReport
@@ -205,8 +205,9 @@ class ImportedPoses(Answer):
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
-def how_to_answer(directory: Path, pose: str, asked: Question) -> str:
+def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
+    directory = pasted(directory)
     if asked.disagree:
         return (
             f"{asked.text} They are held, not used. To take the import back: planner undo "

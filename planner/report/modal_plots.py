@@ -29,7 +29,7 @@ from planner.report.plot_marks import (
     number_modes,
     panels,
 )
-from planner.report.plot_text import plain_text
+from planner.report.plot_text import plain_text, write_values
 
 SINGULAR = ("black", "0.4", "0.65")
 STABLE = {"marker": "o", "color": "tab:green", "ms": 3.5, "ls": ""}
@@ -245,9 +245,7 @@ def mac_figure(modal: ModalModel | MatrixModes | OperatingModes, title: str = ""
     shapes = np.array([mode.shape for mode in modal.modes])
     values, panel = mac_matrix(shapes, shapes), grid[0, 0]
     image = panel.imshow(values, vmin=0, vmax=1, cmap="Blues")
-    for i, k in np.ndindex(count, count):
-        colour = "white" if values[i, k] > 0.6 else "black"
-        panel.text(k, i, f"{values[i, k]:.2f}", ha="center", va="center", color=colour, fontsize=8)
+    write_values(panel, image, ".2f", fontsize=8)
     names = [f"{k + 1}: {mode.frequency_hz:.2f} Hz" for k, mode in enumerate(modal.modes)]
     panel.set_xticks(range(count), names, rotation=45, ha="right", rotation_mode="anchor")
     panel.set_yticks(range(count), names)

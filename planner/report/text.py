@@ -36,6 +36,11 @@ def with_sd(value: float | None, sd: float | None, form: str = ".2f") -> str:
     return f"{number(value, form)} ± {number(sd, form) if not sd or sd != sd else small(sd, form)}"
 
 
+def command(text: str) -> Text:
+    """A command to be pasted: on a line of its own that is never broken."""
+    return Text(text, no_wrap=True, overflow="ignore")
+
+
 def remarks(lines: Sequence[str]) -> list[Text]:
     """What the engineer should mind, one line each."""
     return [Text(f"  {line}", style="yellow") for line in lines]

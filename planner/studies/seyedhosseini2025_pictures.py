@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
+from planner.report.plot_text import write_values
 from planner.studies import drawing
 from planner.studies.report import Table, r_squared
 from planner.studies.seyedhosseini2025_data import MODES, TABLED, PostureData
@@ -33,11 +34,7 @@ def heatmap(correlation: Table) -> Figure:
     panel = figure.subplots()
     values = np.array([row[1:] for row in correlation.rows], dtype=float)
     image = panel.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1, aspect="auto")
-    for (i, j), value in np.ndenumerate(values):
-        panel.text(
-            j, i, f"{value:.2f}", ha="center", va="center",
-            color="white" if abs(value) > 0.6 else "black",
-        )  # fmt: skip
+    write_values(panel, image, ".2f")
     panel.set_xticks(range(TABLED), correlation.columns[1:])
     panel.set_yticks(range(6), [str(row[0]) for row in correlation.rows])
     figure.colorbar(image, label="correlation")
