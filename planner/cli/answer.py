@@ -42,7 +42,7 @@ def respond(answer: "Answer", as_json: bool, code: int = 0) -> int:
 
         text = answer.text()
         if text is not None:
-            UnbrokenConsole().print(text)
+            UnbrokenConsole().print(text, crop=False)  # commands stay whole, see text.command
     return code
 
 

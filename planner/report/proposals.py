@@ -15,7 +15,6 @@ from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import table
 from planner.robot.room_directions import axes_in_the_room
-from planner.words import significant
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -69,12 +68,10 @@ class RepeatedPose:
         found = model.repeat()
         if found is None or found[1] <= found[2]:
             return None
-        pose, gain, new = found
-        often = f", {significant(gain / new)} times as much" if new > 0 else ""
         return cls(
             *found,
-            f"Better than a new pose: hit {pose} again, with as many hits as before. That lowers "
-            f"the uncertainty more{often}, for the noise of its hits is now the largest part.",
+            f"Better than a new pose: hit {found[0]} again, with as many hits as before. That "
+            f"lowers the uncertainty more, as the noise of its hits is now the largest part of it.",
         )
 
 
