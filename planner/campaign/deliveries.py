@@ -3,9 +3,10 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from planner.dataset.recordings import table_folders
 from planner.dataset.screened_files import Source
 from planner.errors import InputError
-from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings, table_folders
+from planner.recording.folder import CHANNELS, TABLE, files_in, read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames, StatedPoints
 from planner.recording.read import READERS

@@ -21,6 +21,7 @@ from filelock import FileLock, Timeout
 from planner.campaign.events import AnyEvent, Entry
 from planner.errors import InputError, JournalError
 from planner.version import __version__
+from planner.words import command
 
 _ENTRY = msgspec.json.Decoder(Entry)
 _ENCODER = msgspec.json.Encoder()
@@ -134,7 +135,7 @@ class Journal:
             folder = self.path.parent
             raise InputError(
                 f"{folder} is not a campaign folder (no {self.path.name}); "
-                f"start one with: planner new {folder} --robot ROBOT_TOML"
+                f"start one with: {command('planner', 'new', folder)} --robot ROBOT_TOML"
             ) from None
 
     @contextmanager

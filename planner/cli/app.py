@@ -132,8 +132,12 @@ def watch(
 
     Example: planner watch cell7 exports/ --diagnose
     """
-    from planner.campaign.campaign import Campaign
     from planner.cli.progress import console
+
+    screen = console(quiet=False, stderr=as_json)
+    # What follows takes seconds before the first page: libraries, the model.
+    screen.print(f"Opening {directory}: the first pose comes in a few seconds.")
+    from planner.campaign.campaign import Campaign
     from planner.report.imports import how_to_answer
     from planner.session.watch import watch as run
 
@@ -141,7 +145,7 @@ def watch(
     summary = run(
         campaign,
         folder,
-        console=console(quiet=False, stderr=as_json),
+        console=screen,
         auto=auto,
         hits_per_pose=hits_per_pose,
         rrd=rrd,

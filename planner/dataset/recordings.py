@@ -1,13 +1,32 @@
 """Recordings as an analyser wrote them: a table, its folder, or a folder of such folders."""
 
+import re
 from pathlib import Path
 
 from planner.dataset.screened_files import Source
 from planner.dataset.visits import Recording
 from planner.errors import InputError
-from planner.recording.folder import TABLE, read_recordings, table_folders
+from planner.recording.folder import TABLE, read_recordings
 from planner.recording.joints import JointUnits
 from planner.recording.points import PointNames
+
+
+def table_folders(path: Path) -> tuple[Path, ...]:
+    """Folders with a recordings.csv: of a table its own, a folder itself, or its subfolders.
+
+    P2 comes before P10. None where there is no table; hidden folders are passed over.
+    """
+    if path.name == TABLE or (path / TABLE).is_file():
+        return (path.parent if path.name == TABLE else path,)
+    found = (table.parent.relative_to(path) for table in path.rglob(TABLE))
+    shown = (folder for folder in found if not any(part[0] == "." for part in folder.parts))
+    return tuple(path / folder for folder in sorted(shown, key=_numbered))
+
+
+def _numbered(folder: Path) -> list[tuple[str, int]]:
+    """Of a name each text with the number that follows it."""
+    parts = re.findall(r"(\D*)(\d*)", folder.as_posix())
+    return [(text, int(digits or 0)) for text, digits in parts]
 
 
 def recordings_in(

@@ -120,7 +120,7 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
         raise RefusedError(f"{record.source} holds no response channel; record accelerations.")
     starts = [0]
     if force is not None:
-        apart = int(LEAST_DECAY_S * rate)
+        apart = round(LEAST_DECAY_S * rate)
         hits = _hits(force.samples, apart)
         hits = hits[hits < values.shape[1] - apart]
         if not hits.size:
@@ -130,7 +130,7 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
         starts = [_pulse_end(force.samples, hit, rate) for hit in hits]
         _remark_on_pulse(force, hits, rate, remarks)
     ends = [*starts[1:], values.shape[1]]
-    margin = int(0.05 * rate)  # the foot of the next pulse
+    margin = round(0.05 * rate)  # the foot of the next pulse
     length = min(e - s for s, e in zip(starts, ends, strict=True)) - margin
     length = max(8, min(length, LONGEST, _lifetime(values, starts, length, rate)))
     samples = np.stack([values[:, s : s + length] for s in starts if s + length <= values.shape[1]])
@@ -142,7 +142,7 @@ def _decays(record: TimeRecord, force: Channel | None, remarks: list[str]) -> _D
 
 def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -> int:
     """Samples until the responses of the longest-lived decay have sunk to the background."""
-    block = max(8, int(BLOCK_S * rate))
+    block = max(8, round(BLOCK_S * rate))
     count = length // block
     if count < 4:
         return length
@@ -157,12 +157,12 @@ def _lifetime(values: np.ndarray, starts: list[int], length: int, rate: float) -
     level = energy / np.maximum(np.median(energy, axis=2, keepdims=True), 1e-300)
     alive = np.flatnonzero(np.max(np.median(level, axis=1), axis=0) < ALIVE)
     quiet = int(alive[0]) if alive.size else count
-    return max(int(LEAST_DECAY_S * rate), (quiet + 1) * block)
+    return max(round(LEAST_DECAY_S * rate), (quiet + 1) * block)
 
 
 def _pulse_end(force: np.ndarray, hit: int, rate: float) -> int:
     size = np.abs(force - np.median(force))
-    last = min(force.size, hit + max(2, int(PULSE_LONGEST_S * rate)))
+    last = min(force.size, hit + max(2, round(PULSE_LONGEST_S * rate)))
     still = np.flatnonzero(size[hit:last] > PULSE_END * size[hit])
     return hit + int(still[-1]) + 1
 

@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -32,24 +31,6 @@ def several_poses(paths: list[Path], least: int = 2) -> bool:
         return True  # said where the table is read in earnest
     at = header.index("pose")
     return len({cells[at].strip() for _, cells in rows}) >= least
-
-
-def table_folders(path: Path) -> tuple[Path, ...]:
-    """Folders with a recordings.csv: of a table its own, a folder itself, or its subfolders.
-
-    P2 comes before P10. None where there is no table; hidden folders are passed over.
-    """
-    if path.name == TABLE or (path / TABLE).is_file():
-        return (path.parent if path.name == TABLE else path,)
-    found = (table.parent.relative_to(path) for table in path.rglob(TABLE))
-    shown = (folder for folder in found if not any(part[0] == "." for part in folder.parts))
-    return tuple(path / folder for folder in sorted(shown, key=_numbered))
-
-
-def _numbered(folder: Path) -> list[tuple[str, int]]:
-    """Of a name each text with the number that follows it."""
-    parts = re.findall(r"(\D*)(\d*)", folder.as_posix())
-    return [(text, int(digits or 0)) for text, digits in parts]
 
 
 def joint_columns(folder: Path) -> JointUnits:

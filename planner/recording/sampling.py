@@ -37,7 +37,7 @@ def sampling_rate(path: Path, time_s: np.ndarray) -> float:
         raise InputError(
             f"{path}: time step {row} differs from the others; samples must be evenly spaced."
         )
-    return 1 / step
+    return float(f"{1 / step:.12g}")  # sums round the last digits
 
 
 def rounding(values: np.ndarray) -> float:

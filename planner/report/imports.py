@@ -216,7 +216,7 @@ class ImportedPoses(Answer):
         return Group(*parts, SIMULATED) if self.simulated else Group(*parts)
 
 
-def how_to_answer(directory: Path, pose: str, asked: Question) -> str:
+def how_to_answer(directory: Path | str, pose: str, asked: Question) -> str:
     """What is asked of held hits, and the commands that answer it, in one line."""
     confirm, withdraw = (command("planner", act, directory, pose) for act in ANSWERS)
     if asked.disagree or asked.about:

@@ -17,6 +17,7 @@ from planner.report.shape_motion import motions, moved
 MOST_SINGULAR = 4  # curves of the mode indicator
 MOST_SHOWN = 24  # modes that have a panel of their own
 LONGEST_SIDE = 0.69  # of such a box, in units of the zoom: its axes' labels stay in the picture
+FILLED = 0.92  # share of a panel that a shape fills
 FLATTEST = 0.3  # of its largest extent: the least height of the box that shows a structure
 AHEAD, BESIDE = "tab:red", "tab:blue"
 
@@ -142,10 +143,9 @@ def geometry_figure(matrix: FrfMatrix, geometry: Geometry, title: str = "") -> F
     ]
     panel.legend(handles=handles, fontsize=8)
     # With its axes, a flat structure in a cube would be small and the cube cut off.
-    extent = np.ptp(geometry.position_m, axis=0)
-    extent = np.maximum(extent, FLATTEST * np.max(extent))
+    extent = _extent(geometry.position_m)
     zoom = LONGEST_SIDE * float(np.linalg.norm(extent) / np.max(extent))
-    _finish(panel, geometry.position_m, extent, zoom)
+    _finish(panel, geometry.position_m, zoom)
     panel.locator_params(nbins=6)
     panel.set_xlabel("x (m)", labelpad=10)
     panel.set_ylabel("y (m)", labelpad=10)
@@ -162,19 +162,32 @@ def _draw_lines(panel: Any, geometry: Geometry, position: np.ndarray, colour: st
         panel.add_collection3d(Line3DCollection(ends, colors=colour, lw=0.9))
 
 
-def _finish(
-    panel: Any, position: np.ndarray, extent: np.ndarray | None = None, zoom: float = 1.8
-) -> None:
-    """Equal scales on all axes, which show `extent` (3,) or the largest extent each."""
-    middle = (position.max(axis=0) + position.min(axis=0)) / 2
-    if extent is None:
-        extent = np.full(3, np.max(np.ptp(position, axis=0)))
+def _extent(points: np.ndarray) -> np.ndarray:
+    """(3,) of points (n, 3), and not flat."""
+    extent = np.ptp(points, axis=0)
+    return np.maximum(extent, FLATTEST * np.max(extent))
+
+
+def _finish(panel: Any, points: np.ndarray, zoom: float) -> None:
+    """Equal scales on all axes, which show points (n, 3)."""
+    middle, extent = (points.max(axis=0) + points.min(axis=0)) / 2, _extent(points)
     half = 0.52 * np.maximum(extent, 1e-9)
     panel.set_xlim(middle[0] - half[0], middle[0] + half[0])
     panel.set_ylim(middle[1] - half[1], middle[1] + half[1])
     panel.set_zlim(middle[2] - half[2], middle[2] + half[2])
     panel.set_box_aspect(half / np.max(half), zoom=zoom)
     panel.view_init(elev=28, azim=-60)
+
+
+def _fill(panel: Any, points: np.ndarray) -> None:
+    """Zoom so that points (n, 3) fill the panel, and none of them is cut off."""
+    from mpl_toolkits.mplot3d.proj3d import proj_transform
+
+    for _ in range(2):  # perspective: what is nearer grows a little faster
+        x, y, _ = proj_transform(points[:, 0], points[:, 1], points[:, 2], panel.get_proj())
+        place = (panel.transData - panel.transAxes).transform(np.column_stack([x, y]))
+        reach = 2 * np.max(np.abs(place - 0.5))
+        panel.set_box_aspect(panel._box_aspect, zoom=FILLED / max(reach, 1e-9))
 
 
 def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Figure:
@@ -189,7 +202,9 @@ def shapes_figure(found: MatrixModes, geometry: Geometry, title: str = "") -> Fi
         size = np.linalg.norm(np.real(motion), axis=1)
         panel.scatter(*place.T, c=size, cmap="plasma", s=9, depthshade=False)
         panel.set_title(f"{k + 1}: {mode.frequency_hz:.4g} Hz", fontsize=9, pad=0)
-        _finish(panel, geometry.position_m)
+        drawn = np.concatenate([geometry.position_m, place])
+        _finish(panel, drawn, 1.0)
+        _fill(panel, drawn)
         panel.set_axis_off()
     return figure
 

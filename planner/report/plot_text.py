@@ -1,6 +1,6 @@
 """Text in pictures: the user's own, and values in coloured cells."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,9 +26,9 @@ def ink(colour: ArrayLike) -> str:
     return "black" if linear @ WEIGHTS > ALIKE else "white"
 
 
-def write_values(panel: "Axes", image: "AxesImage", form: str, fontsize: float = 10.0) -> None:
+def write_values(panel: "Axes", image: "AxesImage", form: str, **style: Any) -> None:
     """The value of every cell of an image in it (`form` as of `format`), in readable ink."""
-    values = np.asarray(image.get_array())
+    values = np.asarray(image.get_array(), dtype=float)
     for (i, j), value in np.ndenumerate(values):
         colour = ink(image.to_rgba(value))
-        panel.text(j, i, format(value, form), ha="center", va="center", color=colour, size=fontsize)
+        panel.text(j, i, format(value, form), ha="center", va="center", color=colour, **style)

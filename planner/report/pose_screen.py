@@ -78,6 +78,7 @@ class PosePage:
     unfinished: tuple[tuple[str, str], ...] = ()
     progress: str = ""
     keys: str = ""
+    room: tuple[str, ...] = ()  # which way +x, +y and +z point, seen from the base
 
     @property
     def counts(self) -> Counter[str]:
@@ -141,12 +142,15 @@ class PosePage:
     def _hits(self) -> Table:
         made = Table(box=None, header_style="bold", pad_edge=False)
         made.add_column(f"hit along, axes of {self.frame}")
+        ways = dict(zip("xyz", self.room, strict=False))
         for axis in self.proposal.hits:
             count = self.counts[axis]
             done = count >= self.per_axis
             marks = "●" * count + "○" * max(0, self.per_axis - count)
             style = "bold green" if done else "bold"
-            made.add_row(Text(f"{axis}  {count}/{self.per_axis}  {marks}", style=style))
+            row = Text(f"{axis}  {count}/{self.per_axis}  {marks}", style=style)
+            way = f"  +{axis} {ways[axis]}" if ways else ""
+            made.add_row(row.append(way, style="not bold"))
         again = [hit for hit in self.hits if hit.kind == "repeat"]
         if again:
             axes = ", ".join(dict.fromkeys(hit.axis or "?" for hit in again))

@@ -14,7 +14,7 @@ from planner.recording.joints import JointUnits
 from planner.report.answer import Answer, plain
 from planner.report.predictions import ExpectedMode
 from planner.report.text import table
-from planner.words import significant
+from planner.robot.room_directions import axes_in_the_room
 
 if TYPE_CHECKING:
     from planner.campaign.model import Model
@@ -27,10 +27,12 @@ class ProposedPose(Answer):
 
     proposal: Proposal
     expected: tuple[ExpectedMode, ...]
+    room: tuple[str, ...] = ()  # which way +x, +y and +z of the tool point there
 
     def to_json(self) -> dict[str, Any]:
-        """The proposal's own keys, and "expected"."""
-        return {**plain(self.proposal), "expected": plain(self.expected)}
+        """The proposal's own keys, "expected", and "axes_in_the_room"."""
+        more = {"expected": plain(self.expected), "axes_in_the_room": list(self.room)}
+        return {**plain(self.proposal), **more}
 
     def parts(self, joints: JointUnits) -> list[RenderableType]:
         """Angles, place and expected modes as text."""
@@ -43,7 +45,9 @@ class ProposedPose(Answer):
         x, y, z = proposal.position_m
         hits = f"hit along {', '.join(proposal.hits)} of the tcp frame"
         place = f"tool at x {x:.3f} m, y {y:.3f} m, z {z:.3f} m; {hits}; {proposal.reason}"
-        return [angles, Text(place), expected]
+        ways = ", ".join(f"+{axis} {way}" for axis, way in zip("xyz", self.room, strict=False))
+        seen = [Text(f"There, seen from the base: {ways}")] if ways else []
+        return [angles, Text(place), *seen, expected]
 
 
 @dataclass(frozen=True)
@@ -64,12 +68,10 @@ class RepeatedPose:
         found = model.repeat()
         if found is None or found[1] <= found[2]:
             return None
-        pose, gain, new = found
-        often = f", {significant(gain / new)} times as much" if new > 0 else ""
         return cls(
             *found,
-            f"Better than a new pose: hit {pose} again, with as many hits as before. That lowers "
-            f"the uncertainty more{often}, for the noise of its hits is now the largest part.",
+            f"Better than a new pose: hit {found[0]} again, with as many hits as before. That "
+            f"lowers the uncertainty more, as the noise of its hits is now the largest part of it.",
         )
 
 
@@ -125,10 +127,14 @@ def proposals(campaign: Campaign, found: tuple[Proposal, ...]) -> ProposalsRepor
     """Of the poses that `Campaign.next` gave."""
     from planner.campaign.proposals import places_for  # status needs none of what it imports
 
-    expected = campaign.predict(campaign.cell.robot.joints.internal([p.joints_deg for p in found]))
-    model = campaign.model
+    robot, model = campaign.cell.robot, campaign.model
+    q = robot.joints.internal([p.joints_deg for p in found])
+    expected = campaign.predict(q)
     return ProposalsReport(
-        tuple(ProposedPose(p, ExpectedMode.all_of(expected, i)) for i, p in enumerate(found)),
+        tuple(
+            ProposedPose(p, ExpectedMode.all_of(expected, i), axes_in_the_room(robot, q[i]))
+            for i, p in enumerate(found)
+        ),
         tuple(campaign.cell.robot.joint_names),
         model.forecast,
         RepeatedPose.of(model),

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from matplotlib import colormaps
 
 from planner.frf.frf import Frf
 from planner.modal.mac import mac_matrix
@@ -38,6 +37,8 @@ FIT, BAND, MODE = (255, 120, 100), (70, 74, 80), (90, 190, 255)
 STABLE, UNSTABLE = (110, 220, 110), (240, 160, 60)
 RESPONSES = ((255, 110, 110), (120, 220, 120), (110, 160, 255))
 MOST_VALUES, WORTH_A_VALUE = 8, 0.1  # modes of whose MAC all values are written; of more, which
+# Cells of shapes that are alike, and of different ones: bright words are read on both.
+ALIKE, DIFFERENT = np.array([28, 100, 180]), np.array([32, 34, 38])
 WIDE, WIDER = 2.0, 5.0  # times the height; where charts lie one above the other
 ShapedMode = Mode | MatrixMode | OperatingMode
 
@@ -79,19 +80,21 @@ def draw_auto_mac(
     """Log how alike modes are to each other; `about` says of what shapes are, {} of how many."""
     shapes = np.array([mode.shape for mode in modes])
     note = f"AutoMAC, {about.format(shapes.shape[-1])}"
-    draw_mac(stream, path, mac_matrix(shapes, shapes), names, names, note)
+    numbers = [name.partition(":")[0] for name in names]  # whole names are beside the rows
+    draw_mac(stream, path, mac_matrix(shapes, shapes), names, numbers, note)
 
 
 def draw_mac(
     stream: rr.RecordingStream, path: str, mac: np.ndarray, rows: list[str], columns: list[str],
     note: str,
 ) -> None:  # fmt: skip
-    """Log a MAC matrix (k, l) as cells with values and names; dark where nothing is known.
+    """Log a MAC matrix (k, l) as cells with values and names; black where nothing is known.
 
     Rerun's own view of a tensor has neither names along its sides nor numbers in its cells. Of many
     modes only values that say something have theirs.
     """
-    cells = (255 * colormaps["viridis"](np.nan_to_num(mac))[..., :3]).astype(np.uint8)
+    share = np.nan_to_num(mac)[..., None]
+    cells = np.round(share * ALIKE + (1 - share) * DIFFERENT).astype(np.uint8)
     cells[~np.isfinite(mac)] = 0
     stream.log(f"{path}/cells", rr.Image(cells))
     inside = [

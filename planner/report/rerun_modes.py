@@ -119,7 +119,7 @@ class ModeDrawing:
             f"{k + 1}: {mode.frequency_hz:.1f} Hz" if mode else f"{k + 1}: none"
             for k, mode in enumerate(pose.modes)
         ]
-        columns = [f"{j + 1}: {hz:.1f} Hz" for j, hz in enumerate(pose.simulated_hz)]
+        columns = [f"{j + 1}: {hz:.1f}" for j, hz in enumerate(pose.simulated_hz)]
         note = f"{pose.pose}, shapes at {3 * points} coordinates"
         few = "; different modes can look alike in so few" if points == 1 else ""
         draw_mac(self._stream, "modes/mac", mac, rows, columns, note + few)

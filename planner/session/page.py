@@ -9,6 +9,7 @@ from planner.campaign.events import Proposal
 from planner.campaign.taking_back import last_acts, last_undone
 from planner.dataset.screened_files import when
 from planner.report.pose_screen import JudgedHit, PosePage, keys_that_do
+from planner.robot.room_directions import axes_in_the_room
 from planner.session.course import BAD, Course
 from planner.session.hit_verdicts import HitVerdict
 from planner.words import counted, short_name
@@ -33,12 +34,13 @@ def page_without_hits(
 ) -> PosePage:
     """What the screen says of a pose before anything was hit there."""
     model, robot = campaign.model, campaign.cell.robot
-    expected = model.predict(robot.joints.internal([proposal.joints_deg]))
+    q = robot.joints.internal([proposal.joints_deg])
+    expected = model.predict(q)
     return PosePage(
         proposal, len(model.labelled) + 1, robot.joints, robot.config.tcp_frame,
         max(1, hits_per_pose // len(proposal.hits)), (),
         tuple(expected.frequency_hz[0].tolist()), tuple(expected.frequency_sd_hz[0].tolist()),
-        folder, progress=course.progress,
+        folder, progress=course.progress, room=axes_in_the_room(robot, q[0]),
     )  # fmt: skip
 
 

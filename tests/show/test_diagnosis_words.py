@@ -16,8 +16,10 @@ from planner.report.diagnosis_plots import _overlay, _residuals
 from planner.report.kept_diagnosis import two_answers
 from planner.report.mismatch import MismatchShares
 from planner.report.place_names import place_names, with_names
+from planner.report.plot_text import ink
 from planner.report.refitted_springs import RefittedSpring
 from planner.robot.robot import Robot
+from planner.words import probable
 from tests.support.plain_arm import make_plain_arm
 
 UNKNOWN = (("unknown", None),)
@@ -156,3 +158,26 @@ def test_curves_that_agree_are_all_seen(picture):
     for colour in colours:
         wanted = np.round(255 * np.array(to_rgb(colour)))
         assert np.sum(np.max(np.abs(seen - wanted), axis=-1) <= 12) > 100, colour
+
+
+@pytest.mark.parametrize("colour", [(1, 1, 0), (0.99, 0.91, 0.14), (0.1, 0.2, 0.5), (0.5,) * 3])
+def test_words_on_colours_are_read(colour):
+    """Contrast as WCAG 2 defines it: at least 4.5 with the ink that is chosen."""
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in colour]
+    light = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    contrast = 1.05 / (light + 0.05) if ink(colour) == "white" else (light + 0.05) / 0.05
+    assert contrast >= 4.5
+
+
+@pytest.mark.parametrize(
+    ("probability", "said"),
+    [
+        (0.0, "below 0.1 %"),
+        (0.004, "0.4 %"),
+        (0.92, "92 %"),
+        (0.993, "99.3 %"),
+        (1.0, "above 99.9 %"),
+    ],
+)
+def test_probabilities_are_never_none_nor_all(probability, said):
+    assert probable(probability) == said
