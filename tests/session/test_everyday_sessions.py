@@ -14,6 +14,7 @@ COUNT = int(os.environ.get("EVERYDAY_SESSIONS", "200"))
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(14400)
 def test_no_hit_gets_in_at_a_pose_where_it_was_not_hit(tmp_path):
     done, faulty = Counter(), {}
     for seed in range(COUNT):
